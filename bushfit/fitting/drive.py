@@ -143,32 +143,31 @@ class Drive:
         motion = History.steady(np.tile(self._motion.value, count), self.frequency, cycles=count)
         return replace(motion, accuracy=_ACCURACY)
 
-    def from_datum(self, response: Array) -> Array:
-        """A response over `history`, less its mean where the fit uses the loop about its own mean."""
-        if self.datum is None:
-            return response
-        if not self.from_rest:
-            return response - response.mean(axis=-1, keepdims=True)
-        return response - np.average(self.at_rows(response), axis=-1, weights=self.weight)[..., None]
-
     def at_rows(self, response: Array) -> Array:
-        """A response over `history`, (..., samples), linearly interpolated at the rows, (..., n).
+        """A response over `history`, (..., samples), linearly interpolated at the rows.
+
+        The mean is taken out if the fit uses the loop about its own mean.
 
         Returns:
             Response at the rows, (..., n).
         """
         length = response.shape[-1]
+        if self.datum is not None and not self.from_rest:
+            response = response - response.mean(axis=-1, keepdims=True)
         if length not in self._places:
             position = self.phase * GRID
             index = position.astype(np.intp)
             ahead = np.minimum(index + 1, length - 1) if self.from_rest else (index + 1) % length
             self._places[length] = index % length, ahead, position - index
         index, ahead, part = self._places[length]
-        return response.take(index, axis=-1) * (1.0 - part) + response.take(ahead, axis=-1) * part
+        rows = response.take(index, axis=-1) * (1.0 - part) + response.take(ahead, axis=-1) * part
+        if self.datum is not None and self.from_rest:
+            rows = rows - np.average(rows, axis=-1, weights=self.weight)[..., None]
+        return rows
 
 
 def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
-    """The cycles of a loop, its displacement cleared of noise, and its force with weights.
+    """Find the cycles of a loop, clear its displacement of noise, and weigh its force.
 
     Outliers of either column do not disturb that; `without_outliers`, rows whose force is one carry no weight.
 
@@ -187,20 +186,29 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
     half_motion = float(np.ptp(series(found.motion, np.arange(GRID) / GRID))) / 2.0
     half_force = float(np.ptp(np.delete(loop.force, outliers))) / 2.0
     noise = loop.noise * half_force if loop.noise is not None else found.force_noise
-    change = _change(loop, frequency, noise, half_force)
-    rests = _rests(loop, found, half_motion, half_force, noise, change)
+    rests = _rests(loop, found, frequency, half_motion, half_force, noise)
     from_rest = first_row == 0 and any(rests)
     unweighted = outliers if without_outliers else outliers[:0]
+    clock = loop.time - loop.time[0] if loop.time[0] else loop.time
+    points = clock * frequency, loop.force, 1.0 - np.isin(np.arange(loop.force.size), unweighted)
+    if loop.force.size > MOST_ROWS:
+        rows = np.delete(clock, unweighted), np.delete(loop.force, unweighted)
+        points = phase_bins(*rows, frequency, cycles, each_cycle=from_rest)
+    notes = [*loop.source.notes] if loop.source else []
+    if loop.part and loop.part.left_out:
+        notes.append(loop.part.left_out)
+    if loop.softening is not None:
+        notes.append(f"the first cycle is {number(100 * loop.softening, 2)} % stiffer than the last (Mullins)")
     drive = Drive(
         loop,
         frequency,
         cycles,
         from_rest,
-        *_points(loop, frequency, cycles, unweighted, each_cycle=from_rest),
+        *points,
         noise=max(noise, FLOOR * half_force),
         coefficients=found.motion,
         half_range=half_force,
-        notes=tuple(filter(None, (*_of_the_record(loop), left_out, wrong_clock(loop, found.motion)))),
+        notes=(*notes, *filter(None, (left_out, wrong_clock(loop, found.motion)))),
         outliers=found.outliers,
         first_row=first_row,
     )
@@ -216,15 +224,6 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
         unknown = drive.follows or abs(found.motion[0]) > 0.01 * half_motion
         drive = replace(drive, datum=found.force_mean if unknown else preload)
     return replace(drive, notes=(*drive.notes, *_preload(drive)))
-
-
-def _of_the_record(loop: Loop) -> Iterator[str]:
-    """Notes on the record that a loop was taken from, and on its first cycle."""
-    yield from loop.source.notes if loop.source else ()
-    if loop.part and loop.part.left_out:
-        yield loop.part.left_out
-    if loop.softening is not None:
-        yield f"the first cycle is {number(100 * loop.softening, 2)} % stiffer than the last (Mullins)"
 
 
 def _check_loses_energy(drive: Drive) -> None:
@@ -269,7 +268,11 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
     scale = np.sqrt(weight) if binned else 1.0
     model, size = row_noise(misfit * scale, less_slow(phase, misfit)[0] * scale, cycles)
     if binned and model.order:
-        drive = replace(drive, weight=_evened(drive.weight, turn))
+        # a row more or less in a bin of rows that depend on one another tells nothing: one weight for each turn
+        weighted = drive.weight > 0.0
+        count = np.bincount(turn[weighted], minlength=turn.max() + 1)
+        mean = np.bincount(turn[weighted], drive.weight[weighted], minlength=count.size) / np.maximum(count, 1)
+        drive = replace(drive, weight=np.where(weighted, mean[turn], 0.0))
         scale = np.sqrt(drive.weight[rows])
         model, size = row_noise(misfit * scale, less_slow(phase, misfit)[0] * scale, cycles)
     if binned:
@@ -279,27 +282,6 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
         return drive
     noise = drive.noise if drive.loop.noise is not None else max(size, FLOOR * drive.half_range)
     return replace(drive, noise=noise, row_noise=model)
-
-
-def _evened(weight: Array, turn: Array) -> Array:
-    """Average the weights of bins of rows that depend on one another, one weight for each turn: a row more or less in a
-    bin tells nothing.
-    """
-    weighted = weight > 0.0
-    count = np.bincount(turn[weighted], minlength=turn.max() + 1)
-    mean = np.bincount(turn[weighted], weight[weighted], minlength=count.size) / np.maximum(count, 1)
-    return np.where(weighted, mean[turn], 0.0)
-
-
-def _points(
-    loop: Loop, frequency: float, cycles: float, unweighted: Array, *, each_cycle: bool
-) -> tuple[Array, Array, Array]:
-    """Phase [cycles], force and weight of each row of a loop, or of each bin of phase where it is long, (n,) each."""
-    clock = loop.time - loop.time[0] if loop.time[0] else loop.time
-    if loop.force.size > MOST_ROWS:
-        clock, force = np.delete(clock, unweighted), np.delete(loop.force, unweighted)
-        return phase_bins(clock, force, frequency, cycles, each_cycle=each_cycle)
-    return clock * frequency, loop.force, 1.0 - np.isin(np.arange(loop.force.size), unweighted)
 
 
 def _at_reversal(drive: Drive) -> Array:
@@ -316,26 +298,13 @@ def _at_reversal(drive: Drive) -> Array:
 
 
 def _rests(
-    loop: Loop, found: LoopHarmonics, half_motion: float, half_force: float, noise: float, change: float
+    loop: Loop, found: LoopHarmonics, frequency: float, half_motion: float, half_force: float, noise: float
 ) -> tuple[bool, bool]:
     """True if the record begins at rest at zero, and true if it begins at rest at its mean, about a preload.
 
-    A settled loop may pass the origin too, where its load cell is off zero, but then it passes it every cycle: `change`
-    is the certain one of its force over the first.
+    A settled loop may pass the origin too, where its load cell is off zero, but then it passes it every cycle: at rest
+    the force at the start differs from that a cycle later by more than noise explains.
     """
-    if not change:
-        return False, False
-    near, chance, reach = _AT_REST * half_force, 3.0 * noise, _AT_REST * half_motion
-    unmoved, unloaded = abs(loop.displacement[0]) <= reach, abs(loop.force[0]) <= near + chance
-    off_mean = abs(loop.displacement[0] - found.motion[0].real), abs(loop.force[0] - found.force_mean)
-    # the virgin curve moves the mean by up to 0.3 of the change
-    in_middle = off_mean[0] <= reach and off_mean[1] <= max(near, 0.5 * change) + chance
-    is_first = loop.part is None or loop.part.first_row == 0
-    return bool(unmoved and unloaded), bool(in_middle and is_first)
-
-
-def _change(loop: Loop, frequency: float, noise: float, half_force: float) -> float:
-    """Change of the force at the start over the first cycle [N or N m]; 0 if noise alone may explain the change."""
     end = np.searchsorted(loop.time, loop.time[0] + 2.0 / frequency)
     clock, force = loop.time[:end] - loop.time[0], loop.force[:end]
     comparable = np.searchsorted(clock, clock[-1] - 1.0 / frequency, side="right")  # a cycle later
@@ -343,7 +312,15 @@ def _change(loop: Loop, frequency: float, noise: float, half_force: float) -> fl
     change = abs(float(np.median(np.interp(first + 1.0 / frequency, clock, force) - force[: first.size])))
     # of a difference, and of a median, whose standard error is sqrt(pi/2) of that of a mean
     chance = 1.25 * _CERTAIN * noise * np.sqrt(2.0 / first.size)
-    return change if change > max(chance, 5e-3 * half_force) else 0.0
+    if change <= max(chance, 5e-3 * half_force):
+        return False, False
+    near, scatter, reach = _AT_REST * half_force, 3.0 * noise, _AT_REST * half_motion
+    unmoved, unloaded = abs(loop.displacement[0]) <= reach, abs(loop.force[0]) <= near + scatter
+    off_mean = abs(loop.displacement[0] - found.motion[0].real), abs(loop.force[0] - found.force_mean)
+    # the virgin curve moves the mean by up to 0.3 of the change
+    in_middle = off_mean[0] <= reach and off_mean[1] <= max(near, 0.5 * change) + scatter
+    is_first = loop.part is None or loop.part.first_row == 0
+    return bool(unmoved and unloaded), bool(in_middle and is_first)
 
 
 def _preload(drive: Drive) -> Iterator[str]:

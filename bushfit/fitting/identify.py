@@ -5,8 +5,7 @@ over the root of the eigenvalue, which is a singular value of the Jacobian scale
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,15 +38,15 @@ _FRICTION = ("sigma_fmax", "eps_half")
 _SPRINGPOT = ("m", "alpha")
 
 
-@dataclass(frozen=True)
-class _Combination:
-    """A modulus that tests may tell without telling its parts.
+class _Combination(NamedTuple):
+    """A modulus that tests may determine without its parts.
 
     Args:
-        formula: in words of the model.
+        formula: formula in the names of the model.
         value: of the modulus [Pa], from the parameters and omega [rad/s]; analytic, so that it takes complex numbers.
+        names: its parameters.
         open_with: it is of interest where one of these is open.
-        remark: what it means.
+        remark: meaning of the modulus.
     """
 
     formula: str
@@ -55,12 +54,6 @@ class _Combination:
     names: tuple[str, ...]
     open_with: tuple[str, ...]
     remark: str = ""
-
-    def weights(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Relative change of the modulus per relative change of each of its parameters."""
-        step, value = 1j * _COMPLEX_STEP, self.value(values)
-        stepped = {name: self.value({**values, name: values[name] * (1.0 + step)}) for name in self.names}
-        return {name: float(changed.imag / _COMPLEX_STEP / value) for name, changed in stepped.items()}
 
 
 _COMBINATIONS = (
@@ -91,7 +84,7 @@ _COMBINATIONS = (
 def left_open(
     model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str], covariance: Covariance
 ) -> list[str]:
-    """Sentences on what the tests leave open of a fitted model; none where everything is determined.
+    """Warnings about parameters of a fitted model that the tests do not determine; none if all are determined.
 
     Each group of parameters that share open directions has a sentence, with the standard errors of the covariance.
 
@@ -107,19 +100,24 @@ def left_open(
     if not names:
         return []
     information = FisherInformation.from_tests(model, data_sets, names)
-    slopes = Coordinates.of_parameters(model, names).slopes(model.values) * relative_sizes(model, names)
-    stderr = np.array([covariance.stderr(name) or 0.0 for name in names])
-    relative_errors = dict(zip(names, stderr / np.abs(slopes), strict=True))
-    groups = _groups(information)
-    zero = [name for group in groups for name in group if _is_zero(model, name, covariance)]
-    amounts = [name for name in names if model.parameters[name].neutral is not None]
-    visible = {effect_name_of(name) for name in amounts if not _is_zero(model, name, covariance)}
-    idle = {effect_name_of(name) for name in zero} - visible
-    unseen = {
-        name: f": these tests do not show {effect_name_of(name)}" for name in zero if effect_name_of(name) in idle
+    groups, lines = _groups(information), list[str]()
+    changes = np.abs(Coordinates.of_parameters(model, names).slopes(model.values) * relative_sizes(model, names))
+    relative_errors = {
+        name: (covariance.stderr(name) or 0.0) / float(c) for name, c in zip(names, changes, strict=True)
     }
-    lines = [f"{name} is no different from zero{unseen.get(name, '')}" for name in zero]
-    if zero:
+
+    def is_zero(name: str) -> bool:
+        """True if noise alone explains that the amount of an added effect is not its neutral value."""
+        neutral, noise = model.parameters[name].neutral, Z95 * (covariance.stderr(name) or 0.0)
+        return "." in name and neutral is not None and abs(model.values[name] - neutral) < noise
+
+    if zero := [name for group in groups for name in group if is_zero(name)]:
+        amounts = [name for name in names if model.parameters[name].neutral is not None]
+        idle = {effect_name_of(name) for name in zero}
+        idle -= {effect_name_of(name) for name in amounts if not is_zero(name)}
+        for name in zero:
+            effect = effect_name_of(name)
+            lines.append(f"{name} is no different from zero" + f": these tests do not show {effect}" * (effect in idle))
         rest = [name for name in names if name not in zero and effect_name_of(name) not in idle]
         if not rest:
             return lines
@@ -129,10 +127,15 @@ def left_open(
         return []
     combinations: dict[str, None] = {}
     for group in groups:
-        errors = ", ".join(f"{name} {percent(float(relative_errors[name]))}" for name in group)
+        listed = ", ".join(f"{name} {percent(relative_errors[name])}" for name in group)
         reasons = "; ".join(_reasons(model, data_sets, group)) or "these tests do not determine"
-        lines.append(f"{reasons}: {_meaning(information, group)} (standard errors: {errors})")
-        combinations |= dict.fromkeys(_combinations(model, data_sets, information, group))
+        meaning = f"{', '.join(group[:-1])} and {group[-1]} cannot be determined separately"
+        if set(group) == set(_FRICTION) and information.error({"sigma_fmax": 1.0, "eps_half": -1.0}) < _KNOWN:
+            meaning = "sigma_fmax and eps_half are determined only as a ratio"
+        elif len(group) == 1:
+            meaning = f"{group[0]} is not determined"
+        lines.append(f"{reasons}: {meaning} (standard errors: {listed})")
+        combinations |= dict.fromkeys(_known_combinations(model, data_sets, information, group))
     if combinations:
         lines.append("what is known nevertheless: " + "; ".join(combinations))
     # what another test would tell beside an error of the model depends on what that error is
@@ -153,21 +156,6 @@ def _groups(information: FisherInformation) -> list[list[str]]:
             group |= overlapping
         groups.append(group)
     return [[name for name in information.names if name in group] for group in groups]
-
-
-def _is_zero(model: Model, name: str, covariance: Covariance) -> bool:
-    """True if noise alone explains that the size of an added effect is not its neutral value."""
-    neutral, noise = model.parameters[name].neutral, Z95 * (covariance.stderr(name) or 0.0)
-    return "." in name and neutral is not None and abs(model.values[name] - neutral) < noise
-
-
-def _meaning(information: FisherInformation, group: Sequence[str]) -> str:
-    """Sentence on the combination of a group of parameters that is not known."""
-    if set(group) == set(_FRICTION) and information.error(dict(zip(_FRICTION, (1.0, -1.0), strict=True))) < _KNOWN:
-        return "sigma_fmax and eps_half are determined only as a ratio"
-    if len(group) > 1:
-        return f"{', '.join(group[:-1])} and {group[-1]} cannot be determined separately"
-    return f"{group[0]} is not determined"
 
 
 def _reasons(model: Model, data_sets: Sequence[MeasuredTest], involved: Sequence[str]) -> Iterator[str]:
@@ -194,19 +182,20 @@ def _reasons(model: Model, data_sets: Sequence[MeasuredTest], involved: Sequence
         yield "there is no loop"
 
 
-def _combinations(
+def _known_combinations(
     model: Model, data_sets: Sequence[MeasuredTest], information: FisherInformation, involved: Sequence[str]
 ) -> Iterator[str]:
-    """Combinations of what is open that are known well, with their errors."""
+    """Combinations of open parameters that are known well, with their errors."""
     errors = dict(zip(information.names, information.errors(), strict=True))
     enough = min(_KNOWN, _BETTER * min(float(errors[name]) for name in involved))
     slow = measured_range(model, data_sets).frequency[0]
     values = {**model.values, "omega": 2.0 * np.pi * slow}
-    for combination in _COMBINATIONS:
-        if not (set(combination.names) <= set(information.names) and set(combination.open_with) & set(involved)):
+    for formula, function, names, open_with, remark in _COMBINATIONS:
+        if not (set(names) <= set(information.names) and set(open_with) & set(involved)):
             continue
-        error = information.error(combination.weights(values))
+        modulus = function(values)
+        stepped = {name: function({**values, name: values[name] * (1.0 + 1j * _COMPLEX_STEP)}) for name in names}
+        error = information.error({name: float(x.imag / _COMPLEX_STEP / modulus) for name, x in stepped.items()})
         if error < enough:
-            condition = f" at {slow:.3g} Hz" if "omega" in combination.formula else ""
-            value = format_range("Pa", combination.value(values), digits=4)
-            yield f"{combination.formula}{condition} = {value} to {percent(error)}{combination.remark}"
+            condition = f" at {slow:.3g} Hz" if "omega" in formula else ""
+            yield f"{formula}{condition} = {format_range('Pa', modulus, digits=4)} to {percent(error)}{remark}"

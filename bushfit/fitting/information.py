@@ -12,7 +12,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.fitting.assess import measured_range
 from bushfit.fitting.coordinates import jacobian
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, new_loop, new_sweep, split_by_kind
+from bushfit.fitting.preparation import MeasuredTest, new_loop, new_sweep, split_by_kind
 from bushfit.fitting.rig_class import ASSUMED
 from bushfit.model.model import Model
 
@@ -61,10 +61,6 @@ class FisherInformation:
         slope = jacobian(model, data_sets, names) * relative_sizes(model, names)[:, None]
         return cls(tuple(names), slope @ slope.T)
 
-    def with_more(self, model: Model, data_sets: Sequence[MeasuredTest]) -> "FisherInformation":
-        """Information with that of further data sets added."""
-        return replace(self, matrix=self.matrix + FisherInformation.from_tests(model, data_sets, self.names).matrix)
-
     def directions(self) -> tuple[Array, Array]:
         """Relative standard errors, (k,), of the eigenvectors of the information, and these, (k, k) by column."""
         values, vectors = np.linalg.eigh(self.matrix)
@@ -106,91 +102,62 @@ def further_test(model: Model, data_sets: Sequence[MeasuredTest], information: F
     Returns:
         At most one sentence.
     """
-    before = information.errors()
+    before, names = information.errors(), information.names
     worst = int(np.argmax(before))
     bearable = max(_BEARABLE, measured_range(model, data_sets).strain[1])
-    after = {
-        words: information.with_more(model, more).errors()
-        for words, more in _tests(model, data_sets)
-        if measured_range(model, more).strain[1] <= bearable
-    }
+    after = dict[str, Array]()
+    for words, tests in _candidates(model, data_sets):
+        if measured_range(model, tests).strain[1] <= bearable:
+            further = FisherInformation.from_tests(model, tests, names)
+            after[words] = FisherInformation(names, information.matrix + further.matrix).errors()
     best = min(after, key=lambda words: float(after[words].max()))
     if after[best].max() > min(_LEAST_GAIN_RATIO * before[worst], _HOPELESS):
         return []
     return [
-        f"the most helpful further test: {best}; the standard error of {information.names[worst]} would fall "
+        f"the most helpful further test: {best}; the standard error of {names[worst]} would fall "
         f"from {percent(float(before[worst]))} to {percent(float(after[best][worst]))}"
     ]
 
 
-def _tests(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[tuple[str, list[MeasuredTest]]]:
-    """Tests that a lab could add: in words, and as the data sets that they would make."""
+def _candidates(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[tuple[str, list[MeasuredTest]]]:
+    """Tests that a laboratory could add: in words, and with the noise of the campaign or of most rigs.
+
+    These are a repeat of every test, the loop of the largest strain at other amplitudes and rates, or slow loops if the
+    campaign has none, and sweeps beyond and within the frequencies and amplitudes of the campaign.
+    """
     loops, sweeps = split_by_kind(data_sets)
     yield "a repeat of every test", list(data_sets)
-    for words, loop in _repeated_loops(model, loops) if loops else _new_loops(model, data_sets):
-        yield words, [loop]
-    for words, sweep in _new_sweeps(model, data_sets, sweeps):
-        yield words, [sweep]
-
-
-def _repeated_loops(model: Model, loops: Sequence[MeasuredLoop]) -> Iterator[tuple[str, MeasuredLoop]]:
-    """The loop of the largest strain at other amplitudes and rates."""
-    largest = max(loops, key=lambda loop: loop.drive.amplitude * model.unit_strain(loop.direction))
-    for factor in (3.0, 10.0):
-        yield f"a loop of {factor:g} times the largest amplitude", _changed(largest, model, amplitude=factor)
-    for words, factor in (("a tenth of", 0.1), ("ten times", 10.0)):
-        yield f"a loop at {words} the rate", _changed(largest, model, rate=factor)
-
-
-def _new_loops(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[tuple[str, MeasuredLoop]]:
-    """Slow loops of the largest amplitude and more, where the campaign has none."""
-    direction = data_sets[0].direction
-    largest = max(float(data_set.amplitude.max()) for data_set in data_sets if data_set.direction == direction)
-    for times, words in ((1.0, ""), (3.0, "three times "), (10.0, "ten times ")):
-        size = times * largest
-        loop = new_loop(model, direction, _NEW_RATE, size, _FORCE_NOISE, cycles=2.0, rows=400, from_rest=True)
-        yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", replace(loop, gain_error=ASSUMED[0])
-
-
-def _changed(loop: MeasuredLoop, model: Model, *, amplitude: float = 1.0, rate: float = 1.0) -> MeasuredLoop:
-    """A loop of so many times the amplitude and rate, as the model would have it, with the same relative noise."""
-    drive = loop.drive
-    changed = replace(drive, coefficients=drive.coefficients * amplitude, frequency=drive.frequency * rate)
-    return replace(loop, drive=changed).noise_free(model).with_noise(loop.relative_noise)
-
-
-def _new_sweeps(
-    model: Model, data_sets: Sequence[MeasuredTest], sweeps: Sequence[MeasuredSweep]
-) -> Iterator[tuple[str, MeasuredSweep]]:
-    """Sweeps beyond the frequencies and amplitudes of the campaign, and within them."""
+    if loops:
+        largest = max(loops, key=lambda loop: loop.drive.amplitude * model.unit_strain(loop.direction))
+        for words, amplitude, rate in (
+            ("of 3 times the largest amplitude", 3.0, 1.0),
+            ("of 10 times the largest amplitude", 10.0, 1.0),
+            ("at a tenth of the rate", 1.0, 0.1),
+            ("at ten times the rate", 1.0, 10.0),
+        ):
+            coefficients, frequency = largest.drive.coefficients * amplitude, largest.drive.frequency * rate
+            changed = replace(largest, drive=replace(largest.drive, coefficients=coefficients, frequency=frequency))
+            yield f"a loop {words}", [changed.noise_free(model).with_noise(largest.relative_noise)]
+    else:
+        direction = data_sets[0].direction
+        most = max(float(data_set.amplitude.max()) for data_set in data_sets if data_set.direction == direction)
+        for times, words in ((1.0, ""), (3.0, "three times "), (10.0, "ten times ")):
+            motion = model, direction, _NEW_RATE, times * most, _FORCE_NOISE
+            loop = new_loop(*motion, cycles=2.0, rows=400, from_rest=True)
+            yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", [replace(loop, gain_error=ASSUMED[0])]
     reach = measured_range(model, data_sets)
-    unit_strain = model.unit_strain(data_sets[0].direction)
-    small, large = (strain / unit_strain for strain in reach.strain)
+    small, large = (strain / model.unit_strain(data_sets[0].direction) for strain in reach.strain)
     slow, fast = reach.frequency
-    low, high = band = _NEW_BAND if fast < _SLOW else (slow, fast)
-    extensions = [
+    low, high = _NEW_BAND if fast < _SLOW else (slow, fast)
+    prefix = f"a sweep from {low:.3g} to {high:.3g} Hz at" if low < high else f"a sweep at {low:.3g} Hz and"
+    planned = [
         (f"a sweep to {2.0 * fast:.3g} Hz", (fast, 2.0 * fast), (small, large)),
         (f"a sweep down to {slow / 10.0:.3g} Hz", (slow / 10.0, slow), (small, large)),
+        (f"{prefix} a tenth and all of the largest amplitude", (low, high), (0.1 * large, large)),
+        (f"{prefix} three times the largest amplitude", (low, high), (3.0 * large,)),
     ]
-    prefix = f"a sweep from {low:.3g} to {high:.3g} Hz at" if low < high else f"a sweep at {low:.3g} Hz and"
-    for words, ends, amplitudes in (
-        *(extensions if sweeps else ()),
-        (f"{prefix} a tenth and all of the largest amplitude", band, (0.1 * large, large)),
-        (f"{prefix} three times the largest amplitude", band, (3.0 * large,)),
-    ):
-        yield words, _sweep(model, sweeps, data_sets[-1], ends, amplitudes)
-
-
-def _sweep(
-    model: Model,
-    sweeps: Sequence[MeasuredSweep],
-    like: MeasuredTest,
-    band: tuple[float, float],
-    amplitudes: Sequence[float],
-) -> MeasuredSweep:
-    """A sweep as the model would have it, as noisy as the campaign's or most rigs', in its direction or `like`'s."""
-    frequency, amplitude = (x.ravel() for x in np.meshgrid(np.geomspace(*band, 9), amplitudes))
-    direction = sweeps[0].direction if sweeps else like.direction
-    shared = sweeps[0].noise.shared if sweeps else ASSUMED
-    random = sweeps[0].relative_noise if sweeps else ASSUMED[0]
-    return new_sweep(model, direction, frequency, amplitude, (random, random), shared)
+    direction = sweeps[0].direction if sweeps else data_sets[-1].direction
+    scatter, shared = (sweeps[0].relative_noise, sweeps[0].noise.shared) if sweeps else (ASSUMED[0], ASSUMED)
+    for words, band, amplitudes in planned if sweeps else planned[2:]:
+        frequencies, levels = (x.ravel() for x in np.meshgrid(np.geomspace(*band, 9), amplitudes))
+        yield words, [new_sweep(model, direction, frequencies, levels, (scatter, scatter), shared)]

@@ -75,7 +75,16 @@ def steady_cycles(loop: Loop) -> SteadyCycles:
     if part is not loop:
         time, motion = _thinned(part)
     frequency, cycles = _fundamental(part, time, motion)
-    _check_no_hole(part, time, frequency)
+    widest = int(np.argmax(np.diff(time)))
+    if time[widest + 1] - time[widest] > HOLE / frequency:
+        raise FitError(
+            "rows are missing inside the loop",
+            file=part.source.file if part.source else None,
+            found=f"none from {time[widest]:.4g} to {time[widest + 1]:.4g} s; the number of cycles, and "
+            "therefore the frequency, is unknown",
+            expected="no gap longer than a third of a cycle",
+            hint="keep the whole cycles before the gap, or those after it",
+        )
     return SteadyCycles(part, frequency, cycles, note)
 
 
@@ -85,21 +94,6 @@ def _thinned(loop: Loop) -> tuple[Array, Array]:
     time, motion = loop.time[selection], loop.displacement[selection]
     rows = gross_rows(motion)
     return np.delete(time, rows), np.delete(motion, rows)
-
-
-def _check_no_hole(loop: Loop, clock: Array, frequency: float) -> None:
-    """Refuse a hole of more than a part of a cycle: nothing tells how many turns the motion made in it."""
-    steps = np.diff(clock)
-    widest = int(np.argmax(steps))
-    if steps[widest] > HOLE / frequency:
-        raise FitError(
-            "rows are missing inside the loop",
-            file=loop.source.file if loop.source else None,
-            found=f"none from {clock[widest]:.4g} to {clock[widest + 1]:.4g} s; the number of cycles, and "
-            "therefore the frequency, is unknown",
-            expected="no gap longer than a third of a cycle",
-            hint="keep the whole cycles before the gap, or those after it",
-        )
 
 
 def _crossings(motion: Array) -> tuple[Array, Array, Array]:
@@ -126,17 +120,6 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
         part, note = _steady_part(whole, *_thinned(whole))
         sentence = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
         return part, sentence if note is None else f"{sentence}, and of these {note}"
-    steady = _steady_ends(time, motion, period)
-    if steady is None:
-        return loop, None
-    first, last, after = steady
-    gaps = (f"{gap:.3g} s" if gap > _BRIEF * period else "" for gap in (first - time[0], time[-1] - last))
-    note = left_out(gaps, (last - first) / period)
-    return _cut(loop, first, last if after else np.inf), note
-
-
-def _steady_ends(time: Array, motion: Array, period: float) -> tuple[float, float, bool] | None:
-    """First and last time of the steady cycles [s], and whether anything follows; None where all or none are steady."""
     clock = time[time + period <= time[-1]]
     difference = change_after(time, motion, period, slice(0, clock.size))
     steady = difference < SAME_MOTION * np.ptp(motion)
@@ -145,8 +128,8 @@ def _steady_ends(time: Array, motion: Array, period: float) -> tuple[float, floa
     stretches = np.concatenate(([0], breaks.ravel(), [steady.size])).reshape(-1, 2)  # between breaks that count
     start, end = stretches[np.argmax(np.diff(stretches))]
     before, after = start > 0, end < difference.size
-    if start == end or not (before or after):
-        return None
+    if start == end or not (before or after):  # none or all are steady
+        return loop, None
     most_off = _MOST_OFF * np.median(difference[start:end]) + _LEAST_OFF * np.ptp(motion)
     unsteady = np.flatnonzero(difference[start:end] > most_off) + start
     if before:
@@ -156,13 +139,14 @@ def _steady_ends(time: Array, motion: Array, period: float) -> tuple[float, floa
     first, last = float(time[start]), float(time[end - 1]) + period
     if before and last - first > THREE_CYCLES * period:
         first += period  # after a run-in the first cycle still remembers it
-    return first, last, bool(after)
+    gaps = (f"{gap:.3g} s" if gap > _BRIEF * period else "" for gap in (first - time[0], time[-1] - last))
+    note = left_out(gaps, (last - first) / period)
+    return _cut(loop, first, last if after else np.inf), note
 
 
 def _cut(loop: Loop, first: float, last: float) -> Loop:
     """The rows between two times [s], both counted in."""
-    rows = slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right"))
-    return loop.select(rows)
+    return loop.select(slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right")))
 
 
 def _period(time: Array, motion: Array) -> float | None:
@@ -235,23 +219,19 @@ def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> fl
     Both ends are drawn as straight lines. They tell how far beyond one cycle the record goes, or how short of it it
     stops; within their error it is just one cycle, of the period `whole` [s].
     """
-    few = max(3, int(0.02 * x.size))
-    first, first_slope, first_scatter = _line(clock[:few] - clock[0], x[:few])
-    last, last_slope, last_scatter = _line(clock[-few:] - clock[-1], x[-few:])
+    few, ends = max(3, int(0.02 * x.size)), []
+    for rows, origin in ((slice(few), clock[0]), (slice(-few, None), clock[-1])):
+        line = np.polynomial.Polynomial.fit(clock[rows] - origin, x[rows], 1)
+        ends.append((line(0.0), line.deriv()(0.0), np.std(x[rows] - line(clock[rows] - origin))))
+    (first, first_slope, first_scatter), (last, last_slope, last_scatter) = ends
     slope, step = (first_slope + last_slope) / 2.0, duration / (x.size - 1)
     if first_slope * last_slope <= 0.0 or abs(last - first) > _CLOSED * duration * abs(slope):
         return None
     error = np.hypot(first_scatter, last_scatter) * np.sqrt(4.0 / few) / abs(slope)
     if error > 0.25 * few * step:
         return None
-    period = duration - (last - first) / slope
+    period = duration - float((last - first) / slope)
     return period if period < whole - max(1.5 * step, 4.0 * error) else whole
-
-
-def _line(time: Array, x: Array) -> tuple[float, float, float]:
-    """Value at time 0, slope, and scatter about them, of the line through some rows."""
-    line = np.polynomial.Polynomial.fit(time, x, 1)
-    return float(line(0.0)), float(line.deriv()(0.0)), float(np.std(x - line(time)))
 
 
 def _refined(clock: Array, x: Array, frequency: float, rows_per_cycle: float) -> float:

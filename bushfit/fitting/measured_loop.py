@@ -8,10 +8,9 @@ from typing import Any, Self
 import numpy as np
 
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
-from bushfit.effects.history import History
 from bushfit.fitting.common_error import CommonError, ErrorProducts
 from bushfit.fitting.drive import Drive
-from bushfit.fitting.measured_test import MeasuredBase, cache_last, store_last
+from bushfit.fitting.measured_test import MeasuredBase
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import force_and_slopes, stiffness_and_slopes
@@ -63,32 +62,17 @@ class MeasuredLoop(MeasuredBase):
     components = ("force",)
 
     @property
-    def size(self) -> int:
-        """Number of residuals."""
-        return 2 if self.fundamental_only else int(self.drive.force.size)
-
-    @cached_property
-    def counted(self) -> int:
-        """Number of residuals that carry weight."""
-        return 2 if self.fundamental_only else self._rows
-
-    @property
-    def independent(self) -> float:
-        """Number of independent points behind what varies slowly: fewer than `counted` where noise is correlated."""
-        return self.counted / (1.0 if self.fundamental_only else self.drive.row_noise.rows_as_one)
-
-    @property
     def test(self) -> Loop:
         return self.drive.loop
 
     @property
     def notes(self) -> Sequence[str]:
-        """Notes on the record for the user."""
-        return (*self.drive.notes, *filter(None, [self.contradiction]))
+        """Warnings about the record for the user."""
+        return [*self.drive.notes, *([self.contradiction] if self.contradiction else [])]
 
     @property
     def temperature(self) -> float:
-        """[K]; nan where it is not known."""
+        """Temperature [K]; nan if it is unknown."""
         return self.test.temperature or np.nan
 
     @property
@@ -112,6 +96,21 @@ class MeasuredLoop(MeasuredBase):
         return np.array([self.drive.first_harmonic()])
 
     @property
+    def size(self) -> int:
+        """Number of residuals."""
+        return 2 if self.fundamental_only else int(self.drive.force.size)
+
+    @cached_property
+    def counted(self) -> int:
+        """Number of residuals that carry weight; of correlated rows those that can be distinguished."""
+        return 2 if self.fundamental_only else round(self.drive.row_noise.share * np.count_nonzero(self._counting))
+
+    @property
+    def independent(self) -> float:
+        """Number of independent points behind what varies slowly: fewer than `counted` where noise is correlated."""
+        return self.counted / (1.0 if self.fundamental_only else self.drive.row_noise.rows_as_one)
+
+    @property
     def weights(self) -> Array:
         return self.drive.weight
 
@@ -120,68 +119,17 @@ class MeasuredLoop(MeasuredBase):
         """Standard deviation of one point, relative to half the force range, or of a sweep to |K|."""
         return self.drive.noise / self.drive.half_range
 
-    @cache_last
-    def force(self, model: Model, values: Values | None = None) -> Array:
-        """Model force at the rows [N or N m], (..., n)."""
-        return self._at_rows(
-            model.force(self.direction, self._history(model), kind="loop", values=values, under=self.under)
-        )
+    def weighted(self, weight: Array) -> Self:
+        """Test with the weight of each point multiplied by a share, (n,)."""
+        return replace(self, drive=replace(self.drive, weight=self.drive.weight * weight))
 
-    def _at_rows(self, force: Array) -> Array:
-        """The force over the motion, (..., samples), at the rows, (..., n)."""
-        return self.drive.at_rows(self.drive.from_datum(force)) + (self.drive.datum or 0.0)
+    def without(self, points: Array) -> Self:
+        """Test without weight on some of its points, by number; a loop's outliers have none from the start."""
+        return self
 
-    def residual(self, model: Model, values: Values | None = None) -> Array:
-        """Whitened residuals, (..., size); `values` in place of the model's own add leading axes."""
-        return self._whitened((self.force(model, values) - self.drive.force) * self._per_noise)
-
-    @cache_last
-    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the whitened residuals by parameter, (len(names), size)."""
-        force, slopes = force_and_slopes(model, self.direction, self._history(model), names, self.under)
-        store_last(self, "force", model, self._at_rows(force))
-        return self._whitened(self.drive.at_rows(self.drive.from_datum(slopes)) * self._per_noise)
-
-    def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
-        """Change of the whitened residuals, (..., size), by a small change of the model's stiffness at the operating
-        points, complex (..., n) [N/m or N m/rad], with another stiffness beside the model's; a loop changes by its
-        first harmonic.
-
-        Args:
-            change: of the model's stiffness, complex (..., n) [N/m or N m/rad].
-            model: model that the change is added to.
-            added: further stiffness at the points, complex (n,) [N/m or N m/rad].
-        """
-        return np.concatenate((change.real, change.imag), axis=-1) @ self._unit_changes
-
-    def residual_with(self, added: Array, model: Model) -> Array:
-        """Whitened residuals with a stiffness of any size added, complex (n,), (size,); as `moved`, but exact."""
-        return self.residual(model) + self.residual_change(added, model)
-
-    def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
-        """Derivatives of `residual_with` by parameter: what is added stays as it is, or stays the same share of the
-        model's.
-
-        Args:
-            added: stiffness added to the model's, complex (n,) [N/m or N m/rad].
-            model: model at whose values the derivatives are taken.
-            names: k parameters.
-            as_share: True if the added stiffness stays the same share of the model's.
-        """
-        slopes = self.jacobian(model, names)
-        if as_share:
-            test = self.direction, self.frequency, self.amplitude
-            stiffness, of_stiffness = stiffness_and_slopes(model, *test, names, "loop", self.under)
-            slopes = slopes + self.residual_change(added / stiffness * of_stiffness, model)
-        return slopes
-
-    def _history(self, model: Model) -> History:
-        return self.drive.history(any(effect.settles for effect in model.records))
-
-    def noise_free(self, model: Model) -> Self:
-        """Test as the model would have it, without noise."""
-        force = self.force(model)
-        return replace(self, drive=replace(self.drive, force=force, half_range=float(np.ptp(force)) / 2.0))
+    def with_weight(self) -> Self:
+        """The part of the test that carries weight."""
+        return self
 
     def fundamental(self) -> Self:
         """Test reduced to its first harmonic, for an addition without a law in time."""
@@ -191,36 +139,99 @@ class MeasuredLoop(MeasuredBase):
         """Loop with another standard deviation of one row, relative to half the force range."""
         return replace(self, drive=replace(self.drive, noise=relative * self.drive.half_range))
 
+    def with_model_error(self, size: float) -> Self:
+        """Test with a relative model error beside its noise."""
+        test = replace(self, model_error=size)
+        test.__dict__["_error_directions"] = self._error_directions
+        return test
+
+    def noise_free(self, model: Model) -> Self:
+        """Test with the response of a model in place of the measured one."""
+        force = self.force(model)
+        return replace(self, drive=replace(self.drive, force=force, half_range=float(np.ptp(force)) / 2.0))
+
+    def force(self, model: Model, values: Values | None = None) -> Array:
+        """Model force at the rows [N or N m], (..., n).
+
+        Args:
+            model: the model.
+            values: parameter values in place of the model's own; leading axes are added to the result.
+        """
+        last = self._last.get("force")
+        if last and last[0] is model and values is None:
+            return last[2]
+        history = self.drive.history(model.settles)
+        force = model.force(self.direction, history, kind="loop", values=values, under=self.under)
+        force = self.drive.at_rows(force) + (self.drive.datum or 0.0)
+        return force if values is not None else self._keep("force", model, (), force)
+
+    def residual(self, model: Model, values: Values | None = None) -> Array:
+        """Whitened residuals, (..., size); `values` in place of the model's own add leading axes."""
+        return self._whitened((self.force(model, values) - self.drive.force) * self._per_noise)
+
+    def residual_with(self, added: Array, model: Model) -> Array:
+        """Whitened residuals with a stiffness of any size added, complex (n,), (size,)."""
+        return self.residual(model) + self.residual_change(added, model)
+
+    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
+        """Derivatives of the whitened residuals by parameter value, (len(names), size)."""
+        last = self._last.get("jacobian")
+        if last and last[0] is model and last[1] == tuple(names):
+            return last[2]
+        return self._keep("jacobian", model, tuple(names), self._whitened(self._slopes(model, names) * self._per_noise))
+
+    def _slopes(self, model: Model, names: Sequence[str]) -> Array:
+        """Derivatives of the force at the rows by parameter value, (len(names), n); the force is kept."""
+        history = self.drive.history(model.settles)
+        force, slopes = force_and_slopes(model, self.direction, history, names, self.under)
+        self._keep("force", model, (), self.drive.at_rows(force) + (self.drive.datum or 0.0))
+        return self.drive.at_rows(slopes)
+
+    def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
+        """Derivatives of `residual_with` by parameter.
+
+        Args:
+            added: stiffness added to the model's, complex (n,) [N/m or N m/rad].
+            model: model at whose values the derivatives are taken.
+            names: k parameters.
+            as_share: True if the added stiffness stays the same share of the model's; False if it stays as it is.
+        """
+        slopes = self.jacobian(model, names)
+        if as_share:
+            test = self.direction, self.frequency, self.amplitude
+            stiffness, of_stiffness = stiffness_and_slopes(model, *test, names, "loop", self.under)
+            slopes = slopes + self.residual_change(added / stiffness * of_stiffness, model)
+        return slopes
+
+    def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
+        """Change of the whitened residuals, (..., size), by a small change of the model's stiffness at the operating
+        points, with another stiffness beside the model's; a loop changes by its first harmonic.
+
+        Args:
+            change: of the model's stiffness, complex (..., n) [N/m or N m/rad].
+            model: model that the change is added to.
+            added: further stiffness at the points, complex (n,) [N/m or N m/rad].
+        """
+        return np.concatenate((change.real, change.imag), axis=-1) @ self._unit_changes
+
     def relative_difference(self, model: Model) -> Array:
         return ((self.force(model) - self.drive.force) / self.drive.half_range)[None]
-
-    def distance(self, model: Model) -> Array:
-        """How far each point lies off the model, in units of noise, (n,)."""
-        return np.abs(self.misfit(model))
 
     def misfit(self, model: Model) -> Array:
         """Residuals, (size,), each row of a loop in units of its noise, whatever the rows before it tell."""
         return (self.force(model) - self.drive.force) * self._per_noise
+
+    def distance(self, model: Model) -> Array:
+        """Distance of each point from the model, in units of noise, (n,)."""
+        return np.abs(self.misfit(model))
 
     def displayed_residual(self, model: Model) -> Array:
         """Residuals as `misfit`, and distances of points without weight, in units of noise, (size,)."""
         distance = (self.force(model) - self.drive.force) / self.drive.noise
         return np.where(self.weights > 0.0, self.misfit(model), distance)
 
-    def weighted(self, weight: Array) -> Self:
-        """Test with the weight of each point, (n,), times a share."""
-        return replace(self, drive=replace(self.drive, weight=self.drive.weight * weight))
-
-    def without(self, points: Array) -> Self:
-        """Test with no weight on some of its points, by number; a loop's outliers have none from the start."""
-        return self
-
-    def with_weight(self) -> Self:
-        """The part of the test that carries weight."""
-        return self
-
     def outlying(self, model: Model) -> Array:
-        """Numbers of the points that are outliers: far off the model and off their neighbours alike.
+        """Numbers of the points that are outliers: far from the model and from their neighbours alike.
 
         Of a loop rows of the record, from 0, whose force stands out from its own harmonics; no model is asked.
         """
@@ -234,23 +245,6 @@ class MeasuredLoop(MeasuredBase):
             for row, noise_units in zip(rows.tolist(), distance.tolist(), strict=True):
                 yield Outlier(self.name, file, row + before + 1, column, noise_units)
 
-    def unsure(self, influence: Array) -> dict[Hashable, Array]:
-        """How an estimator reacts to each variance of the noise that was itself estimated.
-
-        Args:
-            influence: what the estimator takes of each whitened residual, (k, size).
-
-        Returns:
-            Per variance, (k, size): the influence times the whitened derivative of the residuals' covariance by that
-            variance, times its standard error.
-        """
-        reaction = self._less_common(influence)
-        whole = reaction @ self._fundamental.T if self.fundamental_only else reaction
-        by_noise = [self._less_common(self._counted(part)) for part in self.drive.row_noise.unsure(whole)]
-        if not by_noise and self.test.noise is None:
-            by_noise = [np.sqrt(2.0 / self._rows) * self._less_common(reaction)]
-        return {(self.name, index): part for index, part in enumerate(by_noise)}
-
     def contrasts(self) -> Array:
         """A constant force, and the cosine and sine of each harmonic, as whitened residuals, (11, n); 0 of those that
         are left out."""
@@ -260,14 +254,14 @@ class MeasuredLoop(MeasuredBase):
         return rows
 
     def smooth_misfit(self, model: Model) -> float:
-        """Largest smooth misfit, relative as `off`."""
+        """Largest smooth misfit, relative as `relative_difference`."""
         sizes = np.linalg.lstsq(self.contrasts().T, self.residual(model), rcond=None)[0]
         return float(np.abs(sizes @ self._waves[:, self.weights > 0.0]).max())
 
     def gain_and_offset(self) -> Array:
         """Whitened residuals by a unit of gain, and by half the force range of offset, (2, n)."""
         offset = np.full(self.drive.force.size, self.drive.half_range)
-        return np.array([self._less_common(self.unit_gain), self._whitened(offset * self._per_noise)])
+        return np.array([self._less_shared(self.unit_gain), self._whitened(offset * self._per_noise)])
 
     def columns(self) -> dict[str, Any]:
         """Columns by header that name the point of each residual in a table."""
@@ -279,42 +273,75 @@ class MeasuredLoop(MeasuredBase):
         }
 
     @cached_property
+    def _counting(self) -> Array:
+        return self.drive.row_noise.counting(self.drive.weight)
+
+    @cached_property
+    def _per_noise(self) -> Array:
+        return np.sqrt(self.drive.weight) / (self.drive.noise * self.drive.row_noise.size)
+
+    @cached_property
     def _waves(self) -> Array:
         return smooth_waves(self.drive.phase)
 
-    def _whitened(self, rows: Array) -> Array:
-        """Rows in units of noise, (..., n), as independent numbers; 0 for a number that depends on a row left out."""
-        return self._less_common(self._counted(self.drive.row_noise.whiten(rows) * self._counting))
+    def _in_noise(self, rows: Array) -> Array:
+        """Rows in units of noise, (..., n), as the independent numbers that count; 0 for one that depends on a row left
+        out."""
+        white = self.drive.row_noise.whiten(rows) * self._counting
+        return white @ self._fundamental if self.fundamental_only else white
 
-    def _less_common(self, white: Array) -> Array:
-        """Whitened rows, (..., n), whitened by the errors that all of them share as well."""
+    def _less_shared(self, white: Array) -> Array:
+        """Independent numbers, (..., n), whitened by the errors that all of them share as well."""
         if self.model_error:
             directions, size = self._error_directions
             share = 1.0 - 1.0 / np.hypot(1.0, self.model_error * size)
             return white - (white @ directions * share) @ directions.T
         return self._gain.whiten(white) if self._gain else white
 
+    def _whitened(self, rows: Array) -> Array:
+        """Rows in units of noise, (..., n), as independent numbers without shared errors."""
+        return self._less_shared(self._in_noise(rows))
+
     @property
     def log_size(self) -> float:
-        """Logarithm of the determinant of the covariance of its whitened rows before what they share was taken out."""
+        """Natural log of the determinant of the covariance of the independent numbers by their shared errors."""
         if self.model_error:
             return float(np.sum(np.log1p(np.square(self.model_error * self._error_directions[1]))))
         return self._gain.log_size if self._gain else 0.0
 
     @cached_property
-    def _gain(self) -> CommonError | None:
-        """The error of the gain, where it weighs; None without. Beside a model error it does not weigh."""
-        weighs = self.gain_weighs and self.gain_error
-        return CommonError(self.gain_error * self.unit_gain[None]) if weighs else None
+    def _fundamental(self) -> Array:
+        """Orthonormal basis of the residuals that a first harmonic makes, (n, 2)."""
+        waves = self.drive.row_noise.whiten(self._waves[1:3] * self._per_noise) * self._counting
+        return np.linalg.qr(waves.T)[0]
 
     @cached_property
-    def _error_directions(self) -> tuple[Array, Array]:
-        """Orthonormal directions that a model error of 100 % takes in units of noise, (n, c), and its sizes, (c,)."""
-        return CommonError(self._counted(self._error_waves)[2 * (self.first_error - 1) :]).principal_errors
+    def _unit_changes(self) -> Array:
+        """Whitened residuals by 1 and i of a change of stiffness, (2, n)."""
+        wave = self.drive.coefficients[1] * np.exp(2j * np.pi * self.drive.phase)
+        return self._whitened(np.array([wave.real, -wave.imag]) * self._per_noise)
+
+    @cached_property
+    def unit_gain(self) -> Array:
+        """Residuals by a unit of gain, as independent numbers, (n,).
+
+        Notes: of the force without its noise. With it, a fit would take the noise for what the gain makes, and make
+        the model smaller than it is (Peelle's puzzle: R. Fruehwirth, D. Neudecker, H. Leeb, EPJ Web of Conferences 27
+        (2012) 00008).
+        """
+        waves, weighed = self._waves.T, self.weights > 0.0
+        smooth = waves @ np.linalg.lstsq(waves[weighed], self.drive.force[weighed], rcond=None)[0]
+        return self._in_noise(smooth * self._per_noise)
+
+    @cached_property
+    def _gain(self) -> CommonError | None:
+        """The error of the gain, where it weighs; None without. Beside a model error it does not weigh."""
+        return CommonError(self.gain_error * self.unit_gain[None]) if self.gain_weighs and self.gain_error else None
 
     @cached_property
     def _error_waves(self) -> Array:
-        """One standard deviation of a model error of 100 % by harmonics, cosine and sine, in units of noise, (c, n)."""
+        """One standard deviation of a model error of 100 % by harmonics, cosine and sine, as independent numbers,
+        (c, n)."""
         count = 1 if self.fundamental_only else _ERROR_HARMONICS
         angle = 2.0 * np.pi * self.drive.phase * np.arange(1, count + 1)[:, None]
         waves = np.stack((np.cos(angle), np.sin(angle)), axis=1) * _ERROR_SIZES[:count, None, None]
@@ -323,27 +350,45 @@ class MeasuredLoop(MeasuredBase):
             order = np.arange(2.0 * np.ceil(self.drive.cycles))[:, None]
             drift = np.cos(np.pi * order * self.drive.phase / self.drive.cycles) / (1.0 + order)
             waves = np.concatenate((waves, waves * (self.drive.phase < 1.0), drift))
-        return self.drive.row_noise.whiten(waves * (self._per_noise * self.drive.half_range)) * self._counting
+        return self._in_noise(waves * (self._per_noise * self.drive.half_range))
 
-    def with_model_error(self, size: float) -> Self:
-        """Test with a relative model error beside its noise."""
-        test = replace(self, model_error=size)
-        test.__dict__["_error_directions"] = self._error_directions
-        return test
+    @cached_property
+    def _error_directions(self) -> tuple[Array, Array]:
+        """Orthonormal directions that a model error of 100 % takes, (n, c), and its sizes, (c,)."""
+        return CommonError(self._error_waves[2 * (self.first_error - 1) :]).principal_errors
 
     def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
-        """Inner products of the residual and its derivatives by parameter, by which the size of a model error is found.
+        """Inner products of the residual and its derivatives, from which the size of a model error is estimated.
 
         Args:
             model: whose residual it is.
             names: of the parameters.
         """
-        slopes = force_and_slopes(model, self.direction, self._history(model), names, self.under)[1]
+        slopes = self._slopes(model, names)
         misfit = (self.force(model) - self.drive.force)[None]
-        rows = np.concatenate((misfit, self.drive.at_rows(self.drive.from_datum(slopes)))) * self._per_noise
-        white = self._counted(self.drive.row_noise.whiten(rows) * self._counting)
+        white = self._in_noise(np.concatenate((misfit, slopes)) * self._per_noise)
         directions, size = self._error_directions
         return ErrorProducts(white @ white.T, white @ directions * size, np.square(size))
+
+    def unsure(self, influence: Array) -> dict[Hashable, Array]:
+        """Reactions of an estimator to each variance of the noise that was itself estimated.
+
+        Args:
+            influence: weight of each whitened residual in the estimates, (k, size).
+
+        Returns:
+            Per variance, (k, size): the influence times the whitened derivative of the residuals' covariance by that
+            variance, times its standard error.
+        """
+        reaction = self._less_shared(influence)
+        whole = reaction @ self._fundamental.T if self.fundamental_only else reaction
+        parts = list(self.drive.row_noise.unsure(whole))
+        if self.fundamental_only:
+            parts = [part @ self._fundamental for part in parts]
+        if not parts and self.test.noise is None:
+            rows = round(self.drive.row_noise.share * np.count_nonzero(self._counting))
+            parts = [np.sqrt(2.0 / rows) * reaction]
+        return {(self.name, index): self._less_shared(part) for index, part in enumerate(parts)}
 
     def uncounted(self, influence: Array) -> Array:
         """Covariance that an estimate has beside what its weights count: the gain, less the model error of the first
@@ -355,48 +400,6 @@ class MeasuredLoop(MeasuredBase):
         Returns:
             (k, k).
         """
-        first = influence @ self._less_common(self.model_error * self._counted(self._error_waves[:2])).T
-        gain = influence @ self._less_common(self.gain_error * self.unit_gain)
+        first = influence @ self._less_shared(self.model_error * self._error_waves[:2]).T
+        gain = influence @ self._less_shared(self.gain_error * self.unit_gain)
         return np.asarray(np.outer(gain, gain) - first @ first.T)
-
-    def _counted(self, white: Array) -> Array:
-        """Select the residuals among whitened rows, (..., n)."""
-        return white @ self._fundamental if self.fundamental_only else white
-
-    @cached_property
-    def _unit_changes(self) -> Array:
-        """Whitened residuals by 1 and i of a change of stiffness, (2, n)."""
-        wave = self.drive.coefficients[1] * np.exp(2j * np.pi * self.drive.phase)
-        return self._whitened(np.array([wave.real, -wave.imag]) * self._per_noise)
-
-    @cached_property
-    def unit_gain(self) -> Array:
-        """Whitened residuals by a unit of gain, (n,).
-
-        Notes: of the force without its noise. With it, a fit would take the noise for what the gain makes, and make
-        the model smaller than it is (Peelle's puzzle: R. Fruehwirth, D. Neudecker, H. Leeb, EPJ Web of Conferences 27
-        (2012) 00008).
-        """
-        waves, counted = self._waves.T, self.weights > 0.0
-        smooth = waves @ np.linalg.lstsq(waves[counted], self.drive.force[counted], rcond=None)[0]
-        rows = self.drive.row_noise.whiten(smooth * self._per_noise) * self._counting
-        return self._counted(rows)
-
-    @cached_property
-    def _fundamental(self) -> Array:
-        """Orthonormal basis of the residuals that a first harmonic makes, (n, 2)."""
-        waves = self.drive.row_noise.whiten(self._waves[1:3] * self._per_noise) * self._counting
-        return np.linalg.qr(waves.T)[0]
-
-    @cached_property
-    def _rows(self) -> int:
-        """Number of distinguishable rows that carry weight."""
-        return round(self.drive.row_noise.share * np.count_nonzero(self._counting))
-
-    @cached_property
-    def _counting(self) -> Array:
-        return self.drive.row_noise.counting(self.drive.weight)
-
-    @cached_property
-    def _per_noise(self) -> Array:
-        return np.sqrt(self.drive.weight) / (self.drive.noise * self.drive.row_noise.size)

@@ -10,7 +10,7 @@ import numpy as np
 from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.fitting.common_error import ErrorProducts
-from bushfit.fitting.measured_test import MeasuredBase, cache_last, shown_amplitude, store_last
+from bushfit.fitting.measured_test import MeasuredBase, shown_amplitude
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.outliers import contradictions, outlying_points
 from bushfit.fitting.repeats import FLOOR, unit
@@ -75,7 +75,7 @@ class LineMisfit:
 class MeasuredSweep(MeasuredBase):
     """Dynamic stiffness of a sweep, as relative complex residual or as magnitude and loss factor.
 
-    What has no explanation here answers as in `MeasuredLoop`.
+    `MeasuredLoop` documents the methods that have no explanation here.
 
     Points stand sorted by run (what it holds, repeat), then step; a run is a block. The residual
     ln K/K_meas has the gain error in its real and the phase error in its imaginary part.
@@ -105,33 +105,26 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def notes(self) -> list[str]:
-        place = np.unique([self.frequency, self.amplitude], axis=1, return_inverse=True)[1]
-        pairs = contradictions(self.measured, place)
-        rows = [f"{one} and {second}" for _, *pair in pairs for one, second in [sorted(self.order[pair] + 1)]]
-        sentences = [
-            f"{self.source.file if self.source else self.name}: repeats of the same points differ by up to "
-            f"{number(100.0 * share, 2)} %, rows {', '.join(rows[:_MOST_LISTED])}"
-            + f" and {len(rows) - _MOST_LISTED} more pairs"
-            * (len(rows) > _MOST_LISTED)
-            for share, *_ in pairs[:1]
-        ]
-        recorded = self.source.notes if self.source else ()
-        excesses = (words for name, words in self.noise.beyond.items() if name == self.name)
-        return [*recorded, *sentences, *filter(None, [self.contradiction, self._rounded]), *excesses]
-
-    @property
-    def _rounded(self) -> str | None:
-        """A sentence on magnitudes that come in coarse steps: few of them at many points."""
-        sizes = np.unique(np.log(np.abs(self.measured)).round(_DIGITS))
-        points = self.measured.size
-        if not 3 <= sizes.size <= _FEW_SIZES * points or (step := float(np.median(np.diff(sizes)))) < _COARSE:
-            return None
-        many, spacing = f"{sizes.size} magnitudes at {points} points", f"{number(100.0 * step, 2)} % apart"
+        """Warnings about the test for the user."""
         file = self.source.file if self.source else self.name
-        return (
-            f"{file}: {many}, {spacing}: they are rounded, and the rounding error is included in the noise; "
-            "save more digits"
-        )
+        found = [*self.source.notes] if self.source else []
+        points = np.unique([self.frequency, self.amplitude], axis=1, return_inverse=True)[1]
+        if pairs := contradictions(self.measured, points):
+            rows = [f"{one} and {second}" for _, *pair in pairs for one, second in [sorted(self.order[pair] + 1)]]
+            more = f" and {len(rows) - _MOST_LISTED} more pairs" if len(rows) > _MOST_LISTED else ""
+            apart = f"repeats of the same points differ by up to {number(100.0 * pairs[0][0], 2)} %"
+            found.append(f"{file}: {apart}, rows {', '.join(rows[:_MOST_LISTED])}{more}")
+        if self.contradiction:
+            found.append(self.contradiction)
+        sizes = np.unique(np.log(np.abs(self.measured)).round(_DIGITS))
+        step = float(np.median(np.diff(sizes))) if sizes.size > 2 else 0.0
+        if sizes.size <= _FEW_SIZES * self.measured.size and step >= _COARSE:
+            coarse = f"{sizes.size} magnitudes at {self.measured.size} points, {number(100.0 * step, 2)} % apart"
+            rounded = "they are rounded, and the rounding error is included in the noise; save more digits"
+            found.append(f"{file}: {coarse}: {rounded}")
+        if self.name in self.noise.beyond:
+            found.append(self.noise.beyond[self.name])
+        return found
 
     @property
     def temperature(self) -> Array:
@@ -155,30 +148,34 @@ class MeasuredSweep(MeasuredBase):
     def relative_noise(self) -> float:
         return float(np.sqrt(np.mean(np.square(list(self.noise.random.values())))))
 
-    def at_amplitudes(self, amplitudes: Sequence[float] | Array) -> Self:
-        """The part of the sweep at some of its levels, with the same noise."""
-        return self._part(np.isin(self.amplitude, amplitudes))
-
-    def with_weight(self) -> Self:
-        counted = self.weights > 0.0
-        return self if counted.all() else self._part(counted)
-
-    def thinned(self, maximum: int) -> Self:
-        """The part of the sweep of evenly chosen points, a number of them at most."""
-        step = -(-self.order.size // maximum)
-        return self if step == 1 else self._part(np.arange(self.order.size) % step == 0)
-
-    def fundamental(self) -> Self:
-        return self
-
-    def _part(self, chosen: Array) -> Self:
-        return replace(self, weight=self.weights[chosen], part=self.order[chosen])
+    @cached_property
+    def weights(self) -> Array:
+        return np.ones(self.frequency.size) if self.weight is None else self.weight
 
     def weighted(self, weight: Array) -> Self:
         return replace(self, weight=self.weights * weight)
 
     def without(self, points: Array) -> Self:
         return self.weighted(np.isin(np.arange(self.frequency.size), points, invert=True)) if points.size else self
+
+    def select(self, points: Array) -> Self:
+        """The part of the sweep at some points, by a mask, (n,)."""
+        return replace(self, weight=self.weights[points], part=self.order[points])
+
+    def with_weight(self) -> Self:
+        weighed = self.weights > 0.0
+        return self if weighed.all() else self.select(weighed)
+
+    def thinned(self, maximum: int) -> Self:
+        """The part of the sweep at evenly chosen points, a number of them at most."""
+        step = -(-self.order.size // maximum)
+        return self if step == 1 else self.select(np.arange(self.order.size) % step == 0)
+
+    def fundamental(self) -> Self:
+        return self
+
+    def with_model_error(self, size: float) -> Self:
+        return replace(self, model_error=size)
 
     def noise_free(self, model: Model) -> Self:
         stiffness = self.sweep.stiffness.copy()
@@ -217,6 +214,7 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def repeat(self) -> Array:
+        """Number of the repeat that each point belongs to, (n,)."""
         return self.sweep.repeat[self.order]
 
     @cached_property
@@ -229,11 +227,12 @@ class MeasuredSweep(MeasuredBase):
         label = np.stack((self.held, self.repeat.astype(float)))
         return np.concatenate(([0], 1 + np.flatnonzero(np.any(np.diff(label), axis=0))))
 
-    @cache_last
-    def stiffness(self, model: Model, values: Values | None = None) -> Array:
-        """Model stiffness at the points, (..., n); what repeats is computed once."""
-        frequency, amplitude, under, place = self._operating_points(model)
-        return model.stiffness(self.direction, frequency, amplitude, values=values, under=under)[..., place]
+    @cached_property
+    def _distinct(self) -> tuple[Array, Array, Array]:
+        """Frequency and reached amplitude of the distinct operating points, and the place of each point among them."""
+        points = self.frequency + 1j * self.sweep.amplitude_reached[self.order]
+        distinct, place = np.unique(points, return_inverse=True)
+        return distinct.real, distinct.imag, place
 
     def _operating_points(self, model: Model) -> tuple[Array, Array, Circumstances, Array | slice]:
         """Frequency, reached amplitude and circumstances that a model is asked at, and the place of each point there:
@@ -244,82 +243,51 @@ class MeasuredSweep(MeasuredBase):
         frequency, amplitude, place = self._distinct
         return frequency, amplitude, UNKNOWN, place
 
-    @cached_property
-    def _distinct(self) -> tuple[Array, Array, Array]:
-        """Frequency and reached amplitude of the distinct operating points, and the place of each point among them."""
-        points = self.frequency + 1j * self.sweep.amplitude_reached[self.order]
-        distinct, place = np.unique(points, return_inverse=True)
-        return distinct.real, distinct.imag, place
+    def stiffness(self, model: Model, values: Values | None = None) -> Array:
+        """Model stiffness at the points, (..., n); repeats are computed once.
 
-    def relative_difference(self, model: Model) -> Array:
-        relative_difference = (self.stiffness(model) - self.measured) / np.abs(self.measured)
-        return np.stack((relative_difference.real, relative_difference.imag))
+        Args:
+            model: the model.
+            values: parameter values in place of the model's own; leading axes are added to the result.
+        """
+        last = self._last.get("stiffness")
+        if last and last[0] is model and values is None:
+            return last[2]
+        frequency, amplitude, under, place = self._operating_points(model)
+        stiffness = model.stiffness(self.direction, frequency, amplitude, values=values, under=under)[..., place]
+        return stiffness if values is not None else self._keep("stiffness", model, (), stiffness)
 
-    def distance(self, model: Model) -> Array:
-        """Less what its block shares; of gain and phase the root mean square."""
-        return self.scaled_distance(self.deviation(model)) / np.sqrt(2.0)
-
-    def scaled_distance(self, deviation: Array, *, shared: bool = True) -> Array:
-        """Length of deviations, (n,), in units of the random noise, less the likeliest error that a block shares."""
-        return np.hypot(*self._whitening.scaled(deviation, shared=shared))
-
-    def misfit(self, model: Model) -> Array:
-        return self.residual(model)
-
-    def displayed_residual(self, model: Model) -> Array:
-        deviation = self.deviation(model)
-        distances = self._whitening.scaled(deviation).ravel()
-        return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), distances)
-
-    def deviation(self, model: Model, values: Values | None = None) -> Array:
-        """Residual before whitening: gain in the real, phase (or loss factor) in the imaginary part, (..., n)."""
-        return self._deviation_of(self.stiffness(model, values))
-
-    def _deviation_of(self, stiffness: Array) -> Array:
-        """The deviation of a stiffness at the points, (..., n)."""
-        if self.residuals == "complex":
-            return np.log(stiffness / self.measured)
-        gain = np.abs(stiffness / self.measured) - 1.0
-        loss = stiffness.imag / stiffness.real - self.measured.imag / self.measured.real
-        return gain + 1j * loss * self._loss_scale
-
-    @cache_last
     def residual(self, model: Model, values: Values | None = None) -> Array:
         with np.errstate(divide="ignore", invalid="ignore"):  # not finite where there is no stiffness: within free play
-            return self.whiten(self.deviation(model, values))
-
-    @cache_last
-    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        return self.residual_change(self._slopes(model, names), model)
-
-    def with_model_error(self, size: float) -> Self:
-        return replace(self, model_error=size)
-
-    def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
-        slopes = self._relative(self._slopes(model, names), self.stiffness(model))
-        return self._whitening.error_products(np.concatenate((self.deviation(model)[None], slopes)))
-
-    def _slopes(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the stiffness at the points by fit coordinate, (len(names), n); the stiffness is kept."""
-        frequency, amplitude, under, place = self._operating_points(model)
-        stiffness, slopes = stiffness_and_slopes(model, self.direction, frequency, amplitude, names, under=under)
-        store_last(self, "stiffness", model, stiffness[place])
-        return slopes[:, place]
+            return self.whiten(self.deviation(self.stiffness(model, values)))
 
     def residual_with(self, added: Array, model: Model) -> Array:
-        return self.whiten(self._deviation_of(self.stiffness(model) + added))
+        return self.whiten(self.deviation(self.stiffness(model) + added))
+
+    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
+        last = self._last.get("jacobian")
+        if last and last[0] is model and last[1] == tuple(names):
+            return last[2]
+        return self._keep("jacobian", model, tuple(names), self.residual_change(self._slopes(model, names), model))
 
     def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
         """Derivatives of the whitened residuals by parameter, with a stiffness added, (k, 2 n).
 
         Args:
-                    added: stiffness added to the model's, complex (n,) [N/m or N m/rad].
-                    model: model at whose values the derivatives are taken.
-                    names: k parameters.
-                    as_share: True if the added stiffness stays the same share of the model's.
+            added: stiffness added to the model's, complex (n,) [N/m or N m/rad].
+            model: model at whose values the derivatives are taken.
+            names: k parameters.
+            as_share: True if the added stiffness stays the same share of the model's.
         """
         grown = 1.0 + added / self.stiffness(model) if as_share else 1.0
         return self.residual_change(grown * self._slopes(model, names), model, added)
+
+    def _slopes(self, model: Model, names: Sequence[str]) -> Array:
+        """Derivatives of the stiffness at the points by parameter value, (len(names), n); the stiffness is kept."""
+        frequency, amplitude, under, place = self._operating_points(model)
+        stiffness, slopes = stiffness_and_slopes(model, self.direction, frequency, amplitude, names, under=under)
+        self._keep("stiffness", model, (), stiffness[place])
+        return slopes[:, place]
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
         """Change of the whitened residuals by a small change of the model's stiffness.
@@ -329,38 +297,35 @@ class MeasuredSweep(MeasuredBase):
             model: model that the change is added to.
             added: further stiffness at the points, complex (n,) [N/m or N m/rad].
         """
-        return self.whiten(self._relative(change, self.stiffness(model) + added))
+        return self.whiten(self._deviation_change(change, self.stiffness(model) + added))
 
-    def _relative(self, change: Array, stiffness: Array) -> Array:
+    def deviation(self, stiffness: Array) -> Array:
+        """Residual of a stiffness at the points before whitening, (..., n): gain in the real, phase (or loss factor) in
+        the imaginary part.
+        """
+        if self.residuals == "complex":
+            return np.log(stiffness / self.measured)
+        gain = np.abs(stiffness / self.measured) - 1.0
+        loss = stiffness.imag / stiffness.real - self.measured.imag / self.measured.real
+        return gain + 1j * loss * self._phase_per_loss
+
+    def _deviation_change(self, change: Array, stiffness: Array) -> Array:
         """Change of the deviation, (..., n), by small changes of a stiffness at the points, (..., n) each."""
         relative = change / stiffness
         if self.residuals == "complex":
             return relative
         gain = np.abs(stiffness / self.measured) * relative.real
         loss = relative.imag * (np.abs(stiffness) / stiffness.real) ** 2
-        return gain + 1j * loss * self._loss_scale
+        return gain + 1j * loss * self._phase_per_loss
 
-    @cached_property
-    def _loss_scale(self) -> Array:
+    @property
+    def _phase_per_loss(self) -> Array:
         """Phase per loss factor, 1/(1 + eta^2)."""
         return (self.measured.real / np.abs(self.measured)) ** 2
 
-    def whiten(self, deviation: Array) -> Array:
-        """Deviations in units of noise, shared block errors taken out: complex (..., n) -> (..., 2 n)."""
-        return self._whitening.whiten(deviation)
-
-    @property
-    def log_size(self) -> float:
-        return self._whitening.log_size if self.model_error else 0.0
-
-    def uncounted(self, influence: Array) -> Array:
-        return self._whitening.uncounted(influence)
-
-    def unsure(self, influence: Array) -> dict[Hashable, Array]:
-        return self._whitening.unsure(influence)
-
     @cached_property
-    def _whitening(self) -> Whitening:
+    def covariance(self) -> Whitening:
+        """Covariance of the deviations."""
         random = self.noise.scatter(self.name, self.held, self.step)
         if self.sweep.relative_error is not None and self.sweep.noise is None:
             random = np.maximum(np.tile(self.sweep.relative_error[self.order], (2, 1)), FLOOR)
@@ -368,13 +333,49 @@ class MeasuredSweep(MeasuredBase):
         points = np.unique(self.frequency + 1j * self.amplitude, return_inverse=True)[1]
         return Whitening(self.block_starts, line_starts, random, self.noise, self.weights, points, self.model_error)
 
-    @cached_property
-    def weights(self) -> Array:
-        return np.ones(self.frequency.size) if self.weight is None else self.weight
+    def whiten(self, deviation: Array) -> Array:
+        """Deviations in units of noise, shared block errors taken out: complex (..., n) -> (..., 2 n)."""
+        return self.covariance.whiten(deviation)
+
+    def unsure(self, influence: Array) -> dict[Hashable, Array]:
+        return self.covariance.unsure(influence)
+
+    def uncounted(self, influence: Array) -> Array:
+        return self.covariance.uncounted(influence)
+
+    @property
+    def log_size(self) -> float:
+        return self.covariance.log_size if self.model_error else 0.0
+
+    def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
+        slopes = self._deviation_change(self._slopes(model, names), self.stiffness(model))
+        return self.covariance.error_products(np.concatenate((self.deviation(self.stiffness(model))[None], slopes)))
+
+    def relative_difference(self, model: Model) -> Array:
+        difference = (self.stiffness(model) - self.measured) / np.abs(self.measured)
+        return np.stack((difference.real, difference.imag))
+
+    def scaled_distance(self, deviation: Array, *, shared: bool = True) -> Array:
+        """Length of deviations, (n,), in units of the random noise, less the likeliest error that a block shares."""
+        return np.hypot(*self.covariance.scaled(deviation, shared=shared))
+
+    def distance(self, model: Model) -> Array:
+        """Distance of each point from the model, without the likeliest error that its block shares, in units of noise,
+        (n,); the root mean square of gain and phase."""
+        return self.scaled_distance(self.deviation(self.stiffness(model))) / np.sqrt(2.0)
+
+    def misfit(self, model: Model) -> Array:
+        return self.residual(model)
+
+    def displayed_residual(self, model: Model) -> Array:
+        deviation = self.deviation(self.stiffness(model))
+        distances = self.covariance.scaled(deviation).ravel()
+        return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), distances)
 
     def outlying(self, model: Model) -> Array:
         points, freedom = np.stack((self.frequency, self.amplitude)), self.noise.scatter_freedom or np.inf
-        return outlying_points(self.deviation(model), self.scaled_distance, self.block_starts, points, freedom)
+        deviation = self.deviation(self.stiffness(model))
+        return outlying_points(deviation, self.scaled_distance, self.block_starts, points, freedom)
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
         file = str(self.source.file) if self.source else None
@@ -394,12 +395,12 @@ class MeasuredSweep(MeasuredBase):
             _, first, place, counts = np.unique(
                 self.step[chosen], return_index=True, return_inverse=True, return_counts=True
             )
-            mean = np.bincount(place, ratio[chosen].real) + 1j * np.bincount(place, ratio[chosen].imag)
+            mean = (np.bincount(place, ratio[chosen].real) + 1j * np.bincount(place, ratio[chosen].imag)) / counts
             of_one = np.square(self.noise.random[self.name, float(held_value)]) + np.square(self.noise.shared)
             frequency, amplitude = (values[chosen][first] for values in (self.frequency, self.amplitude))
             noise = np.sqrt(of_one / np.median(counts) + np.square(self.noise.level))
-            line = LineMisfit(self.name, self.direction, self.sweep.stepped, frequency, amplitude, mean / counts, noise)
-            lines.append(line)
+            test = self.name, self.direction, self.sweep.stepped
+            lines.append(LineMisfit(*test, frequency, amplitude, mean, noise))
         return lines
 
     def smooth_misfit(self, model: Model) -> float:
@@ -414,7 +415,7 @@ class MeasuredSweep(MeasuredBase):
         return f"run {self.repeat[point]} of {self.name}, {self.direction}"
 
     def moved_together(self, chosen: Array) -> list[Array]:
-        """Whitened residuals of some points, (n,) shares, off by one unit of gain, and off by one of phase."""
+        """Changes of the whitened residuals if some points, (n,) shares, are off by one unit of gain, and of phase."""
         return [self.whiten(unit * chosen.astype(complex)) for unit in (1.0, 1.0j)]
 
     def columns(self) -> dict[str, Any]:

@@ -1,13 +1,12 @@
-"""Base class of loops and sweeps as data: one measured test with its noise."""
+"""Base class of measured loops and sweeps: one test with its noise."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
-from functools import wraps
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Values
+from bushfit.effects.contract import Array
 from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model
 from bushfit.reading.measurement import Loop, Source, Sweep
@@ -21,8 +20,8 @@ class MeasuredBase(ABC):
     if the model is right. A loop of n points has n residuals, a sweep 2 n: all gains, then all phases.
 
     Args:
-        kind: whether it is a loop or a sweep.
-        components: what a point's residuals are of: force, or storage and loss.
+        kind: "loop" or "sweep".
+        components: quantities that the residuals of a point belong to: force, or storage and loss.
     """
 
     kind: ClassVar[Kind]
@@ -44,7 +43,7 @@ class MeasuredBase(ABC):
 
     @property
     def parts(self) -> int:
-        """Numbers that make up a point: 1 for a force, 2 for a complex stiffness."""
+        """Number of residuals of a point: 1 for a force, 2 for a complex stiffness."""
         return len(self.components)
 
     @property
@@ -57,61 +56,27 @@ class MeasuredBase(ABC):
 
     @property
     def source(self) -> Source | None:
-        """The file it came from; None where it came from none."""
+        """The file of the test, if any."""
         return self.test.source
 
     def relative(self, model: Model) -> Array:
-        """Size of the misfit of the points that carry weight, relative as `off`, for NRMSE."""
+        """Size of the relative difference of the points that carry weight, for NRMSE, (n,)."""
         return np.linalg.norm(self.relative_difference(model)[:, self.weights > 0.0], axis=0)
 
     def change(self, one: Model, reference: Model) -> float:
-        """Largest difference between two models, relative as `off`."""
+        """Largest relative difference between two models."""
         return float(np.linalg.norm(self.relative_difference(one) - self.relative_difference(reference), axis=0).max())
 
+    @cached_property
+    def _last(self) -> dict[str, tuple[Model, Any, Array]]:
+        """Last response and derivatives of the response, with their model and the names of the parameters."""
+        return {}
 
-def cache_last(answer: Callable[..., Array]) -> Callable[..., Array]:
-    """Keeps what a data set answered to the last model; of values in place of the model's own nothing is kept.
-
-    Returns:
-        The method, with a cache of its last result.
-    """
-    place = f"_last_{answer.__name__}"
-
-    @wraps(answer)
-    def cached(data_set: Any, model: Model, argument: Sequence[str] | Values | None = None) -> Array:
-        """Result of the method, from the cache if model and argument are those of the last call.
-
-        Args:
-            data_set: test that the method belongs to.
-            model: model that the result belongs to.
-            argument: names of parameters, or values in place of the model's.
-
-        Returns:
-            Result, read-only.
-        """
-        if isinstance(argument, Mapping):
-            return answer(data_set, model, argument)
-        question = () if argument is None else (tuple(argument),)
-        last = data_set.__dict__.get(place)
-        if last is None or last[0] is not model or last[1] != question:
-            last = data_set.__dict__[place] = (model, question, answer(data_set, model, *question))
-            last[2].flags.writeable = False
-        return last[2]
-
-    return cached
-
-
-def store_last(data_set: MeasuredBase, answer: str, model: Model, found: Array) -> None:
-    """Store a result that came with another one, for a method decorated with `cache_last`.
-
-    Args:
-        data_set: test whose cache is filled.
-        answer: name of the method.
-        model: model that the result belongs to.
-        found: the result; it becomes read-only.
-    """
-    data_set.__dict__[f"_last_{answer}"] = model, (), found
-    found.flags.writeable = False
+    def _keep(self, key: str, model: Model, names: Any, values: Array) -> Array:
+        """Store values for the next call with the same model; they become read-only."""
+        values.flags.writeable = False
+        self._last[key] = model, names, values
+        return values
 
 
 def shown_amplitude(direction: Place, amplitude: float) -> str:

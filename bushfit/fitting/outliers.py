@@ -53,21 +53,10 @@ def outlier_limit(rows: int, parts: int, freedom: float) -> float:
     return float(np.sqrt(parts * fdtri(parts, min(freedom, _KNOWN), 1.0 - _CHANCE / max(rows, 1))))
 
 
-def from_neighbours(values: Array, rows: Array, window: int = NEIGHBOURS) -> Array:
-    """Distance of some rows from the median over their neighbours and themselves, (len(rows),).
-
-    Args:
-        values: of all rows, (n,).
-        rows: indices of the rows to compare.
-        window: number of rows of the median.
-    """
-    width = min(window, values.size)
-    first = np.clip(rows - width // 2, 0, values.size - width)
-    return values[rows] - median(sliding_window_view(values, width)[first], axis=1)
-
-
 def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
     """Mask of rows that lie farther than a limit off a curve, by `residual`, and off neighbours, or are stuck, (n,).
+
+    A short run of such rows has to lie as far off the rows before and after the run.
 
     Args:
         residual: distance from the curve, (n,).
@@ -80,10 +69,16 @@ def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
     far = np.abs(residual) > limit
     if not far.any():
         return far
-    rows = np.flatnonzero(far)
+    rows, near = np.flatnonzero(far), np.flatnonzero(~far)
     repeats = _run_lengths(recorded[1:] == recorded[:-1])
-    found = (np.maximum(np.append(repeats, 0), np.append(0, repeats)) >= _STUCK - 1) | _in_burst(residual, far, limit)
-    found[rows] |= np.abs(from_neighbours(residual, rows)) > limit
+    found = np.maximum(np.append(repeats, 0), np.append(0, repeats)) >= _STUCK - 1
+    if near.size:
+        after = np.searchsorted(near, np.arange(far.size))
+        neighbours = residual[near[np.clip((after - 1, after), 0, near.size - 1)]]
+        found |= (_run_lengths(far) <= _LONGEST_BURST) & (np.abs(residual - neighbours).min(axis=0) > limit)
+    width = min(NEIGHBOURS, residual.size)
+    windows = sliding_window_view(residual, width)[np.clip(rows - width // 2, 0, residual.size - width)]
+    found[rows] |= np.abs(residual[rows] - median(windows, axis=1)) > limit
     return far & found
 
 
@@ -124,16 +119,6 @@ def gross_rows(values: Array) -> Array:
         if np.mean(outlying) < _MOST_GROSS:
             return np.flatnonzero(outlying)
     return np.empty(0, dtype=np.intp)
-
-
-def _in_burst(residual: Array, far: Array, limit: float) -> Array:
-    """Rows of short runs of far rows that lie as far off the rows before and after the run, (n,)."""
-    near = np.flatnonzero(~far)
-    if not near.size:
-        return np.zeros(far.size, dtype=bool)
-    after = np.searchsorted(near, np.arange(far.size))
-    neighbours = residual[near[np.clip((after - 1, after), 0, near.size - 1)]]
-    return far & (_run_lengths(far) <= _LONGEST_BURST) & (np.abs(residual - neighbours).min(axis=0) > limit)
 
 
 def _run_lengths(mask: Array) -> Array:
@@ -225,20 +210,17 @@ def _from_repeats(values: Array, place: Array) -> tuple[Array, Array]:
     Points of one `place`, (n,), are repeats.
     """
     counts = np.bincount(place)
-    repeats = counts[place] - 1
-    real, imag = (part - _median_of_others(part, place, counts) for part in (values.real, values.imag))
-    return repeats, np.where(repeats > 0, real + 1j * imag, 0.0)
-
-
-def _median_of_others(values: Array, place: Array, counts: Array) -> Array:
-    """Median of the other values at the place of each value, (n,); a lone value itself. `counts` is by place."""
-    order = np.lexsort((values, place))
-    ordered, size, start = values[order], counts[place[order]], (np.cumsum(counts) - counts)[place[order]]
-    rank = np.arange(order.size) - start
-    middle = [np.minimum(half + (half >= rank), size - 1) for half in ((size - 2) // 2, (size - 1) // 2)]
-    medians = np.empty_like(ordered)
-    medians[order] = (ordered[start + np.maximum(middle[0], 0)] + ordered[start + middle[1]]) / 2.0
-    return medians
+    repeats, distances = counts[place] - 1, []
+    for part in (values.real, values.imag):
+        order = np.lexsort((part, place))
+        size, start = counts[place[order]], (np.cumsum(counts) - counts)[place[order]]
+        rank = np.arange(order.size) - start
+        # the two in the middle of the others, which step over the point itself
+        low, high = (np.minimum(half + (half >= rank), size - 1) for half in ((size - 2) // 2, (size - 1) // 2))
+        medians = np.empty_like(part)
+        medians[order] = (part[order][start + np.maximum(low, 0)] + part[order][start + high]) / 2.0
+        distances.append(part - medians)
+    return repeats, np.where(repeats > 0, distances[0] + 1j * distances[1], 0.0)
 
 
 def least_absolute(basis: Array, values: Array, smallest: float) -> Array:

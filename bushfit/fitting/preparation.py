@@ -46,7 +46,7 @@ _Kind = TypeVar("_Kind", MeasuredLoop, MeasuredSweep)
 def prepare_loops(
     loops: Sequence[Loop], rig: RigSettings = UNSTATED, *, without_outliers: bool = False
 ) -> list[MeasuredLoop]:
-    """One data set per loop; rows that are outliers carry no weight where they are to be left out.
+    """Prepare loops for a fit, each with its noise.
 
     Args:
         loops: measured loops.
@@ -55,7 +55,8 @@ def prepare_loops(
     """
     drives = [drive_of(loop, without_outliers=without_outliers) for loop in loops]
     found = [MeasuredLoop(drive).weighted(np.array(drive.loop.weight)) for drive in drives]
-    return with_gain_errors(with_contradictions(found, [_first_alike(found)]), rig)
+    first = np.argmax(repeats_of(found), axis=1) if found else np.empty(0)
+    return with_gain_errors(_with_contradictions(found, [first]), rig)
 
 
 def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[MeasuredLoop]:
@@ -68,16 +69,13 @@ def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[Me
     errors = of_class(rig)[0] * np.sqrt(np.count_nonzero(repeats_of(loops), axis=1))
     weighs = rig.stiffness_errors[0] is not None
     return [
-        replace(loop, gain_error=error, gain_weighs=weighs) for loop, error in zip(loops, errors.tolist(), strict=True)
+        replace(loop, gain_error=float(error), gain_weighs=weighs) for loop, error in zip(loops, errors, strict=True)
     ]
 
 
 def with_gains(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> list[MeasuredTest]:
     """Tests whose loops' gain errors are part of their noise, or not."""
-    return [
-        replace(data_set, gain_weighs=weigh) if isinstance(data_set, MeasuredLoop) else data_set
-        for data_set in data_sets
-    ]
+    return [replace(test, gain_weighs=weigh) if isinstance(test, MeasuredLoop) else test for test in data_sets]
 
 
 def repeats_of(loops: Sequence[MeasuredLoop]) -> Array:
@@ -87,21 +85,18 @@ def repeats_of(loops: Sequence[MeasuredLoop]) -> Array:
     return np.all(np.abs(conditions[:, None] - conditions) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
 
 
-def _first_alike(loops: Sequence[MeasuredLoop]) -> Array:
-    """The number of the first loop that each repeats, (n,)."""
-    return np.argmax(repeats_of(loops), axis=1) if loops else np.empty(0, dtype=np.intp)
-
-
 def group_repeats(loops: Sequence[MeasuredLoop]) -> list[list[MeasuredLoop]]:
     """Loops in groups that repeat one another; each is in one, that of the first that it repeats."""
-    first = _first_alike(loops)
-    return [[loops[place] for place in np.flatnonzero(first == lead).tolist()] for lead in np.unique(first).tolist()]
+    if not loops:
+        return []
+    first = np.argmax(repeats_of(loops), axis=1)
+    return [[loops[i] for i in np.flatnonzero(first == lead).tolist()] for lead in np.unique(first).tolist()]
 
 
 def prepare_sweeps(
     sweeps: Sequence[Sweep], residuals: Residuals = "complex", rig: RigSettings = UNSTATED
 ) -> list[MeasuredSweep]:
-    """One data set per sweep; the noise of those of one rig, the bushing's or a specimen's, is estimated together.
+    """Prepare sweeps for a fit; the noise of those of one rig, the bushing's or a specimen's, is estimated together.
 
     Args:
         sweeps: measured sweeps.
@@ -111,66 +106,43 @@ def prepare_sweeps(
     Returns:
         Measured sweeps with their noise, in the order given.
     """
-    rigs = [sweep.direction if isinstance(sweep.direction, Specimen) else None for sweep in sweeps]
-    noises = {
-        direction: sweep_noise(
-            [sweep for sweep, rig_direction in zip(sweeps, rigs, strict=True) if rig_direction == direction], rig
-        )
-        for direction in dict.fromkeys(rigs)
-    }
-    data_sets = [
-        MeasuredSweep(sweep, noises[direction], residuals) for sweep, direction in zip(sweeps, rigs, strict=True)
-    ]
-    found = [data_set.weighted(np.array(data_set.sweep.weight)) for data_set in data_sets]
-    names = [str(one.direction) for one in found]
-    places = [np.full(one.measured.size, names.index(name)) for one, name in zip(found, names, strict=True)]
-    conditions = (places, [one.frequency for one in found], [one.amplitude for one in found])
-    return with_contradictions(found, [np.concatenate([np.empty(0), *values]) for values in conditions])
+    by_rig = dict[Specimen | None, list[Sweep]]()
+    for sweep in sweeps:
+        by_rig.setdefault(sweep.direction if isinstance(sweep.direction, Specimen) else None, []).append(sweep)
+    noises = {id(sweep): noise for group in by_rig.values() for noise in [sweep_noise(group, rig)] for sweep in group}
+    found = [MeasuredSweep(sweep, noises[id(sweep)], residuals).weighted(np.array(sweep.weight)) for sweep in sweeps]
+    names = [str(test.direction) for test in found]
+    places = [np.full(test.measured.size, names.index(name)) for test, name in zip(found, names, strict=True)]
+    conditions = (places, [test.frequency for test in found], [test.amplitude for test in found])
+    return _with_contradictions(found, [np.concatenate([np.empty(0), *values]) for values in conditions])
 
 
-def with_contradictions(found: Sequence[_Kind], conditions: Sequence[Array]) -> list[_Kind]:
-    """Loops, or sweeps, each with a sentence on the earlier one whose points it repeats and lies farthest from; points
-    repeat one another where all of `at`, (n,) each, and their temperatures are the same.
+def _with_contradictions(found: Sequence[_Kind], conditions: Sequence[Array]) -> list[_Kind]:
+    """Mark each test that contradicts an earlier one with a sentence on the pair of points that differs most.
 
-    Args:
-        found: loops, or sweeps.
-        conditions: values that repeats have in common, (n,) each, over all operating points.
-
-    Returns:
-        The tests, with `contradiction` set where one contradicts an earlier test.
+    Points repeat one another where all conditions, (n,) each over all operating points, and their temperatures are the
+    same.
     """
     if len(found) < 2:
         return list(found)
-    owner = np.repeat(np.arange(len(found)), [one.measured.size for one in found])
-    points = np.stack([*conditions, _sessions(np.hstack([one.temperature for one in found]))])
-    stiffness = np.concatenate([one.measured for one in found])
+    kelvin = np.nan_to_num(np.hstack([test.temperature for test in found]))  # those that are not known are a group
+    order, session = np.argsort(kelvin), np.empty(kelvin.size, dtype=np.intp)
+    session[order] = np.cumsum(np.diff(kelvin[order], prepend=kelvin[order[0]]) > _SAME_KELVIN)
+    points = np.unique(np.stack([*conditions, session]), axis=1, return_inverse=True)[1]
+    owner = np.repeat(np.arange(len(found)), [test.measured.size for test in found])
     marked = list(found)
-    for separation, one, second in reversed(
-        contradictions(stiffness, np.unique(points, axis=1, return_inverse=True)[1])
-    ):
-        first, later = sorted((int(owner[one]), int(owner[second])))
+    for separation, *pair in reversed(contradictions(np.concatenate([test.measured for test in found]), points)):
+        first, later = np.sort(owner[pair])
         if first != later:  # a file that contradicts itself tells so
-            sentence = (
-                f"it repeats {found[first].name}, and their stiffness differs by {number(100.0 * separation, 2)} %"
-            )
-            marked[later] = replace(found[later], contradiction=sentence)
+            apart = f"their stiffness differs by {number(100.0 * separation, 2)} %"
+            marked[later] = replace(found[later], contradiction=f"it repeats {found[first].name}, and {apart}")
     return marked
-
-
-def _sessions(temperature: Array) -> Array:
-    """A number for each group of temperatures [K], (n,), that count as one; those that are not known are a group."""
-    kelvin = np.nan_to_num(temperature)
-    order = np.argsort(kelvin)
-    groups = np.empty(kelvin.size, dtype=np.intp)
-    groups[order] = np.cumsum(np.diff(kelvin[order], prepend=kelvin[order[0]]) > _SAME_KELVIN)
-    return groups
 
 
 def with_level_errors(
     sweeps: Sequence[MeasuredSweep], error: tuple[float, float], freedom: int
 ) -> tuple[MeasuredSweep, ...]:
-    """Sweeps with gain and phase errors [rad] that all runs of a level share, known by so many degrees of freedom; 0
-    where they count as exact.
+    """Sweeps with gain and phase errors that all runs of a level share.
 
     Args:
         sweeps: measured sweeps.
@@ -182,23 +154,23 @@ def with_level_errors(
 
 
 def split_by_kind(data_sets: Iterable[MeasuredTest]) -> tuple[list[MeasuredLoop], list[MeasuredSweep]]:
-    """Loops and sweeps among some data sets, as two lists."""
+    """Loops and sweeps among some tests, as two lists."""
     tests = list(data_sets)
-    loops = [data_set for data_set in tests if isinstance(data_set, MeasuredLoop)]
-    return loops, [data_set for data_set in tests if isinstance(data_set, MeasuredSweep)]
+    loops = [test for test in tests if isinstance(test, MeasuredLoop)]
+    return loops, [test for test in tests if isinstance(test, MeasuredSweep)]
 
 
 def rows_of(data_sets: Iterable[MeasuredTest]) -> list[slice]:
-    """Slices of the residuals of each data set among those of all."""
-    ends = accumulate((data_set.size for data_set in data_sets), initial=0)
+    """Slices of the residuals of each test among those of all."""
+    ends = accumulate((test.size for test in data_sets), initial=0)
     return [slice(*pair) for pair in pairwise(ends)]
 
 
 def operating_conditions(bushing: Bushing | None, data_sets: Iterable[MeasuredTest]) -> tuple[Array, Array]:
     """Frequencies [Hz] and equivalent strains of all operating points, loops included, (n,) each."""
     tests = list(data_sets)
-    strains = [data_set.amplitude * unit_strain(bushing, data_set.direction) for data_set in tests]
-    return np.concatenate([data_set.frequency for data_set in tests]), np.concatenate(strains)
+    strains = [test.amplitude * unit_strain(bushing, test.direction) for test in tests]
+    return np.concatenate([test.frequency for test in tests]), np.concatenate(strains)
 
 
 def log_slopes(model: Model, data_set: MeasuredTest, names: Sequence[str]) -> Array:
@@ -215,9 +187,12 @@ def log_slopes(model: Model, data_set: MeasuredTest, names: Sequence[str]) -> Ar
 
 
 def sources(data_sets: Iterable[MeasuredTest]) -> tuple[Source, ...]:
-    """The files that data sets came from, each once: a record may hold several loops."""
-    found = [data_set.source for data_set in data_sets if data_set.source is not None]
-    return tuple(source for place, source in enumerate(found) if source not in found[:place])
+    """The files that tests came from, each once: a record may hold several loops."""
+    found = list[Source]()
+    for test in data_sets:
+        if test.source is not None and test.source not in found:
+            found.append(test.source)
+    return tuple(found)
 
 
 def new_loop(

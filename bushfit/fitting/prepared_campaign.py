@@ -11,7 +11,6 @@ import numpy as np
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.session import measured_session
 from bushfit.effects import BASE, effect_name_of, get_effect, with_base
-from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError, error_location
 from bushfit.fitting.assess import mixed_conditions, refuse_strain
 from bushfit.fitting.coordinates import Bounds, residual
@@ -138,7 +137,7 @@ class PreparedCampaign:
 
     @property
     def given_values(self) -> dict[str, float]:
-        """Values the campaign gives, to start from or to hold."""
+        """Values the campaign gives, to start from or to keep fixed."""
         settings = self.campaign.fit.parameters
         return {name: setting.value for name, setting in settings.items() if setting.value is not None}
 
@@ -150,45 +149,37 @@ class PreparedCampaign:
     def starting_model(
         self, effects: Sequence[str], data_sets: Sequence[MeasuredTest], stage_fixed: Mapping[str, float]
     ) -> Model:
-        """A model to fit to some tests: with the values that the campaign gives to start from, or, where those meet the
-        tests worse, with what is read off them.
+        """A model to fit to some tests: at the start values that the campaign gives, or at values read off the tests if
+        these meet the tests better.
 
         Args:
             effects: names of the model's effects.
             data_sets: tests to fit.
-            stage_fixed: values of parameters that this stage holds [SI].
+            stage_fixed: values of parameters that this stage keeps fixed [SI].
 
         Returns:
             Model with start values.
         """
-        fixed = {name: value for name, value in self.given_values.items() if not self.free((name,))}
-        bushing, candidates = self.campaign.bushing, list[tuple[Model, dict[str, float]]]()
-        for values_given in (self.given_values, fixed):
-            with error_location(self.campaign.path):
-                values = start_values(bushing, data_sets, {**values_given, **stage_fixed})
-            candidates.append((Model.with_defaults(bushing, effects, values), values))
-        model, values = (
-            candidates[0]
-            if fixed == self.given_values
-            else min(candidates, key=lambda pair: _misfit(pair[0], data_sets))
-        )
-        named_effects = {effect_name_of(name) for name in self.given_values}
-        added = [name for name in effects if name not in BASE and name not in named_effects]
+        bushing, given = self.campaign.bushing, self.given_values
+        fixed = {name: value for name, value in given.items() if not self.free((name,))}
+        with error_location(self.campaign.path):
+            starts = [start_values(bushing, data_sets, {**known, **stage_fixed}) for known in (given, fixed)]
+        models = [Model.with_defaults(bushing, effects, values) for values in starts]
+        best = 0 if fixed == given else int(np.argmin([_chi_square(model, data_sets) for model in models]))
+        named = {effect_name_of(name) for name in given}
+        added = [name for name in effects if name not in BASE and name not in named]
         added = [name for name in added if get_effect(name).replaces not in effects]
         if not added:
-            return model
+            return models[best]
         replaced = {get_effect(name).replaces for name in added}
-        effects_before = [
-            name for name in (*BASE, *effects) if name in replaced or (name in effects and name not in added)
-        ]
-        plain = Model.with_defaults(bushing, [*dict.fromkeys(effects_before)], values)
-        still = [
-            name for name in (*model.parameters, *plain.parameters) if name in stage_fixed or not self.free((name,))
-        ]
-        return designed(model, plain, data_sets, still, self.bounds)
+        before = [name for name in (*BASE, *effects) if name in replaced or (name in effects and name not in added)]
+        plain = Model.with_defaults(bushing, [*dict.fromkeys(before)], starts[best])
+        names = [*models[best].parameters, *plain.parameters]
+        still = [name for name in names if name in stage_fixed or not self.free((name,))]
+        return designed(models[best], plain, data_sets, still, self.bounds)
 
     def free(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Names of the parameters that the campaign does not hold."""
+        """Names of the parameters that the campaign does not fix."""
         settings = self.campaign.fit.parameters
         return tuple(name for name in names if name not in settings or settings[name].vary)
 
@@ -198,7 +189,7 @@ class PreparedCampaign:
         return with_base(self.campaign.fit.effects)
 
     def select_tests(self, places: Sequence[str] | None) -> list[MeasuredTest]:
-        """Data sets of the places of these names; by default the axial ones, as in the paper, and the specimens'.
+        """Select the tests of some directions and specimens, by default the axial ones, as in the paper, and specimens.
 
         Where no loop of the bushing is axial, all loops are taken by default, and so with sweeps.
 
@@ -212,7 +203,12 @@ class PreparedCampaign:
         hint = "add measured tests, or make some with bushfit simulate"
         data_sets = self.require_tests(self.data_sets, "there is nothing to fit", hint)
         if places is None:
-            return [*_compound(self.loops), *_compound(self.sweeps)]
+            chosen = []
+            for tests in (self.loops, self.sweeps):
+                any_axial = any(test.direction is Direction.AXIAL for test in tests)
+                others = [d for d in Direction if d is not Direction.AXIAL] if any_axial else []
+                chosen += [test for test in tests if test.direction not in others]
+            return chosen
         with error_location(self.campaign.path):
             wanted = [get_place(str(place), self.campaign.specimens) for place in places]
         chosen = [data_set for data_set in data_sets if data_set.direction in wanted]
@@ -228,7 +224,7 @@ class PreparedCampaign:
     def static_loops(self) -> list[MeasuredLoop]:
         """The loops `fit-static` uses: the axial ones, else those of the bushing, else all."""
         hint = "add a quasi-static loop, or run bushfit fit for the sweeps alone"
-        return [*_first(self.require_tests(self.loops, "fit-static needs a loop", hint, "no [[loops]]"))]
+        return _preferred(self.require_tests(self.loops, "fit-static needs a loop", hint, "no [[loops]]"))
 
     @cached_property
     def smallest_sweep(self) -> MeasuredSweep:
@@ -242,15 +238,20 @@ class PreparedCampaign:
         """
         hint = "add a stepped-sine file, or run bushfit fit-static for the loops alone"
         available = self.require_tests(self.sweeps, "fit-dynamic needs a sweep", hint, "no [[sweeps]]")
-        sweeps = _first([data_set for data_set in available if data_set.test.stepped == "frequency"] or available)
+        sweeps = _preferred([sweep for sweep in available if sweep.test.stepped == "frequency"] or available)
         wanted = self.campaign.fit.dynamic_amplitudes
         if not wanted:
-            sweep = min(sweeps, key=lambda data_set: float(data_set.amplitude.min()))
-            return sweep.at_amplitudes(_smallest(sweep))
+            sweep = min(sweeps, key=lambda sweep: float(sweep.amplitude.min()))
+            amplitudes = sweep.amplitude
+            if sweep.test.stepped == "frequency":
+                amplitudes = amplitudes.min(keepdims=True)
+            elif sweep.test.stepped == "amplitude":
+                amplitudes = np.array([amplitudes[sweep.frequency == f].min() for f in np.unique(sweep.frequency)])
+            return sweep.select(np.isin(sweep.amplitude, amplitudes))
         for sweep in sweeps:
-            selected = np.isclose(sweep.amplitude[:, None], wanted, rtol=_SAME_LEVEL).any(axis=1)
+            selected = np.any(np.isclose(sweep.amplitude[:, None], wanted, rtol=_SAME_LEVEL), axis=1)
             if selected.any():
-                return sweep.at_amplitudes(sweep.amplitude[selected])
+                return sweep.select(selected)
         levels = sorted({float(x) for sweep in sweeps for x in sweep.amplitude})
         raise FitError(
             "no sweep at these amplitudes",
@@ -261,35 +262,15 @@ class PreparedCampaign:
         )
 
 
-def _misfit(model: Model, data_sets: Sequence[MeasuredTest]) -> float:
-    """chi-square; infinite where there is no response."""
+def _chi_square(model: Model, data_sets: Sequence[MeasuredTest]) -> float:
+    """chi-square of a model; infinite where there is no response."""
     with suppress(ModelError), np.errstate(all="ignore"):
         chi_square = float(np.sum(np.square(residual(model, data_sets))))
         return chi_square if np.isfinite(chi_square) else np.inf
     return np.inf
 
 
-def _compound(data_sets: Sequence[_Kind]) -> Sequence[_Kind]:
-    """The axial ones and those of specimens; all where the bushing has others only."""
-    if not any(data_set.direction is Direction.AXIAL for data_set in data_sets):
-        return data_sets
-    return [
-        data_set
-        for data_set in data_sets
-        if data_set.direction is Direction.AXIAL or isinstance(data_set.direction, Specimen)
-    ]
-
-
-def _first(data_sets: Sequence[_Kind]) -> Sequence[_Kind]:
-    """The axial ones, else those of the bushing, else all."""
-    axial = [data_set for data_set in data_sets if data_set.direction is Direction.AXIAL]
-    return axial or [data_set for data_set in data_sets if not isinstance(data_set.direction, Specimen)] or data_sets
-
-
-def _smallest(sweep: MeasuredSweep) -> Array:
-    """Amplitudes of a sweep's smallest level, or the smallest at each frequency, or all, by what is stepped, (k,)."""
-    if sweep.test.stepped == "frequency":
-        return sweep.amplitude.min(keepdims=True)
-    if sweep.test.stepped is None:
-        return sweep.amplitude
-    return np.array([sweep.amplitude[sweep.frequency == frequency].min() for frequency in np.unique(sweep.frequency)])
+def _preferred(data_sets: Sequence[_Kind]) -> list[_Kind]:
+    """The axial tests, else those of the bushing, else all."""
+    axial = [test for test in data_sets if test.direction is Direction.AXIAL]
+    return axial or [test for test in data_sets if not isinstance(test.direction, Specimen)] or list(data_sets)

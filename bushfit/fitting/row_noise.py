@@ -119,20 +119,12 @@ class RowNoise:
             moves.append(-(ahead + behind))
         return list(np.tensordot(self.error.T, np.array(moves), axes=1))
 
-    def _coloured(self, rows: Array, delay: int = 0) -> Array:
+    def _coloured(self, rows: Array, delay: int) -> Array:
         """Independent numbers as the noise, over b_0, that they stand for, so many rows late, (..., n)."""
         late = np.zeros((rows.shape[-1], rows[..., 0].size))  # a banded system: no module of filters is loaded
         late[delay:] = rows.reshape(late.shape[::-1])[:, : len(late) - delay].T
         band = np.repeat((self.filter / self.filter[0])[:, None], len(late), axis=1)
         return solve_banded((self.order, 0), band, late).T.reshape(rows.shape)
-
-    def error_of_sums(self, shares: Array) -> Array:
-        """Standard deviation of sums over rows in units of noise, each row with its share, (..., n) -> (...)."""
-        if not self.order:
-            return np.linalg.norm(shares, axis=-1)
-        before = np.zeros((*shares.shape[:-1], shares.shape[-1]))
-        late = np.concatenate((shares[..., ::-1], before), axis=-1)
-        return np.linalg.norm(self._coloured(late), axis=-1) / self.filter[0]
 
 
 class _Model(NamedTuple):

@@ -1,4 +1,4 @@
-"""Deviations of a sweep's points in units of noise: what scatters from point to point, and what a block shares.
+"""Covariance of a sweep's deviations: scatter from point to point, and errors that a block or a line shares.
 
 Beside the noise a model error may count, independent from operating point to operating point; repeats share it.
 
@@ -7,7 +7,7 @@ Notes:
     All runs of a line may share an error besides, u^2 1 1^T over the line. With a_i = 1/s_i, divided by s_i and less
     the share 1 - 1/sqrt(1 + t^2 sum a_i^2) of what lies along a, a deviation is white; of what all runs of a line share
     then, as much is taken out in the same way. A point of weight w has s_i^2 = s^2/w; without weight it is not there,
-    for shared errors either.
+    for shared errors either. Gains and phases are independent: deviations are real, (..., 2 n), all gains first.
 
     Beside a model error of standard deviation e the covariance that whitens is diag(s_i^2) + e^2 R R^T, R = 1 where a
     row repeats an operating point. What runs and lines share stays out of these weights: the model's own error differs
@@ -26,13 +26,13 @@ from bushfit.fitting.noise import SweepNoise
 
 
 @dataclass(frozen=True, eq=False)
-class _Shared:
-    """An error that the points of each group share, groups side by side; what else they have is white.
+class SharedError:
+    """An error that the deviations of each group share, groups side by side; what else they have is white.
 
     Args:
-        starts: index of the first point of each group, (groups,).
-        unit: what a unit of the error makes of each point's gain and phase, in units of noise, (2, n).
-        variance: of the error, in gain and in phase, (2, 1).
+        starts: index of the first deviation of each group, (g,).
+        unit: change of each deviation, in units of noise, by a unit of the error, (m,).
+        variance: of the error of each group, (g,).
     """
 
     starts: Array
@@ -41,37 +41,28 @@ class _Shared:
 
     @cached_property
     def group(self) -> Array:
-        """Number of the group that each point belongs to, (n,)."""
-        return np.repeat(np.arange(self.starts.size), np.diff(self.starts, append=self.unit.shape[-1]))
-
-    @property
-    def log_size(self) -> float:
-        """Natural log of the determinant of 1 + variance unit unit^T, all groups."""
-        return float(np.sum(np.log1p(self.variance * self.weight)))
+        """Number of the group that each deviation belongs to, (m,)."""
+        return np.repeat(np.arange(self.starts.size), np.diff(self.starts, append=self.unit.size))
 
     @cached_property
     def weight(self) -> Array:
-        """Sum of the squares of the unit error of each group, (2, groups)."""
-        return np.maximum(np.add.reduceat(self.unit**2, self.starts, axis=-1), np.finfo(float).tiny)
+        """Sum of the squares of the unit error of each group, (g,)."""
+        return np.maximum(np.add.reduceat(self.unit**2, self.starts), np.finfo(float).tiny)
 
     @cached_property
     def share(self) -> Array:
-        """Share of what lies along the unit error of a group that is taken out, (2, groups)."""
+        """Share of the component along the unit error of a group that is taken out, (g,)."""
         return 1.0 - 1.0 / np.sqrt(1.0 + self.variance * self.weight)
 
-    def components(self, parts: Array) -> Array:
-        """Components along the unit error of each group, (..., 2, n) -> (..., 2, groups)."""
-        return np.add.reduceat(parts * self.unit, self.starts, axis=-1)
+    def components(self, rows: Array) -> Array:
+        """Components along the unit error of each group, (..., m) -> (..., g)."""
+        return np.add.reduceat(rows * self.unit, self.starts, axis=-1)
 
-    def deviations(self, error: Array) -> Array:
-        """Deviations by an error of each group, (..., 2, groups) -> (..., 2, n)."""
-        return error[..., self.group] * self.unit
-
-    def whiten(self, parts: Array) -> Array:
-        """Deviations less the share of what lies along the unit error, which makes them white, (..., 2, n)."""
-        return (
-            parts - self.deviations(self.components(parts) / self.weight * self.share) if self.variance.any() else parts
-        )
+    def whiten(self, rows: Array) -> Array:
+        """White deviations, (..., m): less the share of their component along the unit error."""
+        if not self.variance.any():
+            return rows
+        return rows - (self.components(rows) / self.weight * self.share)[..., self.group] * self.unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +89,9 @@ class Whitening:
     model_error: float = 0.0
 
     def whiten(self, deviation: Array) -> Array:
-        """Deviations in units of noise, shared errors taken out, complex (..., n) -> (..., 2 n), all gains first."""
-        parts = _gain_and_phase(deviation) * self._block.unit
-        if self.model_error:
-            return _flat(self._less_points(parts))
-        return _flat(self._line.whiten(self._block.whiten(parts)))
+        """Deviations in units of noise, shared errors taken out, complex (..., n) -> (..., 2 n)."""
+        rows = np.concatenate((deviation.real, deviation.imag), axis=-1) * self._block.unit
+        return self._less_points(rows) if self.model_error else self._line.whiten(self._block.whiten(rows))
 
     def uncounted(self, influence: Array) -> Array:
         """Covariance that the noise adds to an estimate beside what is counted with a model error in the weights.
@@ -111,57 +100,40 @@ class Whitening:
             influence: of each whitened residual, (k, 2 n).
 
         Returns:
-            (k, k): what runs and lines share, less the independent model error.
+            Effect of the errors that runs and lines share, less that of the independent model error, (k, k).
         """
-        parts = self._less_points(influence.reshape(-1, 2, self.weights.size)) * self._block.unit
+        rows = self._less_points(influence) * self._block.unit
         order, starts = self._by_point
-        added = np.zeros((len(parts), len(parts)))
+        added = np.zeros((len(rows), len(rows)))
         for variance, sums in (
-            (-np.full((2, 1), self.model_error**2), np.add.reduceat(parts[..., order], starts, axis=-1)),
-            (self._block.variance, np.add.reduceat(parts, self.starts, axis=-1)),
-            (self._line.variance, np.add.reduceat(parts, self.lines, axis=-1)),
+            (np.full(starts.size, -(self.model_error**2)), np.add.reduceat(rows[:, order], starts, axis=-1)),
+            (self._block.variance, np.add.reduceat(rows, self._block.starts, axis=-1)),
+            (self._line.variance, np.add.reduceat(rows, self._line.starts, axis=-1)),
         ):
-            added += np.einsum("icp,cq,jcp->ij", sums, variance, sums)
+            added += (sums * variance) @ sums.T
         return added
 
     def error_products(self, deviation: Array) -> ErrorProducts:
         """Inner products of deviations, complex (m, n), in noise that no run shares, with a model error."""
-        parts = _gain_and_phase(deviation) * self._block.unit
-        order, starts = self._by_point
-        components = np.add.reduceat((parts * self._block.unit)[..., order], starts, axis=-1)
-        return ErrorProducts(_flat(parts) @ _flat(parts).T, _flat(components), self._point.weight.ravel())
+        unit, (order, starts) = self._block.unit, self._by_point
+        rows = np.concatenate((deviation.real, deviation.imag), axis=-1) * unit
+        components = np.add.reduceat((rows * unit)[:, order], starts, axis=-1)
+        return ErrorProducts(rows @ rows.T, components, self._point.weight)
 
     @property
     def log_size(self) -> float:
         """Natural log of the determinant of the covariance beside a model error, over that of the random noise."""
-        return self._point.log_size
-
-    @cached_property
-    def _by_point(self) -> tuple[Array, Array]:
-        """Rows ordered by operating point, (n,), and the place where each begins, (points,)."""
-        order = np.argsort(self.points, kind="stable")
-        return order, np.concatenate(([0], 1 + np.flatnonzero(np.diff(self.points[order]))))
-
-    @cached_property
-    def _point(self) -> _Shared:
-        """Error that the rows of an operating point share, in their order, in units of their noise."""
-        order, starts = self._by_point
-        return _Shared(starts, self._block.unit[:, order], np.full((2, 1), self.model_error**2))
-
-    def _less_points(self, parts: Array) -> Array:
-        order, _ = self._by_point
-        remainder = np.empty_like(parts)
-        remainder[..., order] = self._point.whiten(parts[..., order])
-        return remainder
+        return float(np.sum(np.log1p(self._point.variance * self._point.weight)))
 
     def scaled(self, deviation: Array, *, shared: bool = True) -> Array:
         """Deviations over the random noise, complex (n,) -> (2, n), with `shared` less the block's likeliest error."""
-        parts, block = _gain_and_phase(deviation), self._block
+        rows, block = np.concatenate((deviation.real, deviation.imag)), self._block
         if shared:
-            mean = block.components(parts * block.unit) / block.weight
-            weight = (block.variance + self._line.variance) * block.weight
-            parts = parts - (weight / (1.0 + weight) * mean)[:, block.group]
-        return parts / self.random
+            mean = block.components(rows * block.unit) / block.weight
+            level = np.repeat(np.square(self.noise.level), self.starts.size)
+            weight = (block.variance + level) * block.weight
+            rows = rows - (weight / (1.0 + weight) * mean)[block.group]
+        return rows.reshape(2, -1) / self.random
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
         """Reactions of an estimator to each variance of the noise, (k, 2 n) each, as `MeasuredTest.unsure`.
@@ -175,41 +147,52 @@ class Whitening:
             with what lines share.
         """
         block, line, noise = self._block, self._line, self.noise
-        parts = line.whiten(influence.reshape(-1, 2, self.weights.size))
-        reactions = {}
+        rows, reactions = line.whiten(influence), {}
         if noise.scatter_freedom:
-            reactions["scatter"] = line.whiten(block.whiten(block.whiten(parts))) * np.sqrt(2.0 / noise.scatter_freedom)
+            reactions["scatter"] = line.whiten(block.whiten(block.whiten(rows))) * np.sqrt(2.0 / noise.scatter_freedom)
         if noise.freedom:
-            expected = block.variance + self.random[:, self.starts] ** 2 / np.bincount(block.group)
+            expected = block.variance + self.random.ravel()[block.starts] ** 2 / np.bincount(block.group)
             error = np.minimum(expected * np.sqrt(2.0 / noise.freedom), block.variance) * (1.0 - block.share) ** 2
-            reactions["shared"] = line.whiten(block.deviations(block.components(parts) * error))
+            reactions["shared"] = line.whiten((block.components(rows) * error)[:, block.group] * block.unit)
         if noise.level_freedom:
             expected = line.variance + 1.0 / line.weight
             error = np.minimum(expected * np.sqrt(2.0 / noise.level_freedom), line.variance) * (1.0 - line.share)
-            reactions["level"] = line.deviations(line.components(parts) * error)
+            reactions["level"] = (line.components(rows) * error)[:, line.group] * line.unit
+        is_gain = np.arange(rows.shape[-1]) < self.weights.size
         return {
-            (id(noise), kind, column): _flat(reaction * only)
+            (id(noise), kind, part): reaction * only
             for kind, reaction in reactions.items()
-            for column, only in enumerate(np.eye(2)[..., None])
+            for part, only in enumerate((is_gain, ~is_gain))
         }
 
     @cached_property
-    def _block(self) -> _Shared:
+    def _block(self) -> SharedError:
         """Error that the points of a block share, in units of their noise."""
-        return _Shared(self.starts, np.sqrt(self.weights) / self.random, np.square(self.noise.shared)[:, None])
+        unit = (np.sqrt(self.weights) / self.random).ravel()
+        starts = np.concatenate((self.starts, self.starts + self.weights.size))
+        return SharedError(starts, unit, np.repeat(np.square(self.noise.shared), self.starts.size))
 
     @cached_property
-    def _line(self) -> _Shared:
+    def _line(self) -> SharedError:
         """Error that the blocks of a line share, less what is taken out of each block."""
-        unit = (1.0 - self._block.share)[:, self._block.group] * self._block.unit
-        return _Shared(self.lines, unit, np.square(self.noise.level)[:, None])
+        starts = np.concatenate((self.lines, self.lines + self.weights.size))
+        unit = (1.0 - self._block.share)[self._block.group] * self._block.unit
+        return SharedError(starts, unit, np.repeat(np.square(self.noise.level), self.lines.size))
 
+    @cached_property
+    def _by_point(self) -> tuple[Array, Array]:
+        """Deviations ordered by operating point, gains first, (2 n,), and the place where each point begins."""
+        labels = np.concatenate((self.points, self.points + self.points.max() + 1))
+        order = np.argsort(labels, kind="stable")
+        return order, np.concatenate(([0], 1 + np.flatnonzero(np.diff(labels[order]))))
 
-def _gain_and_phase(deviation: Array) -> Array:
-    """Gain and phase, complex (..., n) -> (..., 2, n)."""
-    return np.stack((deviation.real, deviation.imag), axis=-2)
+    @cached_property
+    def _point(self) -> SharedError:
+        """Error that the rows of an operating point share, in their order, in units of their noise."""
+        order, starts = self._by_point
+        return SharedError(starts, self._block.unit[order], np.full(starts.size, self.model_error**2))
 
-
-def _flat(parts: Array) -> Array:
-    """All gains, then all phases, (..., 2, n) -> (..., 2 n)."""
-    return parts.reshape(*parts.shape[:-2], parts.shape[-2] * parts.shape[-1])
+    def _less_points(self, rows: Array) -> Array:
+        remainder, order = np.empty_like(rows), self._by_point[0]
+        remainder[..., order] = self._point.whiten(rows[..., order])
+        return remainder

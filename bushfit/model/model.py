@@ -95,6 +95,11 @@ class Model:
         return any(effect.under for effect in self.records)
 
     @property
+    def settles(self) -> bool:
+        """True if the response changes from cycle to cycle until it is steady."""
+        return any(effect.settles for effect in self.records)
+
+    @property
     def knows_temperature(self) -> bool:
         """True if the response depends on the temperature of the rubber."""
         return any("temperature" in effect.under for effect in self.records)

@@ -125,7 +125,7 @@ def _run_in(truth: Model, place: Place, amplitude: float) -> tuple[int, tuple[in
     The mean friction stress from the start must decay to a thousandth. At a strain of a tenth of eps_half a cycle keeps
     95 % of it, at a hundredth 99.96 %.
     """
-    if any(effect.settles for effect in truth.records):
+    if truth.settles:
         return 0, (0, 1.0)
     if "eps_half" not in truth.values:
         return _LEAST_RUN_IN, (0, 1.0)

@@ -205,5 +205,5 @@ def test_a_campaign_gives_temperatures_and_order(tmp_path: Path, order: tuple[st
     assert under["cold"].temperature == pytest.approx(293.15)
     np.testing.assert_allclose(under["warm"].temperature, [303.15, 304.15, 305.15])
     assert under[first].turn[0] == 0.0
-    part = data.sweeps[1].at_amplitudes([1e-4]).circumstances
+    part = data.sweeps[1].select(data.sweeps[1].amplitude == 1e-4).circumstances
     np.testing.assert_array_equal(part.turn, under["warm"].turn)

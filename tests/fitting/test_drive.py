@@ -187,7 +187,7 @@ def test_a_cycle_and_a_part_is_not_one_longer_cycle(waveform: str, cycles: float
 
 
 def test_less_than_a_cycle_is_refused() -> None:
-    with pytest.raises(FitError, match=r"does not hold a whole cycle[\s\S]*at least one closed cycle"):
+    with pytest.raises(FitError, match=r"does not contain a whole cycle[\s\S]*at least one closed cycle"):
         frequency_found("sine", np.linspace(0.0, 0.9, 2000))
 
 

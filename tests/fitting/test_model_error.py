@@ -199,7 +199,7 @@ def test_parameters_on_their_bounds_beside_a_model_error(rig: Rig, paper_model: 
     assert set(result.profile) == (set() if held else set(FIVE))
     assert result.at_bound == {"mu": "max"}
     assert result.covariance.stderr("mu") is None
-    assert any("mu rests on the max given in [fit]" in line for line in result.warnings)
+    assert any("mu is at the max given in [fit]" in line for line in result.warnings)
 
 
 def test_the_closest_fit_is_as_near_as_five_parameters_can_be(off_by_waves: tuple[Campaign, Result]) -> None:

@@ -193,7 +193,7 @@ def test_held_and_bounded_parameters(measured: PreparedCampaign) -> None:
     assert "alpha" not in result.fitted
     assert result.covariance.stderr("alpha") is None
     assert result.model.values["mu"] <= 1.05e6
-    assert any(line.startswith("mu rests on the max given in [fit]") for line in result.warnings)
+    assert any(line.startswith("mu is at the max given in [fit]") for line in result.warnings)
 
 
 def test_missing_tests_are_said(measured: PreparedCampaign, result: Result) -> None:
