@@ -75,9 +75,9 @@ class Bounds:
         is_empty = {self.min, self.max, self.nominal, self.sigma} == {None}
         if is_empty or (self.nominal is None) != (self.tolerance is None):
             expected = "min, max, nominal with tolerance, or sigma"
-            raise ValueError(CampaignError("these keys make no limit", expected=expected))
+            raise ValueError(CampaignError("these keys do not form a limit", expected=expected))
         if self.min is not None and self.max is not None and self.min >= self.max:
-            raise ValueError(CampaignError("these limits hold no value", expected="min below max"))
+            raise ValueError(CampaignError("no value is within these limits", expected="min below max"))
 
     @property
     def fixed(self) -> tuple[float, float]:

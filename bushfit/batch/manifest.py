@@ -29,7 +29,7 @@ Command = Literal["run", "fit", "diagnose", "predict"]
 
 #: Largest TOML manifest [bytes]: some million rows.
 _LARGEST_MANIFEST = 200_000_000
-_INIT_HINT = "bushfit init FILE... makes a campaign of test files"
+_INIT_HINT = "bushfit init FILE... writes a campaign from test files"
 _DEFAULT_COMMANDS: tuple[Command, ...] = ("fit",)
 #: Commands that use a setting.
 _COMMANDS_USING: dict[str, tuple[Command, ...]] = {
@@ -204,7 +204,7 @@ def read_csv_entries(path: Path) -> list[Entry]:
     try:
         for row in reader:
             if reader.line_num > line + 1:
-                raise csv.Error("a quoted cell goes on in the next line")
+                raise csv.Error("a quoted cell continues in the next line")
             line += 1
             cells, place = [cell.strip() for cell in row], f"line {line}"
             if not header:
@@ -323,7 +323,7 @@ def check_used(settings: RowSettings, rows: Collection[tuple[Command, ...]], sou
                 file=source,
                 place=name,
                 found=f"commands {', '.join(sorted({command for commands in rows for command in commands}))}",
-                expected=f"it goes with {' or '.join(users)}",
+                expected=f"a setting of {' or '.join(users)}",
                 hint=f"{another}leave {name} out",
             )
 

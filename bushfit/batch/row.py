@@ -73,7 +73,7 @@ class RowTask:
         except BushfitError as error:
             record = RowFile(status="failed", error=str(error))
         except Exception as error:  # whatever happens to a row costs that row, and is reported
-            kind = "out of memory" if isinstance(error, MemoryError) else "a fault in bushfit itself"
+            kind = "out of memory" if isinstance(error, MemoryError) else "an internal error of bushfit"
             record = RowFile(status="failed", error=f"{kind}: {type(error).__name__}: {error}")
         digests = {name: store.digest(content) for name, content in files.items()}
         record = replace(record, key=key, seconds=round(time.perf_counter() - start, 4), files=digests)

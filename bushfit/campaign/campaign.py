@@ -199,7 +199,7 @@ def refuse_tests(paths: Sequence[Path]) -> None:
     if tests:
         found = "a folder" if tests[0].is_dir() else "a test file" if len(tests) == 1 else "test files"
         sizes = '--inner-radius "10 mm" --outer-radius "18 mm" --length "34 mm"'
-        hint = f"bushfit init {' '.join(map(quote_path, tests))} {sizes} makes one, with the sizes of your rubber"
+        hint = f"bushfit init {' '.join(map(quote_path, tests))} {sizes} writes one, with the dimensions of your rubber"
     else:
         found, hint = "a model", f"bushfit predict {quote_path(first)} predicts from a model"
     raise CampaignError("a campaign is needed", file=(tests or paths)[0], found=found, expected=expected, hint=hint)

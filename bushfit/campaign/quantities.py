@@ -107,7 +107,9 @@ def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
             ends = np.clip([table.get("min", low), table.get("max", high)], low, high)
             if ordered != sorted(ordered) or ends[0] == ends[1]:
                 expected = f"min below max within {low:g} to {high:g} {parameter.unit}, and value between them"
-                raise CampaignError("these limits hold no value", place=name, found=str(raw[name]), expected=expected)
+                raise CampaignError(
+                    "no value is within these limits", place=name, found=str(raw[name]), expected=expected
+                )
             table |= {key: float(end) for key, end in zip(("min", "max"), ends, strict=True) if key in table}
     return settings
 

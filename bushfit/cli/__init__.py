@@ -123,7 +123,7 @@ def _status(command: click.Command) -> int:
         if wrong := re.search(r"'([^']*)' is not one of (.*)\.$", text):
             near = did_you_mean(wrong[1], re.findall(r"'([^']*)'", wrong[2]))
             text = f"{text[:-1]}; {near}" if near else text
-        message = printable(f"error: {text}  ({context.command_path if context else 'bushfit'} -h tells more)")
+        message = printable(f"error: {text}  (see {context.command_path if context else 'bushfit'} -h)")
     except BushfitError as error:
         message = f"error: {error}"
     except MemoryError:
@@ -137,7 +137,7 @@ def _status(command: click.Command) -> int:
         if os.environ.get("BUSHFIT_TRACEBACK"):
             raise
         message = (
-            f"a fault in bushfit itself: {type(error).__name__}: {printable(str(error))}\n"
+            f"an internal error of bushfit: {type(error).__name__}: {printable(str(error))}\n"
             "  try: set BUSHFIT_TRACEBACK=1, run again, and report what it prints"
         )
     sys.stderr.write(f"bushfit: {message}\n")

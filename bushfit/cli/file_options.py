@@ -147,7 +147,7 @@ def direction_error(file: Path, sheet: str | None = None) -> MeasurementError:
         place=sheet and f'{word_for_part(file)} "{sheet}"',
         found="neither the name nor the columns contain axial, radial or torsion",
         expected="a direction",
-        hint="state it: --direction axial (or radial, torsion); or where others say another, name the file after it",
+        hint="state it: --direction axial (or radial, torsion); or put it into the file name",
     )
 
 

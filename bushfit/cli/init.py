@@ -131,7 +131,7 @@ def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
     radius, diameter = sizes[f"{side}_radius"], sizes[f"{side}_diameter"]
     options = f"--{side}-radius", f"--{side}-diameter"
     if radius is not None and diameter is not None:
-        raise click.UsageError(f"'{options[0]}' and '{options[1]}' are one size; give one of them.")
+        raise click.UsageError(f"'{options[0]}' and '{options[1]}' state the same size; give one of them.")
     if radius is not None:
         return radius
     if diameter is None:
@@ -212,7 +212,7 @@ def _inspect_files(
                 "this is a raw stepped-sine history, not a sweep",
                 file=inspection.file,
                 expected="hysteresis loops and sweeps",
-                hint=f"{hint}; give that instead",
+                hint=f"{hint}; give that file instead",
             )
         sentences.append(f"{source}: a raw stepped-sine history; {hint}")
     return inspections, sentences

@@ -99,7 +99,7 @@ def command(
     if aim not in (None, "parameters") and parameters:
         raise click.UsageError("'--parameters' goes with '--for parameters'.")
     if targets and (aim or rivals or parameters):
-        raise click.UsageError("'--target' is an aim of its own: without '--for', '--parameters' and '--rivals'.")
+        raise click.UsageError("'--target' cannot be combined with '--for', '--parameters' and '--rivals'.")
     implied = "targets" if targets else "rivals" if rivals else "parameters" if parameters else "predictions"
     settings: dict[str, Any] = {
         **grid_values((), grids),

@@ -56,7 +56,7 @@ def model_file(path: Path) -> Path:
             file=path,
             found=found,
             expected="a .json file, as bushfit run, the fits and diagnose write it, or its folder",
-            hint=f"bushfit {command} makes one",
+            hint=f"bushfit {command} writes one",
         )
     return path
 

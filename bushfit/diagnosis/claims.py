@@ -132,7 +132,7 @@ def _claimed(data: PreparedCampaign, name: str) -> Claim:
     if mistake is None or bool(tests) != bool(mistake.kinds) or (test and not tests):
         expected = [labelled(name.partition(SEPARATOR)[0], data_sets[place].name) for place in possible]
         raise ModelError(
-            "this mistake cannot have been made there",
+            "this mistake is not possible in this test",
             found=name,
             expected="one of " + ", ".join(expected) if expected else "another mistake: no test has room for this one",
         )

@@ -182,7 +182,7 @@ def _trusted(correction: Unnamed, whole: Evidence) -> str:
         for patch in correction.patches
     ]
     misfit = max((region.excess for region in locate(whole) if region.kind == "loop"), default=0.0)
-    stays = f" (their form stays off by {number(misfit, 2)} times the noise)" if misfit else ""
+    stays = f" (their form still differs by {number(misfit, 2)} times the noise)" if misfit else ""
     loops = f", of loops the first harmonic only{stays}" if split_by_kind(whole.data_sets)[0] else ""
     return f"valid only between these tests ({'; '.join(patches)}){loops}, and of this bushing"
 

@@ -32,19 +32,19 @@ class EffectEntry(TypedDict):
     name: Annotated[str, Doc("of the effect or mistake.")]
     level: Annotated[
         str,
-        Doc('whether it belongs to the material, the component, the rig and so on; "unresolved" where it has twins.'),
+        Doc('level: material, component, instrument or record; "unresolved" if it has twins.'),
     ]
-    twins: Annotated[list[str], Doc("effects of the rig that no such test tells from it.")]
-    replaces: Annotated[str | None, Doc("the branch of the paper that it stands in place of, or null.")]
-    test: Annotated[str | None, Doc("of a mistake in the record, the test in which it was made; else null.")]
-    sentence: Annotated[str, Doc("what it is, in words.")]
+    twins: Annotated[list[str], Doc("effects of the rig that tests of the bushing cannot distinguish from it.")]
+    replaces: Annotated[str | None, Doc("the branch of the paper that it replaces, or null.")]
+    test: Annotated[str | None, Doc("the test with the mistake; null for an effect.")]
+    sentence: Annotated[str, Doc("description.")]
     correction: Annotated[
         str | None,
-        Doc("of a mistake, where it was made and what to write into the campaign; else null."),
+        Doc("what to write into the campaign to correct a mistake; null for an effect."),
     ]
     parameters: Annotated[dict[str, SizeEntry], Doc("by name.")]
-    evidence: Annotated[str, Doc("why it was named, in words.")]
-    alternatives: Annotated[list[str], Doc("what these tests cannot tell it from.")]
+    evidence: Annotated[str, Doc("the reason for the name.")]
+    alternatives: Annotated[list[str], Doc("explanations that these tests cannot distinguish from it.")]
 
 
 #: The keys have a unit that is no name in Python, so that this type is made by a call.
@@ -72,10 +72,10 @@ WhereEntry.__doc__ = "One region in which model and measurement disagree."
 class BeforeAfter(TypedDict):
     """Root mean square residual in units of noise: 1 is the floor."""
 
-    before: Annotated[float | None, Doc("of the model as it came.")]
+    before: Annotated[float | None, Doc("of the model at the start.")]
     after: Annotated[
         float | None,
-        Doc("of the model with what was added; or, of a mistake, if the record is put right."),
+        Doc("of the model with the added effects, or with the corrected record."),
     ]
 
 
@@ -85,7 +85,7 @@ class GapEntry(TypedDict):
     calibration: Annotated[BeforeAfter, Doc("on the data that were fitted.")]
     heldout: Annotated[
         BeforeAfter | None,
-        Doc("on data that were left out and predicted from the rest; null where nothing can be left out."),
+        Doc("on data that were left out and predicted from the rest; null if no data can be left out."),
     ]
     parts: Annotated[tuple[HeldOut, ...], Doc("the held-out figures part by part.")]
     skipped: Annotated[tuple[Skipped, ...], Doc("parts that were not held out.")]
@@ -130,21 +130,26 @@ class DiagnosisFile(TypedDict):
     verdict: Annotated[
         Verdict,
         Doc(
-            "in a word: nothing is missing; named, and the gap is closed; several that cannot be told apart; a gap "
-            "without a name, described; most of it named; a gap that nothing explains."
+            "consistent: nothing is missing; named: one explanation closes the gap; ambiguous: several "
+            "explanations; described: a correction without a name; partly: a remainder is left; unexplained: "
+            "nothing closes the gap."
         ),
     ]
     summary: Annotated[str, Doc("the verdict in a sentence.")]
     nothing: Annotated[float, Doc("probability that nothing is missing beyond noise and tolerance.")]
     odds: Annotated[
         list[OddsEntry],
-        Doc("what may explain the gap, the most probable first; what is left of 1 is for what is not told."),
+        Doc(
+            "possible explanations, the most probable first; the rest to 1 belongs to explanations that are not listed."
+        ),
     ]
-    effects: Annotated[list[EffectEntry], Doc("what was added, or the leaders of sets that cannot be told apart.")]
+    effects: Annotated[
+        list[EffectEntry], Doc("effects that were added, or those of the most probable explanation if none was.")
+    ]
     where: Annotated[list[WhereEntry], Doc("regions of disagreement before anything was added.")]
-    remainder: Annotated[list[WhereEntry], Doc("regions of disagreement that stay.")]
+    remainder: Annotated[list[WhereEntry], Doc("regions of disagreement that remain.")]
     description: Annotated[Description | None, Doc("of a gap without a name; else null.")]
-    gap: Annotated[GapEntry, Doc("how far model and tests lie apart, before and after.")]
-    usable: Annotated[UsableEntry | None, Doc("within what model.json meets the tests; null where nothing was fitted.")]
-    next_test: Annotated[str, Doc("the measurement that would decide or confirm; empty where there is none.")]
-    warnings: Annotated[list[str], Doc("what else a user must know.")]
+    gap: Annotated[GapEntry, Doc("misfit of model and tests, before and after.")]
+    usable: Annotated[UsableEntry | None, Doc("expected error of model.json; null if nothing was fitted.")]
+    next_test: Annotated[str, Doc("the test that would decide or confirm; empty if there is none.")]
+    warnings: Annotated[list[str], Doc("warnings.")]

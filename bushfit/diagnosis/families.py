@@ -66,7 +66,7 @@ class FittedFamily:
     def words(self) -> str:
         """Sentence that compares the held-out error of the family with that of the first family."""
         if self.gain is None or self.p is None or self.held.before is None or self.held.after is None:
-            return "nothing can be held out of both"
+            return "no part can be held out of both"
         figures = f"held out {number(self.held.after, 3)} x noise, the first {number(self.held.before, 3)}"
         if abs(self.held.after / self.held.before - 1.0) < _ALIKE:
             return f"{figures}: alike within {number(100.0 * _ALIKE, 2)} %"
@@ -156,7 +156,7 @@ def _chain(
     effect, present = get_effect(last), chain[-1].model.effects
     if not _fits(chain[-1].model, last):
         has = "the model has this effect already"
-        problem = has if last in present else "what this effect stands in place of is not in the model"
+        problem = has if last in present else "the effect that this one replaces is not in the model"
         laws = " or ".join(name for name in (*_RATE, *_AMPLITUDE) if _fits(chain[-1].model, name))
         raise ModelError(problem, found=last, expected=f"such as {laws}")
     solution = with_effect(chain[-1].solution, chain[-1].data_sets, effect, fixed, bounds)

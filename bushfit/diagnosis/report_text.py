@@ -166,9 +166,7 @@ class DiagnosisWriter:
             f"if the records of the tests confirm it, state {'; '.join(claim.corrections(self.data))} (or {command})"
         )
         companions = [*best.effects, *(place.name for place in best.places)]
-        words = f"these tests agree if {claim.words(self.data)}" + f", with {_all(companions)} beside it" * bool(
-            companions
-        )
+        words = f"these tests agree if {claim.words(self.data)}" + f", and with {_all(companions)}" * bool(companions)
         found = self._finished(self.finding.verdict, words, self.base, names, places=best, next_test=advice)
         warning = f"fitted to the tests as they are, which only agree if {claim.words(self.data)}: {advice}"
         after = self._fitted(best.weighed.state.evidence)

@@ -124,7 +124,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         reached = reached + pace * step
     if not history.periodic and np.any(error > 1e-3 * size):  # less than any test resolves
         raise ModelError(
-            "a rig or sleeve gives way too much to be followed through time",
+            "a rig or sleeve is too compliant to be simulated in time",
             found=f"{float(np.max(compliance)):.3g} m/N",
             expected="one that is several times stiffer than the bushing",
         )

@@ -200,7 +200,7 @@ class PreparedCampaign:
             FitError: there is none.
             ModelError: a name that is neither a direction nor a specimen of the campaign.
         """
-        hint = "add measured tests, or make some with bushfit simulate"
+        hint = "add measured tests, or simulate some with bushfit simulate"
         data_sets = self.require_tests(self.data_sets, "there is nothing to fit", hint)
         if places is None:
             chosen = []

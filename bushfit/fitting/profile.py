@@ -113,7 +113,7 @@ def profile95(best: FitResult, covariance: Covariance) -> Mapping[str, Interval]
         raise FitError(
             "a profile needs two parameters or more",
             found=f"{len(names)} fitted",
-            hint="leave out --profile, or hold fewer parameters in [fit]",
+            hint="leave out --profile, or fix fewer parameters in [fit]",
         )
     start, limits = best.coordinates.point(best.model.values), np.transpose(best.problem.limits)
     linear = linear_errors(best.jacobian)

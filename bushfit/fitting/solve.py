@@ -47,7 +47,7 @@ def solve(
         raise FitError(
             "the fit did not converge",
             found=f"no end after {found.evaluations} evaluations of the model",
-            hint="hold a parameter with vary = false, or give bounds, in [fit] of the campaign",
+            hint="fix a parameter with vary = false, or give bounds, in [fit] of the campaign",
         )
     return found
 

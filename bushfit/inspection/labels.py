@@ -117,7 +117,7 @@ def _held_quantity(table: Table, place: Place, key: str, sources: Mapping[str, L
     example = found[0].text if found else usual.get(expected, "1 deg")
     state = f'state {key} = "{example}" in the campaign'
     if "block" in table.headers:
-        state = f'give each block a [[sweeps]] table with rows = {{ block = "1" }} and {key} = "{example}"'
+        state = f'write a [[sweeps]] table for each block with rows = {{ block = "1" }} and {key} = "{example}"'
     raise table.header_error(
         f"the {role} of this test is not stated",
         found=f"{label}: {' and '.join(quantity.text for quantity in found)}" if found else None,
@@ -150,13 +150,13 @@ def wrong_labels(
         double = any(_is_close(value, 2.0 * x) for value in amplitudes_in_name for x in amplitudes)
         found = _listed([factor * x for x in amplitudes])
         named = _join_quantities(labels.of_dimension(expected))
-        doubt = ": the name may count peak-to-peak" if double else ""
-        yield f"the name says {named}, the amplitude is {found} {unit} zero-to-peak{doubt}"
+        doubt = ": the name may be peak-to-peak" if double else ""
+        yield f"the name states {named}, the amplitude is {found} {unit} zero-to-peak{doubt}"
     frequencies_in_name = labels.of_dimension("Hz")
     if frequencies_in_name and not any(
         _is_close(units.parse_quantity(quantity.text, "Hz"), f) for quantity in frequencies_in_name for f in frequencies
     ):
-        yield f"the name says {_join_quantities(frequencies_in_name)}, the frequency is {_listed(frequencies)} Hz"
+        yield f"the name states {_join_quantities(frequencies_in_name)}, the frequency is {_listed(frequencies)} Hz"
 
 
 def _is_close(value: float, reference: float) -> bool:

@@ -109,7 +109,7 @@ def _gaps(motion: RecordedChannel, time: Floats, *, timed: bool) -> Iterator[str
         description = (
             f"{steps[first]:.3g} s without a row, else mostly {np.median(steps):.3g} s"
             if timed
-            else f"the {motion.name} goes from {motion.format_row(first)} to {motion.format_row(first + 1)} "
+            else f"the {motion.name} jumps from {motion.format_row(first)} to {motion.format_row(first + 1)} "
             f"{motion.unit} at once"
         )
         channel = "time" if timed else "the motion"

@@ -169,7 +169,8 @@ def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) ->
             f"{'the units say' if turns else 'the file says'} {found}, and --direction {test_options['direction']}",
             found=", ".join([*filter(None, [file.name, table.source.sheet]), *headers]),
             expected="one direction",
-            hint="leave --direction out; or give the file a name that says its direction, which goes before its header",
+            hint="leave --direction out; or state the direction in the file name, which takes precedence over "
+            "the header",
         )
     return Direction(test_options["direction"])
 
@@ -267,7 +268,7 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
     if is_sweep and (amplitude := table.roles.get("amplitude")):
         counted = amplitude.convention is not None
         if "peak-to-peak" in (amplitude.convention, entry.get("amplitude")):
-            facts["amplitudes"] += f', half of "{amplitude.header}", which counts peak-to-peak'
+            facts["amplitudes"] += f', half of "{amplitude.header}", which is peak-to-peak'
     all_oddities = tuple(turned + oddities)
     return Inspection(file, kind, direction, _written(table), columns, facts, all_oddities, entry, measured, counted)
 

@@ -21,7 +21,7 @@ from bushfit.validation import to_json_data
 
 #: A hysteresis loop, a sweep, or the raw history of a stepped sine.
 Kind = Literal["loop", "sweep", "history"]
-#: What the content of a file tells: facts in words, by label, and a sentence for each thing that is odd.
+#: What the content of a file tells: facts in words, by label, and a sentence for each unusual finding.
 Findings = tuple[dict[str, str], list[str]]
 #: For each kind of test the array of tables that lists it in a campaign.
 _TABLES = {"loop": "loops", "sweep": "sweeps"}
@@ -58,15 +58,13 @@ class InspectedFile(TypedDict):
     sheet: Annotated[str | int | None, Doc("of a workbook; null where there is one only.")]
     kind: Annotated[Kind, Doc("a hysteresis loop, a sweep, or the raw history of a stepped sine.")]
     direction: Annotated[str | None, Doc("of the test, or specimen; null where neither file nor options say it.")]
-    written: Annotated[
-        dict[str, str], Doc("how the file is written, by label: encoding, delimiter, decimal mark and so on.")
-    ]
+    written: Annotated[dict[str, str], Doc("format of the file by label: encoding, delimiter, decimal mark and so on.")]
     columns: Annotated[tuple[ColumnSeen, ...], Doc("all of them, in order.")]
     facts: Annotated[dict[str, str], Doc("in words, by label.")]
     assumed: Annotated[
-        str | None, Doc("what was assumed, with the option or key that says otherwise; null where nothing was.")
+        str | None, Doc("assumptions, each with the option or key that changes it; null if there are none.")
     ]
-    odd: Annotated[list[str], Doc("a sentence for each thing that is odd.")]
+    odd: Annotated[list[str], Doc("a sentence for each unusual finding.")]
 
 
 class InspectionDocument(TypedDict):
@@ -132,7 +130,8 @@ class Inspection:
             if self.direction.strain == "tension":
                 meaning, alternative = "that of a bar in tension", "engineering"
             assumptions.append(
-                f'its strain is taken as {meaning}, else strain = "{alternative}" or "tensor" in [[specimens]]'
+                f'its strain is read as {meaning}; otherwise state strain = "{alternative}" or "tensor" in '
+                "[[specimens]]"
             )
         if self.is_counting_open:
             missing = "nothing says" if "at_amplitude" in self.entry else "the header does not state"
@@ -205,7 +204,7 @@ def campaigns_of_parts(
             file=files[of_parts.index(None)].file,
             found=f"parts {', '.join(dict.fromkeys(filter(None, of_parts)))} in others",
             expected="a number of the specimen in every file, or the tests of one part",
-            hint="--specimen-number takes the tests of one part, and counts for files without such a column",
+            hint="--specimen-number selects the tests of one part, and applies to files without such a column",
         )
     texts = {listed_in: f"# a campaign of each part: bushfit batch {listed_in}\n"}
     for number, part in enumerate(dict.fromkeys(of_parts), start=1):
@@ -276,7 +275,7 @@ def file_text(inspection: Inspection, folder: Path | None = None) -> str:
     with suppress(ValueError):  # another drive, where no path leads
         name = Path(os.path.relpath(inspection.file, folder)).as_posix() if folder else name
     direction = (
-        f'"{inspection.direction}"' if inspection.direction else '"..."  # axial or radial: the file does not say'
+        f'"{inspection.direction}"' if inspection.direction else '"..."  # axial or radial: the file does not state it'
     )
     if inspection.kind == "history":
         name = printable(name)

@@ -224,7 +224,7 @@ class Result:
         covariance: of the fitted parameters, and of held ones whose error is known.
         quality: None where the model was not fitted.
         measured: operating conditions of the tests that were fitted; None where the model was not fitted.
-        warnings: what a user must know before using the numbers.
+        warnings: warnings on the use of the numbers.
         profile: 95 % intervals by profile likelihood, where they were asked for; None is an open end.
         at_bound: parameters that came to rest on the least or largest value they may have, and on which.
         unresolved: effects of the model with a twin of the rig, which these tests cannot tell from it.

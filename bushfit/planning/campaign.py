@@ -93,7 +93,7 @@ def campaign_toml(plan: Plan, seed: int = 0) -> str:
     knowledge, settings = plan.knowledge, settings_of(plan.planned.tests, plan.knowledge.noise, seed)
     tested = [test.direction for test in plan.planned.tests]
     lines = [
-        "# Planned by bushfit plan; bushfit simulate makes these tests of the model below. No rubber was tested.",
+        "# Planned by bushfit plan; bushfit simulate computes these tests from the model below. No rubber was tested.",
         "# All repeats of a sweep follow each other here; the order on the rig is that of the sheet.",
         *body_lines(knowledge.model.bushing, dict.fromkeys(place for place in tested if isinstance(place, Specimen))),
         *("", "[simulate]", *(_line(key, getattr(settings, key)) for key in _SETTINGS)),

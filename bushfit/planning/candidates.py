@@ -119,10 +119,10 @@ def candidates(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
     if not runs:
         places = " and ".join(map(str, request.places))
         raise ModelError(
-            "the rig can make no test of this bushing",
+            "the rig cannot test this bushing",
             place="[rig]",
             found=f"limits below every test that is considered, {places}",
-            expected="limits that let it make two points of a sweep, or a loop",
+            expected="limits that permit two points of a sweep, or a loop",
         )
     return list(dict.fromkeys(runs))
 

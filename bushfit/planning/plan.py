@@ -95,7 +95,7 @@ def explain_miss(search: PlanSearch, goal: Goal) -> str | None:
     limit, covariance = problem.limit_covariance, problem.error_covariance
     if sentence := search.untested(goal, counts):
         origin = "in the plan" if goal.target.place in problem.request.places else "on offer"
-        return f"no test so far or {origin} is made there: {sentence}"
+        return f"no test so far or {origin} covers this: {sentence}"
     if not goal.met(limit):
         reached, reason = percent(goal.half_width(limit)), goal.explain_limit(problem.knowledge, limit)
         return f"no test on offer meets it, {UNLIMITED_RUNS} runs of each would reach {reached}: {reason}"

@@ -300,7 +300,7 @@ def predict_resonance(
         ModelError: a place without displacement and force.
     """
     if place.motion is not TRANSLATION:
-        raise ModelError("no mass stands on this", found=str(place), expected="a direction or mount with a stiffness")
+        raise ModelError("this cannot carry a mass", found=str(place), expected="a direction or mount with a stiffness")
     bushings, *rig_models = _car_models(result.model, result.unresolved)
     under = Circumstances(temperature)
     if frequencies is None:

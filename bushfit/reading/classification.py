@@ -231,7 +231,7 @@ def _preferred(cells: Cells, first: Column, second: Column) -> Column:
         f"more than one column could be the {role.replace('_', ' ')}",
         found=f"{first.header}, {second.header}",
         expected="one",
-        hint=("give each a header of its own, or " if numbered else "")
+        hint=("give each column its own header, or " if numbered else "")
         + "choose it in the campaign: "
         + " or ".join(f'columns = {{ {role} = "{choice}" }}' for choice in choices),
     )

@@ -88,8 +88,8 @@ def format_of(data: bytes, file: Path) -> Format | None:
             f"this is no {by_ending.name} file",
             file=file,
             found="the first bytes of another file",
-            expected=f"a {by_ending.name} file, as its ending {file.suffix} says",
-            hint="export it again, or give it the ending of what it is, such as .csv",
+            expected=f"a {by_ending.name} file, according to its ending {file.suffix}",
+            hint="export it again, or give it the right ending, such as .csv",
         )
     return by_content
 

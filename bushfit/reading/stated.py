@@ -44,7 +44,7 @@ def motion_quantity(suffix: str = "") -> BeforeValidator:
         return parse_quantity(raw, motion.displacement_unit + suffix)
 
     units = " or ".join(f"{motion.displacement_unit}{suffix}" for motion in (TRANSLATION, ROTATION, STRAINING))
-    return converter(convert, text(f"a number with a unit of {units}, by what is tested"))
+    return converter(convert, text(f"a number with a unit of {units}, depending on the test"))
 
 
 #: Amplitude of the motion of a test.

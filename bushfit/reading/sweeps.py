@@ -163,7 +163,7 @@ def sweep_columns(
             column=columns["amplitude"],
             found=f'{counted} in the header, amplitude = "{convention}" in the campaign',
             expected="one convention",
-            hint="correct one of them; what the header says needs no key in the campaign",
+            hint="correct one of them; what the header states needs no key in the campaign",
         )
     counted = counted or convention or "zero-to-peak"
     force = columns.get("force_amplitude")

@@ -245,12 +245,12 @@ def _long_table(
     ]
     problem = None
     if None in by_role:
-        problem = "a block of this wide table does not say what it holds"
+        problem = "the quantity of a block of this wide table is not stated"
         expected = "a quantity such as K* [N/mm] or tan delta above each block, or in each header"
     elif any(block != levels[0] for block in levels):
         problem, expected = "the blocks of this wide table differ", "the same frequencies and amplitudes in all blocks"
     elif len(down) > 1 or len(across) > 1 or len(quantities) > len(by_role):
-        problem = "this wide table counts one thing in two ways"
+        problem = "this wide table states one quantity in two ways"
         expected = "one unit for each quantity, and levels of one kind"
     if problem:
         plural = {"frequency": "frequencies", "amplitude": "amplitudes", None: "amplitudes"}

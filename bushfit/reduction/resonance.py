@@ -231,7 +231,7 @@ def counts_phases_backwards(test: ResonanceTest) -> bool:
     positive = float(np.sum(weight[flexibility.real > 0.0]))
     if positive < _CLEAR_SHARE:
         raise MeasurementError(
-            "the stiffness comes out below zero",
+            "the stiffness is negative",
             file=test.source.file,
             found=f"a stiffness above zero in {100 * positive:.0f} % of the points that the test determines",
             expected="a mass that moves with the base at low frequency, and more around the resonance",

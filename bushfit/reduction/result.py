@@ -25,7 +25,7 @@ class ReductionDocument(TypedDict, total=False):
     direction: Annotated[str, Doc("what was tested: one of the two.")]
     specimen: Annotated[str, Doc("what was tested: one of the two.")]
     points: Required[Annotated[dict[str, list[float | str | None]], Doc("the columns of sweep.csv, by header.")]]
-    warnings: Required[Annotated[list[str], Doc("what a user must know before using the numbers.")]]
+    warnings: Required[Annotated[list[str], Doc("warnings on the use of the numbers.")]]
     campaign: Required[Annotated[str, Doc("the text for a campaign.")]]
     mass_kg: Annotated[float, Doc("that stood on the mount [kg]; of a resonance test, as the next two.")]
     resonance_Hz: Annotated[float, Doc("frequency of the largest transmissibility [Hz].")]
@@ -131,8 +131,8 @@ class Reduction:
                 low, high = (factor * level * (1.0 + end) for end in (miss.min(), miss.max()))
                 sentences.append(
                     f"the rig reached {low:.4g} to {high:.4g} {unit} at the level of {factor * level:.4g} {unit}: |K| "
-                    f"there is up to {number(100 * steepest * np.abs(miss).max(), 2)} % off that at the level (fits "
-                    "use the amplitude that was reached)"
+                    f"there is up to {number(100 * steepest * np.abs(miss).max(), 2)} % from that at the level "
+                    "(fits use the amplitude that was reached)"
                 )
         coarse = [step for step in steps if step.rows_per_cycle < _FEW_ROWS_PER_CYCLE]
         if coarse:
@@ -156,7 +156,7 @@ class Reduction:
             for skip in rejected[:_MOST_LISTED]
         ]
         if len(rejected) > _MOST_LISTED:
-            sentences.append(f"{len(rejected) - _MOST_LISTED} more stretches make no point")
+            sentences.append(f"{len(rejected) - _MOST_LISTED} more parts give no point")
         return tuple(sentences)
 
 

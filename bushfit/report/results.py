@@ -271,7 +271,7 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
         if not nearest.is_dir():
             raise NotADirectoryError(errno.ENOTDIR, "Not a directory", str(nearest))
         if not os.access(nearest, os.W_OK | os.X_OK):
-            raise PermissionError(errno.EACCES, "no right to write there", str(nearest))
+            raise PermissionError(errno.EACCES, "no permission to write there", str(nearest))
         existing = [name for name in names if os.path.lexists(folder / name)]
         for name in existing:
             if (folder / name).is_dir():
@@ -327,5 +327,5 @@ def unwritable(folder: Path, error: OSError) -> OutputError:
         "the results cannot be written",
         file=folder,
         found=error.strerror or str(error),
-        hint="free some space or rights there, or name another folder with -o/--output",
+        hint="free some space, get permission, or name another folder with -o/--output",
     )

@@ -501,7 +501,7 @@ def required(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
     """
     for header in headers:
         if header not in rows:
-            hint = "write the results anew, or remove the table: the page then goes without it"
+            hint = "write the results again, or remove the table: the page then omits it"
             raise ModelError("a column of a table is missing", expected=header, hint=hint)
     return rows
 

@@ -67,7 +67,7 @@ def _campaign_toml(simulated: Simulated, form: Form) -> str:
         file, folder = (quote_path(Path(name)) for name in (f"{resonance.name}.{end}", resonance.name))
         option = "specimen" if isinstance(resonance.direction, Specimen) else "direction"
         place = quote_path(Path(str(resonance.direction)))
-        lines += ["", "# A sweep comes of this resonance test with:"]
+        lines += ["", "# This command converts the resonance test to a sweep:"]
         lines += [f'# bushfit reduce {file} --mass "{mass:.6g} kg" --{option} {place} -o {folder}']
         lines += [
             f"# {line}" for line in table_lines("sweeps", f"{resonance.name}/sweep.{end}", resonance.direction) if line

@@ -148,7 +148,7 @@ def _clean_programme(truth: Model, test: SimulatedLoop, under: Circumstances) ->
             place="simulate.loops",
             found=f"{duration:.3g} s at up to {fastest:.3g} Hz, {duration / step:.2g} steps",
             expected=f"no more than {_MOST_STEPS} steps, {_ROWS_PER_CYCLE * _STEPS_PER_ROW} a cycle of the fastest",
-            hint="pause for less, or simulate slow and fast loops as programmes of their own",
+            hint="use shorter pauses, or simulate slow and fast loops in separate programmes",
         )
     rest = np.zeros(round(test.pause / step))
     motions = []

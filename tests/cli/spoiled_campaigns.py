@@ -50,7 +50,7 @@ IN_CAMPAIGN = [
 ]
 #: The same for keys that the plain campaign does not use.
 IN_MORE = [
-    ('min = "0.5 MPa"', 'min = "5 MPa"', "more.toml, fit.mu: these limits hold no value", "min below max within 1000 to 1e+09 Pa, and value between them"),
+    ('min = "0.5 MPa"', 'min = "5 MPa"', "more.toml, fit.mu: no value is within these limits", "min below max within 1000 to 1e+09 Pa, and value between them"),
     ("vary = true", 'vary = "yes"', "more.toml, fit.mu.vary: this value is not understood", "true or false"),
     ('step = "10 Hz"', 'step = "1e-9 Hz"', "more.toml, predict.frequencies: this is no range of frequencies", "0 < start <= stop, step > 0"),
     (', step = "10 Hz"', "", "more.toml, predict.frequencies: this is no range of frequencies", '{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }, or a list such as ["5 Hz", "15 Hz"]'),
@@ -63,7 +63,7 @@ IN_MORE = [
     ("alpha = 0.24", "alpha = 2.4", "more.toml, alpha: impossible value", "0.02 to 1 (order of the fractional derivative)"),
     ('amplitude = "1 mm"', 'amplitude = "1 mm"\namplitudes = ["1 mm"]', "more.toml, simulate.loops #1: one of these keys is too many", "amplitude = ..., or amplitudes = [...] of a programme"),
     ('frequency = "0.1 Hz"', "", "more.toml, simulate.loops #1: a key is missing", "frequency = ..., or frequencies = [...] of a programme"),
-    ('frequency = "0.1 Hz"', 'frequencies = ["0.001 Hz", "10 Hz"]', "simulate.loops: a programme of loops is too long to simulate", "pause for less, or simulate slow and fast loops as programmes of their own"),
+    ('frequency = "0.1 Hz"', 'frequencies = ["0.001 Hz", "10 Hz"]', "simulate.loops: a programme of loops is too long to simulate", "use shorter pauses, or simulate slow and fast loops in separate programmes"),
     ('specimen = "DMA"', 'specimen = "DMB"', "more.toml, simulate.sweeps #2: this specimen is not in the campaign", "one of DMA"),
     ('specimen = "DMA"', 'specimen = "DMA"\ndirection = "axial"', "more.toml, simulate.sweeps #2: a specimen has no such direction", 'direction = "shear", or none'),
     ('specimen = "DMA"\n', "", "more.toml, simulate.sweeps #2: a test without a direction", 'or specimen = "DMA"'),

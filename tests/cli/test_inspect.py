@@ -122,7 +122,7 @@ def test_the_unit_tells_frequency_from_force(typed: Run, tmp_path: Path, header:
     [
         ("amplitude [mm]", (), "zero-to-peak is assumed; --amplitude peak-to-peak", "half of"),
         ("Pegel [mm]", ("--column", "amplitude=Pegel"), "zero-to-peak is assumed; --amplitude", "half of"),
-        ("Amplitude SS [mm]", (), '0.05 mm zero-to-peak, half of "Amplitude SS [mm]", which counts peak', "is assumed"),
+        ("Amplitude SS [mm]", (), '0.05 mm zero-to-peak, half of "Amplitude SS [mm]", which is peak', "is assumed"),
         ("Pegel", ("--column", "amplitude=Pegel", "--unit", "amplitude=mmpp"), 'half of "Pegel"', "is assumed"),
         ("amplitude [mm]", ("--amplitude", "peak-to-peak"), 'half of "amplitude [mm]"', "is assumed"),
         ("amplitude 0-p [mm]", (), "0.1 mm zero-to-peak", "is assumed"),

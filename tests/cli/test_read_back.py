@@ -100,7 +100,9 @@ def reduced(tests: Path) -> None:
     typed = [line for line in said if line.startswith("bushfit reduce")]
     for line in typed:
         typing(tests)(*shlex.split(line)[1:], "--no-plots")
-    told = [line for line in said if line not in typed and not line.startswith(("A sweep comes", "Simulated by"))]
+    told = [
+        line for line in said if line not in typed and not line.startswith(("This command converts", "Simulated by"))
+    ]
     (tests / "campaign.toml").write_text("\n".join(told), encoding="utf-8")
 
 

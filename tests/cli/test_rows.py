@@ -164,7 +164,7 @@ def test_a_column_that_is_given_twice(typed: Run, points: dict[str, Rows], tmp_p
     export(tmp_path / "axial.csv", head, [(row[0], row[1], row[1], *row[2:]) for row in points["axial"]])
     typed("inspect", "axial.csv", "-o", "x", "--no-plots")
     export(tmp_path / "axial.csv", head, [(row[0], row[1], 3 * row[1], *row[2:]) for row in points["axial"]])
-    assert "give each a header of its own" in typed("inspect", "axial.csv", "--no-plots", status=2).stderr
+    assert "give each column its own header" in typed("inspect", "axial.csv", "--no-plots", status=2).stderr
     export(
         tmp_path / "axial.csv",
         ("Freq [Hz]", "Amplitude [mm]", "Dyn. Disp. p-p [mm]", *head[3:]),

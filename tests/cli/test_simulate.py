@@ -72,8 +72,8 @@ def test_simulated_specimens_are_reduced_and_fitted_as_the_campaign_says(typed: 
     assert len(commands) == 2
     for command in commands:
         typing(tmp_path / "sim")(*command, "--no-plots")
-        start = next(place for place, line in enumerate(lines) if line.startswith("# A sweep comes"))
-    named = "\n".join(line for line in lines[start:] if not line.startswith(("# A sweep", "# bushfit")))
+        start = next(place for place, line in enumerate(lines) if line.startswith("# This command converts"))
+    named = "\n".join(line for line in lines[start:] if not line.startswith(("# This command", "# bushfit")))
     (tmp_path / "sim/all.toml").write_text("\n".join(lines[:start]) + "\n" + named.replace("# ", ""))
     campaign = load_campaign(tmp_path / "sim/all.toml")
     model = from_document(truth).model

@@ -45,7 +45,7 @@ def assert_refused(row: Spoiled, done: Done | subprocess.CompletedProcess[str]) 
     assert done.returncode == 2, done.stderr
     assert done.stdout == ""
     assert "Traceback" not in done.stderr
-    assert "fault in bushfit" not in done.stderr
+    assert "internal error of bushfit" not in done.stderr
     assert len(ERROR.findall(done.stderr)) == 1, done.stderr
     for words in row.says:
         assert words in done.stderr, done.stderr

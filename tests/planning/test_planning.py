@@ -288,7 +288,7 @@ def test_what_is_given_by_hand_half_of_the_rows_and_a_rig_that_can_make_no_test(
     assert knowledge.names == tuple(paper_model.parameters)
     np.testing.assert_allclose(knowledge.covariance, 0.25 * np.eye(5))
     assert "a factor of 2.7" in knowledge.source
-    with pytest.raises(ModelError, match="the rig can make no test"):
+    with pytest.raises(ModelError, match="the rig cannot test"):
         plan(known, wanted("predictions", 4.0, max_force=1e-3))
     # Whatever its sampling, the noise of a force is that of as many rows as planned loops have.
     (loop,) = campaign.loops

@@ -147,7 +147,7 @@ def test_a_folder_that_allows_no_writing() -> None:
             try:
                 write(folder, NEW, force=True)
             except OutputError as error:
-                status = 0 if "no right to write there" in str(error) else 2
+                status = 0 if "no permission to write there" in str(error) else 2
             os._exit(status)
         assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
         assert contents(folder) == {}

@@ -172,7 +172,7 @@ def read_results(folder: Path) -> list[ResultFile]:
             file=folder,
             found=", ".join(present) or "nothing",
             expected=" or ".join(f"{name}.json" for name in MODELS),
-            hint=f"bushfit run CAMPAIGN -o {folder} makes one",
+            hint=f"bushfit run CAMPAIGN -o {folder} writes one",
         )
     read = {name: read_document(file) for name, file in files.items()}
     specimens = report_record(read, {}, files).result.specimens
@@ -205,7 +205,7 @@ def read_table(folder: Path, name: str) -> pd.DataFrame | None:
                 "this table is not as bushfit writes it",
                 file=file,
                 found=str(error),
-                hint="write the results anew, or remove the file: the page then goes without it",
+                hint="write the results again, or remove the file: the page then omits it",
             ) from error
     return None
 

@@ -56,8 +56,8 @@ def plan_figure(plan: Plan) -> Figure:
     _draw_stiffness(grid[-1, 1], programmes)
     return style.explained(
         figure,
-        "Above: points of each run of the rig; a line joins the points of a sweep. Below: expected relative standard "
-        "errors of the parameters and of the stiffness at the wanted points after each programme. All values are "
+        "Above: points of each run; a line joins the points of a sweep. Below: expected relative standard errors "
+        "of the parameters and of the stiffness at the wanted points, after each programme. All values are "
         "computed from a model: nothing was tested.",
     )
 
