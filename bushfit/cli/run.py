@@ -91,7 +91,7 @@ def _model_description(outcome: RunOutput) -> str:
     """Description of the model to use."""
     if outcome.diagnosed and outcome.added:
         effects = ", ".join(effect.label for effect in outcome.diagnosed.diagnosis.effects)
-        return f"with {effects}; joint.json is without"
+        return f"with {effects}; joint.json is the fit without"
     if outcome.diagnosed and outcome.diagnosed.diagnosis.changed:  # a mistake in the record is named
         return "the joint fit to the uncorrected tests: correct the record first, then run again"
     return "the joint fit"
@@ -101,7 +101,7 @@ def _print_range(output: Output, outcome: RunOutput) -> None:
     """Print the tested range of each direction, whether or not its tests were fitted."""
     measured = outcome.result.measured
     fitted = measured.directions if measured else ()
-    output.console.print("tested range; outside of it the model extrapolates", style="bold")
+    output.console.print("tested range; outside this range the model extrapolates", style="bold")
     for direction in dict.fromkeys(data_set.direction for data_set in outcome.data.data_sets):
         unit, factor = direction.display.displacement
         tests = [data_set for data_set in outcome.data.data_sets if data_set.direction == direction]

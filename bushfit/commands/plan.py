@@ -116,7 +116,7 @@ def plan(
     for name in parameters:
         if name not in knowledge.names:
             raise ModelError(
-                "this parameter is not among those that tests are to tell",
+                "this is not a parameter of the plan",
                 place="--parameters",
                 found=name,
                 expected=", ".join(knowledge.names),

@@ -84,9 +84,9 @@ class PlanFile(TypedDict):
     """plan.json: the tests of a plan and their expected results."""
 
     schema: Annotated[str, Field(description="Name and version of this schema.")]
-    source: Annotated[str, Field(description="Origin of what is knowledge before further tests.")]
+    source: Annotated[str, Field(description="Starting point of the plan.")]
     aim: Annotated[Aim, Field(description="Aim of the plan.")]
-    hours: Annotated[float, Field(description="Largest duration on the rig [h].")]
+    hours: Annotated[float, Field(description="Available time on the rig [h].")]
     tests: Annotated[list[PlannedRun], Field(description="Runs of the rig in their order.")]
     hours_planned: Annotated[float, Field(description="Duration of the planned tests [h].")]
     hours_standard: Annotated[

@@ -209,7 +209,10 @@ def test_repeats_that_nothing_tells_are_asked_for(sweep: Sweep, tmp_path: Path, 
         ("loop axial 1,0 mm 10mm_min.csv", ()),
         ("axial_18mm_bushing_1mm.csv", ()),
         ("loop_axial_2mm.csv", ("the name states 2 mm, the amplitude is 1 mm zero-to-peak: the name may be p",)),
-        ("loop_axial_0p5mm_0.2Hz.csv", ("the name states 0.5 mm, the amplitude", "the name says 0.2 Hz, the frequency")),
+        (
+            "loop_axial_0p5mm_0.2Hz.csv",
+            ("the name states 0.5 mm, the amplitude", "the name says 0.2 Hz, the frequency"),
+        ),
     ],
 )
 def test_labels_are_held_against_the_content(loop: Loop, tmp_path: Path, name: str, said: tuple[str, ...]) -> None:
@@ -324,7 +327,9 @@ def test_gaps_in_a_motion_are_told_and_slow_loops_are_no_stepped_sine(
     table = raw_loop_table(loop).iloc[:, 1:].drop(index=range(500, 530))
     table.to_csv(tmp_path / "axial.csv", index=False)
     odd = inspect_file(tmp_path / "axial.csv", {"frequency": "0.1 Hz", "waveform": "sine"}).odd
-    assert any("1 gap in the motion, the first after data row 500: the displacement jumps from " in line for line in odd)
+    assert any(
+        "1 gap in the motion, the first after data row 500: the displacement jumps from " in line for line in odd
+    )
     planned = SimulatedLoop(Direction.AXIAL, 5e-4, cycles=4, frequencies=(0.1, 0.3))
     (record,) = simulate(paper_model, SimulateSettings(loops=(planned,))).loops
     seen = look(tmp_path, record)

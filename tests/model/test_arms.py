@@ -76,7 +76,7 @@ def test_a_model_without_memory_has_none(paper_model: Model) -> None:
 
 
 def test_what_no_passive_arms_can_do_is_refused() -> None:
-    with pytest.raises(ModelError, match="no springs and dashpots") as refused:
+    with pytest.raises(ModelError, match="no set of springs and dashpots") as refused:
         fitted_arms(lambda omega: 1e4j + 0.0 * omega, (5.0, 155.0), 0.01)
     assert "an error of" in str(refused.value)
     with pytest.raises(ModelError, match="no error for arms"):

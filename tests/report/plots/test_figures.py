@@ -314,7 +314,7 @@ def test_many_loops(paper_model: Model, looped: Looped, count: int) -> None:
     assert names[-1] == "model"
     assert names[0].startswith("0.5 mm, 0.1 Hz")
     assert len(names) == min(count, 8) + 1
-    assert ("Of more than 8 loops of a direction 8 are drawn" in note(figure)) is (count > 8)
+    assert ("Only 8 loops of a direction are drawn" in note(figure)) is (count > 8)
     for after in (paper_model, paper_model.with_values({"mu": 1.2 * paper_model.values["mu"]})):
         checked(gap(paper_model, after, data_sets))
 
