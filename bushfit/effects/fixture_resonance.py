@@ -5,6 +5,10 @@ from functools import partial
 import numpy as np
 
 from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
+from bushfit.effects.maxwell import recursion
+
+#: Largest damping ratio in time: at 1 both poles of the mode are one, which has another solution.
+_UNDER = 1.0 - 1e-9
 
 
 def fixture(p: Values, omega: Array) -> Array:
@@ -57,9 +61,15 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
 
 
 def _mode(omega: float, damping: float, push: Array, step: float) -> Array:
-    """y'' + 2 zeta w y' + w^2 y = w^2 push from rest, exact for a push that is straight between samples."""
-    from scipy.signal import cont2discrete, lfilter
+    """y'' + 2 zeta w y' + w^2 y = w^2 push from rest, exact for a push that is straight between samples.
 
-    system = (np.array([omega**2]), np.array([1.0, 2.0 * damping * omega, omega**2]))
-    above, under, _ = cont2discrete(system, step, method="foh")
-    return np.asarray(lfilter(np.ravel(above), under, push))
+    Notes: y = w^2/Im(p) Im z with z' = p z + push and the pole p above the real axis.
+    """
+    damping = min(damping, _UNDER)
+    pole = omega * complex(-damping, np.sqrt(1.0 - damping**2))
+    turn = pole * step
+    mean = np.expm1(turn) / turn  # of exp(p t) over a step, and weighted by the push at its end
+    at_end = (mean - 1.0) / turn
+    before = np.concatenate(([0.0], push[:-1]))
+    z = recursion(np.exp(turn), step * ((mean - at_end) * before + at_end * push))
+    return np.asarray(omega**2 / pole.imag * z.imag)

@@ -42,14 +42,24 @@ def relax(rate: Value, values: Array, step: Value) -> Array:
     >>> relax(1.0, np.array([1.0, 2.0, 2.0]), np.log(2.0)).round(3)
     array([0.721, 1.082, 0.541])
     """
-    from scipy.signal import lfilter
     from scipy.special import exprel
 
     def row(decay: float, values: Array) -> Array:
-        gain = exprel(-decay)
-        return np.asarray(lfilter([gain, -gain], [1.0, -np.exp(-decay)], values))
+        return recursion(float(np.exp(-decay)), exprel(-decay) * np.diff(values, prepend=0.0))
 
     return np.asarray(np.vectorize(row, signature="(),(n)->(n)")(np.atleast_1d(rate * step)[..., 0], values))
+
+
+def recursion(ratio: complex, added: Array) -> Array:
+    """Solution y_n = ratio y_{n-1} + added_n from rest, (n,) -> (n,).
+
+    >>> recursion(0.5, np.array([1.0, 0.0, 0.0]))
+    array([1.  , 0.5 , 0.25])
+    """
+    from scipy.linalg import solve_banded
+
+    bands = np.stack((np.ones(added.size), np.full(added.size, -ratio)))
+    return np.asarray(solve_banded((1, 0), bands, added, check_finite=False))
 
 
 def stress(p: Values, history: History) -> Array:
