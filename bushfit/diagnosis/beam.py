@@ -165,7 +165,7 @@ class Search:
         new = [each.name for each in weighed.effects if state.key | {each.name} not in self._seen]
         prior = state.log_prior + state.density - weighed.log_posterior
         evidence = {
-            each.name: prior + self._prior("effect", each.name) + worth.whole
+            each.name: prior + self._prior("effect", each.name) + worth.total
             for each, worth in weighed.group_evidence
             if each.kind == "effect"
         }
@@ -214,13 +214,13 @@ class Search:
     def _with_places(self, weighed: Weighed, depth: int) -> list[Weighed]:
         state, grown = weighed.state, []
         own = [(each, worth) for each, worth in weighed.group_evidence if isinstance(each, FaultyPlace)]
-        own.sort(key=lambda pair: -(self._prior("place", pair[0].name) + pair[1].whole))
+        own.sort(key=lambda pair: -(self._prior("place", pair[0].name) + pair[1].total))
         for place, shifted in own[:_PLACES]:
             free = place.freely
             (scattered,) = weighed.group_evidence_of([free])
-            each, worth = (free, scattered) if scattered.whole > shifted.whole else (place, shifted)
+            each, worth = (free, scattered) if scattered.total > shifted.total else (place, shifted)
             odds = self._prior("place", each.name) - log(depth + 1)
-            better = state.log_prior + state.density + odds + worth.whole > weighed.log_posterior
+            better = state.log_prior + state.density + odds + worth.total > weighed.log_posterior
             if better and state.key | {each.name} not in self._seen:
                 evidence = state.evidence
                 if evidence.reduced > _BENT:  # by the place, too

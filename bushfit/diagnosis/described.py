@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.currency import LinearModel
+from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.document import Description
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import unnamed
@@ -112,7 +112,7 @@ def weighed(fitted: Evidence, rig: RigSettings) -> tuple[Evidence, LinearModel]:
     bare = scattering_alone(fitted)
     rows, curves = bare.solution.jacobian, [explanation.group for explanation in unnamed(bare) if explanation.group]
     plain = LinearModel(bare.residual, rows, np.zeros(len(rows)), rig_errors(bare, rig), curves)
-    return bare, replace(plain, at=plain.likely(_NEAR))
+    return bare, replace(plain, chosen_nodes=plain.likely(_NEAR))
 
 
 def _refitted(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds) -> Evidence:

@@ -10,7 +10,7 @@ import numpy as np
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim
-from bushfit.diagnosis.currency import Group, GroupEvidence, LinearModel
+from bushfit.diagnosis.linear_model import Group, GroupEvidence, LinearModel
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import (
     Explanation,
@@ -245,7 +245,9 @@ class Weighed:
 
     def group_evidence_of(self, every: Sequence[Explanation]) -> Sequence[GroupEvidence]:
         """Evidence for explanations that have columns."""
-        return replace(self.first, at=self._nodes).group_evidence_of([each.group for each in every if each.group])
+        return replace(self.first, chosen_nodes=self._nodes).group_evidence_of(
+            [each.group for each in every if each.group]
+        )
 
     def with_(self, each: Explanation, worth: GroupEvidence, log_odds: float) -> list[Hypothesis]:
         """Hypotheses that extend this state by one explanation, with its evidence counted linearly.

@@ -13,7 +13,7 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import COMPOUND, KNOWN, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
 from bushfit.effects.contract import Array
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, group_repeats, split_by_kind, with_gains
+from bushfit.fitting.preparation import MeasuredSweep, group_repeats, split_by_kind, with_gains
 from bushfit.fitting.rig_class import ASSUMED, of_class
 
 #: Kinds of errors, by their place in `Node.errors`.
@@ -24,12 +24,13 @@ _FEWEST = 4
 
 @dataclass(frozen=True)
 class Node:
-    """One size of each of the rig's errors, with the logarithm of its weight.
+    """One size of each of the rig's errors, with its prior weight.
 
     Args:
         scatter: standard deviation of a sweep's point, relative to the one that counts.
         errors: standard deviations by kind of error, in units of the rig's class.
-        wide: whether errors of levels are larger than the class allows.
+        log_weight: natural log of the prior weight.
+        wide: True if errors of levels are larger than the class allows.
         compound: size of the compound's own deviation from the model's laws, relative to |K|.
     """
 
@@ -45,10 +46,10 @@ class Block:
     """Rows of the tests that share errors of the rig, and no others.
 
     Args:
-        rows: their numbers, (n,).
-        columns: whitened residuals that an error of the class makes of them, (w, n).
-        kinds: number of each error's kind, (w,).
-        scatters: whether the rows scatter as sweeps' points do, which nodes change.
+        rows: indices of the rows, (n,).
+        columns: whitened residuals that an error of the class causes, (w, n).
+        kinds: kind of each error, (w,).
+        scatters: True if the rows scatter as sweeps' points do, which nodes change.
     """
 
     rows: Array
@@ -65,56 +66,37 @@ class RigErrors:
     nodes: Sequence[Node]
 
     @cached_property
-    def _combinations(self) -> dict[tuple[float, ...], int]:
-        """Index of each distinct combination of scatter and errors of the nodes."""
-        return {sizes: number for number, sizes in enumerate(dict.fromkeys((n.scatter, *n.errors) for n in self.nodes))}
-
-    @cached_property
-    def combination(self) -> Array:
-        """Index of the combination of scatter and errors of each node, (nodes,)."""
-        return np.array([self._combinations[node.scatter, *node.errors] for node in self.nodes])
-
-    @cached_property
-    def distinct_scatter(self) -> Array:
-        """Scatter of each combination, (combinations,)."""
-        return np.array([sizes[0] for sizes in self._combinations])
-
-    @cached_property
-    def within_class(self) -> Array:
-        """Mask of the nodes within the class of the rig, (nodes,)."""
-        return np.array([not node.wide for node in self.nodes])
-
-    @cached_property
-    def compound(self) -> Array:
-        """Size of the compound's own deviation at each node, (nodes,)."""
-        return np.array([node.compound for node in self.nodes])
-
-    @cached_property
-    def width(self) -> int:
-        """Largest number of errors of a block."""
-        return max((len(block.kinds) for block in self.blocks), default=0)
+    def combinations(self) -> tuple[Array, Array]:
+        """Distinct sizes of scatter and errors, (combinations, 1 + kinds), and the index of each node's, (nodes,)."""
+        sizes = np.array([(node.scatter, *node.errors) for node in self.nodes])
+        distinct, index = np.unique(sizes, axis=0, return_inverse=True)
+        return distinct, index.ravel()
 
     @cached_property
     def roots(self) -> tuple[Array, Array]:
         """Factors of the covariance of the errors at every combination.
 
-        Returns: L^-1 D of S = 1 + D W W^T D = L L^T, (combinations, blocks, w, w), and ln|S|, (combinations,).
+        Returns:
+            L^-1 D of S = 1 + D W W^T D = L L^T, (combinations, blocks, w, w), and ln|S|, (combinations,).
 
-        Notes: the squared product of the factor with the products of errors and rows is subtracted from the products of
+        Notes:
+            The squared product of the factor with the products of errors and rows is subtracted from the products of
             rows.
         """
-        inner = np.zeros((len(self.blocks), self.width, self.width))
+        sizes, _ = self.combinations
+        width = max((len(block.kinds) for block in self.blocks), default=0)
+        inner = np.zeros((len(self.blocks), width, width))
         kinds = np.full(inner.shape[:2], -1)
         for number, block in enumerate(self.blocks):
-            size = len(block.kinds)
-            inner[number, :size, :size] = block.columns @ block.columns.T
-            kinds[number, :size] = block.kinds
+            count = len(block.kinds)
+            inner[number, :count, :count] = block.columns @ block.columns.T
+            kinds[number, :count] = block.kinds
         scatters = np.array([block.scatters for block in self.blocks], dtype=bool)
-        share = np.where(scatters, 1.0 / self.distinct_scatter[:, None], 1.0)[..., None]
-        errors = np.array([(*sizes[1:], 0.0) for sizes in self._combinations])[:, kinds] * share
-        root = np.linalg.cholesky(np.eye(self.width) + errors[..., None] * inner * errors[..., None, :])
-        log_size = 2.0 * np.sum(np.log(np.einsum("nbii->nbi", root)), axis=(1, 2))
-        return np.linalg.inv(root) * (errors * share)[..., None, :], log_size
+        share = np.where(scatters, 1.0 / sizes[:, :1], 1.0)[..., None]
+        errors = np.pad(sizes[:, 1:], ((0, 0), (0, 1)))[:, kinds] * share
+        root = np.linalg.cholesky(np.eye(width) + errors[..., None] * inner * errors[..., None, :])
+        log_det = 2.0 * np.sum(np.log(np.einsum("nbii->nbi", root)), axis=(1, 2))
+        return np.linalg.inv(root) * (errors * share)[..., None, :], log_det
 
 
 def scattering_alone(evidence: Evidence) -> Evidence:
@@ -140,7 +122,7 @@ def scattering_alone(evidence: Evidence) -> Evidence:
 
 def rig_errors(evidence: Evidence, rig: RigSettings) -> RigErrors:
     """Errors of the rig in the tests that a model was fitted to."""
-    return RigErrors(blocks(evidence, rig), nodes(evidence))
+    return RigErrors(list(blocks(evidence, rig)), nodes(evidence))
 
 
 def nodes(evidence: Evidence) -> list[Node]:
@@ -158,66 +140,53 @@ def nodes(evidence: Evidence) -> list[Node]:
     freedom = max((sweep.noise.scatter_freedom for sweep in sweeps), default=0)
     thirds = (np.arange(3) + 0.5) / 3
     scatters = np.sqrt(freedom / chdtri(freedom, 1.0 - thirds)).tolist() if 0 < freedom < KNOWN else [1.0]
-    runs = RUNS if sweeps else ((0.0, 1.0),)
-    waves = WANDERING if sweeps else ((0.0, 1.0),)
+    runs, waves = (RUNS, WANDERING) if sweeps else (((0.0, 1.0),),) * 2
     unnormalised = [
         Node(scatter, (run, level, wave, level), log(a * b * c * d / len(scatters)), level > WITHIN_CLASS, deviation)
         for scatter, (run, a), (level, b), (wave, c), (deviation, d) in product(scatters, runs, LEVELS, waves, COMPOUND)
-        if deviation == 0.0 or level <= WITHIN_CLASS  # what levels have beyond the class would hide a deviation
+        if deviation == 0.0 or level <= WITHIN_CLASS  # errors of levels beyond the class would hide a deviation
     ]
-    whole = logsumexp([node.log_weight for node in unnormalised])
-    return [replace(node, log_weight=float(node.log_weight - whole)) for node in unnormalised]
+    total = logsumexp([node.log_weight for node in unnormalised])
+    return [replace(node, log_weight=float(node.log_weight - total)) for node in unnormalised]
 
 
-def blocks(evidence: Evidence, rig: RigSettings) -> list[Block]:
+def blocks(evidence: Evidence, rig: RigSettings) -> Iterator[Block]:
     """List blocks of rows that share errors: gains and phases of each level of a sweep, and repeated loops.
 
     Args:
         evidence: the fitted model and the tests.
         rig: stated class of the rig.
 
-    Returns:
+    Yields:
         Blocks that together contain every row once.
     """
     loops, sweeps = split_by_kind(evidence.data_sets)
-    gain = of_class(rig, ASSUMED)
-    found = [block for sweep in sweeps for block in _of_sweep(evidence, sweep, gain)]
+    classes = of_class(rig, ASSUMED)
+    for sweep in sweeps:
+        first, count = evidence.place[sweep].start, sweep.frequency.size
+        runs = np.split(np.arange(count), sweep.block_starts[1:])
+        units = sweep.whiten(np.full(count, 1.0 + 1.0j)).reshape(2, count)
+        for level in np.unique(sweep.held):
+            line = np.flatnonzero(sweep.held == level)
+            line_runs = [run - line[0] for run in runs if sweep.held[run[0]] == level]
+            columns, kinds = _shared_errors(line.size, line_runs)
+            for part, unit_class in enumerate(classes):
+                yield Block(first + part * count + line, unit_class * columns * units[part, line], kinds, scatters=True)
     for group in group_repeats(loops):
-        rows = np.concatenate([np.arange(*_ends(evidence, loop)) for loop in group])
-        column = gain[0] * np.concatenate([loop.unit_gain for loop in group])
-        found.append(Block(rows, column[None], np.array([_LOOP]), scatters=False))
-    return found
+        rows = np.concatenate([np.arange(evidence.place[loop].start, evidence.place[loop].stop) for loop in group])
+        gain = classes[0] * np.concatenate([loop.unit_gain for loop in group])
+        yield Block(rows, gain[None], np.array([_LOOP]), scatters=False)
 
 
-def _ends(evidence: Evidence, data_set: MeasuredSweep | MeasuredLoop) -> tuple[int, int]:
-    place = evidence.place[data_set]
-    return place.start, place.stop
-
-
-def _of_sweep(evidence: Evidence, sweep: MeasuredSweep, classes: Sequence[float]) -> Iterator[Block]:
-    first, _ = _ends(evidence, sweep)
-    size, runs = sweep.frequency.size, np.split(np.arange(sweep.frequency.size), sweep.block_starts[1:])
-    units = sweep.whiten(np.full(size, 1.0 + 1.0j)).reshape(2, size)
-    for level in np.unique(sweep.held):
-        line = np.flatnonzero(sweep.held == level)
-        line_runs = [run - line[0] for run in runs if sweep.held[run[0]] == level]
-        columns, kinds = _shared(line.size, line_runs)
-        for part, unit_class in enumerate(classes):
-            rows = first + part * size + line
-            yield Block(rows, unit_class * columns * units[part, line], kinds, scatters=True)
-
-
-def _shared(size: int, runs: Sequence[Array]) -> tuple[Array, Array]:
+def _shared_errors(count: int, runs: Sequence[Array]) -> tuple[Array, Array]:
     """Columns of the rig's errors in the points of a line, (w, n), and the kind of each, (w,)."""
-    columns, kinds = [np.ones(size)], [_LEVEL]
+    columns, kinds = [np.ones(count)], [_LEVEL]
     for run in runs:
-        among = np.zeros(size)
-        among[run] = 1.0
-        columns.append(among)
-        kinds.append(_RUN)
-        for order in range(1, WAVES + 1) if run.size >= _FEWEST else ():
-            wave = np.zeros(size)
-            wave[run] = np.sqrt(2.0) * np.cos(np.pi * order * (np.arange(run.size) + 0.5) / run.size) / order
-            columns.append(wave)
-            kinds.append(_WAVE)
+        orders = np.arange(1, WAVES + 1)[:, None] if run.size >= _FEWEST else np.empty((0, 1))
+        waves = np.sqrt(2.0) * np.cos(np.pi * orders * (np.arange(run.size) + 0.5) / run.size) / orders
+        for shape, kind in ((np.ones(run.size), _RUN), *((wave, _WAVE) for wave in waves)):
+            column = np.zeros(count)
+            column[run] = shape
+            columns.append(column)
+            kinds.append(kind)
     return np.array(columns), np.array(kinds)

@@ -14,7 +14,7 @@ import pytest
 from rigged import LEVELS, SHARED, Fitted, Measured, Tamper, both, loop_too_strong, no_loops, no_repeats, no_sweeps, off
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.currency import LinearModel
+from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation, effects, places, unnamed
 from bushfit.diagnosis.propose import proposals, scores, sensitivity

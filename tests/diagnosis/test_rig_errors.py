@@ -55,7 +55,7 @@ def test_what_shares_an_error_moves_together(
 def test_every_point_is_in_one_block_and_scatters_as_its_sweep(bare: Evidence) -> None:
     """Loops each by itself, and each level of a sweep in gain and in phase."""
     loops, sweeps = split_by_kind(bare.data_sets)
-    made = blocks(bare, RIG)
+    made = list(blocks(bare, RIG))
     rows = np.concatenate([block.rows for block in made])
     assert np.array_equal(np.sort(rows), np.arange(bare.residual.size))
     assert [block.scatters for block in made].count(False) == len(loops)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bushfit.diagnosis.currency import Group
+from bushfit.diagnosis.linear_model import Group
 from bushfit.diagnosis.propose import Proposal
 from bushfit.effects.contract import Array
 from bushfit.geometry import Place

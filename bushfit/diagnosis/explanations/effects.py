@@ -4,7 +4,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from bushfit.diagnosis.currency import Group
+from bushfit.diagnosis.linear_model import Group
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.contract import MissingEffect
 from bushfit.diagnosis.propose import proposals

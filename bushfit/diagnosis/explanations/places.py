@@ -7,7 +7,7 @@ from itertools import groupby
 
 import numpy as np
 
-from bushfit.diagnosis.currency import Group
+from bushfit.diagnosis.linear_model import Group
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.contract import FaultyPlace
 from bushfit.effects.contract import Array

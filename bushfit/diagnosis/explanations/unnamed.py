@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.linalg import block_diag
 
-from bushfit.diagnosis.currency import Group
+from bushfit.diagnosis.linear_model import Group
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.contract import Explanation
 from bushfit.effects.contract import Array

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.special import logsumexp
 from scipy.stats import kstest, multivariate_normal, norm
 
-from bushfit.diagnosis.currency import Group, LinearModel
+from bushfit.diagnosis.linear_model import Group, LinearModel
 from bushfit.diagnosis.priors import SIZES
 from bushfit.diagnosis.rig_errors import Block, Node, RigErrors
 from bushfit.effects.contract import Array
@@ -104,7 +104,7 @@ def test_an_amount_is_integrated_over_its_sense(sense: int) -> None:
     """Numerically, and the free parameter with it: where an effect is missing, the model stays below the tests."""
     of = ledger(4, flat=1, known=0)
     column, unit, own = of.groups[0].columns[0], 0.7, of.jacobian[0]
-    of = replace(of, at=np.array([0]), groups=(Group(column[None], np.array([unit]), together=False, sense=sense),))
+    of = replace(of, chosen_nodes=np.array([0]), groups=(Group(column[None], np.array([unit]), together=False, sense=sense),))
     noise, spreads = multivariate_normal(cov=covariance(of, NODES[0])), SIZES / unit
     low, high = {1: (0.0, 1.0), -1: (-1.0, 0.0), 0: (-1.0, 1.0)}[sense]
     x, weight = np.polynomial.legendre.leggauss(300)
@@ -197,7 +197,7 @@ def test_the_chance_of_clean_tests_is_even(node: int) -> None:
     of, random = ledger(7, groups=False, rows=14), np.random.default_rng(2)
     noise = np.linalg.cholesky(covariance(of, NODES[node]))
     drawn = [noise @ random.normal(size=of.residual.size) for _ in range(200)]
-    alone = [replace(of, residual=row, at=np.array([node])).chance() for row in drawn]
+    alone = [replace(of, residual=row, chosen_nodes=np.array([node])).chance() for row in drawn]
     every = [replace(of, residual=row).chance() for row in drawn]
     print(f"p {kstest(alone, 'uniform').pvalue:.3f}; below 5 %: {np.mean(np.array(every) < 0.05):.3f}")
     assert kstest(alone, "uniform").pvalue > 1e-3
@@ -219,7 +219,7 @@ def test_nodes_that_a_group_makes_likely_are_kept(seed: int) -> None:
     """They are others than nothing more makes likely: what a group explains is no error of the rig."""
     of = ledger(seed)
     best = int(np.argmax([each.log_evidence for each in of.group_evidence]))
-    kept = replace(of, at=of.likely(8.0)).group_evidence[best].log_evidence
+    kept = replace(of, chosen_nodes=of.likely(8.0)).group_evidence[best].log_evidence
     assert kept == pytest.approx(of.group_evidence[best].log_evidence, abs=0.1)
 
 

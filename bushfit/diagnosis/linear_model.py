@@ -1,0 +1,430 @@
+"""Marginal likelihood of the tests under each explanation of a gap.
+
+Notes:
+    Around a fitted model the whitened residuals are r = noise + W e + J p + D d + U a: errors e of the rig, independent
+    and of unit variance times a size that is not known; parameters p, with a flat prior or one of known precision; a
+    deviation d of the compound from the model's laws, of size s; and amounts a of what may be missing. With S the
+    covariance of noise and rig and the parameters projected out, P = S^-1 - S^-1 J (J^T S^-1 J)^-1 J^T S^-1, the
+    logarithm of the restricted likelihood is -(r^T P r + ln|S| + ln|J^T S^-1 J|)/2 but for a constant (Patterson and
+    Thompson, 1971). Amounts of variance v^2 along columns U add, with the eigenvalues l of U^T P U and the components b
+    of U^T P r along its eigenvectors, sum (v^2 b^2/(1 + v^2 l) - ln(1 + v^2 l))/2. One decomposition of D^T P D gives
+    the same for every size s of the deviation. Sizes of the rig's errors, of the deviation and of amounts are summed
+    over nodes with weights of a prior. Only inner products of rows enter; errors of the rig stay within blocks of rows.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from scipy.special import chdtrc, log_ndtr, logsumexp
+
+from bushfit.diagnosis.priors import SIZES
+from bushfit.diagnosis.rig_errors import RigErrors
+from bushfit.effects.contract import Array
+
+#: Share of a parameter's information that is added to it, so that what the tests leave open can be inverted.
+_ROUNDING = 1e-9
+#: Change of |K| by a unit of an amount, below which the tests do not see it.
+_UNSEEN = 1e-9
+#: Numbers that errors of the rig at all nodes together, or columns of groups, may take at once: 32 MB.
+_AT_ONCE = 4_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Columns with a Gaussian prior, whose amounts are relative to |K|.
+
+    Args:
+        columns: whitened residuals of a unit of each amount, (c, n).
+        unit: share of |K| that a unit changes, (c,); of columns that move together complex at some points, (c, p).
+        together: True if the amounts are independent and of one size; else one column is chosen, each as likely.
+        sense: +1 where only positive amounts make sense, of columns of which one is chosen.
+        among: the rows that the columns have, and the number of all rows, where they have not all of them.
+    """
+
+    columns: Array
+    unit: Array
+    together: bool
+    sense: int = 0
+    among: tuple[slice, int] | None = None
+
+    @property
+    def whole(self) -> Array:
+        """The columns over all rows, (c, n)."""
+        if self.among is None:
+            return self.columns
+        rows, count = self.among
+        whole = np.zeros((len(self.columns), count))
+        whole[:, rows] = self.columns
+        return whole
+
+    @property
+    def scaled(self) -> Array:
+        """The columns over all rows, each of a unit of relative change where one of them is chosen, (c, n)."""
+        if self.together:
+            return self.whole
+        visible = self.unit > _UNSEEN
+        return self.whole * np.where(visible, 1.0 / np.where(visible, self.unit, 1.0), 0.0)[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class GroupEvidence:
+    """Evidence of the tests for a group of columns.
+
+    Args:
+        log_evidence: of the tests with the group, over all sizes and nodes.
+        size: relative change of |K| by the group, root mean square over its posterior.
+        likeliest: the size at which the tests are likeliest.
+        beside: the same beside a deviation of the compound; None without.
+    """
+
+    log_evidence: float
+    size: float
+    likeliest: float
+    beside: "GroupEvidence | None" = None
+
+    @property
+    def total(self) -> float:
+        """Log evidence, with a deviation of the compound and without."""
+        if self.beside is None:
+            return self.log_evidence
+        return float(np.logaddexp(self.log_evidence, self.beside.log_evidence))
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModel:
+    """Everything linear about one fitted model and its tests.
+
+    Args:
+        residual: whitened by the points' own scatter alone, (n,).
+        jacobian: by the parameters and what else moves freely, (k, n).
+        precision: prior precision of each of these; 0 where the prior is flat, (k,).
+        rig: errors of the rig.
+        groups: what may be missing.
+        chosen_nodes: indices of the rig's nodes that count; all where it is None.
+        compound: the compound's own deviation at unit size, a part of every hypothesis; None without.
+    """
+
+    residual: Array
+    jacobian: Array
+    precision: Array
+    rig: RigErrors
+    groups: Sequence[Group] = ()
+    chosen_nodes: Array | None = None
+    compound: Group | None = None
+
+    @cached_property
+    def nodes(self) -> Array:
+        """Indices of the rig's nodes that count; without a compound those without a deviation."""
+        chosen = np.arange(len(self.rig.nodes)) if self.chosen_nodes is None else self.chosen_nodes
+        return np.array([n for n in chosen.tolist() if self.compound or not self.rig.nodes[n].compound], dtype=int)
+
+    @cached_property
+    def _deviation(self) -> Array:
+        """Size of the compound's deviation at each node, relative to |K|, (nodes,)."""
+        return np.array([self.rig.nodes[n].compound for n in self.nodes])
+
+    @cached_property
+    def _plain(self) -> Array:
+        """Mask of the nodes without level errors beyond the rig's class and without a deviation of the compound."""
+        return np.array([not self.rig.nodes[n].wide for n in self.nodes]) & (self._deviation == 0.0)
+
+    @cached_property
+    def _blocks(self) -> list[tuple[Array, Array]]:
+        """Rows of the groups whose amounts have one size, by the number of rows in a block.
+
+        Returns:
+            For each width the index of the group, (blocks,), and the rows, (blocks, width).
+        """
+        first = 1 + len(self.jacobian) + (len(self.compound.columns) if self.compound else 0)
+        ends = first + np.cumsum([0, *(len(group.columns) for group in self.groups)])
+        by_width: dict[int, list[tuple[int, Array]]] = {}
+        for number, (group, (start, stop)) in enumerate(zip(self.groups, pairwise(ends.tolist()), strict=True)):
+            rows = np.arange(start, stop)
+            for block in rows[None] if group.together else rows[:, None]:
+                by_width.setdefault(block.size, []).append((number, block))
+        return [tuple(map(np.array, zip(*blocks, strict=True))) for blocks in by_width.values()]  # type: ignore[misc]
+
+    @cached_property
+    def _at_nodes(self) -> "_AtNodes":
+        """Evidence without a group at each node, and products of the groups; some nodes at a time to limit memory."""
+        rig = self.rig
+        deviation = self.compound.whole if self.compound else np.zeros((0, self.residual.size))
+        rows = np.concatenate([self.residual[None], self.jacobian, deviation, *(group.scaled for group in self.groups)])
+        first = 1 + len(self.jacobian) + len(deviation)
+        scatters = np.zeros(self.residual.size, dtype=bool)
+        along = np.zeros((len(rig.blocks), rig.roots[0].shape[-1], len(rows)))
+        for number, block in enumerate(rig.blocks):
+            scatters[block.rows] |= block.scatters
+            along[number, : len(block.kinds)] = block.columns @ rows[:, block.rows].T
+        parts = [_columns(rows, scatters), _columns(rows, ~scatters)]
+        products = [part[:first] @ part.T for part in parts]
+        block_products = [[_block_products(part, block_rows) for part in parts] for _, block_rows in self._blocks]
+        told = np.diag(products[0] + products[1])[1 : 1 + len(self.jacobian)]
+        index = rig.combinations[1][self.nodes]
+        used = np.unique(index)
+        results = list[tuple[Array, _AtNodes]]()
+        for part in np.array_split(used, max(1, min(used.size, used.size * along.size // _AT_ONCE))):
+            scatter, roots = rig.combinations[0][part, 0], rig.roots[0][part]
+            share = 1.0 / np.square(scatter)[:, None, None]
+            left = (roots @ along).reshape(len(part), -1, len(rows))
+            gram = share * products[0] + products[1] - left[..., :first].swapaxes(1, 2) @ left
+            grams = []
+            for (_, block_rows), both in zip(self._blocks, block_products, strict=True):
+                errors = np.moveaxis(left[..., block_rows], 1, -1)  # (combinations, blocks, width, errors)
+                grams.append(share[..., None] * both[0] + both[1] - errors @ errors.swapaxes(-1, -2))
+            log_det = rig.roots[1][part] + 2.0 * np.count_nonzero(scatters) * np.log(scatter)
+            chosen = np.flatnonzero(np.isin(index, part))
+            at_nodes = self._projected(chosen, np.searchsorted(part, index[chosen]), gram, grams, log_det, told)
+            results.append((chosen, at_nodes))
+        order = np.argsort(np.concatenate([chosen for chosen, _ in results]))
+        base, misfit, moved = (
+            np.concatenate([getattr(result, name) for _, result in results])[order]
+            for name in ("base", "misfit", "moved")
+        )
+        along_groups, grams = (
+            [
+                np.concatenate(kind)[order]
+                for kind in zip(*(getattr(result, name) for _, result in results), strict=True)
+            ]
+            for name in ("along", "grams")
+        )
+        return _AtNodes(base, misfit, moved, along_groups, grams)
+
+    def _projected(
+        self, chosen: Array, index: Array, gram: Array, grams: Sequence[Array], log_det: Array, told: Array
+    ) -> "_AtNodes":
+        """Products beside the parameters and the compound's deviation, at some of the nodes.
+
+        Args:
+            chosen: indices among `nodes`, (m,).
+            index: combination of the rig's errors at each of them, (m,).
+            gram: products of residual, derivatives and the compound with all rows, at each combination.
+            grams: products within the blocks of groups, at each combination.
+            log_det: natural log of the determinant of the covariance of noise and rig, at each combination.
+            told: products of the derivatives with themselves by noise alone, (k,).
+        """
+        flat, known = slice(1, 1 + len(self.jacobian)), self.precision > 0.0
+        scale = np.sqrt(np.maximum(told + self.precision, np.finfo(float).tiny))
+        information = gram[:, flat, flat] + np.diag(self.precision)
+        root = np.linalg.cholesky(information / np.outer(scale, scale) + _ROUNDING * np.eye(scale.size))
+        free = np.linalg.solve(root, gram[:, flat] / scale[:, None])
+        log_det = log_det + 2.0 * np.sum(np.log(np.einsum("nkk->nk", root) * scale), axis=1)
+        log_det -= np.sum(np.log(self.precision[known]))
+        residual = gram[:, 0] - np.einsum("nk,nkc->nc", free[..., 0], free)
+        smooth = slice(flat.stop, gram.shape[1])
+        deviation = gram[:, smooth] - free[..., smooth].swapaxes(1, 2) @ free
+        values, vectors = np.linalg.eigh(deviation[..., smooth])
+        values, deviation = np.maximum(values, 0.0)[index], (vectors.swapaxes(1, 2) @ deviation)[index]
+        variance = np.square(self._deviation[chosen])[:, None]
+        taken = variance / (1.0 + variance * values)  # of the products along each eigenvector
+        residual = residual[index] - np.einsum("nq,nqc->nc", taken * deviation[..., 0], deviation)
+        log_det = log_det[index] + np.sum(np.log1p(variance * values), axis=1)
+        moved = np.zeros(len(chosen))
+        if self.compound:
+            amounts = np.einsum("nij,nj->ni", vectors[index], taken * deviation[..., 0])
+            moved = np.square(np.abs(amounts @ self.compound.unit)).max(axis=-1)
+        along, projected = [], []
+        for (_, rows), products in zip(self._blocks, grams, strict=True):
+            absorbed = np.moveaxis(free[..., rows], 1, -1)  # (combinations, blocks, width, k)
+            beside = np.moveaxis(deviation[..., rows], 1, -1)
+            products = products - absorbed @ absorbed.swapaxes(-1, -2)
+            projected.append(products[index] - (beside * taken[:, None, None]) @ beside.swapaxes(-1, -2))
+            along.append(residual[:, rows])
+        weight = np.array([self.rig.nodes[n].log_weight for n in self.nodes[chosen]])
+        return _AtNodes(weight - 0.5 * (residual[:, 0] + log_det), residual[:, 0], moved, along, projected)
+
+    @cached_property
+    def _gains(self) -> list[tuple[Array, Array]]:
+        """For each group the gain in log evidence, and the squared relative change, by node, block and size."""
+        gains: list[list[tuple[Array, Array]]] = [[] for _ in self.groups]
+        at_nodes = self._at_nodes
+        for (numbers, _), along, gram in zip(self._blocks, at_nodes.along, at_nodes.grams, strict=True):
+            units = [self.groups[number].unit if self.groups[number].together else np.eye(1) for number in numbers]
+            senses = np.array([self.groups[number].sense for number in numbers])
+            for number, gain, moved in zip(numbers, *_block_gains(gram, along, units, senses), strict=True):
+                gains[number].append((gain, moved))
+        return [
+            (np.stack(gain, axis=1), np.stack(moved, axis=1)) for gain, moved in (zip(*g, strict=True) for g in gains)
+        ]
+
+    @cached_property
+    def group_evidence(self) -> list[GroupEvidence]:
+        """Evidence for each group, with the rig's errors within its class."""
+        bent = self._deviation > 0.0
+        return [
+            self._over_nodes(gains, self._plain, self._over_nodes(gains, bent) if bent.any() else None)
+            for gains in self._gains
+        ]
+
+    def _over_nodes(
+        self, gains: tuple[Array, Array], chosen: Array, beside: GroupEvidence | None = None
+    ) -> GroupEvidence:
+        """Evidence for a group over some nodes."""
+        log_evidence = (self._at_nodes.base[:, None, None] + gains[0])[chosen]
+        if not log_evidence.size:
+            return GroupEvidence(-np.inf, 0.0, float(SIZES[0]), beside)
+        total = float(logsumexp(log_evidence))
+        share = np.exp(log_evidence - total)
+        size = float(np.sqrt(np.sum(share * gains[1][chosen])))
+        likeliest = float(SIZES[int(np.argmax(share.sum(axis=(0, 1))))])
+        return GroupEvidence(total - float(np.log(log_evidence[0].size)), size, likeliest, beside)
+
+    def group_evidence_of(self, groups: Sequence[Group]) -> list[GroupEvidence]:
+        """Evidence for other groups, computed in parts to limit the memory."""
+        part = np.cumsum([len(group.columns) for group in groups]) * self.residual.size // _AT_ONCE
+        ends = [0, *(np.flatnonzero(np.diff(part)) + 1).tolist(), len(groups)]
+        return [
+            evidence
+            for start, stop in pairwise(ends)
+            for evidence in replace(self, groups=groups[start:stop]).group_evidence
+        ]
+
+    def _log_evidence_over(self, chosen: Array) -> float:
+        return float(logsumexp(self._at_nodes.base[chosen])) if chosen.any() else -np.inf
+
+    @property
+    def log_evidence(self) -> float:
+        """Log evidence of the tests if nothing is missing and the rig's errors are within its class."""
+        return self._log_evidence_over(self._plain)
+
+    @property
+    def log_evidence_bent(self) -> float:
+        """Log evidence of the tests with a deviation of the compound."""
+        return self._log_evidence_over(self._deviation > 0.0)
+
+    @property
+    def log_evidence_wide(self) -> float:
+        """Log evidence of the tests with level errors beyond the rig's class."""
+        return self._log_evidence_over(~self._plain & (self._deviation == 0.0))
+
+    @property
+    def deviation(self) -> tuple[float, float]:
+        """Relative change by a deviation of the compound, estimated from the tests, and its most probable size."""
+        bent = self._deviation > 0.0
+        share = np.exp(self._at_nodes.base[bent] - self.log_evidence_bent)
+        sizes = self._deviation[bent]
+        likeliest = max(np.unique(sizes), key=lambda size: share[sizes == size].sum())
+        return float(np.sqrt(share @ self._at_nodes.moved[bent])), float(likeliest)
+
+    def likely(self, far: float) -> Array:
+        """Nodes of the rig's errors at which a further group of columns may contribute.
+
+        Args:
+            far: difference in log evidence from the best node, beyond which a node is left out.
+
+        Returns:
+            Indices of the nodes that are near the best without a further group, or with one of the groups. Without a
+            deviation of the compound, nodes that such a deviation makes likely are included.
+        """
+        plain, index = self._plain, self.rig.combinations[1][self.nodes]
+        base = np.where(plain | (self._deviation > 0.0), self._at_nodes.base, -np.inf)
+        best = np.full(index.max() + 1, -np.inf)
+        np.maximum.at(best, index, base)
+        near = (base > base.max() - far) | (plain & (base > base[plain].max() - far))
+        beside = np.max([base, *(self._at_nodes.base + gains.max(axis=(1, 2)) for gains, _ in self._gains)], axis=0)
+        led = (best[index] > best.max() - far) | (beside > beside[plain].max() - far)
+        return self.nodes[near | (plain & led)]
+
+    def chance(self, *, bent: bool = False) -> float:
+        """Probability that tests of this model and rig leave more than these do, over the nodes as likely as they are;
+        `bent` beside a deviation of the compound.
+
+        Notes: a posterior predictive check on r^T P r (Gelman, Meng and Stern, 1996).
+        """
+        base = np.where(self._deviation > 0.0 if bent else self._plain, self._at_nodes.base, -np.inf)
+        freedom = max(self.residual.size - int(np.count_nonzero(self.precision == 0.0)), 1)
+        return float(np.exp(base - logsumexp(base)) @ chdtrc(freedom, self._at_nodes.misfit))
+
+    def amounts(self, number: int) -> tuple[Array, Array]:
+        """Posterior of the amounts of a group whose columns move together.
+
+        Args:
+            number: index of the group.
+
+        Returns:
+            Mean, (g,), and covariance, (g, g), over all sizes and the nodes within the class of the rig.
+        """
+        kind, place = next(
+            (kind, int(np.flatnonzero(numbers == number)[0]))
+            for kind, (numbers, _) in enumerate(self._blocks)
+            if number in numbers
+        )
+        values, vectors = np.linalg.eigh(self._at_nodes.grams[kind][self._plain, place])
+        along = np.einsum("nij,ni->nj", vectors, self._at_nodes.along[kind][self._plain, place])[:, None]
+        v2 = np.square(SIZES)[:, None]
+        grown = 1.0 + v2 * np.maximum(values, 0.0)[:, None]
+        gain = 0.5 * np.sum(v2 * along**2 / grown - np.log(grown), axis=-1) + self._at_nodes.base[self._plain, None]
+        share = np.exp(gain - logsumexp(gain))
+        means = np.einsum("nij,nsj->nsi", vectors, -v2 * along / grown)
+        mean = np.einsum("ns,nsi->i", share, means)
+        spread = np.einsum("nij,nj,nkj->ik", vectors, np.einsum("ns,nsj->nj", share, v2 / grown), vectors)
+        return mean, spread + np.einsum("ns,nsi,nsj->ij", share, means - mean, means - mean)
+
+
+@dataclass(frozen=True, eq=False)
+class _AtNodes:
+    """Products at each node, beside the parameters and the compound's deviation.
+
+    Args:
+        base: log evidence without a group, (nodes,).
+        misfit: r^T P r, (nodes,).
+        moved: square of the largest relative change by the compound's deviation, (nodes,).
+        along: U^T P r of the blocks of each width, (nodes, blocks, width) each.
+        grams: U^T P U of the blocks of each width, (nodes, blocks, width, width) each.
+    """
+
+    base: Array
+    misfit: Array
+    moved: Array
+    along: list[Array]
+    grams: list[Array]
+
+
+def _columns(rows: Array, chosen: Array) -> Array:
+    """Some columns of all rows, (n,) bool; without a copy where they stand side by side."""
+    places = np.flatnonzero(chosen)
+    if places.size and places[-1] - places[0] + 1 == places.size:
+        return rows[:, places[0] : places[-1] + 1]
+    return rows[:, places]
+
+
+def _block_products(part: Array, block_rows: Array) -> Array:
+    """Inner products within each block, (m, g) -> (m, g, g); most have nothing in loops, or in sweeps."""
+    filled = np.any(np.any(part, axis=1)[block_rows], axis=1)
+    products, rows = np.zeros((*block_rows.shape, block_rows.shape[1])), part[block_rows[filled]]
+    products[filled] = rows @ rows.swapaxes(-1, -2)
+    return products
+
+
+def _block_gains(gram: Array, along: Array, units: Sequence[Array], senses: Array) -> tuple[Array, Array]:
+    """Gains in log evidence and squared relative changes by blocks of columns that move together.
+
+    Args:
+        gram: products within the blocks, (nodes, blocks, width, width).
+        along: products with the residual, (nodes, blocks, width).
+        units: share of |K| that a unit of each amount changes at some points, (width, p) for each block.
+        senses: +1 for each block of one column that only a positive amount makes sense of, (blocks,).
+
+    Returns:
+        Gains and squared changes, (blocks, nodes, sizes) each.
+    """
+    single = gram.shape[-1] == 1
+    values, vectors = (gram[..., 0], np.ones_like(gram)) if single else np.linalg.eigh(gram)
+    along = np.einsum("nmij,nmi->nmj", vectors, along)[:, :, None]
+    v2 = np.square(SIZES)[:, None]
+    grown = 1.0 + v2 * np.maximum(values, 0.0)[:, :, None]
+    gain = 0.5 * np.sum(v2 * along**2 / grown - np.log(grown), axis=-1)
+    amounts = -(v2 * along / grown) @ vectors.swapaxes(-1, -2)
+    if senses.any():
+        standardised = senses[:, None] * (amounts * np.sqrt(grown) / np.sqrt(v2))[..., 0]
+        gain = np.where(senses[:, None] != 0, gain + np.log(2.0) + log_ndtr(standardised), gain)
+    if single:
+        moved = np.square(amounts[..., 0] * np.array([np.abs(unit).max() for unit in units])[:, None])
+    else:
+        moved = np.stack(
+            [np.square(np.abs(amounts[:, block] @ unit)).max(axis=-1) for block, unit in enumerate(units)], axis=1
+        )
+    return gain.swapaxes(0, 1), moved.swapaxes(0, 1)
