@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.document import Description
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import unnamed
 from bushfit.diagnosis.fingerprint import Fingerprint, fingerprint
 from bushfit.diagnosis.holdout import HoldOut, HoldOutPart
+from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
 from bushfit.effects.contract import Array

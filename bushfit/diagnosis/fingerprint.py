@@ -18,8 +18,8 @@ from math import log
 import numpy as np
 from scipy.special import logsumexp
 
-from bushfit.diagnosis.linear_model import Group, LinearModel
 from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.linear_model import Group, LinearModel
 from bushfit.diagnosis.priors import TELLS
 from bushfit.diagnosis.terms import Measure, Terms
 from bushfit.effects.contract import Array

@@ -10,7 +10,6 @@ import numpy as np
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim
-from bushfit.diagnosis.linear_model import Group, GroupEvidence, LinearModel
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import (
     Explanation,
@@ -22,6 +21,7 @@ from bushfit.diagnosis.explanations import (
     places,
     unnamed,
 )
+from bushfit.diagnosis.linear_model import Group, GroupEvidence, LinearModel
 from bushfit.diagnosis.priors import LEVELS
 from bushfit.diagnosis.rig_errors import RigErrors, rig_errors, scattering_alone
 from bushfit.effects.contract import Array

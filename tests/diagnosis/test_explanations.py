@@ -14,9 +14,9 @@ import pytest
 from rigged import LEVELS, SHARED, Fitted, Measured, Tamper, both, loop_too_strong, no_loops, no_repeats, no_sweeps, off
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation, effects, places, unnamed
+from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.propose import proposals, scores, sensitivity
 from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
 from bushfit.effects import BASE, LIBRARY, get_effect

@@ -104,7 +104,9 @@ def test_an_amount_is_integrated_over_its_sense(sense: int) -> None:
     """Numerically, and the free parameter with it: where an effect is missing, the model stays below the tests."""
     of = ledger(4, flat=1, known=0)
     column, unit, own = of.groups[0].columns[0], 0.7, of.jacobian[0]
-    of = replace(of, chosen_nodes=np.array([0]), groups=(Group(column[None], np.array([unit]), together=False, sense=sense),))
+    of = replace(
+        of, chosen_nodes=np.array([0]), groups=(Group(column[None], np.array([unit]), together=False, sense=sense),)
+    )
     noise, spreads = multivariate_normal(cov=covariance(of, NODES[0])), SIZES / unit
     low, high = {1: (0.0, 1.0), -1: (-1.0, 0.0), 0: (-1.0, 1.0)}[sense]
     x, weight = np.polynomial.legendre.leggauss(300)

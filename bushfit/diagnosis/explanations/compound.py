@@ -7,9 +7,9 @@ hypothesis, at sizes that `priors.COMPOUND` weighs, and nothing is named for wha
 
 import numpy as np
 
-from bushfit.diagnosis.linear_model import Group
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.unnamed import harmonics
+from bushfit.diagnosis.linear_model import Group
 from bushfit.fitting.preparation import group_repeats, split_by_kind
 from bushfit.gaussian_process import coordinates, in_lengths, patterns
 

@@ -4,9 +4,9 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from bushfit.diagnosis.linear_model import Group
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.contract import MissingEffect
+from bushfit.diagnosis.linear_model import Group
 from bushfit.diagnosis.propose import proposals
 
 

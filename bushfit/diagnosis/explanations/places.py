@@ -7,9 +7,9 @@ from itertools import groupby
 
 import numpy as np
 
-from bushfit.diagnosis.linear_model import Group
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.contract import FaultyPlace
+from bushfit.diagnosis.linear_model import Group
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, split_by_kind
 

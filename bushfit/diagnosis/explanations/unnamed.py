@@ -5,9 +5,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.linalg import block_diag
 
-from bushfit.diagnosis.linear_model import Group
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations.contract import Explanation
+from bushfit.diagnosis.linear_model import Group
 from bushfit.effects.contract import Array
 from bushfit.fitting.measured_loop import smooth_waves
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, group_repeats, split_by_kind
