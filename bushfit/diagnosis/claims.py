@@ -51,6 +51,11 @@ class Claim:
     tests: tuple[int, ...]
 
     @property
+    def key(self) -> tuple[str, tuple[int, ...]]:
+        """Identity of the claim."""
+        return self.mistake.name, self.tests
+
+    @property
     def single_tests(self) -> list[Claim]:
         """Claims about each of the tests alone."""
         return [Claim(self.mistake, (place,)) for place in self.tests] or [self]

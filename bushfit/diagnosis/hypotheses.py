@@ -1,4 +1,4 @@
-"""Hypotheses: sets of explanations, the state of the model and tests around which each is weighed, and its worth."""
+"""Hypotheses: sets of explanations, and the states of model and tests around which they are weighed."""
 
 from __future__ import annotations
 
@@ -11,26 +11,17 @@ import numpy as np
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import (
-    Explanation,
-    FaultyPlace,
-    Meeting,
-    MissingEffect,
-    compound,
-    effects,
-    places,
-    unnamed,
-)
+from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPlace, Meeting, compound, unnamed
+from bushfit.diagnosis.faulty_places import faulty_places
 from bushfit.diagnosis.linear_model import Group, GroupEvidence, LinearModel
 from bushfit.diagnosis.priors import LEVELS
+from bushfit.diagnosis.propose import Proposal, proposals
 from bushfit.diagnosis.rig_errors import RigErrors, rig_errors, scattering_alone
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.rig_class import ASSUMED, of_class
 
-#: Name of the compound's own deviation among what has no name.
-COMPOUND = "compound"
 #: Logarithm of odds below which a node of the sizes of the rig's errors does not count; chosen for time, as e^-8 of an
 #: answer changes none.
 _NEAR = 8.0
@@ -42,43 +33,44 @@ class DiagnosisRequest:
 
     Args:
         data: the tests.
-        base: the model as it came, fitted to them.
-        fitted: fits it to tests of which a record was put right.
+        base: the starting model, fitted to them.
+        fit_mended: fits the starting model to tests with a corrected record.
         without: effects and mistakes not to consider.
-        most: effects added at the most.
-        tolerance: change of |K|, relative, that counts as nothing.
-        start: values read off the data, for a model that the gap has bent too far.
-        met: points without weight that meet at a frequency.
-        held, bounds: parameters that do not move, and limits of the others inside their own.
+        max_effects: maximum number of added effects.
+        tolerance: relative change of |K| that counts as nothing.
+        start: starting values read off the data, for a model whose parameters the gap has bent too far.
+        meetings: frequencies at which several outliers lie.
+        fixed: parameters that are not fitted.
+        bounds: limits of the others inside their general limits.
     """
 
     data: PreparedCampaign
     base: Evidence
-    fitted: Callable[[PreparedCampaign], Evidence]
+    fit_mended: Callable[[PreparedCampaign], Evidence]
     without: Sequence[str]
-    most: int
+    max_effects: int
     tolerance: float
     start: Mapping[str, float]
-    met: Sequence[Meeting]
-    held: Sequence[str]
+    meetings: Sequence[Meeting]
+    fixed: Sequence[str]
     bounds: Bounds
 
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """A set of explanations and what it is worth.
+    """A set of explanations with its posterior.
 
     Args:
-        effects: by name, in the order in which they were added.
-        claim: that a record is mistaken, or None.
-        places: of the tests gone wrong.
+        effects: names of the effects, in the order in which they were added.
+        claim: mistake in a record, or None.
+        places: faulty places of the tests.
         unnamed: the process without a name; "" without.
-        levels: whether errors of levels are larger than the class of the rig allows.
-        log_posterior: logarithm of prior times evidence.
-        size: of what it changes, relative to |K|.
-        last: of this, what its last explanation changes, where it was counted linearly; else 0.
-        weighed: the state that it is, with its effects refitted, or to which its last explanation was added linearly.
-        bent: whether the compound deviates from the model's laws beside all of this.
+        levels: True if errors of levels are larger than the class of the rig allows.
+        log_posterior: natural log of prior times evidence.
+        change: relative change of |K| by all of them.
+        last_change: relative change by the last explanation where it was counted linearly; else 0.
+        state: the state that this is, with its effects refitted, or to which the last explanation was added linearly.
+        bent: True if the compound deviates from the model's laws beside all of this.
     """
 
     effects: tuple[str, ...]
@@ -87,227 +79,239 @@ class Hypothesis:
     unnamed: str
     levels: bool
     log_posterior: float
-    size: float
-    last: float
-    weighed: Weighed
+    change: float
+    last_change: float
+    state: State
     bent: bool = False
 
     @property
     def key(self) -> frozenset[Hashable]:
-        marks = ["levels"] if self.levels else []
-        more = [each for each in (self.unnamed, self.claim and (self.claim.mistake.name, self.claim.tests)) if each]
-        return frozenset((*self.effects, *(place.name for place in self.places), *more, *marks))
+        """Identity of the set of explanations; empty if it has none."""
+        marks = [self.unnamed, "levels" if self.levels else "", self.claim and self.claim.key]
+        return frozenset((*self.effects, *(place.name for place in self.places), *filter(None, marks)))
 
     @property
     def refitted(self) -> bool:
         """True if all of its effects were refitted, and none was counted linearly only."""
-        return self.effects == self.weighed.state.effects
+        return self.effects == self.state.effects
 
     @property
     def chance(self) -> float:
-        """Probability of tests that it meets worse than these."""
-        return self.weighed.first.chance(bent=self.bent)
+        """Probability of tests that agree less with the hypothesis than these."""
+        return self.state.linear.chance(bent=self.bent)
 
 
 @dataclass(frozen=True, eq=False)
 class Tests:
-    """Tests as they are recorded, or with a record put right, and the model as it came fitted to them.
+    """Tests as they are recorded, or with a corrected record, and the starting model fitted to them.
 
     Args:
-        log_odds: of these beforehand, with nothing else missing.
-        size: of what a record that is put right changes; 0 of the tests as they are.
+        base: the fit.
+        rig: stated class of the rig.
+        log_prior: natural log of their prior probability with nothing else missing.
+        claim: the mistake that is corrected, or None.
+        change: relative change of what the record says; 0 for the tests as they are.
     """
 
     base: Evidence
     rig: RigSettings
-    log_odds: float
+    log_prior: float
     claim: Claim | None = None
-    size: float = 0.0
-
-    @property
-    def state(self) -> State:
-        return State(self, (), (), self.base, self.log_odds, size=self.size)
+    change: float = 0.0
 
     @cached_property
     def bare(self) -> Evidence:
+        """The fit with residuals in units of the scatter from point to point."""
         return scattering_alone(self.base)
 
     @cached_property
     def errors(self) -> RigErrors:
+        """Errors of the rig, in residuals of `bare`."""
         return rig_errors(self.bare, self.rig)
 
     @cached_property
     def compound(self) -> Group | None:
-        """The compound's own deviation from the model's laws, in residuals as `bare` has them."""
+        """The compound's own deviation from the model's laws, in residuals of `bare`."""
         return compound(self.bare)
 
     @cached_property
-    def deviation(self) -> Group | None:
+    def compound_in_fits(self) -> Group | None:
         """The compound's own deviation in residuals as they are fitted."""
         return compound(self.base)
 
     @cached_property
-    def fixed(self) -> list[Explanation]:
-        """Explanations that do not depend on the model."""
-        return [*places(self.bare), *unnamed(self.bare)]
+    def explanations(self) -> list[Explanation]:
+        """Explanations that do not depend on the model: faulty places and smooth curves."""
+        return [*faulty_places(self.bare), *unnamed(self.bare)]
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A set of effects and places around which everything else is weighed.
+    """A model with refitted effects and free places, around which every further explanation is weighed linearly.
 
     Args:
-        precision: prior precision of coordinates of effects, by name; infinite of what rests on an end of its range.
-        density: ln of their prior density, with the factor of Laplace's method.
+        tests: the tests.
+        request: the request for the search.
+        evidence: fit of the model with the effects.
+        log_prior: natural log of the prior probability.
+        effects: names of the effects that were added.
+        places: faulty places whose points move freely.
+        precision: prior precision of coordinates of effects, by name; infinite for one at an end of its range.
+        log_density: natural log of their prior density, with the factor of Laplace's method.
         amounts: size of each place's amounts, relative to |K|.
+        change: relative change of |K| by the effects and places.
     """
 
     tests: Tests
-    effects: tuple[str, ...]
-    places: tuple[FaultyPlace, ...]
+    request: DiagnosisRequest
     evidence: Evidence
     log_prior: float
+    effects: tuple[str, ...] = ()
+    places: tuple[FaultyPlace, ...] = ()
     precision: Mapping[str, float] = field(default_factory=dict)
-    density: float = 0.0
+    log_density: float = 0.0
     amounts: tuple[float, ...] = ()
-    size: float = 0.0
+    change: float = 0.0
+
+    @classmethod
+    def of_tests(cls, tests: Tests, request: DiagnosisRequest) -> State:
+        """The state of tests with nothing added."""
+        return cls(tests, request, tests.base, tests.log_prior, change=tests.change)
 
     @property
     def key(self) -> frozenset[Hashable]:
+        """Identity of the state."""
         claim = self.tests.claim
-        own = [(claim.mistake.name, claim.tests)] if claim else []
-        return frozenset((*self.effects, *(place.name for place in self.places), *own))
-
-
-@dataclass(frozen=True, eq=False)
-class Weighed:
-    """A state with what every explanation beside it is worth.
-
-    Args:
-        bare: the fit with residuals in units of what scatters from point to point.
-        first: of nothing more, at every size of the rig's errors.
-    """
-
-    state: State
-    asked: DiagnosisRequest
+        return frozenset((*self.effects, *(place.name for place in self.places), *([claim.key] if claim else [])))
 
     @cached_property
     def bare(self) -> Evidence:
-        same = self.state.evidence is self.state.tests.base
-        return self.state.tests.bare if same else scattering_alone(self.state.evidence)
+        """The fit with residuals in units of the scatter from point to point."""
+        return self.tests.bare if self.evidence is self.tests.base else scattering_alone(self.evidence)
 
     @cached_property
-    def first(self) -> LinearModel:
-        state, tests = self.state, self.state.tests
-        known = [state.precision.get(name, 0.0) for name in self.bare.solution.coordinates.names]
-        moves = np.isfinite(known)
-        precision = np.array(known)[moves].tolist()
-        free = [self.bare.solution.jacobian[moves]]
-        for place, amount in zip(state.places, state.amounts, strict=True):
-            free.append(place.columns)
-            precision += [amount**-2] * len(place.columns)
-        rows = np.concatenate(free)
-        return LinearModel(self.bare.residual, rows, np.array(precision), tests.errors, compound=tests.compound)
+    def linear(self) -> LinearModel:
+        """The linear model with nothing more, at every size of the rig's errors."""
+        tests, solution = self.tests, self.bare.solution
+        precision = np.array([self.precision.get(name, 0.0) for name in solution.coordinates.names])
+        moves = np.isfinite(precision)
+        known = [np.full(len(p.columns), x**-2) for p, x in zip(self.places, self.amounts, strict=True)]
+        rows = np.concatenate([solution.jacobian[moves], *(place.columns for place in self.places)])
+        precision = np.concatenate([precision[moves], *known])
+        return LinearModel(self.bare.residual, rows, precision, tests.errors, compound=tests.compound)
 
     @cached_property
     def log_posterior(self) -> float:
-        whole = float(np.logaddexp(self.first.log_evidence, self.first.log_evidence_bent))
-        return self.state.log_prior + self.state.density + whole
+        """Natural log of prior times evidence, with a deviation of the compound and without."""
+        total = float(np.logaddexp(self.linear.log_evidence, self.linear.log_evidence_bent))
+        return self.log_prior + self.log_density + total
 
     @cached_property
-    def bent(self) -> float:
+    def likeliest_deviation(self) -> float:
         """Likeliest size of a deviation of the compound, relative to |K|; 0 where none is likelier."""
-        first = self.first
-        return first.deviation[1] if first.log_evidence_bent > first.log_evidence else 0.0
+        linear = self.linear
+        return linear.deviation[1] if linear.log_evidence_bent > linear.log_evidence else 0.0
 
     @property
-    def fitted_beside(self) -> Array | None:
-        """Columns beside which effects are refitted, at one standard deviation; None where the compound obeys."""
-        deviation = self.state.tests.deviation
-        return self.bent * deviation.whole if self.bent and deviation else None
+    def free_columns(self) -> Array | None:
+        """Columns beside which effects are refitted, at one standard deviation; None if the compound obeys the laws."""
+        deviation = self.tests.compound_in_fits if self.likeliest_deviation else None
+        return self.likeliest_deviation * deviation.whole if deviation else None
 
     @cached_property
-    def effects(self) -> list[MissingEffect]:
-        return effects(self.bare, (*self.asked.without, *self.state.effects), self.asked.held)
+    def proposals(self) -> list[Proposal]:
+        """Effects of the library that the model lacks, the highest score first."""
+        return proposals(self.bare, (*self.request.without, *self.effects), self.request.fixed)
 
     @cached_property
-    def group_evidence(self) -> list[tuple[Explanation, GroupEvidence]]:
-        """Every explanation that can be counted linearly, at the sizes of the rig's errors that matter."""
-        every = [each for each in (*self.effects, *self.state.tests.fixed) if each.group is not None]
-        return list(zip(every, self.group_evidence_of(every), strict=True))
+    def weighed(self) -> list[tuple[Explanation, GroupEvidence]]:
+        """Every explanation that can be counted linearly, with its evidence."""
+        explanations = [e for e in (*self.proposals, *self.tests.explanations) if e.group is not None]
+        return list(zip(explanations, self.weigh(explanations), strict=True))
+
+    def weigh(self, explanations: Sequence[Explanation]) -> list[GroupEvidence]:
+        """Evidence for explanations that have columns, at the sizes of the rig's errors that matter."""
+        at_nodes = replace(self.linear, chosen_nodes=self._likely_nodes)
+        return at_nodes.group_evidence_of([e.group for e in explanations if e.group is not None])
 
     @cached_property
-    def _nodes(self) -> Array:
-        """Numbers of the nodes that nothing more, a deviation of the compound, or something smooth makes likely."""
-        smooth = [each.group for each in self.state.tests.fixed if each.group and each.kind == "unnamed"]
-        curves = replace(self.first, groups=smooth, compound=None)
-        return np.union1d(self.first.likely(_NEAR), curves.likely(_NEAR))
+    def _likely_nodes(self) -> Array:
+        """Nodes that nothing more, a deviation of the compound, or something smooth makes likely."""
+        smooth = [e.group for e in self.tests.explanations if e.group and e.kind == "unnamed"]
+        curves = replace(self.linear, groups=smooth, compound=None)
+        return np.union1d(self.linear.likely(_NEAR), curves.likely(_NEAR))
 
-    def group_evidence_of(self, every: Sequence[Explanation]) -> Sequence[GroupEvidence]:
-        """Evidence for explanations that have columns."""
-        return replace(self.first, chosen_nodes=self._nodes).group_evidence_of(
-            [each.group for each in every if each.group]
-        )
-
-    def with_(self, each: Explanation, worth: GroupEvidence, log_odds: float) -> list[Hypothesis]:
+    def extended(self, explanation: Explanation, evidence: GroupEvidence, log_odds: float) -> list[Hypothesis]:
         """Hypotheses that extend this state by one explanation, with its evidence counted linearly.
 
         Args:
-            each: the explanation.
-            worth: evidence of its columns.
+            explanation: the explanation.
+            evidence: evidence of its columns.
             log_odds: natural log of its prior odds.
 
         Returns:
             The extended hypothesis, and the same beside a deviation of the compound.
         """
-        state, tests = self.state, self.state.tests
-        names = (*state.effects, each.name) if each.kind == "effect" else state.effects
-        spots = (*state.places, each) if isinstance(each, FaultyPlace) else state.places
-        curve = each.name if each.kind == "unnamed" else ""
-        prior = state.log_prior + state.density + log_odds
-        found = [
-            Hypothesis(
-                names,
-                tests.claim,
-                spots,
-                curve,
-                False,
-                prior + worth.log_evidence,
-                max(state.size, worth.size),
-                worth.size,
-                self,
+        plain = self.hypotheses[0]
+        if explanation.kind == "effect":
+            plain = replace(plain, effects=(*plain.effects, explanation.name))
+        elif isinstance(explanation, FaultyPlace):
+            plain = replace(plain, places=(*plain.places, explanation))
+        else:
+            plain = replace(plain, unnamed=explanation.name)
+        log_prior = self.log_prior + self.log_density + log_odds
+        extended = [
+            replace(
+                plain,
+                log_posterior=log_prior + evidence.log_evidence,
+                change=max(self.change, evidence.size),
+                last_change=evidence.size,
             )
         ]
-        if worth.beside and np.isfinite(worth.beside.log_evidence):
-            size = max(state.size, worth.beside.size, self.first.deviation[0])
-            posterior = prior + worth.beside.log_evidence
-            found.append(
-                Hypothesis(
-                    names, tests.claim, spots, curve or COMPOUND, False, posterior, size, worth.beside.size, self, True
-                )
+        if evidence.beside and np.isfinite(evidence.beside.log_evidence):
+            bent = replace(
+                plain,
+                unnamed=plain.unnamed or COMPOUND,
+                log_posterior=log_prior + evidence.beside.log_evidence,
+                change=max(self.change, evidence.beside.size, self.linear.deviation[0]),
+                last_change=evidence.beside.size,
+                bent=True,
             )
-        return found
+            extended.append(bent)
+        return extended
 
-    @property
-    def alone(self) -> list[Hypothesis]:
+    @cached_property
+    def hypotheses(self) -> list[Hypothesis]:
         """This state with nothing more; with errors of levels beyond the class of the rig; and with a deviation of the
         compound."""
-        state, first = self.state, self.first
-        prior, claim = state.log_prior + state.density, state.tests.claim
+        linear, tests = self.linear, self.tests
+        log_prior = self.log_prior + self.log_density
         plain = Hypothesis(
-            state.effects, claim, state.places, "", False, prior + first.log_evidence, state.size, 0.0, self
+            self.effects,
+            tests.claim,
+            self.places,
+            unnamed="",
+            levels=False,
+            log_posterior=log_prior + linear.log_evidence,
+            change=self.change,
+            last_change=0.0,
+            state=self,
         )
-        size = max(state.size, LEVELS[-1][0] * max(of_class(state.tests.rig, ASSUMED)))
-        wide = replace(plain, levels=True, log_posterior=prior + first.log_evidence_wide, size=size)
-        if not np.isfinite(first.log_evidence_bent):
+        wide = replace(
+            plain,
+            levels=True,
+            log_posterior=log_prior + linear.log_evidence_wide,
+            change=max(self.change, LEVELS[-1][0] * max(of_class(tests.rig, ASSUMED))),
+        )
+        if not np.isfinite(linear.log_evidence_bent):
             return [plain, wide]
-        deviation = first.deviation[0]
+        deviation = linear.deviation[0]
         bent = replace(
             plain,
             unnamed=COMPOUND,
-            log_posterior=prior + first.log_evidence_bent,
-            size=max(state.size, deviation),
-            last=deviation,
+            log_posterior=log_prior + linear.log_evidence_bent,
+            change=max(self.change, deviation),
+            last_change=deviation,
             bent=True,
         )
         return [plain, wide, bent]

@@ -33,8 +33,8 @@ BEAM, ROUNDS = (4, 3), 3
 REFITS = ((4, 3), (2, 2), (8, 12))
 #: Probability of nothing, from which on a verdict is `consistent`.
 NOTHING = 0.15
-#: Probability from which on an explanation is named; a set that reaches it is told, of so many at most.
-NAMED, MOST_TOLD = 0.97, 4
+#: Probability from which on an explanation is named; a set that reaches it is reported, of so many at most.
+NAMED, MOST_REPORTED = 0.97, 4
 #: Difference of chi-square that makes such odds between two.
 TELLS = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))
 #: Share of what is missing, by its change of |K|, that names make where they may stand beside the unnamed: `partly`.

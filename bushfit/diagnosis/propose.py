@@ -13,10 +13,11 @@ from itertools import product
 import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.explanations import Explanation
+from bushfit.diagnosis.linear_model import Group
 from bushfit.effects import Branch, Effect, effects_for_places, qualified_name, twins_of
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.descent import Descent
 from bushfit.fitting.design import fit_from, probes
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.model.model import Model
@@ -29,28 +30,21 @@ _STEP = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
-class Proposal:
-    """Expected gain by one effect before any refit.
+class Proposal(Explanation):
+    """An effect of the library as an explanation, with its expected gain before any refit.
+
+    Its group has one column for each shape tried; an effect that replaces a branch has none.
 
     Args:
-        name: of the effect.
         model: model with the effect in its best shape at no amount; at the suggested amount if that is fitted in its
             logarithm. An effect that replaces a branch has the starting values that the branch suggests.
         score: decrease of chi-square if the model were linear.
-        columns: whitened sensitivity in each shape tried, (shapes, n); of an effect that replaces a branch by each of
-            its parameters, (k, n).
-        sense: +1 if only positive amounts are physical, else 0.
         visible: whether these tests could show the effect beside the model's parameters.
-        together: whether the columns move together; else one of them is chosen.
     """
 
-    name: str
     model: Model
     score: float
-    columns: Array
-    sense: int
     visible: bool
-    together: bool = False
 
 
 def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str]) -> list[Proposal]:
@@ -64,30 +58,32 @@ def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str
     Returns:
         One proposal for each effect in its best shape, the highest score first.
     """
-    missing = missing_effects(evidence.model, [str(data_set.direction) for data_set in evidence.data_sets], excluded)
-    answers = {
-        effect: sensitivity(evidence.model, evidence.data_sets, effect) for effect in missing if effect.replaces is None
-    }
-    probed_effects = [effect for effect, (shapes, _) in answers.items() if shapes]
-    probed = [answers[effect] for effect in probed_effects]
-    ends = np.cumsum([0, *(len(columns) for _, columns in probed)])
-    all_columns = np.concatenate([np.empty((0, evidence.residual.size)), *(columns for _, columns in probed)])
-    gains, amounts, shown_by_tests = scores(evidence, all_columns)
-    found = []
-    for effect, (shapes, columns), first, last in zip(probed_effects, probed, ends[:-1], ends[1:], strict=True):
+    relative_noise = np.empty(evidence.residual.size)
+    for test, place in evidence.place.items():
+        relative_noise[place] = test.relative_noise
+    ranked = []
+    for effect in missing_effects(evidence.model, [str(test.direction) for test in evidence.data_sets], excluded):
+        family = effect.name.partition(".")[0]
+        if effect.replaces is not None:
+            if effect.replaces in evidence.model.effects and (start := _replacement(evidence, effect, fixed)):
+                ranked.append(Proposal("effect", family, effect.name, None, *start, visible=True))
+            continue
+        shapes, columns = sensitivity(evidence.model, evidence.data_sets, effect)
+        if not shapes:
+            continue
+        gains, amounts, visible = scores(evidence, columns)
         amount = effect.amount
         sense = 1 if amount.neutral == amount.bounds[0] else 0
-        possible_gains = np.where((amounts[first:last] > 0.0) | (sense == 0), gains[first:last], 0.0)
-        best = int(np.argmax(possible_gains))
-        suggested = float(np.clip(amounts[first + best] * amount.typical, *amount.bounds))
+        gains = np.where((amounts > 0.0) | (sense == 0), gains, 0.0)
+        best = int(np.argmax(gains))
+        suggested = float(np.clip(amounts[best] * amount.typical, *amount.bounds))
         shape = shapes[best] | ({qualified_name(effect, amount): suggested} if amount.log else {})
         model = evidence.model.with_effect(effect.name, shape)
-        visible = bool(shown_by_tests[first:last].any())
-        found.append(Proposal(effect.name, model, float(possible_gains[best]), columns, sense, visible))
-    for effect in missing:
-        if effect.replaces in evidence.model.effects:
-            found += filter(None, [_replacing(evidence, effect, fixed)])
-    return sorted(found, key=lambda proposal: -proposal.score)
+        group = Group(columns, np.abs(columns * relative_noise).max(axis=1), together=False, sense=sense)
+        ranked.append(
+            Proposal("effect", family, effect.name, group, model, float(gains[best]), visible=bool(visible.any()))
+        )
+    return sorted(ranked, key=lambda proposal: (-proposal.score, proposal.group is None))
 
 
 def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
@@ -104,10 +100,10 @@ def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
     lengths = np.linalg.norm(columns, axis=1)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
     projected = evidence.project_out(columns / lengths[:, None])
-    size, products = np.einsum("ij,ij->i", projected, projected), projected @ evidence.residual
-    visible = size > _LEFT**2
-    per_size = visible / np.where(visible, size, 1.0)
-    return per_size * np.square(products), -per_size * products / lengths, visible
+    squares, products = np.einsum("ij,ij->i", projected, projected), projected @ evidence.residual
+    visible = squares > _LEFT**2
+    inverse = visible / np.where(visible, squares, 1.0)
+    return inverse * np.square(products), -inverse * products / lengths, visible
 
 
 def has_what_it_uses(effect: Effect, model: Model) -> bool:
@@ -140,24 +136,18 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
     ]
 
 
-def _replacing(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> Proposal | None:
-    """Proposal of an effect that replaces a branch, after one linear step; None if the effect has no response."""
-    fits = []
+def _replacement(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> tuple[Model, float] | None:
+    """Model with an effect in place of a branch, from the start that promises most after one linear step, and the
+    decrease of chi-square; None if the effect has no response."""
+    ends = list[tuple[float, Model]]()
     for start in evidence.model.starts(effect):
         with suppress(FitError, ModelError):  # no response from there
-            fits.append(fit_from(evidence.model.with_effect(effect.name, start), evidence.data_sets, fixed, {}))
-    if not fits:
+            fit = fit_from(evidence.model.with_effect(effect.name, start), evidence.data_sets, fixed, {})
+            ends.append((fit.chi_square - fit.expected_fall, fit.model))
+    if not ends:
         return None
-    best = min(fits, key=_promised)
-    coordinate_names = [qualified_name(effect, parameter) for parameter in effect.parameters]
-    columns = best.jacobian[[best.problem.coordinates.names.index(name) for name in coordinate_names]]
-    score = max(evidence.chi_square - _promised(best), 0.0)
-    return Proposal(effect.name, best.model, score, columns, 0, visible=True, together=True)
-
-
-def _promised(fit: Descent) -> float:
-    """Chi-square of a fit after its next step if the model were linear."""
-    return fit.chi_square - fit.expected_fall
+    chi_square, model = min(ends, key=lambda end: end[0])
+    return model, max(evidence.chi_square - chi_square, 0.0)
 
 
 def sensitivity(

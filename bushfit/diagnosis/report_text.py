@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 
-from bushfit.diagnosis.beam import Search
 from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.described import GapDescription, describe
 from bushfit.diagnosis.document import Verdict
@@ -20,6 +19,7 @@ from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.priors import MOST_LEFT
 from bushfit.diagnosis.record import CandidateResult, Diagnosis, Named, Odds, Where, format_probability
+from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Composition, Finding
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.unnamed import NAME as UNNAMED
@@ -55,15 +55,15 @@ class DiagnosisWriter:
 
     @property
     def data(self) -> PreparedCampaign:
-        return self.search.asked.data
+        return self.search.request.data
 
     @property
     def base(self) -> Evidence:
-        return self.search.asked.base
+        return self.search.request.base
 
     @property
     def first(self) -> Composition | None:
-        return self.finding.told[0] if self.finding.told else None
+        return self.finding.reported[0] if self.finding.reported else None
 
     def diagnosis(self) -> Diagnosis:
         """Build the diagnosis with all texts.
@@ -106,20 +106,20 @@ class DiagnosisWriter:
             for hypothesis in self.hypotheses
             if set(hypothesis.effects) >= set(names) and hypothesis.refitted
         ]
-        fitted = (of_names or supersets)[0].weighed.state
+        fitted = (of_names or supersets)[0].state
         model = fitted.evidence.model
         for name in fitted.effects:
             if name not in names:
                 model = model.without(name)
-        request = self.search.asked
-        return fit(model, fitted.evidence.data_sets, request.held, request.bounds)
+        request = self.search.request
+        return fit(model, fitted.evidence.data_sets, request.fixed, request.bounds)
 
     def _doubt(self, after: Evidence, names: Sequence[str]) -> str:
         """Why names that are all but sure do not explain the whole gap; "" if they do."""
-        holdout = hold_out(self._fitted(self.base), self._fitted(after), self.search.asked.bounds)
+        holdout = hold_out(self._fitted(self.base), self._fitted(after), self.search.request.bounds)
         if holdout.after is not None and holdout.after > MOST_LEFT:
             return f"a held-out gap of {number(holdout.after, 3)} times the noise"
-        result = result_of(self._fitted(after), self.search.asked.bounds, after.model.effects, lacking=False)
+        result = result_of(self._fitted(after), self.search.request.bounds, after.model.effects, lacking=False)
         for name in names:
             effect = get_effect(name)
             amount = qualified_name(effect, effect.amount) if effect.replaces is None else ""
@@ -151,9 +151,11 @@ class DiagnosisWriter:
         return self._finished("partly", words, gap.after if gap else after, entries, places=best, gap=gap)
 
     def _described(self, evidence: Evidence) -> GapDescription | None:
-        request, rig = self.search.asked, self.data.campaign.rig
+        request, rig = self.search.request, self.data.campaign.rig
         return (
-            describe(self._fitted(evidence), rig, request.start, request.held, request.bounds) if request.most else None
+            describe(self._fitted(evidence), rig, request.start, request.fixed, request.bounds)
+            if request.max_effects
+            else None
         )
 
     def _of_record(self, claim: Claim) -> Diagnosis:
@@ -169,21 +171,21 @@ class DiagnosisWriter:
         words = f"these tests agree if {claim.words(self.data)}" + f", and with {_all(companions)}" * bool(companions)
         found = self._finished(self.finding.verdict, words, self.base, names, places=best, next_test=advice)
         warning = f"fitted to the tests as they are, which only agree if {claim.words(self.data)}: {advice}"
-        after = self._fitted(best.weighed.state.evidence)
+        after = self._fitted(best.state.evidence)
         return replace(
             found,
             after=after,
             remainder=locate(after),
-            holdout=hold_out(found.before, after, self.search.asked.bounds),
+            holdout=hold_out(found.before, after, self.search.request.bounds),
             result=replace(found.result, warnings=(*found.result.warnings, warning)),
         )
 
     def _of_claim(self, composition: Composition) -> str:
-        gain = self.base.chi_square - composition.best.weighed.state.evidence.chi_square
+        gain = self.base.chi_square - composition.best.state.evidence.chi_square
         return f"lowers chi-square by {gain:.0f} without a new parameter; {self._probability(composition)}"
 
     def _ambiguous(self) -> Diagnosis:
-        compositions = self.finding.told
+        compositions = self.finding.reported
         labels = {id(composition): self.label(composition) for composition in compositions}
         led = next((composition for composition in compositions if composition.names or composition.best.claim), None)
         lookalikes = tuple(labels[id(composition)] for composition in compositions if composition is not led)
@@ -198,7 +200,7 @@ class DiagnosisWriter:
         *first_labels, last_label = labels.values()
         words = f"these tests cannot distinguish between {', '.join(first_labels)} and {last_label}"
         fitted = [composition for composition in compositions if composition.best.effects and composition.best.refitted]
-        models = [composition.best.weighed.state.evidence.model for composition in fitted]
+        models = [composition.best.state.evidence.model for composition in fitted]
         advice = deciding_test(
             models, [composition.probability for composition in fitted], self.base.data_sets, self.data.campaign.rig
         )
@@ -240,10 +242,9 @@ class DiagnosisWriter:
     @cached_property
     def odds(self) -> Odds:
         """Explanations that are reported, the most probable first."""
-        compositions = sorted(self.finding.told, key=lambda composition: -composition.probability)
+        compositions = sorted(self.finding.reported, key=lambda composition: -composition.probability)
         models = (
-            composition.best.weighed.state.evidence.model if composition.best.refitted else None
-            for composition in compositions
+            composition.best.state.evidence.model if composition.best.refitted else None for composition in compositions
         )
         pairs = ((self._in_words(composition), composition.probability) for composition in compositions)
         labels, exclusive = tuple(map(self.label, compositions)), self.finding.verdict == "ambiguous"
@@ -267,7 +268,7 @@ class DiagnosisWriter:
         return f"lowers chi-square by {gain:.0f}{suffix}; {self._probability(self.first)}"
 
     def _probability(self, composition: Composition) -> str:
-        rivals = [rival for rival in self.finding.told if rival is not composition]
+        rivals = [rival for rival in self.finding.reported if rival is not composition]
         words = f"probability {format_probability(composition.probability)}"
         if not rivals:
             return words
@@ -284,7 +285,7 @@ class DiagnosisWriter:
         next_test: str = "",
         gap: GapDescription | None = None,
     ) -> Diagnosis:
-        base, after, bounds = self._fitted(self.base), self._fitted(after), self.search.asked.bounds
+        base, after, bounds = self._fitted(self.base), self._fitted(after), self.search.request.bounds
         spots = list(places.places) if places else []
         if not next_test and names:
             next_test = get_effect(names[0].name).confirmed_by
@@ -317,8 +318,8 @@ class DiagnosisWriter:
         if self.data.campaign.rig.stiffness_errors[0] is not None or not any(loop.gain_weighs for loop in loops):
             return evidence
         if evidence not in self._refitted:
-            request, data_sets = self.search.asked, with_gains(evidence.data_sets, weigh=False)
-            self._refitted[evidence] = fit(evidence.model, data_sets, request.held, request.bounds)
+            request, data_sets = self.search.request, with_gains(evidence.data_sets, weigh=False)
+            self._refitted[evidence] = fit(evidence.model, data_sets, request.fixed, request.bounds)
         return self._refitted[evidence]
 
     @cached_property
@@ -341,10 +342,10 @@ class DiagnosisWriter:
         for hypothesis in self.hypotheses:
             if (claim := hypothesis.claim) and len(hypothesis.key) == 1:
                 share = weight[id(hypothesis)] / whole
-                gain = self.base.chi_square - hypothesis.weighed.state.evidence.chi_square
+                gain = self.base.chi_square - hypothesis.state.evidence.chi_square
                 why = "closes the gap" if self.first and self.first.best is hypothesis else _LESS_LIKELY
                 found.append(CandidateResult(" + ".join(claim.labels(self.data)), gain, gain, share, {}, why))
-        for candidate in self.search.root.effects:
+        for candidate in self.search.root.proposals:
             share = (
                 sum(weight[id(hypothesis)] for hypothesis in self.hypotheses if candidate.name in hypothesis.effects)
                 / whole
@@ -352,8 +353,8 @@ class DiagnosisWriter:
             found.append(
                 self._judged(
                     candidate.name,
-                    candidate.proposal.score,
-                    candidate.proposal.visible,
+                    candidate.score,
+                    candidate.visible,
                     alone.get(candidate.name),
                     share,
                 )
@@ -366,7 +367,7 @@ class DiagnosisWriter:
         if alone is None:
             why = "score too small to refit" if visible else "not visible in these tests"
             return CandidateResult(name, score, None, share, {}, why)
-        after = alone.weighed.state.evidence
+        after = alone.state.evidence
         values = {key: value for key, value in after.model.values.items() if key not in self.base.model.values}
         is_named = self.first and name in self.first.names
         why = "part of the most probable explanation" if is_named else _LESS_LIKELY
@@ -374,7 +375,7 @@ class DiagnosisWriter:
 
     def _notes(self) -> tuple[str, ...]:
         """Sentence on the effects that these tests cannot show."""
-        unseen = [candidate.name for candidate in self.search.root.effects if not candidate.proposal.visible]
+        unseen = [candidate.name for candidate in self.search.root.proposals if not candidate.visible]
         blind = [name for name in unseen if not get_effect(name).under]  # what no test states is not asked for
         notes = [f"not identifiable from these tests: {', '.join(blind)}"] if blind else []
         if self.first and self.first.unnamed and len({str(test.direction) for test in self.base.data_sets}) == 1:
@@ -423,7 +424,7 @@ def _entries(data: PreparedCampaign, claim: Claim, evidence: str) -> list[Named]
 
 def _place_where(base: Evidence, place: FaultyPlace, best: Hypothesis) -> Where:
     kind, component = ("loop", "force") if place.family == "loop" else ("sweep", "storage")
-    reading = f"{place.name} departs by {number(100 * best.size, 2)} % from all other tests"
+    reading = f"{place.name} departs by {number(100 * best.change, 2)} % from all other tests"
     return Where(
         place.direction,
         kind,

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations, product
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import logsumexp
 
 from bushfit.diagnosis.document import Verdict
-from bushfit.diagnosis.explanations import FaultyPlace, Meeting, is_pattern
-from bushfit.diagnosis.hypotheses import COMPOUND, Hypothesis
-from bushfit.diagnosis.priors import DOES_NOT_FIT, MOST_TOLD, MOSTLY, NAMED, NOTHING
+from bushfit.diagnosis.explanations import COMPOUND, FaultyPlace, Meeting, is_pattern
+from bushfit.diagnosis.hypotheses import Hypothesis
+from bushfit.diagnosis.priors import DOES_NOT_FIT, MOST_REPORTED, MOSTLY, NAMED, NOTHING
 from bushfit.effects import get_effect
 from bushfit.effects.contract import Level
 
@@ -25,7 +28,7 @@ class Composition:
         best: the likeliest hypothesis of these parts.
         names: effects that are part of it. Beside a deviation of the compound these are none of the rubber: such a law
             is part of the deviation.
-        unnamed: whether something without a name is beside them, a deviation of the compound among them.
+        unnamed: True if something without a name is beside them, a deviation of the compound among them.
     """
 
     probability: float
@@ -42,9 +45,16 @@ class Composition:
     def parts(self) -> frozenset[str]:
         """Names of its effects, kinds of places and other parts."""
         best = self.best
-        spots = [f"place: {place.family}" for place in self.places] + (["levels"] if best.levels else [])
-        claim = [str(best.claim.mistake.name)] if best.claim else []
-        return frozenset((*self.names, *spots, *(["unnamed"] if self.unnamed else []), *claim))
+        others = [f"place: {place.family}" for place in self.places] + ["levels"] * best.levels
+        others += ["unnamed"] * self.unnamed + ([str(best.claim.mistake.name)] if best.claim else [])
+        return frozenset((*self.names, *others))
+
+    @property
+    def may_mislead(self) -> bool:
+        """True if the places at fault may bend the effects beside them, as a fault of a level, a repeat or a frequency
+        does. A loop is a test of its own, and points that were left out have no weight."""
+        faults = [place for place in self.places if not isinstance(place, Meeting)]
+        return bool(self.places) and (not self.names or any(place.family != "loop" for place in faults))
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,15 +62,16 @@ class Finding:
     """The verdict, with the probabilities that it stands on.
 
     Args:
+        verdict: the verdict in one word.
         nothing: probability that nothing is missing beyond noise and tolerance.
-        told: what may explain the gap, the most probable first; of a single explanation that one.
+        reported: explanations of the gap that are reported, the most probable first, or the one that is nearly sure.
         leads: effects that help, but are no explanation; beside a name what may be there too.
         names: effects that are named.
     """
 
     verdict: Verdict
     nothing: float
-    told: tuple[Composition, ...]
+    reported: tuple[Composition, ...]
     leads: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
 
@@ -70,145 +81,139 @@ def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
 
     Args:
         hypotheses: all hypotheses that were compared, the most probable first.
-        tolerance: change of |K|, relative, below which an explanation counts as nothing.
+        tolerance: relative change of |K| below which an explanation counts as nothing.
 
     Returns:
         Verdict, probability that nothing is missing, and the explanations behind the verdict.
     """
-    weights = np.exp(
-        [each.log_posterior for each in hypotheses] - logsumexp([each.log_posterior for each in hypotheses])
-    )
-    pairs = list(zip(hypotheses, weights.tolist(), strict=True))
-    small = [_is_nothing(each, tolerance) for each in hypotheses]
-    nothing = sum(weight for (_, weight), is_small in zip(pairs, small, strict=True) if is_small)
-    left = [pair for pair, is_small in zip(pairs, small, strict=True) if not is_small]
-    if nothing >= NOTHING or not left:
+    log_posteriors = np.array([hypothesis.log_posterior for hypothesis in hypotheses])
+    weights = np.exp(log_posteriors - logsumexp(log_posteriors)).tolist()
+    small = [hypothesis.change <= tolerance or not hypothesis.key for hypothesis in hypotheses]
+    nothing = sum(weight for weight, is_small in zip(weights, small, strict=True) if is_small)
+    large = [(h, weight) for h, weight, is_small in zip(hypotheses, weights, small, strict=True) if not is_small]
+    if nothing >= NOTHING or not large:
         return Finding("consistent", nothing, ())
-    compositions = _compositions(left)
-    first = compositions[0]
-    leads = _leads(left)
+    compositions = compose(large)
+    first, leads = compositions[0], _leads(large)
     if first.probability >= NAMED:
-        return _of_one(first, nothing, leads)
-    told, together = list[Composition](), 0.0
-    for each in compositions:
-        if together < NAMED:
-            told.append(each)
-            together += each.probability
-    common = frozenset.intersection(*(each.parts for each in told))
-    unnamed = sum(each.probability for each in told if each.unnamed)
-    shown = common | {"unnamed"} if unnamed > 0.5 else common
-    sure = next((each for each in told if each.parts == shown), None)
-    if sure:  # all that is probable has these parts; what else there is is not shown, but that there is something
-        found = _of_one(sure, nothing, leads)
-        return replace(found, told=(sure, *(each for each in told if each is not sure)))
+        return _single(first, nothing, leads)
+    before = np.cumsum([0.0, *(composition.probability for composition in compositions[:-1])])
+    likely = [composition for composition, sum_before in zip(compositions, before, strict=True) if sum_before < NAMED]
+    common = frozenset.intersection(*(composition.parts for composition in likely))
+    unnamed = sum(composition.probability for composition in likely if composition.unnamed)
+    certain = common | {"unnamed"} if unnamed > 0.5 else common
+    alone = next((composition for composition in likely if composition.parts == certain), None)
+    if alone:  # all that is probable has these parts; the tests show no other part, but that there is one
+        others = (composition for composition in likely if composition is not alone)
+        return replace(_single(alone, nothing, leads), reported=(alone, *others))
+    reported = tuple(likely[:MOST_REPORTED])
     if common and all(part.startswith("place: ") for part in common):  # whatever else there is, this has to go first
-        return Finding("unexplained", nothing, tuple(told[:MOST_TOLD]), leads)
-    nameless = sum(each.probability for each in told if each.parts == {"unnamed"})
+        return Finding("unexplained", nothing, reported, leads)
+    nameless = sum(composition.probability for composition in likely if composition.parts == {"unnamed"})
     fits = first.best.claim is not None or first.best.chance >= DOES_NOT_FIT
-    if len(told) <= MOST_TOLD and nameless < 0.5 and fits:
-        return Finding("ambiguous", nothing, tuple(told))
-    names = tuple(name for name in first.names if sum(e.probability for e in compositions if name in e.names) >= NAMED)
+    if len(likely) <= MOST_REPORTED and nameless < 0.5 and fits:
+        return Finding("ambiguous", nothing, reported)
+    share = {name: sum(c.probability for c in compositions if name in c.names) for name in first.names}
+    names = tuple(name for name in first.names if share[name] >= NAMED)
     if names and first.unnamed:  # whatever the compound does beside them
-        return Finding("partly", nothing, tuple(told[:MOST_TOLD]), leads, names)
-    return Finding("described", nothing, tuple(told[:MOST_TOLD]), leads)
+        return Finding("partly", nothing, reported, leads, names)
+    return Finding("described", nothing, reported, leads)
 
 
-def _is_nothing(each: Hypothesis, tolerance: float) -> bool:
-    return each.size <= tolerance or not each.key
-
-
-def _of_one(first: Composition, nothing: float, leads: Sequence[str]) -> Finding:
-    """The verdict where one composition is all but sure."""
+def _single(first: Composition, nothing: float, leads: Sequence[str]) -> Finding:
+    """The verdict where one composition is nearly sure."""
     best, names = first.best, first.names
     leads = tuple(dict.fromkeys((*names, *leads)))
-    if _bend_names(first) or not (names or best.claim or first.unnamed):  # a place that is off has to go first
+    if first.may_mislead or not (names or best.claim or first.unnamed):
         return Finding("unexplained", nothing, (first,), leads)
-    curve = best.unnamed not in ("", COMPOUND) and best.last >= (1.0 - MOSTLY) * best.size
+    curve = best.unnamed not in ("", COMPOUND) and best.last_change >= (1.0 - MOSTLY) * best.change
     if not best.claim and (not names or curve or best.chance < DOES_NOT_FIT):
         return Finding("described", nothing, (first,), leads)
-    if first.unnamed or best.levels or first.places:
-        return Finding("partly", nothing, (first,), names=names)
-    return Finding("named", nothing, (first,), names=names)
-
-
-def _bend_names(composition: Composition) -> bool:
-    """True if the places at fault may bend the names beside them: a fault of a level, a repeat or a frequency does. A
-    loop is a test of its own, and points that were left out have no weight."""
-    faults = [place for place in composition.places if not isinstance(place, Meeting)]
-    return bool(composition.places) and (not composition.names or any(place.family != "loop" for place in faults))
+    partly = first.unnamed or best.levels or first.places
+    return Finding("partly" if partly else "named", nothing, (first,), names=names)
 
 
 def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
-    """Effects that nearly all that is probable has in common."""
-    share: dict[str, float] = {}
-    for each, weight in pairs:
-        for name in each.effects:
-            share[name] = share.get(name, 0.0) + weight
-    whole = sum(weight for _, weight in pairs)
-    return tuple(name for name in pairs[0][0].effects if share[name] >= MOSTLY * whole)
+    """Effects that nearly all probable hypotheses have in common."""
+    share: dict[str, float] = defaultdict(float)
+    for hypothesis, weight in pairs:
+        for name in hypothesis.effects:
+            share[name] += weight
+    total = sum(weight for _, weight in pairs)
+    return tuple(name for name in pairs[0][0].effects if share[name] >= MOSTLY * total)
 
 
-def _compositions(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
-    """Hypotheses of the same parts as one, with a deviation of the compound beside them or without.
+class _Parts(NamedTuple):
+    """Parts of a hypothesis: effects, places by kind and name, whether something without a name is all that there is,
+    and the claim on a record."""
+
+    effects: frozenset[str]
+    places: frozenset[str]
+    only_unnamed: bool
+    claim: Hashable
+
+    @classmethod
+    def of_hypothesis(cls, hypothesis: Hypothesis) -> _Parts:
+        """The parts of a hypothesis; beside a deviation of the compound without laws of the rubber."""
+        effects = frozenset(
+            name for name in hypothesis.effects if not (hypothesis.bent and get_effect(name).level == Level.MATERIAL)
+        )
+        pattern = is_pattern(hypothesis.places)
+        places = [f"{place.family}:{place.name}" for place in hypothesis.places] + ["levels:"] * hypothesis.levels
+        places = [] if pattern else places
+        claim = hypothesis.claim and hypothesis.claim.key
+        only_unnamed = (pattern or bool(hypothesis.unnamed)) and not (effects or places or claim)
+        return cls(effects, frozenset(places), only_unnamed, claim)
+
+    def simpler(self) -> set[_Parts]:
+        """These parts with some, but not all, left out; and with each effect that has a limit replaced by its limit."""
+        reduced = product(_subsets(self.effects), _subsets(self.places), [False], {None, self.claim})
+        limit = self._replace(effects=frozenset(get_effect(name).limit or name for name in self.effects))
+        return {parts for parts in (*map(_Parts._make, reduced), limit) if any(parts)} - {self}
+
+
+def _subsets(names: frozenset[str]) -> list[frozenset[str]]:
+    return [frozenset(chosen) for count in range(len(names) + 1) for chosen in combinations(names, count)]
+
+
+def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
+    """Join hypotheses of the same parts, with a deviation of the compound beside them or without.
 
     A part without which a composition does better is not shown by these tests, and it counts with the simpler one; so
-    does an effect that has another as its limit. Places that overlap are one, told several ways.
+    does an effect that has another as its limit. Places that overlap are one.
+
+    Args:
+        pairs: hypotheses and their weights, the most probable first.
+
+    Returns:
+        Compositions, the most probable first.
     """
     best: dict[_Parts, Hypothesis] = {}
-    total: dict[_Parts, float] = {}
-    bent: dict[_Parts, float] = {}
-    for each, weight in pairs:  # the most probable first
-        parts = _parts(each)
-        best.setdefault(parts, each)
-        if not best[parts].refitted and each.refitted:
-            best[parts] = each
-        total[parts] = total.get(parts, 0.0) + weight
-        bent[parts] = bent.get(parts, 0.0) + weight * (bool(each.unnamed) or is_pattern(each.places))
-    merged: dict[_Parts, float] = {}
-    for parts in sorted(total, key=lambda parts: -total[parts]):
-        limit = (frozenset(map(_limit, parts[0])), *parts[1:])
-        simpler = [other for other in merged if _within(other, parts) or (other == limit and other != parts)]
-        home = simpler[0] if simpler else parts
-        merged[home] = merged.get(home, 0.0) + total[parts]
-    kinds: dict[tuple[object, ...], list[_Parts]] = {}
+    total: dict[_Parts, float] = defaultdict(float)
+    unnamed: dict[_Parts, float] = defaultdict(float)
+    for hypothesis, weight in pairs:
+        parts = _Parts.of_hypothesis(hypothesis)
+        if parts not in best or (hypothesis.refitted and not best[parts].refitted):
+            best[parts] = hypothesis
+        total[parts] += weight
+        unnamed[parts] += weight * (bool(hypothesis.unnamed) or is_pattern(hypothesis.places))
+    merged: dict[_Parts, float] = defaultdict(float)
+    order = {parts: rank for rank, parts in enumerate(sorted(total, key=lambda parts: -total[parts]))}
+    for parts in order:
+        simpler = parts.simpler() & merged.keys()
+        merged[min(simpler, key=order.__getitem__) if simpler else parts] += total[parts]
+    kinds: dict[Hashable, list[_Parts]] = defaultdict(list)
     for parts in sorted(merged, key=lambda parts: -merged[parts]):
-        own = frozenset(place.partition(":")[0] for place in parts[1])
-        kinds.setdefault((parts[0], own, *parts[2:]), []).append(parts)
+        families = frozenset(place.partition(":")[0] for place in parts.places)
+        kinds[parts._replace(places=families)].append(parts)
     whole = sum(merged.values())
-    found = [
+    compositions = [
         Composition(
-            sum(merged[parts] for parts in each) / whole,
-            best[each[0]],
-            tuple(name for name in best[each[0]].effects if name in each[0][0]),
-            bent[each[0]] > 0.5 * total[each[0]],
+            sum(merged[parts] for parts in alike) / whole,
+            best[alike[0]],
+            tuple(name for name in best[alike[0]].effects if name in alike[0].effects),
+            unnamed[alike[0]] > 0.5 * total[alike[0]],
         )
-        for each in kinds.values()
+        for alike in kinds.values()
     ]
-    return sorted(found, key=lambda each: -each.probability)
-
-
-#: Effects, places by kind and name, whether there is nothing but something without a name, and the claim on a record.
-_Parts = tuple[frozenset[str], frozenset[str], bool, object]
-
-
-def _parts(each: Hypothesis) -> _Parts:
-    spots = [f"{place.family}:{place.name}" for place in each.places] + (["levels:"] if each.levels else [])
-    claim = each.claim and (each.claim.mistake.name, each.claim.tests)
-    names = frozenset(name for name in each.effects if not (each.bent and _is_of_rubber(name)))
-    pattern = is_pattern(each.places)
-    spots = [] if pattern else spots
-    return names, frozenset(spots), (pattern or bool(each.unnamed)) and not (names or spots or claim), claim
-
-
-def _is_of_rubber(name: str) -> bool:
-    return get_effect(name).level == Level.MATERIAL
-
-
-def _within(one: _Parts, other: _Parts) -> bool:
-    """True if a composition is another one with some parts left out."""
-    less = one[0] <= other[0] and one[1] <= other[1] and one[2] <= other[2] and one[3] in (None, other[3])
-    return less and one != other and bool(one[0] or one[1] or one[2] or one[3])
-
-
-def _limit(name: str) -> str:
-    return get_effect(name).limit or name
+    return sorted(compositions, key=lambda composition: -composition.probability)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
-from bushfit.diagnosis.beam import Search
 from bushfit.diagnosis.claims import adopted
 from bushfit.diagnosis.condense import condensed
 from bushfit.diagnosis.evidence import EVALUATIONS, Evidence
@@ -14,6 +12,7 @@ from bushfit.diagnosis.explanations import meetings
 from bushfit.diagnosis.hypotheses import DiagnosisRequest
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.report_text import DiagnosisWriter
+from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import judged
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.mistakes import get_candidate, get_mistake
@@ -26,7 +25,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 
 #: Rounds of looking for wild points at most: each may uncover others beside those left out.
-_MOST_ROUNDS = 4
+_MAXIMUM_ROUNDS = 4
 
 
 def diagnose(
@@ -50,80 +49,74 @@ def diagnose(
     settings = settings or DiagnosisSettings()
     for name in (*settings.adopt, *settings.without):
         get_candidate(name)
-    mended = [name for name in settings.adopt if get_mistake(name)]
-    data, messages = adopted(data, mended)
-    data, initial, excluded_points = _without_wild(data, model, settings)
-    whole, (data, fewer) = data, condensed(data)
-    if fewer:
-        initial = _begin(data, model, settings)
-    request = DiagnosisRequest(
-        data,
-        initial.evidence,
-        lambda mended: _begin(mended, model, settings).evidence,
-        settings.without,
-        settings.max_effects,
-        settings.tolerance,
-        initial.start,
-        meetings(excluded_points, whole.sweeps, initial.evidence.model),
-        initial.held,
-        data.bounds,
+    data, messages = adopted(data, [name for name in settings.adopt if get_mistake(name)])
+    excluded: tuple[Outlier, ...] = ()
+    for _ in range(_MAXIMUM_ROUNDS):  # single outliers of sweeps, which repeats and neighbours contradict
+        initial = _initial_fit(data, model, settings)
+        known_rows = {(outlier.test, outlier.row) for outlier in excluded}  # a robust fit finds them anew
+        sweeps = split_by_kind(initial.evidence.data_sets)[1]
+        candidates = (*initial.outliers, *outliers_at(initial.evidence.model, sweeps))
+        wild = tuple(outlier for outlier in candidates if (outlier.test, outlier.row) not in known_rows)
+        if not wild:
+            break
+        data, excluded = data.without(wild), (*excluded, *wild)
+    whole, (data, reductions) = data, condensed(data)
+    if reductions:
+        initial = _initial_fit(data, model, settings)
+    search = Search(
+        DiagnosisRequest(
+            data,
+            initial.evidence,
+            lambda mended: _initial_fit(mended, model, settings).evidence,
+            settings.without,
+            settings.max_effects,
+            settings.tolerance,
+            initial.start,
+            meetings(excluded, whole.sweeps, initial.evidence.model),
+            initial.fixed,
+            data.bounds,
+        )
     )
-    search = Search(request)
     hypotheses = search.run()
-    found = DiagnosisWriter(search, judged(hypotheses, settings.tolerance), hypotheses, settings.unresolved).diagnosis()
+    finding = judged(hypotheses, settings.tolerance)
+    diagnosis = DiagnosisWriter(search, finding, hypotheses, settings.unresolved).diagnosis()
     pairs = zip(whole.sweeps, data.sweeps, strict=True)
-    changed = {after.name for before, after in pairs if after.size < before.size}
-    counts = Counter(outlier.test for outlier in initial.outliers if outlier.test in changed)
-    fewer += tuple(
+    reduced = {after.name for before, after in pairs if after.size < before.size}
+    counts = Counter(outlier.test for outlier in initial.outliers if outlier.test in reduced)
+    left_out = (
         f"{name}: {count} of these points are left out, because they deviate by more than noise"
         for name, count in counts.items()
     )
-    of_loops = outliers_at(found.result.model, data.loops)
-    outliers = (*outlier_warnings(of_loops, robust=data.robust), *outlier_warnings(excluded_points, robust=True))
-    notes = (*messages, *fewer, *found.notes, *data.assumed, *outliers)
-    warnings = (*messages, *found.result.warnings, *outliers)
+    of_loops = outliers_at(diagnosis.result.model, data.loops)
+    outliers = (*outlier_warnings(of_loops, robust=data.robust), *outlier_warnings(excluded, robust=True))
+    notes = (*messages, *reductions, *left_out, *diagnosis.notes, *data.assumed, *outliers)
     result = replace(
-        found.result, outliers=(*of_loops, *excluded_points), warnings=warnings, specimens=data.campaign.specimens
+        diagnosis.result,
+        outliers=(*of_loops, *excluded),
+        warnings=(*messages, *diagnosis.result.warnings, *outliers),
+        specimens=data.campaign.specimens,
     )
-    return replace(found, notes=notes, result=result)
+    return replace(diagnosis, notes=notes, result=result)
 
 
-def _without_wild(
-    data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings
-) -> tuple[PreparedCampaign, InitialFit, tuple[Outlier, ...]]:
-    """Remove the weight of single outliers of sweeps, which repeats and neighbours contradict.
-
-    Returns: the campaign, its fit, and the outliers.
-    """
-    excluded_points: tuple[Outlier, ...] = ()
-    for _ in range(_MOST_ROUNDS):
-        initial = _begin(data, model, settings)
-        known_rows = {(outlier.test, outlier.row) for outlier in excluded_points}  # a robust fit finds them anew
-        found = (*initial.outliers, *outliers_at(initial.evidence.model, split_by_kind(initial.evidence.data_sets)[1]))
-        wild = tuple(outlier for outlier in found if (outlier.test, outlier.row) not in known_rows)
-        if not wild:
-            break
-        data, excluded_points = data.without(wild), (*excluded_points, *wild)
-    return data, initial, excluded_points
-
-
-class InitialFit(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class InitialFit:
     """Starting model fitted to all tests of a campaign.
 
     Args:
         evidence: the fit.
         start: starting values read from the data.
-        held: names of parameters that are not fitted.
+        fixed: names of parameters that are not fitted.
         outliers: points that a robust fit left out.
     """
 
     evidence: Evidence
     start: dict[str, float]
-    held: list[str]
+    fixed: list[str]
     outliers: tuple[Outlier, ...]
 
 
-def _begin(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> InitialFit:
+def _initial_fit(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> InitialFit:
     """Fit the starting model with the adopted effects; gains of loops are errors of a stated or assumed class."""
     hint = "add measured tests to the campaign"
     data_sets = data.require_tests(data.data_sets, "there is nothing to diagnose", hint)

@@ -15,13 +15,15 @@ from rigged import LEVELS, SHARED, Fitted, Measured, Tamper, both, loop_too_stro
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import Explanation, effects, places, unnamed
+from bushfit.diagnosis.explanations import Explanation, unnamed
+from bushfit.diagnosis.faulty_places import faulty_places
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.propose import proposals, scores, sensitivity
 from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
 from bushfit.effects import BASE, LIBRARY, get_effect
 from bushfit.effects.contract import Array, Values
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind
+from bushfit.gaussian_process import matern
 from bushfit.model.model import Model
 
 SHARED_RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
@@ -60,7 +62,7 @@ def test_the_place_that_went_wrong_is_the_likeliest(
 ) -> None:
     """Errors of the rig, of all sizes, are counted beside it."""
     evidence = scattering_alone(fitted(tamper(measured(plan=SHARED))))
-    found = best(evidence, places(evidence))
+    found = best(evidence, faulty_places(evidence))
     assert (found.kind, found.family) == ("place", kind)
     assert found.name == words
 
@@ -73,7 +75,7 @@ def test_places_are_those_of_the_tests_there_are(
     measured: Measured, fitted: Fitted, part: Tamper, gone: set[str]
 ) -> None:
     evidence = scattering_alone(fitted(part(measured(plan=SHARED))))
-    assert {each.family for each in places(evidence)} == {"frequency", "level", "repeat", "loop"} - gone
+    assert {each.family for each in faulty_places(evidence)} == {"frequency", "level", "repeat", "loop"} - gone
 
 
 def test_curves_have_unit_variance_and_fall_off_with_distance(bare: Evidence) -> None:
@@ -84,12 +86,12 @@ def test_curves_have_unit_variance_and_fall_off_with_distance(bare: Evidence) ->
     sweep = split_by_kind(bare.data_sets)[1][0]
     point = sweep.whiten(np.ones(sweep.frequency.size)).reshape(2, -1)[0]
     same = np.flatnonzero((sweep.amplitude == LEVELS[1]) & (sweep.repeat == 1))
-    distance = np.log(sweep.frequency[same, None] / sweep.frequency[same])
-    for how, length, short in (("smooth", 1.5, 0.02), ("rough", 0.5, 0.6)):
+    for how, length, short in (("smooth", 1.5, 0.1), ("rough", 0.5, 0.6)):
         group = made[f"{how} axial"].group
         assert group is not None
         own = group.columns[:, bare.place[sweep]].reshape(len(group.columns), 2, -1)[:, 0] / point
-        apart = np.exp(-0.5 * (distance / length) ** 2) - (own.T @ own)[np.ix_(same, same)]
+        correlation = matern(np.log(sweep.frequency[same, None]) / length, np.log(sweep.frequency[same, None]) / length)
+        apart = correlation - (own.T @ own)[np.ix_(same, same)]
         assert np.linalg.eigvalsh(apart).min() > -0.01
         assert apart.max() < short
         assert not group.columns[:, : bare.place[sweep].start].any()
@@ -97,7 +99,7 @@ def test_curves_have_unit_variance_and_fall_off_with_distance(bare: Evidence) ->
 
 def test_effects_are_sized_by_what_they_change(bare: Evidence) -> None:
     """A typical amount times its unit is its largest share of |K|; of one that replaces a branch its refit tells."""
-    found = {each.name: each for each in effects(bare, ("delay",), ())}
+    found = {each.name: each for each in proposals(bare, ("delay",), ())}
     assert "delay" not in found
     assert found["kraus"].group is None
     group = found["inertia"].group
@@ -111,12 +113,12 @@ def test_effects_are_sized_by_what_they_change(bare: Evidence) -> None:
 
 
 def test_every_effect_is_proposed_but_twins_and_what_the_tests_do_not_state(bare: Evidence) -> None:
-    found = {each.name: each for each in effects(bare, (), ())}
+    found = {each.name: each for each in proposals(bare, (), ())}
     twins = {twin for effect in LIBRARY.values() for twin in effect.twins}
     later = {name for name, effect in LIBRARY.items() if effect.after}
     assert found.keys() >= LIBRARY.keys() - {*BASE, *twins, *later}
     assert not found.keys() & twins
-    temperature = found["temperature"].proposal  # none is stated
+    temperature = found["temperature"]  # none is stated
     assert temperature is not None
     assert (temperature.score, temperature.visible) == (0.0, False)
 
@@ -146,7 +148,7 @@ def test_an_effect_is_visible_where_any_of_its_shapes_is(bare: Evidence) -> None
     """Of a second springpot one shape is the first, and noise may speak against all others."""
     against = replace(bare, solution=replace(bare.solution, residual=-bare.residual))
     for evidence in (bare, against):
-        assert all(each.proposal.visible for each in effects(evidence, (), ()) if each.name == "second_springpot")
+        assert all(each.visible for each in proposals(evidence, (), ()) if each.name == "second_springpot")
 
 
 def test_scores_are_those_of_a_linear_refit(bare: Evidence) -> None:

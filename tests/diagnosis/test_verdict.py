@@ -21,15 +21,13 @@ def one(parts: str, odds: float, *, size: float = 0.05, last: float = 0.0, chanc
     names = parts.split("+") if parts else []
     spots = [name.split(":") for name in names if ":" in name]
     places: Any = tuple(SimpleNamespace(family=family, name=name, extreme=False) for family, name in spots)
-    claims: list[Any] = [SimpleNamespace(mistake=MISTAKES[name], tests=(0,)) for name in names if name in MISTAKES]
+    claims: list[Any] = [SimpleNamespace(mistake=MISTAKES[name], key=name) for name in names if name in MISTAKES]
     others = {"unnamed", "levels", *MISTAKES}
     effects = tuple(name for name in names if ":" not in name and name not in others)
-    weighed: Any = SimpleNamespace(
-        state=SimpleNamespace(effects=effects), first=SimpleNamespace(chance=lambda **_: chance)
-    )
+    state: Any = SimpleNamespace(effects=effects, linear=SimpleNamespace(chance=lambda **_: chance))
     claim, curve = claims[0] if claims else None, "smooth all" if "unnamed" in names else ""
     size = size if names else 0.0
-    return Hypothesis(effects, claim, places, curve, "levels" in names, log(odds), size, last, weighed)
+    return Hypothesis(effects, claim, places, curve, "levels" in names, log(odds), size, last, state)
 
 
 def of(**odds: float) -> Finding:
@@ -39,7 +37,7 @@ def of(**odds: float) -> Finding:
 
 def told(finding: Finding) -> dict[str, float]:
     """Parts and rounded probabilities of what is told."""
-    return {"+".join(sorted(each.parts)): round(each.probability, 2) for each in finding.told}
+    return {"+".join(sorted(each.parts)): round(each.probability, 2) for each in finding.reported}
 
 
 @pytest.mark.parametrize(
@@ -80,7 +78,7 @@ def test_what_changes_less_than_the_tolerance_is_nothing() -> None:
 def test_of_more_than_can_be_told_it_is_described_by_what_nearly_all_have_in_common() -> None:
     others = ("inertia", "viscous", "maxwell", "high_pass", "clearance", "asymmetry")
     finding = of(**{f"delay+{name}": 1.0 for name in others})
-    assert (finding.verdict, finding.leads, len(finding.told)) == ("described", ("delay",), 4)
+    assert (finding.verdict, finding.leads, len(finding.reported)) == ("described", ("delay",), 4)
     assert of(**dict.fromkeys(others, 1.0)).leads == ()
 
 

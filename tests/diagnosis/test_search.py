@@ -161,7 +161,7 @@ def test_odds_by_hand(left: tuple[PreparedCampaign, Model]) -> None:
     count = np.unique(np.concatenate([sweep.frequency for sweep in data.sweeps])).size
     (three,) = meetings(at(data, (0, 65.0, 0), (0, 65.0, 1), (1, 65.0, 0)), data.sweeps, model)
     assert three.log_odds == pytest.approx(2.0 * np.log(count))
-    assert three.apart == pytest.approx(8.0)
+    assert three.outlier_distance == pytest.approx(8.0)
     pairs = meetings(at(data, (0, 65.0, 0), (0, 65.0, 1), (1, 45.0, 0)), data.sweeps, model)
     assert [pair.frequency[0] for pair in pairs] == [65.0]
     assert pairs[0].log_odds == pytest.approx(-np.log(1.0 - (1.0 - 1.0 / count) ** 2))

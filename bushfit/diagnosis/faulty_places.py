@@ -1,0 +1,171 @@
+"""Faulty parts of the tests: a frequency, a level, a repeat, or a loop that disagrees with all others."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import groupby
+
+import numpy as np
+
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.explanations import FaultyPlace
+from bushfit.diagnosis.linear_model import Group
+from bushfit.effects.contract import Array
+from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
+
+#: Neighbouring frequencies that one disturbance covers at most: mains hum and its sidebands.
+_WIDEST = 3
+#: Frequencies that a campaign has at least before one of them can be a suspect.
+_FEWEST_FREQUENCIES = 5
+#: Suspects of one frequency at most; of more frequencies neighbours count as one. Chosen for time.
+_MOST_FREQUENCIES = 100
+
+
+def faulty_places(evidence: Evidence) -> list[FaultyPlace]:
+    """List the places whose points may deviate together, in gain and phase; levels and repeats also with a slope.
+
+    Args:
+        evidence: the fitted model and the tests.
+
+    Returns:
+        Frequencies, levels, repeats and, beside sweeps, loops. Their columns do not depend on the model.
+    """
+    loops, sweeps = split_by_kind(evidence.data_sets)
+    places = [*_frequencies(evidence, sweeps), *_levels(evidence, sweeps), *_repeats(evidence, sweeps)]
+    for loop in loops if sweeps else ():  # wrong as a whole, in gain or offset
+        group = Group(
+            np.array(loop.gain_and_offset()),
+            np.eye(2),
+            together=True,
+            among=(evidence.place[loop], evidence.residual.size),
+        )
+        ends = (loop.drive.frequency,) * 2, (loop.drive.amplitude,) * 2
+        places.append(FaultyPlace("place", "loop", f"the loop {loop.name}", group, loop.direction, *ends))
+    return places
+
+
+def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPlace]:
+    """Each level of a direction that has several, and each repeat of a level."""
+    for sweep in sweeps:
+        levels_of_direction = [np.unique(other.held) for other in sweeps if other.direction == sweep.direction]
+        known = np.concatenate(levels_of_direction)
+        for level in np.unique(sweep.held):
+            mask = sweep.held == level
+            label = sweep.line_words(int(np.argmax(mask)))
+            if known.size > 1:  # in this file or in others
+                place = _shifted(evidence, "level", label, [sweep], [mask], sloping=True)
+                yield replace(place, extreme=known.size > 2 and level in (known.min(), known.max()))
+            numbers = np.unique(sweep.repeat[mask])
+            for number in numbers if numbers.size > 2 else ():
+                repeat = mask & (sweep.repeat == number)
+                yield _shifted(evidence, "repeat", f"repeat {number} of {label}", [sweep], [repeat])
+
+
+def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPlace]:
+    """A repeat as a whole, of one direction or of all."""
+    for _, label, members in _scopes(sweeps):
+        if not all(np.unique(sweep.repeat).size > 1 for sweep in members):
+            continue
+        for number in sorted({int(repeat) for sweep in members for repeat in sweep.repeat}):
+            chosen = [sweep.repeat == number for sweep in members]
+            if all(mask.any() for mask in chosen):
+                yield _shifted(evidence, "repeat", f"repeat {number} of {label}", members, chosen, sloping=True)
+
+
+def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPlace]:
+    """A disturbance at one frequency or a few neighbours, in one direction or in all."""
+    steps = np.unique(np.concatenate([sweep.frequency for sweep in sweeps])) if sweeps else np.empty(0)
+    if steps.size < _FEWEST_FREQUENCIES:
+        return
+    bands = [part[[0, -1]].tolist() for part in np.array_split(steps, min(steps.size, _MOST_FREQUENCIES))]
+    for location, _, members in _scopes(sweeps):
+        masks = [[(low <= sweep.frequency) & (sweep.frequency <= high) for sweep in members] for low, high in bands]
+        columns = [_shift_columns(evidence, members, chosen) for chosen in masks]
+        for width in range(1, _WIDEST + 1):
+            for first in range(len(bands) - width + 1):
+                window = slice(first, first + width)
+                if not all(mask.any() for chosen in masks[window] for mask in chosen):
+                    continue
+                ends = dict.fromkeys((bands[first][0], bands[first + width - 1][-1]))
+                name = f"{' to '.join(f'{end:.4g}' for end in ends)} Hz in {location}, at every amplitude"
+                chosen = [np.any(of_sweep, axis=0) for of_sweep in zip(*masks[window], strict=True)]
+                unit = np.kron(np.eye(width), np.array([[1.0], [1.0j]]))
+                yield _place(evidence, "frequency", name, members, chosen, np.concatenate(columns[window]), unit)
+
+
+def _scopes(sweeps: Sequence[MeasuredSweep]) -> Iterator[tuple[str, str, Sequence[MeasuredSweep]]]:
+    """Groups of sweeps that may deviate together: one sweep, all sweeps of a direction, and all.
+
+    Yields:
+        The location and the sweeps in words, and the sweeps.
+    """
+
+    def direction_of(sweep: MeasuredSweep) -> str:
+        return str(sweep.direction)
+
+    by_direction = [(name, list(group)) for name, group in groupby(sorted(sweeps, key=direction_of), direction_of)]
+    for name, members in by_direction:
+        several = len(members) > 1
+        for sweep in members:
+            label = f"the {name} sweep {sweep.name}"
+            yield label if several else name, label, [sweep]
+        if several:
+            yield name, f"every {name} sweep", members
+    if len(by_direction) > 1:
+        yield "all directions", "every sweep", sweeps
+
+
+def _shifted(
+    evidence: Evidence,
+    family: str,
+    name: str,
+    sweeps: Sequence[MeasuredSweep],
+    chosen: Sequence[Array],
+    *,
+    sloping: bool = False,
+) -> FaultyPlace:
+    """Points of sweeps, (n,) bool each, with a common error of gain and phase and, if `sloping`, of their slopes."""
+    ends = np.array([[1.0, 1.0], [1.0, -1.0]])[: 1 + sloping]
+    unit = np.kron(ends, np.array([[1.0], [1.0j]]))
+    return _place(evidence, family, name, sweeps, chosen, _shift_columns(evidence, sweeps, chosen, sloping), unit)
+
+
+def _place(
+    evidence: Evidence,
+    family: str,
+    name: str,
+    sweeps: Sequence[MeasuredSweep],
+    chosen: Sequence[Array],
+    columns: Array,
+    unit: Array,
+) -> FaultyPlace:
+    """Points of sweeps as a place at fault, with its columns and the relative change by a unit of each."""
+    frequency, amplitude = (
+        np.concatenate([getattr(sweep, axis)[mask] for sweep, mask in zip(sweeps, chosen, strict=True)])
+        for axis in ("frequency", "amplitude")
+    )
+    ends = (float(frequency.min()), float(frequency.max())), (float(amplitude.min()), float(amplitude.max()))
+    group = Group(columns, unit, together=True, among=(_rows(evidence, sweeps), evidence.residual.size))
+    return FaultyPlace("place", family, name, group, sweeps[0].direction, *ends)
+
+
+def _shift_columns(
+    evidence: Evidence, sweeps: Sequence[MeasuredSweep], chosen: Sequence[Array], sloping: bool = False
+) -> Array:
+    """Residuals of a common error of some points of sweeps, (2 or 4, rows): gain, phase, and their slopes."""
+    rows = _rows(evidence, sweeps)
+    columns = np.zeros((2 + 2 * sloping, rows.stop - rows.start))
+    for sweep, mask in zip(sweeps, chosen, strict=True):
+        log_step = np.log(sweep.step)
+        slope = 2.0 * (log_step - log_step.mean()) / max(float(np.ptp(log_step)), 1e-9)
+        shapes = [mask.astype(float), *([mask * slope] if sloping else [])]
+        place = evidence.place[sweep]
+        columns[:, place.start - rows.start : place.stop - rows.start] = [
+            column for shape in shapes for column in sweep.moved_together(shape)
+        ]
+    return columns
+
+
+def _rows(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> slice:
+    """Slice from the first row of some sweeps to their last."""
+    places = [evidence.place[sweep] for sweep in sweeps]
+    return slice(min(place.start for place in places), max(place.stop for place in places))
