@@ -215,31 +215,6 @@ def test_every_export_says_what_predict_says(ran: Ran, model: Path, bushfit: Run
         assert [line for line in told if line not in text] == [], file.name
 
 
-def test_a_comparison_says_of_whom_each_holds(ran: Ran, model: Path, bushfit: Run, tmp_path: Path) -> None:
-    done = bushfit("compare", "model/model.json", model, "-o", tmp_path / "c", "--no-plots", "--json", "-v")
-    told = warned(done)
-    assert sorted(told) == sorted(json.loads(done.stdout)["warnings"])
-    assert f"B: {ODD}" in told
-    for line in document(model)["warnings"]:
-        assert any(re.match(r"(A, )?B: ", each) and each.endswith(line) for each in told), line
-    page = text_of(tmp_path / "c/compare.html")
-    assert [line for line in told if line not in page] == []
-
-
-def test_a_batch_says_a_long_text_once(ran: Ran, model: Path, bushfit: Run, tmp_path: Path) -> None:
-    row = (
-        f'[[bushings]]\ncampaign = "{ran[0].as_posix()}"\nmodel = "model.json"\ncommands = ["predict"]\nname = "{{}}"\n'
-    )
-    at = 'at = ["axial 25 Hz 0.1 mm", "radial 25 Hz 0.1 mm"]\n'
-    (tmp_path / "b.toml").write_text(at + row.format("one") + row.format("two"), encoding="utf-8")
-    bushfit("batch", tmp_path / "b.toml", "-o", tmp_path / "b", "--jobs", "1", "--no-plots")
-    table, page = pd.read_csv(tmp_path / "b/batch.csv"), text_of(tmp_path / "b/index.html")
-    for cell in table["warnings"]:
-        assert all(each in cell for each in (ODD, *ran[2]))
-    told = document(tmp_path / "b/bushings/one/row.json")["warnings"]
-    assert [page.count(line) for line in told] == [1] * len(told)
-
-
 #: Options of every format that is written without a compiler.
 ALL = [f"--format={name}" for name in ("nastran", "abaqus", "adams", "csv", "xlsx")]
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
-import fmpy
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
@@ -129,32 +127,6 @@ def test_an_fmu_is_of_the_temperature_asked_for(paper_model: Model, tmp_path: Pa
     warm = model.stiffness("axial", frequency, amplitude, under=Circumstances(at))
     print(abs(found / warm - 1.0), abs(found / model.stiffness("axial", frequency, amplitude) - 1.0))
     assert abs(found / warm - 1.0) < LARGEST < 0.2 * abs(found / model.stiffness("axial", frequency, amplitude) - 1.0)
-
-
-def test_steps_of_any_length_agree_where_the_motion_is_straight(paper: Running) -> None:
-    rng = np.random.default_rng(5)
-    motion = 2e-4 * rng.uniform(-1.0, 1.0, (200, 3)) * np.array([1.0, 1.0, 50.0])
-    motion[0] = 0.0
-    steps = rng.uniform(1e-4, 5e-3, 199)
-    parts = 4
-    share = np.arange(1, parts + 1)[:, None] / parts
-    finer = np.concatenate([motion[:1], *(a + share * (b - a) for a, b in pairwise(motion))])
-    coarse, fine = paper.run(motion, steps), paper.run(finer, np.repeat(steps / parts, parts))
-    np.testing.assert_allclose(fine[::parts], coarse, rtol=1e-9, atol=1e-9 * np.abs(coarse).max())
-
-
-def test_a_held_input_is_answered_one_step_later(paper: Running, paper_model: Model) -> None:
-    """By FMPy's own simulation, which sets no derivatives."""
-    motion, step, frequency = motions("random", 1)
-    motion = motion[:2001]
-    time = np.arange(len(motion)) * step
-    signals = np.rec.fromarrays([time, *motion.T], names=["time", *paper.inputs])
-    found = fmpy.simulate_fmu(
-        str(paper.file), stop_time=time[-1], step_size=step, output_interval=step, input=signals, output=paper.outputs
-    )
-    expected = on_the_rig(paper_model, motion, step, frequency)
-    for k, name in enumerate(paper.outputs):
-        assert off(found[name][1:], expected[:-1, k]) < LARGEST
 
 
 def test_the_description_is_valid(paper: Running) -> None:

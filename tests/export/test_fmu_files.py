@@ -65,15 +65,6 @@ def test_the_library_exports_the_interface_and_needs_no_other(exported: Exported
     assert {f"sources/{name}" for name in (*listed, "bushing.h", "fmi2.h", "model.h")} <= set(content)
 
 
-def test_an_fmu_is_written_without_a_home_folder(
-    paper_model: Model, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """The compiler then has no folder for its cache of its own."""
-    for name in ("HOME", "XDG_CACHE_HOME", "LOCALAPPDATA", "ZIG_GLOBAL_CACHE_DIR"):
-        monkeypatch.delenv(name, raising=False)
-    assert written(order_of(paper_model), tmp_path).stat().st_size > 10_000
-
-
 def test_the_same_model_gives_the_same_bytes_and_another_its_own_guid(paper_model: Model) -> None:
     once, again = (export(order_of(paper_model)).files for _ in range(2))
     assert once == again

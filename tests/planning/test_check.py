@@ -186,17 +186,6 @@ def test_tests_tell_a_bounded_parameter_as_if_it_were_free(data: PreparedCampaig
     assert measured.errors[place] > 2.0 * _held(measured).errors[place]
 
 
-@pytest.mark.parametrize("effect", ["temperature", "force_saturation"])
-def test_a_parameter_that_the_tests_do_not_see_stops_no_plan(data: PreparedCampaign, effect: str) -> None:
-    """Tests at one temperature, and a force that saturates nowhere."""
-    campaign = replace(data.campaign, fit=replace(data.campaign.fit, effects=(effect,)))
-    known = from_campaign(PreparedCampaign.from_campaign(campaign))
-    points = (Points(AXIAL, np.array([20.0, 100.0]), np.array([2e-4, 2e-4])),)
-    planned = plan(known, PlanRequest("predictions", 2.0, RigSettings(), (AXIAL,), points, known.names)).planned
-    assert np.all(np.isfinite(known.covariance))
-    assert np.all(np.isfinite(planned.stiffness))
-
-
 def _held(known: Knowledge) -> Knowledge:
     """The same with what rests on a bound held there."""
     k = len(known.names)

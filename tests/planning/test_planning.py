@@ -1,6 +1,5 @@
 """A plan against what is worked out another way: full covariances, every choice there is, and fits."""
 
-from collections import Counter
 from dataclasses import replace
 from itertools import permutations, product
 from pathlib import Path
@@ -10,7 +9,7 @@ import pytest
 
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.quantities import Compound
-from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
 from bushfit.commands.plan import plan as plan_tests
 from bushfit.effects import get_effect
 from bushfit.effects.contract import Array
@@ -29,11 +28,8 @@ from bushfit.planning.compound import guess_parameters
 from bushfit.planning.contract import Aim, Knowledge, Noise, Plan, PlanRequest, Points, Programme, Test, motions
 from bushfit.planning.criterion import Budget, Criterion, DriftEffect, best_runs, order_runs
 from bushfit.planning.information import CandidateGrid, ModelInformation, relative_slopes, rival_chi_squares
-from bushfit.planning.knowledge import from_campaign, from_result, noise_of
+from bushfit.planning.knowledge import from_result, noise_of
 from bushfit.planning.plan import plan
-from bushfit.planning.problem import RIVALS_APART
-from bushfit.simulation.measured import simulate
-from bushfit.simulation.undisturbed import PAPER_LOOPS, PAPER_SWEEPS
 
 AXIAL, RADIAL = Direction.AXIAL, Direction.RADIAL
 BAND = (5.0, 20.0, 60.0, 150.0)
@@ -227,42 +223,6 @@ def test_a_plan_is_better_than_the_standard_programme_and_errors_before_are_thos
     slopes = np.array([(wanted_of(name, 1.0 + 1e-4) - wanted_of(name, 1.0 - 1e-4)) / 2e-4 for name in known.names])
     expected = np.sqrt(np.einsum("kcn,kl,lcn->cn", slopes, np.linalg.inv(known.precision), slopes))
     np.testing.assert_allclose([planned.before.stiffness, planned.before.loss], expected, rtol=1e-3)
-
-
-@pytest.mark.parametrize("hours", [0.9, 2.5])
-def test_repeats_tell_the_noise_where_that_costs_little(
-    root: Path, hours: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def planned(enough: int) -> Plan:
-        monkeypatch.setattr("bushfit.planning.search._SCATTER_FREEDOM", enough)
-        return plan_tests(load_campaign(root / "configs/new_bushing.toml"), hours=hours).plan
-
-    told, without = planned(10), planned(0)
-    runs = Counter(test for test in told.planned.tests if isinstance(test, SimulatedSweep))
-    differences = sum((count - 1) * (len(test.steps) - 1) for test, count in runs.items() if len(test.steps) > 2)
-    one, other = mean_error(told.planned), mean_error(without.planned)
-    print(f"{differences} differences tell the scatter from point to point, at {one / other:.3f} of the error")
-    assert differences >= 10 or hours < 2.5
-    assert one <= 1.06 * other
-    assert told.notes == without.notes
-
-
-@pytest.mark.slow
-def test_rivals_stand_beside_what_a_diagnosis_is_sure_of_and_take_few_hours(known: Knowledge) -> None:
-    """Simulated tests of a bushing with a plain inertia, and a damping that a lag of the record explains as well."""
-    model = known.model.with_effect("inertia", {"inertia.mass": 0.05}).with_effect("viscous", {"viscous.eta": 60.0})
-    settings = SimulateSettings(
-        seed=4, repeats=3, noise=0.004, force_noise=0.003, loops=PAPER_LOOPS, sweeps=PAPER_SWEEPS
-    )
-    campaign = replace(simulate(model, settings).campaign(), rig=RigSettings(max_frequency=300.0))
-    after = from_campaign(PreparedCampaign.from_campaign(campaign), ("viscous", "delay"))
-    assert {rival.model.effects[3] for rival in after.rivals} <= {"inertia", "fixture_resonance"}  # whose limit it is
-    assert [rival.model.effects[4:] for rival in after.rivals] == [("viscous",), ("delay",)]
-    found = plan_tests(after, campaign, aim="rivals").plan
-    print(found.planned.hours, found.planned.rival_chi_square)
-    assert found.planned.rival_chi_square is not None
-    assert found.planned.rival_chi_square > 2.0 * RIVALS_APART
-    assert found.planned.hours <= 4.0
 
 
 @pytest.mark.parametrize(

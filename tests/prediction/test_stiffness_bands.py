@@ -110,32 +110,6 @@ def test_what_may_be_the_rigs_is_predicted_both_ways_and_the_bands_span_both(eit
     np.testing.assert_allclose(rigs_too, np.abs(shaken.if_rigs.transmissibility))
 
 
-def test_of_two_that_may_be_the_rigs_the_band_spans_every_reading(either: Result) -> None:
-    model = either.model.with_effect("stiffness_factor.radial", {"stiffness_factor.radial": 1.1})
-    found = predict(
-        replace(either, model=model, unresolved=("stiffness_factor.radial", "sleeve_compliance")),
-        *(Direction.RADIAL, [55.0], [1e-4]),
-    )
-    ends = [
-        abs(complex(model.without(*left).stiffness("radial", 55.0, 1e-4)))
-        for left in ((), ("stiffness_factor.radial",), ("sleeve_compliance",), model.effects[3:])
-    ]
-    assert found.if_rigs is not None
-    assert found.if_rigs.stiffness.value[0] == pytest.approx(ends[3])
-    assert found.stiffness.low[0] < min(ends[1], ends[0])
-    assert found.stiffness.high[0] > ends[2] == max(ends)
-
-
-def test_what_may_be_the_rigs_stays_with_its_bushing_or_goes_with_its_specimen(either: Result) -> None:
-    wide, mount = Bushing("wide", 0.010, 0.018, 0.068), Specimen("mount", "shear", area=1e-3, thickness=1e-2)
-    model = either.model.with_effect("stiffness_factor.mount", {"stiffness_factor.mount": 1.1})
-    both = ("stiffness_factor.mount", "sleeve_compliance")
-    other, said = carried(replace(either, model=model, specimens=(mount,), unresolved=both), wide)
-    assert other.unresolved == ("stiffness_factor.mount",)
-    assert said.endswith("rig: sleeve_compliance")
-    assert predict(other, mount, [55.0], [1e-4]).if_rigs is not None
-
-
 def test_the_measured_stiffness_stands_beside_and_what_the_rig_took_is_said(paper_model: Model) -> None:
     rigged = paper_model.with_effect("rig_compliance", {"rig_compliance.compliance": 2e-8})
     frequency, amplitude = np.array([5.0, 5.02, 55.0, 155.0]), np.array([1e-4, 1.005e-4, 1e-4, 3e-4])
@@ -320,10 +294,3 @@ def test_a_band_that_lacks_the_error_of_a_formula_says_so(
     found = predict(replace(result, model=model, measured=reach), Direction(direction), [5.0], [1e-6]).warnings
     assert len(found) == len(said)
     assert all(part in line for part, line in zip(said, found, strict=True)), found
-
-
-def test_a_radial_factor_stands_for_the_error_of_the_radial_formula(result: Result) -> None:
-    model = result.model.with_effect("stiffness_factor.radial", {"stiffness_factor.radial": 1.05})
-    for direction, said in ((Direction.RADIAL, False), (Direction.TORSION, True)):
-        warnings = predict(replace(result, model=model), direction, [5.0], [2e-5]).warnings
-        assert any("not fitted" in line for line in warnings) is said

@@ -11,20 +11,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bushfit.campaign.schema import SimulatedLoop, SimulateSettings
-from bushfit.diagnosis.workflow import diagnose
+from bushfit.campaign.schema import SimulateSettings
 from bushfit.effects.contract import Array
 from bushfit.errors import MeasurementError
 from bushfit.fitting.drive import drive_of
-from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop
 from bushfit.reading.stated import LoopFile
 from bushfit.reduction.programme import programme
-from bushfit.simulation.measured import simulate
 
 STEP = 0.01
 NOISE = SimulateSettings(seed=2, force_noise=3e-3, displacement_noise=2e-4)
@@ -137,28 +133,6 @@ def test_one_amplitude_and_rate_is_the_record_itself(paper_model: Model, case: s
     assert (loop.time, loop.displacement, loop.force) == (record.time, record.displacement, record.force)
 
 
-def test_a_drift_of_the_mean_parts_nothing(paper_model: Model) -> None:
-    record = recorded(paper_model, *[cycles(5, x) for x in (0.2, 0.5, 1)])
-    drifting = replace(record, displacement=record.displacement + np.linspace(0.0, 2e-5, record.time.size))
-    assert len(programme(drifting)) == 3
-    one = recorded(paper_model, cycles(15, 0.3))
-    (same,) = programme(replace(one, displacement=one.displacement + np.linspace(0.0, 3e-4, one.time.size)))
-    assert same.part is None
-
-
-def test_a_rig_that_misses_its_amplitude_makes_no_parts() -> None:
-    """By 2 % from cycle to cycle."""
-    rightly = 0
-    for seed in range(20):
-        random = np.random.default_rng(seed)
-        for sizes in ((1.0,), (0.2, 0.5, 1.0)):
-            reached = [x * (1.0 + 0.02 * random.standard_normal()) for x in sizes for _ in range(8)]
-            motion = np.concatenate([cycles(1, x) for x in reached])
-            loop = Loop("loop", Direction.AXIAL, STEP * np.arange(motion.size), motion, 5e5 * motion)
-            rightly += len(programme(loop)) == len(sizes)
-    assert rightly >= 39
-
-
 def test_amplitudes_that_change_all_the_time_are_refused(paper_model: Model) -> None:
     record = recorded(paper_model, *(cycles(1, x) for x in (0.2, 0.4, 0.6, 0.8, 1)))
     with pytest.raises(MeasurementError, match="no part of the record is a loop"):
@@ -200,45 +174,6 @@ def test_a_softening_is_told_of_each_part(paper_model: Model) -> None:
     assert one.softening == pytest.approx(0.12, abs=0.03)
 
 
-@pytest.mark.slow
-def test_a_softening_in_the_virgin_cycles_of_a_programme_is_diagnosed(paper_model: Model) -> None:
-    """Later parts of the record are past it, though each is a loop of its own."""
-    values = {"mullins_softening.share": 0.2, "mullins_softening.cycles": 1.0}
-    softening = paper_model.with_effect("mullins_softening", values)
-    loop = SimulatedLoop(Direction.AXIAL, cycles=5, amplitudes=(2e-4, 5e-4, 1e-3), frequency=0.1, pause=12.0)
-    data = PreparedCampaign.from_campaign(simulate(softening, replace(NOISE, loops=(loop,))).campaign())
-    found = diagnose(data)
-    share = found.result.model.values["mullins_softening.share"]
-    print(f"{found.verdict}: {[effect.name for effect in found.effects]}, share {share:.3f} of 0.2")
-    assert [effect.name for effect in found.effects] == ["mullins_softening"]
-    assert share == pytest.approx(0.2, abs=0.02)
-
-
 def test_what_rubber_remembers_is_no_softening(paper_model: Model, other_models: dict[str, Model]) -> None:
     for model in (paper_model, *other_models.values()):
         assert {loop.softening for loop in programme(recorded(model, *PROGRAMMES["up and down"][0]))} == {None}
-
-
-def test_a_stiffness_other_to_either_side_is_no_preload(paper_model: Model) -> None:
-    """It makes a mean force as large as its second harmonic, which the diagnosis looks for."""
-    loop = recorded(paper_model, cycles(4, 1, start=0.25))
-    uneven = replace(loop, force=loop.force + 0.7 * np.ptp(loop.force) * np.square(loop.displacement / 1e-3))
-    assert np.mean(uneven.force) > 0.25 * np.ptp(uneven.force) / 2.0
-    assert drive_of(uneven).datum is None
-
-
-def test_a_programme_fits_as_its_loops_in_files_of_their_own(paper_model: Model) -> None:
-    sizes, rates = (2e-4, 5e-4, 1e-3), (0.02, 0.5)
-    whole = SimulatedLoop(Direction.AXIAL, cycles=4, amplitudes=sizes, frequencies=rates)
-    single = tuple(SimulatedLoop(Direction.AXIAL, x, f, cycles=3) for f in rates for x in sizes)
-    results = []
-    for loops in ((whole,), single):
-        simulated = simulate(paper_model, replace(NOISE, loops=loops))
-        data = PreparedCampaign.from_campaign(simulated.campaign())
-        assert len(data.loops) == 6
-        results.append(fit_joint(data))
-        assert [outlier for outlier in results[-1].outliers if outlier.distance > 6.0] == []
-    for name in ("mu", "sigma_fmax", "eps_half"):
-        one, other = (result.model.values[name] for result in results)
-        print(f"{name}: {one:.4g} of the programme, {other:.4g} of single loops, {paper_model.values[name]:.4g} true")
-        assert one == pytest.approx(other, rel=0.02)

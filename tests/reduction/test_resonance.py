@@ -20,7 +20,6 @@ from bushfit.reading.measurement import Source
 from bushfit.reading.resonance import ResonanceTest, read_resonance
 from bushfit.reading.table import Table
 from bushfit.reduction.resonance import (
-    LARGEST_ERROR,
     MOST_POINTS,
     Resonance,
     reduce_resonance,
@@ -74,19 +73,6 @@ def test_a_clean_test_gives_the_stiffness_back(paper_model: Model, rows: int) ->
     assert found.rows.sum() == rows
     assert not found.turned
     assert found.warnings == ()
-
-
-def test_each_point_has_the_rows_that_it_is_the_mean_of(paper_model: Model) -> None:
-    """One or two of 170 for each of 100 points, also of those that stay where others are left out."""
-    random = np.random.default_rng(0)
-    test = shaken(paper_model, 170, lambda n: 0.06 * random.standard_normal(n))
-    found = reduce_resonance(test, MASS)
-    assert found.left_out.size % 10
-    parts = np.split(test.frequency, np.arange(1, MOST_POINTS) * 170 // MOST_POINTS)
-    rows = {round(float(part.mean()), 6): part.size for part in parts}
-    assert found.rows.tolist() == [rows[round(frequency, 6)] for frequency in found.frequency.tolist()]
-    assert found.relative_error.max() <= LARGEST_ERROR
-    assert f"{found.left_out.size} of 100 points left out" in found.warnings[0]
 
 
 def wandering(random: np.random.Generator, sigma: float) -> Callable[[int], Array]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,9 +14,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
-from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop
-from bushfit.reading.stated import LoopFile
 from bushfit.reduction.harmonics import spread_rows
 from bushfit.reduction.result import Reduction
 from bushfit.reduction.steps import reduce
@@ -232,22 +229,6 @@ def test_a_preload_is_told(clean: Loop) -> None:
     assert sentence.startswith("recorded about a mean displacement of 1.5 mm and a mean force of 82")
     assert not any("preload" in line for line in plain.warnings)
     np.testing.assert_allclose(column(told, "stiffness"), column(plain, "stiffness"), rtol=1e-6)
-
-
-def test_the_record_in_data_can_be_made_again(paper_model: Model, root: Path) -> None:
-    """data/cmp_15961_raw: three levels, five frequencies, set points missed by about 1 %."""
-    random = np.random.default_rng(34)
-    points = [
-        (frequency, amplitude * (1.0 + 0.01 * random.standard_normal()))
-        for amplitude in (1e-4, 2e-4, 5e-4)
-        for frequency in (10.0, 20.0, 40.0, 80.0, 155.0)
-    ]
-    clean = stepped(paper_model, points, step=4e-6, every=100, pause=0.15, cycles=12)
-    made = measured(clean, random, noise=5e-4, drift=0.005)
-    kept = read_loop(root / "data/cmp_15961_raw/stepped_sine_axial.csv", Direction.AXIAL, LoopFile(file=""))
-    assert kept.time.size == made.time.size
-    np.testing.assert_allclose(kept.displacement, made.displacement, atol=1.1e-8)
-    np.testing.assert_allclose(kept.force, made.force, atol=0.02)
 
 
 @given(
