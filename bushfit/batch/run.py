@@ -157,13 +157,13 @@ def batch_files(result: BatchResult) -> list[ResultFile]:
     Returns:
         Document, table, and picture and page if they are wanted.
     """
-    from bushfit.report.page.index import page_of
+    from bushfit.report.page.index import index_page
     from bushfit.report.plots.batch import batch_figure
 
     plan, panels = result.plan, make_panels(result) if result.plan.formats.pictures else []
     names = [row.name for row in plan.rows]
     files = [json_file("batch", to_json_data(result.document, BatchFile)), table_file("batch", result.table)]
-    files += [page_file("index", page_of(plan.task.output), files[:1])] if plan.formats.pages else []
+    files += [page_file("index", partial(index_page, folder=plan.task.output), files[:1])] if plan.formats.pages else []
     return files + ([figure_file("batch", partial(batch_figure, panels, plan.title, names))] if panels else [])
 
 

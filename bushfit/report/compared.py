@@ -1,4 +1,4 @@
-"""Tables, cells and curves of a comparison, made from its document."""
+"""Tables and cells of a comparison: of two results at a place, and of compare.json."""
 
 from __future__ import annotations
 
@@ -12,13 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.model.file import require_schema
-from bushfit.prediction.comparison import ParameterContrast
+from bushfit.prediction.comparison import Comparison, Contrast, ParameterContrast, relative
 from bushfit.report.compare_document import SCHEMA, ComparisonFile
-from bushfit.report.tables import numbers, required
-from bushfit.units import display_unit, format_range, number, split_header
+from bushfit.report.tables import columns_of, required, words
+from bushfit.units import display_unit, number, split_header
 from bushfit.validation import validate_tables
 
 #: Digits of a parameter's value, and decimals of a difference at most.
@@ -27,57 +26,41 @@ _DIGITS, _MOST_DECIMALS = 4, 6
 _OPEN = 1e7
 #: Smallest probability that is written as a number.
 _LEAST_PROBABILITY = 1e-3
-#: Smallest span of an axis of relative differences [%] and of differences of the loss factor.
-_LEAST_PERCENT, _LEAST_LOSS = 1.0, 0.005
 #: Heads of `SideBySide.family_cells`.
 FAMILY_HEADS = ("family", "parameters", "NRMSE", "χ²", "probability", "held out", "first, held out", "parts")
 
 
-class ContrastLine(NamedTuple):
-    """Values of one result at one held level, with their 95 % bands.
+def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
+    """Stiffness and loss factor of two results over operating points of a place, and their differences.
 
     Args:
-        label: of the result.
-        level: 0 of the smallest held value, 1 of the largest.
-        x, value, low, high: (n,) each.
+        comparison: comparison that the contrast belongs to; it widens the bands so that all points hold at once.
+        contrast: contrast of one place.
+
+    Returns:
+        A row per point: values, differences, the ends of their 95 % bands, and whether differences are significant.
     """
-
-    label: str
-    level: int
-    x: Array
-    value: Array
-    low: Array
-    high: Array
-
-
-class ContrastPanel(NamedTuple):
-    """Lines of one quantity.
-
-    Args:
-        header: quantity with its unit.
-        lines: one per result and level.
-        minimum_span: smallest span of the axis of a difference; 0 of a value.
-    """
-
-    header: str
-    lines: list[ContrastLine]
-    minimum_span: float
-
-
-class PlaceContrast(NamedTuple):
-    """Curves of all results at one place.
-
-    Args:
-        place: direction or specimen.
-        x_header: header of the quantity along x.
-        levels: smallest and largest held value, as texts.
-        panels: stiffness and loss factor, and the differences of both from the first result.
-    """
-
-    place: str
-    x_header: str
-    levels: list[str]
-    panels: list[ContrastPanel]
+    (_, length), _, (_, factor) = contrast.place.display
+    amplitude, name, _ = columns_of(contrast.place)
+    columns: dict[str, Any] = {
+        "frequency [Hz]": contrast.reference.frequency,
+        amplitude: contrast.reference.amplitude * length,
+    }
+    for label, side in (("reference", contrast.reference), ("other", contrast.other)):
+        for quantity, band, scale in ((name, side.stiffness, factor), ("loss factor [-]", side.loss_factor, 1.0)):
+            header = f"{label} {quantity}"
+            columns |= {header: band.value * scale, f"{header}, low": band.low * scale}
+            columns[f"{header}, high"] = band.high * scale
+    differences = (
+        (f"relative difference of {words(contrast.place)[2]} [-]", contrast.stiffness, relative),
+        ("difference of loss factor [-]", contrast.loss_factor, np.asarray),
+    )
+    for header, band, convert in differences:
+        wide = comparison.widened(band)
+        sure = bool(len(band.root)) & ((wide.low > 0.0) | (wide.high < 0.0))
+        columns |= {header: convert(band.value), f"{header}, low": convert(band.low)}
+        columns |= {f"{header}, high": convert(band.high), f"{header}, sure": np.where(sure, "yes", "no")}
+    return pd.DataFrame(columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,22 +135,18 @@ class SideBySide:
             for pair in pairs
             for row in pair["parameters"]
         ]
-        families = {"families": pd.DataFrame([*self._families()])} if self.document["families"] else {}
         by_place = [self.differences_at(place) for place in self.places]
         differences = pd.concat([tables[pair["other"]] for pair in pairs for tables in by_place], ignore_index=True)
-        return {"parameters": pd.DataFrame(parameters), **families, "differences": differences}
-
-    def _families(self) -> Iterator[dict[str, Any]]:
-        """Rows of the table of families."""
-        families = self.document["families"] or []
-        for family in families:
+        tables = {"parameters": pd.DataFrame(parameters), "differences": differences}
+        families = []
+        for family in self.document["families"] or ():
             gain = family["gain"] or (None, None, None)
-            yield {
+            row = {
                 "label": family["label"],
                 "family": family["name"],
                 "parameters": family["parameters"],
                 "reduced chi-square": family["reduced_chi_square"],
-                "BIC less the first's": family["bic"] - families[0]["bic"],
+                "BIC less the first's": family["bic"] - (self.document["families"] or [family])[0]["bic"],
                 "held out [noise]": family["heldout"],
                 "the first there [noise]": family["first_there"],
                 "parts held out": len(family["parts"]),
@@ -176,6 +155,8 @@ class SideBySide:
                 "probability": family["probability"],
                 "words": family["words"],
             }
+            families.append(row)
+        return tables | ({"families": pd.DataFrame(families)} if families else {})
 
     def family_cells(self) -> Iterator[list[str]]:
         """Rows of texts on the families, with the columns `FAMILY_HEADS`.
@@ -221,63 +202,6 @@ class SideBySide:
             table.insert(1, "place", place)
             tables[pair["other"]] = table
         return tables
-
-    def curves(self, place: str) -> PlaceContrast:
-        """Curves of a place over frequency, or over amplitude where there is one frequency.
-
-        Args:
-            place: one of `places`.
-
-        Returns:
-            Curves at the smallest and the largest held value.
-        """
-        tables = self.differences_at(place)
-        headers = ContrastHeaders.from_table(next(iter(tables.values())))
-        grid = numbers(next(iter(tables.values())), "frequency [Hz]", headers.amplitude)
-        over_frequency = np.unique(grid[0]).size > 1
-        x_header, fixed_header = (
-            ("frequency [Hz]", headers.amplitude) if over_frequency else (headers.amplitude, "frequency [Hz]")
-        )
-        levels = np.unique(np.unique(grid[int(over_frequency)])[[0, -1]])
-        first, *other_labels = self.names
-        results = [
-            (first, tables[other_labels[0]], "reference "),
-            *((label, tables[label], "other ") for label in other_labels),
-        ]
-        differences = [(label, tables[label], "") for label in other_labels]
-
-        def lines(
-            quantity: str, scale: float, tables_of_results: list[tuple[str, pd.DataFrame, str]]
-        ) -> Iterator[ContrastLine]:
-            """Lines of a quantity with their bands.
-
-            Args:
-                quantity: header of the quantity.
-                scale: factor from the table to the panel.
-                tables_of_results: label, table, and start of the header of each result.
-
-            Yields:
-                A line per result and level.
-            """
-            for label, table, prefix in tables_of_results:
-                header = f"{prefix}{quantity}"
-                columns = numbers(table, x_header, fixed_header, header, f"{header}, low", f"{header}, high")
-                for level, value in enumerate(levels):
-                    x, _, *ends = columns[:, columns[1] == value]
-                    yield ContrastLine(label, level, x, *(scale * end for end in ends))
-
-        largest = max(float(np.nanmax(line.value, initial=0.0)) for line in lines(headers.stiffness, 1.0, results))
-        name, unit = split_header(headers.stiffness)
-        display_name, scale = display_unit(unit or "", 1.0, largest)
-        relative = [*lines(headers.relative, 100.0, differences)]
-        panels = [
-            ContrastPanel(f"{name} [{display_name}]", [*lines(headers.stiffness, scale, results)], 0.0),
-            ContrastPanel("loss factor [-]", [*lines("loss factor [-]", 1.0, results)], 0.0),
-            ContrastPanel(f"{name} minus {first} [% of {first}]", relative, _LEAST_PERCENT),
-            ContrastPanel(f"loss factor minus {first} [-]", [*lines(headers.loss, 1.0, differences)], _LEAST_LOSS),
-        ]
-        names = [format_range(split_header(fixed_header)[1] or "", float(level)) for level in levels]
-        return PlaceContrast(place, x_header, names, panels)
 
 
 class ContrastHeaders(NamedTuple):

@@ -16,7 +16,7 @@ import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -30,10 +30,6 @@ if TYPE_CHECKING:
 
     from bushfit.geometry import Place
 
-#: JSON documents by name.
-Documents = Mapping[str, Mapping[str, Any]]
-#: Tables by name.
-Tables = Mapping[str, "pd.DataFrame"]
 #: Formats of a picture.
 Picture = Literal["png", "svg", "pdf"]
 #: Kinds of result file in the order in which they are written: numbers first, so that a failing picture loses none.
@@ -45,20 +41,24 @@ _RECORD = ".bushfit.sha256"
 _STEERING = re.compile(rf"(?!\n){CONTROL.pattern}")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ResultFile:
     """One file of a result.
 
     Args:
         name: name of the file without its ending; of a raw file with it.
         kind: "json", "table", "figure", "page" (HTML) or "raw".
-        make: function without arguments that makes the content: a mapping, a pandas table, a matplotlib figure, a text,
-            or bytes.
+        make: function that makes the content: a mapping, a pandas table, a chart, a text, or bytes.
     """
 
     name: str
     kind: Kind
     make: Callable[[], Any]
+
+    @cached_property
+    def content(self) -> Any:
+        """Content, made once however many files and pages show it."""
+        return self.make()
 
 
 def json_file(name: str, document: Mapping[str, Any]) -> ResultFile:
@@ -81,25 +81,20 @@ def raw_file(name: str, content: bytes) -> ResultFile:
     return ResultFile(name, "raw", lambda: content)
 
 
-def page_file(name: str, page: Callable[[Documents, Tables], str], files: Sequence[ResultFile]) -> ResultFile:
-    """HTML page of the documents and tables among other result files.
+def page_file(name: str, page: Callable[[Sequence[ResultFile]], str], files: Sequence[ResultFile]) -> ResultFile:
+    """HTML page that shows other result files.
 
     Args:
         name: name of the file without its ending.
-        page: function that makes the HTML from documents and tables by name.
-        files: result files with the documents and tables.
-
-    Returns:
-        File whose page is made when it is written.
+        page: function that makes the HTML from result files.
+        files: result files with documents, tables and figures.
     """
+    return ResultFile(name, "page", lambda: page(files))
 
-    def make() -> str:
-        documents, tables = (
-            {file.name: file.make() for file in files if file.kind == kind} for kind in _KINDS[::2][:2]
-        )
-        return page(documents, tables)
 
-    return ResultFile(name, "page", make)
+def contents(files: Iterable[ResultFile], kind: Kind) -> dict[str, Any]:
+    """Contents of the result files of a kind by their names."""
+    return {file.name: file.content for file in files if file.kind == kind}
 
 
 def place_names(places: Iterable[Place]) -> list[str]:
@@ -132,50 +127,34 @@ class Formats:
         return f"{name}.{ending(self.table_form)}"
 
     def names(self, file: ResultFile) -> list[str]:
-        """Names of the files that a result file becomes: none if its kind is left out, one for each picture format.
-
-        Args:
-            file: file of the result.
-
-        Returns:
-            File names with endings.
-        """
-        pictures = [f"{file.name}.{form}" for form in self.picture_forms] if self.pictures else []
+        """Names of the files that a result file becomes: one for each picture format; none if its kind is left out."""
         return {
             "json": [f"{file.name}.json"],
             "raw": [file.name],
-            "table": [self.table(file.name)] if self.tables else [],
-            "page": [f"{file.name}.html"] if self.pages else [],
-            "figure": pictures,
+            "table": [self.table(file.name)] * self.tables,
+            "page": [f"{file.name}.html"] * self.pages,
+            "figure": [f"{file.name}.{form}" for form in self.picture_forms] * self.pictures,
         }[file.kind]
 
     def encode(self, file: ResultFile) -> dict[str, bytes]:
-        """Bytes of the files that a result file becomes, by their names.
-
-        Args:
-            file: file of the result.
-
-        Returns:
-            Content by file name; empty if the kind is left out.
+        """Bytes of the files that a result file becomes, by their names; empty if the kind is left out.
 
         Raises:
             OutputError: a table that is too large for its format.
         """
         names = self.names(file)
-        if not names:
-            return {}
-        content = file.make()
-        if file.kind == "figure":
+        if file.kind == "figure" and names:
             from bushfit.report import plots
 
-            return {f"{file.name}.{form}": plots.style.to_image(content, form) for form in self.picture_forms}
+            images = (plots.style.to_image(file.content, form) for form in self.picture_forms)
+            return dict(zip(names, images, strict=True))
         encoders: Mapping[Kind, Callable[[Any], bytes]] = {
             "json": to_json,
             "raw": bytes,
             "table": lambda table: to_bytes(file.name, table, self.table_form),
             "page": str.encode,
         }
-        return {names[0]: encoders[file.kind](content)}
+        return {name: encoders[file.kind](file.content) for name in names}
 
 
 def encode_all(files: Iterable[ResultFile], formats: Formats) -> dict[str, bytes]:
@@ -271,18 +250,19 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
         if not nearest.is_dir():
             raise NotADirectoryError(errno.ENOTDIR, "Not a directory", str(nearest))
         if not os.access(nearest, os.W_OK | os.X_OK):
-            raise PermissionError(errno.EACCES, "no permission to write there", str(nearest))
-        existing = [name for name in names if os.path.lexists(folder / name)]
-        for name in existing:
-            if (folder / name).is_dir():
-                raise OutputError(
-                    "a folder has the name of a result file", file=folder / name, hint=f"move it away, or {elsewhere}"
-                )
-            if any(_is_same(folder / name, file) for file in inputs):
-                raise OutputError("a result would replace an input of this run", file=folder / name, hint=elsewhere)
-        digests = {name: _digest(folder / name) for name in existing}
-        record = _recorded(folder) if existing else set()  # read after the files
-        foreign = [name for name, digest in digests.items() if (digest, name) not in record]
+            raise PermissionError(errno.EACCES, "no right to write there", str(nearest))
+        existing = {name: folder / name for name in names if os.path.lexists(folder / name)}
+        read = [file for file in inputs if file.exists()]
+        for file in existing.values():
+            if file.is_dir():
+                raise OutputError("a folder stands where a file goes", file=file, hint=f"move it away, or {elsewhere}")
+            if file.exists() and any(file.samefile(path) for path in read):
+                raise OutputError("a result would replace an input of this run", file=file, hint=elsewhere)
+        # digests before the record: a command that runs now records its files, then moves them here
+        lines = {f"{_digest(file)}  {name}": name for name, file in existing.items()}
+        record = folder / _RECORD
+        recorded = record.read_text(encoding="utf-8", errors="replace").splitlines() if record.exists() else []
+        foreign = [name for line, name in lines.items() if line not in recorded]
     except OSError as error:
         raise unwritable(folder, error) from error
     if foreign:
@@ -299,21 +279,6 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
             found=", ".join(existing),
             hint="--force replaces them; -o/--output names another folder",
         )
-
-
-def _is_same(file: Path, reference: Path) -> bool:
-    """Return True if two paths lead to one existing file."""
-    with suppress(OSError):
-        return file.samefile(reference)
-    return False
-
-
-def _recorded(folder: Path) -> set[tuple[str, str]]:
-    """SHA-256 and name of each file that bushfit wrote into a folder."""
-    with suppress(FileNotFoundError):
-        lines = (folder / _RECORD).read_text(encoding="utf-8", errors="replace").splitlines()
-        return {(digest, name) for digest, _, name in (line.partition("  ") for line in lines)}
-    return set()
 
 
 def _digest(file: Path) -> str:

@@ -16,7 +16,6 @@ from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Displa
 from bushfit.model.arms import Arms, arm_rows
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
-from bushfit.prediction.comparison import Comparison, Contrast, relative
 from bushfit.prediction.stiffness import Band, PredictedResonance, Prediction
 from bushfit.reading.measurement import loss_factor
 from bushfit.reduction.resonance import Resonance
@@ -372,42 +371,6 @@ def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
         for judged in diagnosis.candidates
     ]
     return pd.DataFrame(rows)
-
-
-def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
-    """Stiffness and loss factor of two results over operating points of a place, and their differences.
-
-    Args:
-        comparison: comparison that the contrast belongs to; it widens the bands so that all points hold at once.
-        contrast: contrast of one place.
-
-    Returns:
-        A row per point: values, differences, the ends of their 95 % bands, and whether differences are significant.
-    """
-    name, factor = columns_of(contrast.place)[1], contrast.place.display.stiffness.factor
-    values: dict[str, Any] = {
-        "frequency [Hz]": contrast.reference.frequency,
-        **_amplitudes(contrast.place, contrast.reference.amplitude),
-    }
-    for result_name, side in (("reference", contrast.reference), ("other", contrast.other)):
-        for quantity, band, scale in ((name, side.stiffness, factor), ("loss factor [-]", side.loss_factor, 1.0)):
-            for end, column in _ends(band).items():
-                values[f"{result_name} {quantity}{end}"] = column * scale
-    differences = (
-        (f"relative difference of {words(contrast.place)[2]} [-]", contrast.stiffness, relative),
-        ("difference of loss factor [-]", contrast.loss_factor, np.asarray),
-    )
-    for quantity, band, convert in differences:
-        wide = comparison.widened(band)
-        sure = bool(len(band.root)) & ((wide.low > 0.0) | (wide.high < 0.0))
-        values |= {f"{quantity}{end}": convert(column) for end, column in _ends(band).items()}
-        values[f"{quantity}, sure"] = np.where(sure, "yes", "no")
-    return pd.DataFrame(values)
-
-
-def _ends(band: Band) -> dict[str, Array]:
-    """Value, low and high of a band by the ends of their headers."""
-    return {"": band.value, ", low": band.low, ", high": band.high}
 
 
 #: Columns of a reduced sweep on the origin of each point, and the attributes of a step.

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from functools import cache
+from collections.abc import Sequence
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,21 +15,17 @@ from bushfit.units import number
 if TYPE_CHECKING:
     import jinja2
 
-    from bushfit.report.results import Documents, ResultFile, Tables
+    from bushfit.report.results import ResultFile
 
 #: Where the templates are, with the style sheet and the script that go into every page.
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
-def report_page(documents: Documents, tables: Tables) -> str:
+def report_page(files: Sequence[ResultFile]) -> str:
     """The report of a result as HTML.
 
     Args:
-        documents: model, plain fit and diagnosis by the names of their files without endings.
-        tables: sweeps, loops, gap and predicted places by the names of their files without endings.
-
-    Returns:
-        The page as HTML.
+        files: documents (model, plain fit, diagnosis), tables (sweeps, loops, gap and predicted places) and figures.
 
     Raises:
         ModelError: no model among the documents, or a document or table that is not as bushfit writes it.
@@ -36,22 +33,18 @@ def report_page(documents: Documents, tables: Tables) -> str:
     from bushfit.report.page.record import report_record
     from bushfit.report.page.report import report_context
 
-    return rendered("report.html", report_context(report_record(documents, tables)))
+    return rendered("report.html", report_context(report_record(files)))
 
 
-def comparison_page(documents: Documents, _: Tables) -> str:
-    """The page of a comparison as HTML, made from its document.
-
-    Returns:
-        The page as HTML.
+def comparison_page(files: Sequence[ResultFile]) -> str:
+    """The page of a comparison as HTML, made from its document and its figure.
 
     Raises:
         ModelError: a document that is not as bushfit writes it.
     """
-    from bushfit.report.compared import SideBySide
     from bushfit.report.page.comparison import comparison_context
 
-    return rendered("compare.html", comparison_context(SideBySide.from_document(documents["compare"])))
+    return rendered("compare.html", comparison_context(files))
 
 
 def rendered(template: str, context: dict[str, Any]) -> str:
@@ -67,7 +60,8 @@ def rendered(template: str, context: dict[str, Any]) -> str:
     from markupsafe import Markup
 
     style, script = (Markup((_TEMPLATES / name).read_text(encoding="utf-8")) for name in ("style.css", "script.js"))
-    sources = f"style-src {_hash(style)}; script-src {_hash(script)}; img-src data:"
+    digests = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in (style, script)]
+    sources = "style-src 'sha256-{}'; script-src 'sha256-{}'; img-src data:".format(*digests)
     allowed = f"default-src 'none'; {sources}; base-uri 'none'; form-action 'none'"
     page = filled(template, {"style": style, "script": script, "allowed": allowed, **context})
     return printable(page, lines=True) + "\n"
@@ -78,13 +72,9 @@ def filled(template: str, context: dict[str, Any]) -> str:
     return _environment().get_template(template).render(context)
 
 
-def _hash(text: str) -> str:
-    """Hash of a text as a content policy states it."""
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
-
-
 @cache
 def _environment() -> jinja2.Environment:
+    """Templates with the filters `number` (significant digits), `formula` and `px` (pixels)."""
     import jinja2
 
     from bushfit.report.page.formulas import formula
@@ -96,9 +86,8 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["number"] = number
-    environment.filters["formula"] = formula
-    environment.filters["px"] = lambda pixels: f"{pixels:.1f}".removesuffix(".0")
+    pixels = {"px": lambda length: f"{length:.1f}".removesuffix(".0")}
+    environment.filters |= {"number": number, "formula": formula, **pixels}
     return environment
 
 
@@ -116,12 +105,12 @@ def folder_pages(folder: Path, base: str = "") -> list[ResultFile]:
         ModelError: a folder without results, or a file in it that is not as bushfit writes it.
     """
     from bushfit.report.page.comparison import read_comparison
-    from bushfit.report.page.index import is_batch, page_of, read_batch
+    from bushfit.report.page.index import index_page, read_batch
     from bushfit.report.page.record import has_model, read_results
     from bushfit.report.results import page_file
 
-    if is_batch(folder):
-        return [page_file("index", page_of(folder, base), read_batch(folder))]
+    if (folder / "batch.json").exists():
+        return [page_file("index", partial(index_page, folder=folder, base=base), read_batch(folder))]
     compared = (folder / "compare.json").exists()
     pages = [page_file("compare", comparison_page, read_comparison(folder))] if compared else []
     if has_model(folder) or not compared:

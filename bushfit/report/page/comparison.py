@@ -11,11 +11,11 @@ from bushfit.geometry import Bushing
 from bushfit.model.file import read_document
 from bushfit.prediction.caveats import by_importance, use_of
 from bushfit.report import plots
-from bushfit.report.compare_document import ComparedEntry
 from bushfit.report.compared import FAMILY_HEADS, ContrastHeaders, SideBySide, chance, parameter_cells, signed
-from bushfit.report.page.report import MOST, conditions, grid_corners, tube_description
+from bushfit.report.page.report import MOST, conditions, tube_description
 from bushfit.report.page.svg import picture
-from bushfit.report.results import ResultFile, json_file
+from bushfit.report.page.values import grid_corners
+from bushfit.report.results import ResultFile, contents, json_file
 from bushfit.report.tables import numbers
 from bushfit.units import format_aligned, format_range, number, split_header
 
@@ -39,68 +39,75 @@ def read_comparison(folder: Path) -> list[ResultFile]:
     return [json_file("compare", document)]
 
 
-def comparison_context(comparison: SideBySide) -> dict[str, Any]:
+def comparison_context(files: Sequence[ResultFile]) -> dict[str, Any]:
     """Everything that the template of a comparison needs.
 
     Args:
-        comparison: validated comparison.
+        files: the document of the comparison and, in a run, its figure.
 
     Returns:
         Values of the template by name.
     """
-    document, names = comparison.document, comparison.names
-    reference, *other_names = names.values()
-    families = bool(document["families"])
-    places = comparison.places
-    entries = [_entry(entry) for entry in document["compared"]]
-    body = document["compared"][0]["bushing"]
-    title = (
-        f"{other_names[0]} compared with {reference}"
-        if len(other_names) == 1
-        else f"{len(other_names)} results and {reference}"
-    )
-    drawn = len(names) * len(places) <= _MOST_DRAWN
+    comparison = SideBySide.from_document(contents(files, "json")["compare"])
+    document, names, places = comparison.document, comparison.names, comparison.places
+    compared, (reference, *others) = document["compared"], names.values()
+    tables = [next(iter(comparison.differences_at(place).values())) for place in places]
+    stiffness = [ContrastHeaders.from_table(table).stiffness for table in tables]
+    title = f"{others[0]} compared with {reference}" if len(others) == 1 else f"{len(others)} results and {reference}"
+    if families := bool(document["families"]):
+        bushing = compared[0]["bushing"]
+        title = f"Model families of {bushing.name if bushing else compared[0]['source']}"
+    entries = list[dict[str, Any]]()
+    for entry in compared:
+        measured, tests = entry["measured"], "parameters given, not fitted"
+        if measured:
+            strain = format_range("%", *(100.0 * end for end in measured.strain))
+            tests = f"{format_range('Hz', *measured.frequency)}, strain {strain}, {', '.join(measured.directions)}"
+        body = tube_description(Bushing(*astuple(entry["bushing"]))) if entry["bushing"] else "rubber compound"
+        stated = dict(conditions(source.conditions for source in entry["inputs"]))
+        entries.append({"of": entry, "body": body, "tests": tests, "conditions": stated})
+    labels: dict[tuple[str, str], list[str]] = {}
+    for entry in compared:
+        inputs = [(str(source.file), source.sha256) for source in entry["inputs"]]
+        for file, sha256 in dict.fromkeys([(entry["source"], entry["sha256"]), *inputs]):
+            if sha256:
+                labels.setdefault((file, sha256), []).append(entry["label"])
+    pictures = []
+    if len(names) * len(places) <= _MOST_DRAWN:
+        charts = contents(files, "figure")
+        chart = charts.get("compare") or plots.comparison.comparison_figure(comparison)
+        pictures.append(picture(chart, "compare", chart.heading.get_text()))
     return {
         "document": document,
         "names": names,
-        "resisted": "modulus" if all(_is_modulus(comparison, place) for place in places) else "stiffness",
-        "title": f"Model families of {body.name if body else document['compared'][0]['source']}" if families else title,
+        "resisted": "modulus" if all(header.startswith("modulus") for header in stiffness) else "stiffness",
+        "title": title,
         "entries": entries,
-        "differ": [name for name in _CONDITIONS if len({entry["conditions"].get(name) for entry in entries}) > 1],
-        "sizes": [row for place in places for row in _sizes(comparison, place)],
+        "differ": [name for name in _CONDITIONS if len({row["conditions"].get(name) for row in entries}) > 1],
+        "sizes": [row for place in places for row in difference_sizes(comparison, place)],
         "family_heads": FAMILY_HEADS,
         "family_rows": [*comparison.family_cells()],
-        "judged": families and len(other_names) + document["words"][0].startswith("use "),
+        "judged": families and len(others) + document["words"][0].startswith("use "),
         "most": MOST,
         "cells": parameter_cells,
         "chance": chance,
-        "pictures": [picture(plots.batch.comparison_figure(comparison), "compare")] if drawn else [],
-        "tabled": [*_tabled(comparison, places)][: 2 * _ROWS],
+        "pictures": pictures,
+        "tabled": [*value_rows(comparison)][: 2 * _ROWS],
         "warnings": [(line, use_of(line)) for line in by_importance(document["warnings"])],
-        "files": _files(document["compared"]),
+        "files": [(f"{', '.join(of)}: {file}", sha256) for (file, sha256), of in labels.items()],
     }
 
 
-def _is_modulus(comparison: SideBySide, place: str) -> bool:
-    return ContrastHeaders.from_table(next(iter(comparison.differences_at(place).values()))).stiffness.startswith(
-        "modulus"
-    )
+def difference_sizes(comparison: SideBySide, place: str) -> Iterator[dict[str, Any]]:
+    """Smallest and largest difference from the first result at a place, and the number of significant points.
 
+    Args:
+        comparison: validated comparison.
+        place: one of its places.
 
-def _entry(entry: ComparedEntry) -> dict[str, Any]:
-    """Texts on a result: its body, its tests and their conditions."""
-    bushing, measured = entry["bushing"], entry["measured"]
-    tests = "parameters given, not fitted"
-    if measured:
-        strain = format_range("%", *(100.0 * end for end in measured.strain))
-        tests = f"{format_range('Hz', *measured.frequency)}, strain {strain}, {', '.join(measured.directions)}"
-    test_conditions = dict(conditions(source.conditions for source in entry["inputs"]))
-    body = tube_description(Bushing(*astuple(bushing))) if bushing else "rubber compound"
-    return {"of": entry, "body": body, "tests": tests, "conditions": test_conditions}
-
-
-def _sizes(comparison: SideBySide, place: str) -> Iterator[dict[str, Any]]:
-    """Smallest and largest difference from the first result at a place, and the number of significant points."""
+    Yields:
+        Texts of a result: `label`, `place`, `stiffness` and `loss`, and for both, with `_sure`, their significance.
+    """
     for label, table in comparison.differences_at(place).items():
         heads = ContrastHeaders.from_table(table)
         row: dict[str, Any] = {"label": label, "place": place}
@@ -117,12 +124,17 @@ def _sizes(comparison: SideBySide, place: str) -> Iterator[dict[str, Any]]:
         yield row
 
 
-def _tabled(comparison: SideBySide, places: Sequence[str]) -> Iterator[tuple[Any, ...]]:
+def value_rows(comparison: SideBySide) -> Iterator[tuple[Any, ...]]:
     """Rows of values of the first and of each other result at some points, with the intervals of their differences.
 
-    Cells: place, label, frequency, amplitude; then of stiffness and loss factor both values, their difference with its
-    interval, and whether it is significant at all points at once.
+    Args:
+        comparison: validated comparison.
+
+    Yields:
+        Place, label, frequency, amplitude; then of stiffness and loss factor both values, their difference with its
+        interval, and whether it is significant at all points at once.
     """
+    places = comparison.places
     tables = [(label, place, table) for place in places for label, table in comparison.differences_at(place).items()]
     point_limit = max(_ROWS // max(len(tables), 1), 1)
     amplitudes = min(point_limit, _AMPLITUDES)
@@ -141,17 +153,3 @@ def _tabled(comparison: SideBySide, places: Sequence[str]) -> Iterator[tuple[Any
                 cells.append((*(side + suffix for side in sides), size + percent, " to ".join(ends), significant))
             point = f"{number(frequency[index], 4)} Hz", format_range(length or "", amplitude[index])
             yield place, label, *point, *cells
-
-
-def _files(compared: Sequence[ComparedEntry]) -> list[tuple[str, str]]:
-    """Every file behind the comparison with its SHA-256, and the results it belongs to."""
-    labels: dict[tuple[str, str], list[str]] = {}
-    for entry in compared:
-        named = [(entry["source"], entry["sha256"] or ""), *((str(s.file), s.sha256) for s in entry["inputs"])]
-        for file in named:
-            labels.setdefault(file, []).append(entry["label"])
-    return [
-        (f"{', '.join(dict.fromkeys(entry_labels))}: {file}", sha256)
-        for (file, sha256), entry_labels in labels.items()
-        if sha256
-    ]

@@ -3,34 +3,35 @@
 from __future__ import annotations
 
 import io
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 import pandas as pd
 
 from bushfit.diagnosis.document import DiagnosisFile
-from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction, Place
 from bushfit.model.document import CampaignTable, TestTable
 from bushfit.model.file import from_document, read_document, require_schema
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction, predict
-from bushfit.reading.files import read_utf8, view_bytes
-from bushfit.reading.parts import read_sheets
+from bushfit.reading.files import read_utf8
 from bushfit.reading.tablefile import undefused
-from bushfit.report.results import Documents, ResultFile, Tables, json_file, place_names, table_file
-from bushfit.report.tables import TEXTS, columns_of, required, spread
+from bushfit.report.results import ResultFile, contents, json_file, place_names, table_file
+from bushfit.report.tables import columns_of, required, spread
 from bushfit.validation import validate_tables
 
 #: Documents that hold a model, the one to use first, and the plain fit beside it.
 MODELS, JOINT = ("model", "dynamic", "static"), "joint"
 #: Schema of diagnosis.json.
 DIAGNOSIS = "bushfit/diagnosis/3"
+#: Columns that hold texts; the others hold numbers.
+_TEXTS = ("loop", "sweep", "test", "kind", "direction", "stepped", "part", "outlier")
 #: Most levels of a grid that is made from the measured points.
 _MOST_LEVELS = 10
 #: Size of a table that is read at most [bytes].
@@ -47,9 +48,9 @@ class ReportRecord:
         campaign: as the model file has it.
         diagnosis: the document of diagnosis.json.
         versions: of bushfit and of the packages that the numbers rest on, by name.
-        sweeps, loops: measured and modelled tests, as `tables.sweeps_table` and `tables.loops_table` make them.
-        gap: measured minus model before and after a diagnosis, as `tables.gap_table` makes it.
-        predictions: of every place that was tested or predicted.
+        tables: measured minus model (`gap`), measured and modelled `sweeps` and `loops`, by name, where they are known.
+        predictions: of every place that was tested or predicted, by the name of its file.
+        charts: figures of the run, by name; those that are missing are made from the tables.
     """
 
     result: Result
@@ -57,10 +58,9 @@ class ReportRecord:
     campaign: CampaignTable | None
     diagnosis: DiagnosisFile | None
     versions: Mapping[str, str]
-    sweeps: pd.DataFrame | None
-    loops: pd.DataFrame | None
-    gap: pd.DataFrame | None
-    predictions: Sequence[Prediction]
+    tables: Mapping[str, pd.DataFrame]
+    predictions: Mapping[str, Prediction]
+    charts: Mapping[str, ResultFile]
 
     @property
     def tests(self) -> Sequence[TestTable]:
@@ -68,21 +68,19 @@ class ReportRecord:
         return self.campaign.tests if self.campaign else ()
 
 
-def report_record(documents: Documents, tables: Tables, files: Mapping[str, Path] | None = None) -> ReportRecord:
-    """The records of a result from its documents and tables; predictions are computed from the model.
+def report_record(files: Sequence[ResultFile], folder: Path | None = None) -> ReportRecord:
+    """The records of a result from its files; predictions are computed from the model.
 
     Args:
-        documents: JSON documents by name: the model, the plain fit, the diagnosis.
-        tables: by name: loops, sweeps, gap, and one per predicted place, which gives its grid.
-        files: of the documents, for error messages.
-
-    Returns:
-        Record for `report_context`.
+        files: documents (model, plain fit, diagnosis), tables (loops, sweeps, gap, and one per predicted place, which
+            gives its grid) and figures.
+        folder: where the documents were read, for error messages.
 
     Raises:
         ModelError: no model among the documents, or a document or table that is not as bushfit writes it.
     """
-    paths = files or {}
+    documents, tables = contents(files, "json"), contents(files, "table")
+    paths = {name: folder / f"{name}.json" for name in documents} if folder else {}
     name = next((name for name in MODELS if name in documents), None)
     if name is None:
         raise ModelError("there is no model among the results", expected=" or ".join(f"{name}.json" for name in MODELS))
@@ -93,56 +91,55 @@ def report_record(documents: Documents, tables: Tables, files: Mapping[str, Path
         require_schema(diagnosis, paths.get("diagnosis"), "a diagnosis", DIAGNOSIS, hint=hint)
         diagnosis = validate_tables(diagnosis, paths.get("diagnosis"), DiagnosisFile, kind=ModelError)
     campaign, provenance = model.get("campaign"), model.get("provenance", {})
-    gap = tables.get("gap")
-    sweeps, loops = tables.get("sweeps"), tables.get("loops")
-    if gap is not None:
-        required(gap, "test", "kind", "direction")
-        sweeps = sweeps if sweeps is not None else _of_kind(gap, "sweep")
-        loops = loops if loops is not None else _of_kind(gap, "loop")
-    for table, header in ((sweeps, "stepped"), (loops, "frequency [Hz]")):
-        if table is not None:
-            required(table, "direction", header, "outlier")
+    if campaign:
+        campaign = validate_tables(campaign, paths.get(name), CampaignTable, "campaign", kind=ModelError)
+    tested = _tests(tables)
     return ReportRecord(
         result,
         from_document(joint, paths.get(JOINT)) if joint else None,
-        validate_tables(campaign, paths.get(name), CampaignTable, "campaign", kind=ModelError) if campaign else None,
+        campaign or None,
         diagnosis,
         {"bushfit": provenance.get("bushfit") or "", **provenance.get("packages", {})},
-        sweeps,
-        loops,
-        gap,
-        _predictions(result, tables, sweeps),
+        tested,
+        _predictions(result, tables, tested.get("sweeps")),
+        {file.name: file for file in files if file.kind == "figure"},
     )
 
 
-def _of_kind(gap: pd.DataFrame, kind: str) -> pd.DataFrame | None:
-    """The sweeps or loops of a table of the gap, as tables of their own would hold them."""
-    names = {"force after [noise]": "residual [noise]", "storage after [noise]": "stiffness residual [noise]"}
-    names["loss after [noise]"] = "loss residual [noise]"
-    rows = gap[gap["kind"] == kind].rename(columns=names)
-    return rows if len(rows) else None
+def _tests(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
+    """Tables of the gap, sweeps and loops, where they are known; sweeps and loops without their own are in the gap."""
+    tested = {name: tables[name] for name in ("gap", "sweeps", "loops") if name in tables}
+    if "gap" in tested:
+        gap = required(tested["gap"], "test", "kind", "direction")
+        parts = {"force": "residual", "storage": "stiffness residual", "loss": "loss residual"}
+        rows = gap.rename(columns={f"{part} after [noise]": f"{name} [noise]" for part, name in parts.items()})
+        for name, kind in (("sweeps", "sweep"), ("loops", "loop")):
+            if name not in tested and (gap["kind"] == kind).any():
+                tested[name] = rows[gap["kind"] == kind]
+    for name, header in (("sweeps", "stepped"), ("loops", "frequency [Hz]")):
+        if name in tested:
+            required(tested[name], "direction", header, "outlier")
+    return tested
 
 
-def _predictions(result: Result, tables: Tables, sweeps: pd.DataFrame | None) -> list[Prediction]:
-    """Predictions on the grids of the tables of places, or on that of the measured sweeps."""
+def _predictions(
+    result: Result, tables: Mapping[str, pd.DataFrame], sweeps: pd.DataFrame | None
+) -> dict[str, Prediction]:
+    """Predictions by file name on the grids of the tables of places, or on that of the measured sweeps."""
     places: list[Place] = [*(Direction if result.model.bushing else ()), *result.specimens]
-    predictions = []
+    predictions = {}
     for name, place in zip(place_names(places), places, strict=True):
         table = tables.get(name)
         if table is None and sweeps is not None:
             table = sweeps[sweeps["direction"] == str(place)]
         if table is None or table.empty:
             continue
-        amplitude = columns_of(place)[0]
-        columns = required(table, "frequency [Hz]", amplitude)[["frequency [Hz]", amplitude]].to_numpy(dtype=float).T
-        frequencies, amplitudes = (_levels(column, name in tables) for column in columns)
-        predictions.append(predict(result, place, frequencies, amplitudes / place.display.displacement.factor))
+        headers = ["frequency [Hz]", columns_of(place)[0]]
+        axes = [np.unique(column) for column in required(table, *headers)[headers].to_numpy(dtype=float).T]
+        if name not in tables:
+            axes = [levels[spread(levels.size, _MOST_LEVELS)] for levels in axes]
+        predictions[name] = predict(result, place, axes[0], axes[1] / place.display.displacement.factor)
     return predictions
-
-
-def _levels(values: Array, as_predicted: bool) -> Array:
-    levels = np.unique(values)
-    return levels if as_predicted else levels[spread(levels.size, _MOST_LEVELS)]
 
 
 def has_model(folder: Path) -> bool:
@@ -153,18 +150,12 @@ def has_model(folder: Path) -> bool:
 def read_results(folder: Path) -> list[ResultFile]:
     """Documents and tables of a folder of results.
 
-    Returns:
-        Result files with the documents and tables of the folder.
-
     Raises:
         ModelError: no folder, no results in it, or a file that is not as bushfit writes it.
     """
     if not folder.is_dir():
         kind = "a file" if folder.exists() else "nothing"
         raise ModelError("a folder of results is needed", file=folder, found=kind, expected="as bushfit run writes it")
-    files = {
-        name: folder / f"{name}.json" for name in (*MODELS, JOINT, "diagnosis") if (folder / f"{name}.json").exists()
-    }
     if not has_model(folder):
         present = sorted(path.name for path in folder.iterdir())[:8]
         raise ModelError(
@@ -174,64 +165,49 @@ def read_results(folder: Path) -> list[ResultFile]:
             expected=" or ".join(f"{name}.json" for name in MODELS),
             hint=f"bushfit run CAMPAIGN -o {folder} writes one",
         )
-    read = {name: read_document(file) for name, file in files.items()}
-    specimens = report_record(read, {}, files).result.specimens
+    paths = {name: folder / f"{name}.json" for name in (*MODELS, JOINT, "diagnosis")}
+    documents = [json_file(name, read_document(path)) for name, path in paths.items() if path.exists()]
+    specimens = report_record(documents, folder).result.specimens
     names = ("loops", "sweeps", "gap", *place_names([*Direction, *specimens]))
     tables = {name: table for name in names if (table := read_table(folder, name)) is not None}
-    return [
-        *(json_file(name, document) for name, document in read.items()),
-        *(table_file(name, partial(pd.DataFrame, table)) for name, table in tables.items()),
-    ]
+    return [*documents, *(table_file(name, partial(pd.DataFrame, table)) for name, table in tables.items())]
 
 
 def read_table(folder: Path, name: str) -> pd.DataFrame | None:
-    """A table of a folder in the form it was written in; None where it is missing.
+    """A table of a folder in the form it was written in: CSV, with decimal commas or without, or a workbook.
 
     Returns:
-        Columns as numbers, or as texts for the headers in `tables.TEXTS`; None without a file.
+        Columns as numbers, or as texts for the names of tests and what they are; None without a file.
 
     Raises:
         ModelError: a table that is not as bushfit writes it.
     """
-    for ending, read in (("csv", _csv), ("xlsx", _workbook)):
-        file = folder / f"{name}.{ending}"
-        if not file.exists():
-            continue
-        try:
-            cells = read(file)
-            return pd.DataFrame({header: _column(header, cells[header]) for header in cells.columns})
-        except (ValueError, KeyError, pd.errors.ParserError) as error:
-            raise ModelError(
-                "this table is not as bushfit writes it",
-                file=file,
-                found=str(error),
-                hint="write the results again, or remove the file: the page then omits it",
-            ) from error
-    return None
-
-
-def _column(header: str, cells: pd.Series[str]) -> object:
-    """Texts, or numbers with nan for empty cells."""
-    if header in TEXTS:
-        return [undefused(cell) for cell in cells]
-    values = cells.str.replace(",", ".").replace("", "nan").astype(float)
-    if np.isinf(values).any():
-        raise ValueError(f"{header}: inf")
-    return values
-
-
-def _csv(file: Path) -> pd.DataFrame:
-    """Cells of a CSV file as texts, with commas and decimal points, or semicolons and decimal commas."""
-    data = read_utf8(file, ModelError, largest=_LARGEST)
-    separator = re.search("[,;]", data.partition(b"\n")[0].decode("utf-8-sig"))
-    return pd.read_csv(
-        io.BytesIO(data), sep=separator[0] if separator else ",", dtype=str, keep_default_na=False, encoding="utf-8-sig"
-    )
-
-
-def _workbook(file: Path) -> pd.DataFrame:
-    """Cells of the first sheet of a workbook as texts."""
-    (first, _), *_ = read_sheets(view_bytes(file, ModelError, largest=_LARGEST), file, kind=ModelError)
-    header, *rows = first.content
-    cells = ([*map(str, row), *[""] * (len(header) - len(row))] for row in rows if row)
-    return pd.DataFrame(list(cells), columns=[str(cell) for cell in header])
+    file, workbook = folder / f"{name}.csv", folder / f"{name}.xlsx"
+    try:
+        if file.exists():
+            data = read_utf8(file, ModelError, largest=_LARGEST)
+            separator = ";" if b";" in data.partition(b"\n")[0] else ","
+            form: dict[str, Any] = {
+                "sep": separator,
+                "decimal": "," if separator == ";" else ".",
+                "encoding": "utf-8-sig",
+            }
+            types = dict.fromkeys(_TEXTS, str)
+            table = pd.read_csv(io.BytesIO(data), dtype=types, keep_default_na=False, na_values=[""], **form)
+        elif (file := workbook).exists():
+            table = pd.read_excel(file, engine="openpyxl", keep_default_na=False, na_values=[""])
+        else:
+            return None
+        texts = [header for header in table if header in _TEXTS]
+        numbers = table.columns.difference(texts)
+        table = table.astype(dict.fromkeys(numbers, float))
+        if np.isinf(table[numbers].to_numpy()).any():
+            raise ValueError("inf")
+        return table.assign(**{header: [undefused(str(cell)) for cell in table[header].fillna("")] for header in texts})
+    except (ValueError, KeyError, BadZipFile) as error:
+        raise ModelError(
+            "this table is not as bushfit writes it",
+            file=file,
+            found=str(error),
+            hint="write the results anew, or remove the file: the page then goes without it",
+        ) from error

@@ -5,34 +5,29 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.axis import Axis
 from matplotlib.collections import PolyCollection
-from matplotlib.figure import Figure
 from scipy.special import fdtri
 
-from bushfit.effects.contract import Array
 from bushfit.model.model import FIVE
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction
-from bushfit.report.parameters import ParameterRow, parameter_rows
+from bushfit.report.parameters import parameter_rows
 from bushfit.report.plots import style
 from bushfit.report.plots.measured import sweep_groups
-from bushfit.report.plots.prediction import lines_of
+from bushfit.report.plots.prediction import refined
 from bushfit.report.tables import columns_of, spread
 from bushfit.units import format_range
 
 #: Most amplitudes that are drawn.
 _MOST_LEVELS = 6
-#: Side of a cell of the matrix of ellipses [cm].
-_CELL = 2.3
-#: Half the side of the frame of an ellipse, as a share of its cell.
-_HALF_CELL = 0.4
+#: Side of a cell of the matrix of ellipses [cm], and half the side of the frame of an ellipse as a share of it.
+_CELL, _HALF_CELL = 2.3, 0.4
 #: Correlation from which a pair is marked: only its combination is known well.
 _STRONG = 0.9
 
 
 @style.in_own_style
-def complex_figure(result: Result, prediction: Prediction, table: pd.DataFrame | None, title: str) -> Figure:
+def complex_figure(result: Result, prediction: Prediction, table: pd.DataFrame | None, title: str) -> style.Chart:
     """Storage and loss stiffness over frequency, and loss over storage stiffness (Cole-Cole), per amplitude.
 
     Args:
@@ -44,53 +39,48 @@ def complex_figure(result: Result, prediction: Prediction, table: pd.DataFrame |
     Returns:
         Figure with three panels.
     """
-    place = prediction.direction
+    place, fine = prediction.direction, refined(result, prediction)
     amplitude_header, stiffness_header, _ = columns_of(place)
     (unit, length), _, (stiffness_unit, factor) = place.display
-    lines = lines_of(result, prediction).bushing
     levels = np.unique(prediction.amplitude)
     levels = levels[spread(levels.size, _MOST_LEVELS)]
-    measured = _measured(result, prediction, table)
-    figure = style.new_figure(title, style.ROW)
+    of_place = table[table["direction"] == str(place)] if table is not None else None
+    groups = sweep_groups(of_place, result) if of_place is not None else []
+    measured = [
+        curve.rows[curve.rows["outlier"] == "no"]
+        for group in groups
+        if group.axis == "frequency" and group.shares_levels
+        for curve in group.curves
+    ]
+    figure = style.Chart(title, style.ROW)
     storage, loss, cole_cole = figure.subplots(1, 3)
     for level, look in zip(levels, style.styles(levels.size, "amplitude"), strict=True):
-        mask = lines.amplitude == level
-        frequency = lines.frequency[mask]
-        for axes, band in ((storage, lines.storage_stiffness), (loss, lines.loss_stiffness)):
-            axes.plot(frequency, factor * band.value[mask], color=look.color, ls=look.dashes, lw=1.1)
+        mask = fine.amplitude == level
+        frequency = fine.frequency[mask]
+        bands = [fine.storage_stiffness, fine.loss_stiffness]
+        line: dict[str, Any] = {"color": look.color, "ls": look.dashes, "lw": 1.1}
+        for axes, band in zip((storage, loss), bands, strict=True):
+            axes.plot(frequency, factor * band.value[mask], **line)
             axes.fill_between(frequency, factor * band.low[mask], factor * band.high[mask], color=look.color, alpha=0.2)
-        real, imaginary = (factor * b.value[mask] for b in (lines.storage_stiffness, lines.loss_stiffness))
-        cole_cole.plot(real, imaginary, color=look.color, ls=look.dashes, lw=1.1)
-        near = measured[np.isclose(measured[amplitude_header], level * length, 0.01, 0.0)]
-        x, magnitude, loss_factor = (near[name] for name in ("frequency [Hz]", stiffness_header, "loss factor [-]"))
-        real = magnitude / np.sqrt(1.0 + loss_factor**2)
-        imaginary = loss_factor * real
-        for axes, points in ((storage, (x, real)), (loss, (x, imaginary)), (cole_cole, (real, imaginary))):
-            axes.plot(*points, look.marker, color=look.color, **style.DOT)
-    style.label_axes(storage, "frequency [Hz]", f"storage {stiffness_header}", lines.frequency)
-    style.label_axes(loss, "frequency [Hz]", f"loss {stiffness_header}", lines.frequency)
+        cole_cole.plot(*(factor * band.value[mask] for band in bands), **line)
+        near = [rows[np.isclose(rows[amplitude_header], level * length, 0.01, 0.0)] for rows in measured]
+        if near:
+            columns = [stiffness_header, "loss factor [-]"]
+            means = pd.concat(near).groupby("frequency [Hz]")[columns].mean()
+            x, (magnitude, loss_factor) = means.index.to_numpy(), means.to_numpy().T
+            real = magnitude / np.sqrt(1.0 + loss_factor**2)
+            imaginary = loss_factor * real
+            for axes, points in ((storage, (x, real)), (loss, (x, imaginary)), (cole_cole, (real, imaginary))):
+                axes.plot(*points, look.marker, color=look.color, **style.DOT)
+    style.label_axes(storage, "frequency [Hz]", f"storage {stiffness_header}", fine.frequency)
+    style.label_axes(loss, "frequency [Hz]", f"loss {stiffness_header}", fine.frequency)
     style.label_axes(cole_cole, f"storage [{stiffness_unit}]", f"loss [{stiffness_unit}]")
-    style.name_levels(
-        cole_cole, [format_range(unit, length * level) for level in levels], "amplitude", [True] * levels.size
-    )
-    return style.explained(figure, "Lines: model, shaded: its 95 % band. Points: measured, mean of the repeats.")
-
-
-def _measured(result: Result, prediction: Prediction, table: pd.DataFrame | None) -> pd.DataFrame:
-    """Means over the repeats of the sweeps at the place of a prediction that step the frequency."""
-    amplitude, stiffness, _ = columns_of(prediction.direction)
-    keys, values = ["frequency [Hz]", amplitude], [stiffness, "loss factor [-]"]
-    if table is None or table.empty:
-        return pd.DataFrame(columns=[*keys, *values], dtype=float)
-    sweeps = table[table["direction"] == str(prediction.direction)]
-    groups = [group for group in sweep_groups(sweeps, result) if group.axis == "frequency" and group.shares_levels]
-    rows = [curve.rows[curve.rows["outlier"] == "no"] for group in groups for curve in group.curves]
-    empty = pd.DataFrame(columns=[*keys, *values], dtype=float)
-    return pd.concat(rows).groupby(keys, as_index=False)[values].mean() if rows else empty
+    style.name_levels(cole_cole, [format_range(unit, length * level) for level in levels], "amplitude")
+    return figure.explain("Lines: model, shaded: its 95 % band. Points: measured, mean of the repeats.")
 
 
 @style.in_own_style
-def ellipses_figure(result: Result, title: str) -> Figure | None:
+def ellipses_figure(result: Result, title: str) -> style.Chart | None:
     """95 % confidence ellipses of all pairs of the paper's parameters.
 
     A positive parameter is fitted by its logarithm, in which the region is an ellipse. Axes are in standard errors of
@@ -114,11 +104,12 @@ def ellipses_figure(result: Result, title: str) -> Figure | None:
     halves = {row.name: covariance.half(row.name) / (covariance.stderr(row.name) or np.inf) for row in rows}
     angle = np.linspace(0.0, 2.0 * np.pi, 60)
     corners = _HALF_CELL * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
-    figure = style.new_figure(title, _CELL * (len(rows) - 1))
+    figure = style.Chart(title, _CELL * (len(rows) - 1))
     axes = figure.subplots()
     axes.grid(visible=False)
     axes.spines[:].set_visible(False)
     frames, ellipses = [], []
+    ticks: dict[str, dict[float, str]] = {"x": {}, "y": {}}
     # one panel for all pairs: a panel each takes ten times as long to draw
     for y, y_row in enumerate(rows[:0:-1]):
         for x, x_row in enumerate(rows[: len(rows) - 1 - y]):
@@ -136,26 +127,19 @@ def ellipses_figure(result: Result, title: str) -> Figure | None:
             strong = {"weight": "bold", "color": "#9b0f18"} if abs(correlation) >= _STRONG else {}
             text = f"{correlation:+.2f}"
             axes.text(x, y + _HALF_CELL + 0.02, text, ha="center", va="bottom", **(style.WORDS | strong))
-            if y == 0:
-                _add_ticks(axes.xaxis, x, x_ends, x_row, "\n")
-            if x == 0:
-                _add_ticks(axes.yaxis, y, y_ends, y_row)
+            for axis, center, ends, row, outer in (("x", x, x_ends, x_row, y == 0), ("y", y, y_ends, y_row, x == 0)):
+                if outer:
+                    name = row.name if "^" in row.unit else f"{row.name} [{row.unit}]"
+                    low, high = row.interval.split(" to ")
+                    ticks[axis] |= {center + ends[0]: low, center: "\n" * (axis == "x") + name, center + ends[1]: high}
     axes.add_collection(PolyCollection(frames, facecolors="none", edgecolors=style.INK, lw=0.8))
     axes.add_collection(PolyCollection(ellipses, facecolors="#1f4e9c40", edgecolors="#1f4e9c", lw=1.0))
     axes.tick_params(length=0.0)
+    axes.set_xticks([*ticks["x"]], [*ticks["x"].values()])
+    axes.set_yticks([*ticks["y"]], [*ticks["y"].values()])
     axes.set(xlim=(-0.5, len(rows) - 1.5), ylim=(-0.5, len(rows) - 1.4))
-    return style.explained(
-        figure,
+    return figure.explain(
         "Ellipses: pairs of values inside are compatible with the tests (95 %). Broken lines: 95 % interval of each "
-        f"parameter, with its ends as ticks. Number: correlation, bold from {_STRONG:g}. The tests determine a "
-        "combination of such a pair well and each parameter less well: compare the pair, not one parameter.",
+        f"parameter, with its ends as ticks. Number: correlation, bold from {_STRONG:g}. Of such a pair the tests "
+        "determine a combination well and each parameter less well: compare the pair, not one of them."
     )
-
-
-def _add_ticks(axis: Axis, center: int, ends: Array, row: ParameterRow, before: str = "") -> None:
-    """Add the name of a parameter and the ends of its interval to the ticks of the matrix of ellipses."""
-    name = row.name if "^" in row.unit else f"{row.name} [{row.unit}]"
-    low, high = row.interval.split(" to ")
-    texts = [text.get_text() for text in axis.get_ticklabels()] if center else []
-    ticks = [*axis.get_ticklocs()] if center else []
-    axis.set_ticks([*ticks, center + ends[0], center, center + ends[1]], labels=[*texts, low, before + name, high])

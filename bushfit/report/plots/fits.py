@@ -1,12 +1,10 @@
 """A fit beside its tests: sweeps and loops with the model and with measured minus model."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from bushfit.effects.contract import Array
@@ -40,12 +38,11 @@ _PANEL_POINTS, _CURVE_POINTS = 480, 24
 _MOST_ROWS = 240
 #: Relative error that a file states of a point, from which the point is not drawn: such points hide the others.
 _WORST_DRAWN = 0.05
-_RESIDUALS = "Lower panels: measured minus model, in units of noise. 95 % of the points should be in the grey band."
 _OUTLIERS = "Crosses: outliers, drawn at the edge if they are beyond it."
 
 
 @style.in_own_style
-def sweeps_figure(result: Result, table: pd.DataFrame, title: str) -> Figure:
+def sweeps_figure(result: Result, table: pd.DataFrame, title: str) -> style.Chart:
     """Stiffness magnitude and loss factor of sweeps, measured and modelled, with the residuals below.
 
     A row of panels per place and stepped quantity. The model includes the effects of the rig, as the tests do.
@@ -59,13 +56,25 @@ def sweeps_figure(result: Result, table: pd.DataFrame, title: str) -> Figure:
         Figure with four panels per place and stepped quantity.
     """
     groups = [group.thinned() for group in sweep_groups(table, result)]
-    figure = style.new_figure(title, (style.ROW + _STRIP) * len(groups))
-    grid = figure.subplots(2 * len(groups), 2, squeeze=False, height_ratios=[style.ROW, _STRIP] * len(groups))
-    for group, pair, strips in zip(groups, grid[::2], grid[1::2], strict=True):
+    figure = style.Chart(title, (style.ROW + _STRIP) * len(groups))
+    grid = figure.add_gridspec(len(groups), 2)
+    for row, group in enumerate(groups):
+        columns = [grid[row, i].subgridspec(2, 1, height_ratios=[style.ROW, _STRIP], hspace=0.1) for i in (0, 1)]
+        pair = [figure.add_subplot(column[0]) for column in columns]
+        strips = [figure.add_subplot(column[1], sharex=panel) for column, panel in zip(columns, pair, strict=True)]
         draw_curves(pair, group, result)
-        _draw_residuals(pair, strips, group)
-    outliers = _OUTLIERS * bool((table["outlier"] == "yes").any())
-    return style.explained(figure, "Lines: model.", points_note(table), _RESIDUALS, outliers, thinned_note(groups))
+        _draw_residuals(strips, group)
+        for panel in pair:
+            panel.set_xlabel("")
+            panel.tick_params(labelbottom=False)
+    return figure.explain(
+        "Lines: model.",
+        points_note(table),
+        "Lower panels: measured minus model, in units of noise. 95 % of the points should be in the grey band.",
+        _OUTLIERS * bool((table["outlier"] == "yes").any()),
+        f"Of more than {MOST_CURVES} levels {MOST_CURVES} are drawn."
+        * any(len(group.curves) == MOST_CURVES for group in groups),
+    )
 
 
 def draw_curves(pair: Sequence[Axes], group: SweepGroup, result: Result) -> None:
@@ -76,20 +85,18 @@ def draw_curves(pair: Sequence[Axes], group: SweepGroup, result: Result) -> None
         group: of sweeps; a curve per level.
         result: the model with the effects of the rig.
     """
-    stiffness = columns_of(group.place)[1]
+    stiffness, x_header = columns_of(group.place)[1], group.x_header
     factor, labels = stiffness_scale(group.place, max(curve.rows[stiffness].max() for curve in group.curves))
     looks = style.styles(len(group.curves), group.palette)
     for axes, label, header, scale in zip(pair, labels, (stiffness, "loss factor [-]"), (factor, 1.0), strict=True):
         for curve, look in zip(group.curves, looks, strict=True):
-            points = drawn_points(curve)
-            draw_points(axes, points, group.x_header, header, scale, look, len(group.curves))
+            draw_points(axes, drawn_points(curve.rows), x_header, header, scale, look, len(group.curves))
             x, values = _model_line(group, curve, header, result)
             axes.plot(x, scale * values, color=look.color, ls=look.dashes, lw=1.3)
-        x = np.concatenate([curve.rows[group.x_header] for curve in group.curves])
-        style.label_axes(axes, group.x_header, label, x)
+        style.label_axes(axes, x_header, label, np.concatenate([curve.rows[x_header] for curve in group.curves]))
     names = [style.file_name(curve.name, 30) for curve in group.curves]
     if group.shares_levels:
-        style.name_levels(pair[-1], names, group.palette, [True] * len(names))
+        style.name_levels(pair[-1], names, group.palette)
     else:
         style.legend(pair[-1], [look.handle(True) for look in looks], names, "test")
 
@@ -108,12 +115,12 @@ def stiffness_scale(place: Place, largest: float) -> tuple[float, tuple[str, str
     return to_figure / factor, (f"{place} {quantity}{symbol} [{unit}]", f"{place} loss factor [-]")
 
 
-def drawn_points(curve: Curve) -> pd.DataFrame:
-    """Rows of a curve without outliers and without points of large stated error."""
-    keep = curve.rows["outlier"] == "no"
-    if "stated error [-]" in curve.rows:
-        keep &= ~(curve.rows["stated error [-]"] > _WORST_DRAWN)
-    return curve.rows[keep]
+def drawn_points(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows of a table of sweeps without outliers and without points of large stated error."""
+    keep = rows["outlier"] == "no"
+    if "stated error [-]" in rows:
+        keep &= ~(rows["stated error [-]"] > _WORST_DRAWN)
+    return rows[keep]
 
 
 def draw_points(
@@ -129,19 +136,21 @@ def draw_points(
         look: of the level.
         curves: number of levels in the panel, which share its points.
     """
-    repeats = rows.groupby(x_header)[header]
-    count = len(repeats)
-    drawn = scale * repeats.agg(["mean", "min", "max"]).iloc[thinning(count, curves)]
-    if count < len(rows):
-        axes.vlines(drawn.index, drawn["min"], drawn["max"], color=look.color, lw=0.7, alpha=0.7)
-    points = style.POINT if count <= _MANY_POINTS else style.DOT | {"alpha": 0.5}
-    axes.plot(drawn.index, drawn["mean"], look.marker, color=look.color, **points)
+    x, index = np.unique(rows[x_header].to_numpy(), return_inverse=True)
+    values = scale * rows[header].to_numpy()[np.argsort(index, kind="stable")]
+    counts = np.bincount(index)
+    starts = np.cumsum(counts) - counts
+    kept = slice(None, None, _thinning(x.size, curves))
+    if x.size < len(rows):
+        low, high = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
+        axes.vlines(x[kept], low[kept], high[kept], color=look.color, lw=0.7, alpha=0.7)
+    points = style.POINT if x.size <= _MANY_POINTS else style.DOT | {"alpha": 0.5}
+    axes.plot(x[kept], (np.add.reduceat(values, starts) / counts)[kept], look.marker, color=look.color, **points)
 
 
-def thinning(count: int, curves: int) -> slice:
-    """Every n-th of the points of a curve, so that the panel stays readable."""
-    maximum = max(_CURVE_POINTS, _PANEL_POINTS // curves)
-    return slice(None, None, max(1, -(-count // maximum)))
+def _thinning(count: int, curves: int) -> int:
+    """Step from one drawn point of a curve to the next, so that a panel of so many curves stays readable."""
+    return max(1, -(-count // max(_CURVE_POINTS, _PANEL_POINTS // curves)))
 
 
 def points_note(table: pd.DataFrame) -> str:
@@ -152,12 +161,6 @@ def points_note(table: pd.DataFrame) -> str:
     hidden = int((table["stated error [-]"] > _WORST_DRAWN).sum()) if "stated error [-]" in table else 0
     left_out = f" {hidden} points with a stated error above {100 * _WORST_DRAWN:g} % are not drawn." if hidden else ""
     return f"Points: {bars}.{left_out}"
-
-
-def thinned_note(groups: Sequence[SweepGroup]) -> str:
-    """Sentence that states that not all levels are drawn; empty otherwise."""
-    full = any(len(group.curves) == MOST_CURVES for group in groups)
-    return f"Only {MOST_CURVES} of the levels are drawn." * full
 
 
 def _model_line(group: SweepGroup, curve: Curve, header: str, result: Result) -> tuple[Array, Array]:
@@ -175,30 +178,25 @@ def _model_line(group: SweepGroup, curve: Curve, header: str, result: Result) ->
     return fine, np.abs(stiffness) * group.place.display.stiffness.factor
 
 
-def _draw_residuals(pair: Sequence[Axes], strips: Sequence[Axes], group: SweepGroup) -> None:
+def _draw_residuals(strips: Sequence[Axes], group: SweepGroup) -> None:
     """Draw residuals of stiffness (left) and loss (right) below the panels of a group of sweeps."""
-    looks = style.styles(len(group.curves), group.palette)
-    for panel, strip, part in zip(pair, strips, ("stiffness", "loss"), strict=True):
+    looks, rows = style.styles(len(group.curves), group.palette), pd.concat([curve.rows for curve in group.curves])
+    x, outliers = rows[group.x_header].to_numpy(), rows[rows["outlier"] == "yes"]
+    for strip, part in zip(strips, ("stiffness", "loss"), strict=True):
         header = f"{part} residual [noise]"
         for curve, look in zip(group.curves, looks, strict=True):
-            points = drawn_points(curve)
-            points = points.iloc[thinning(len(points), len(group.curves))]
-            look_of_points = style.DOT | {"color": look.color, "alpha": 0.8}
-            strip.plot(points[group.x_header], points[header], look.marker, **look_of_points)
-        strip.sharex(panel)
-        rows = pd.concat([curve.rows for curve in group.curves])
-        style.label_axes(strip, group.x_header, f"{part} residual\n/ noise", rows[group.x_header].to_numpy())
-        if group.axis == "amplitude" and rows[group.x_header].max() > 3.0 * rows[group.x_header].min():
-            style.logarithmic(strip, rows[group.x_header].to_numpy())
-        panel.tick_params(labelbottom=False)
-        panel.set_xlabel("")
+            points = drawn_points(curve.rows)
+            points = points[:: _thinning(len(points), len(looks))]
+            strip.plot(points[group.x_header], points[header], look.marker, color=look.color, alpha=0.8, **style.DOT)
+        style.label_axes(strip, group.x_header, f"{part} residual\n/ noise", x)
+        if group.axis == "amplitude" and x.max() > 3.0 * x.min():
+            style.logarithmic(strip, x)
         style.noise_band(strip)
-        outliers = rows[rows["outlier"] == "yes"]
         style.mark_outliers(strip, outliers[group.x_header].to_numpy(), outliers[header].to_numpy())
 
 
 @style.in_own_style
-def loops_figure(result: Result, table: pd.DataFrame, title: str) -> Figure:
+def loops_figure(result: Result, table: pd.DataFrame, title: str) -> style.Chart:
     """Force over displacement of loops, measured and modelled, and residuals over the phase of the cycle.
 
     A row of panels per place. Of each loop at most 240 rows of the first and the last two cycles are drawn.
@@ -212,25 +210,24 @@ def loops_figure(result: Result, table: pd.DataFrame, title: str) -> Figure:
         Figure with two panels per place.
     """
     places = list(loops_of(table, result))
-    figure = style.new_figure(title, 1.25 * style.ROW * len(places))  # a hysteresis loop wants a square
+    figure = style.Chart(title, 1.25 * style.ROW * len(places))  # a hysteresis loop wants a square
     grid = figure.subplots(len(places), 2, squeeze=False, width_ratios=[1.15, 1.0])
     for (place, loops), (force_panel, phase_panel) in zip(places, grid, strict=True):
-        _draw_forces(force_panel, place, loops)
+        looks = style.styles(len(loops), "loop")
+        _draw_forces(force_panel, place, loops, looks)
         style.label_axes(phase_panel, "phase after the upper turn [deg]", "force residual / noise")
-        for loop, look in zip(loops.values(), style.styles(len(loops), "loop"), strict=True):
+        for loop, look in zip(loops.values(), looks, strict=True):
             counted = loop[loop["outlier"] == "no"]
-            phase, residual = phase_after_turn(counted, place), counted["residual [noise]"].to_numpy()
             rows = _drawn_rows(counted)
-            dots: dict[str, Any] = {"color": look.color, "alpha": 0.4, **style.DOT}
-            phase_panel.plot(phase[rows], residual[rows], ".", **dots)
-            phase_panel.plot(*sector_means(phase, residual), color=look.color, ls=look.dashes, lw=1.4)
+            points = phase_after_turn(counted, place)[rows], counted["residual [noise]"].to_numpy()[rows]
+            phase_panel.plot(*points, ".", color=look.color, alpha=0.4, **style.DOT)
+            curve = sector_means(counted, place, "residual [noise]")
+            phase_panel.plot(*curve, color=look.color, ls=look.dashes, lw=1.4)
         style.noise_band(phase_panel)
         phase_panel.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))
-        handles = [look.handle(False) for look in style.styles(len(loops), "loop")]
         model = {"model": Line2D([], [], color=style.INK, lw=0.8)}
-        style.legend(phase_panel, handles, loop_labels(place, loops), "loop", extra_lines=model)
-    return style.explained(
-        figure,
+        style.legend(phase_panel, [look.handle(False) for look in looks], loop_labels(place, loops), "loop", model)
+    return figure.explain(
         "Left: measured force over displacement without its noise. Black lines: model. Right: measured minus model, "
         f"in units of the noise of a row, and means over {SECTOR:g}° of the cycle (lines). 95 % of the points should "
         "be in the grey band.",
@@ -239,14 +236,15 @@ def loops_figure(result: Result, table: pd.DataFrame, title: str) -> Figure:
     )
 
 
-def _draw_forces(axes: Axes, place: Place, loops: dict[str, pd.DataFrame]) -> None:
+def _draw_forces(axes: Axes, place: Place, loops: dict[str, pd.DataFrame], looks: Sequence[style.Style]) -> None:
+    """Draw force over displacement of the loops of a place, with lines of the model and crosses at outliers."""
     motion, force = moved_of(place), columns_of(place)[2]
     name, factor = place.display.force
     unit, to_figure = display_unit(name, factor, max(loop[force].abs().max() for loop in loops.values()) / factor)
     scale = to_figure / factor
     motion_name, resisting, _ = place.motion.words
     style.label_axes(axes, f"{motion_name} [{place.display.displacement.name}]", f"{place} {resisting} [{unit}]")
-    for loop, look in zip(loops.values(), style.styles(len(loops), "loop"), strict=True):
+    for loop, look in zip(loops.values(), looks, strict=True):
         counted = loop[loop["outlier"] == "no"]
         drawn = counted.iloc[_drawn_rows(counted)]
         modelled = scale * drawn[f"model {force}"].to_numpy()
@@ -254,8 +252,8 @@ def _draw_forces(axes: Axes, place: Place, loops: dict[str, pd.DataFrame]) -> No
         modelled[1:][np.diff(turns) > 0.5] = np.nan  # between the first and the last cycles
         axes.plot(drawn[motion], scale * drawn[force], "o", color=look.color, alpha=0.5, **style.DOT)
         axes.plot(drawn[motion], modelled, color=style.INK, lw=0.8)
-    outliers = pd.concat(loops.values())
-    outliers = outliers[outliers["outlier"] == "yes"]
+    rows = pd.concat(loops.values())
+    outliers = rows[rows["outlier"] == "yes"]
     style.mark_outliers(axes, outliers[motion].to_numpy(), scale * outliers[force].to_numpy())
 
 
@@ -265,9 +263,6 @@ def loop_labels(place: Place, loops: dict[str, pd.DataFrame]) -> list[str]:
     Args:
         place: direction or specimen of the loops.
         loops: rows of each loop by the name of its test.
-
-    Returns:
-        Labels in the order of the loops.
     """
     labels = []
     for loop in loops.values():

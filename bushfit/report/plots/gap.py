@@ -12,31 +12,18 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
-from matplotlib.figure import Figure, SubFigure
 
 from bushfit.effects.contract import Array
-from bushfit.errors import printable
 from bushfit.geometry import Place
 from bushfit.model.result import Result
 from bushfit.report.plots import style
 from bushfit.report.plots.fits import loop_labels
-from bushfit.report.plots.measured import (
-    SECTOR,
-    Curve,
-    SweepGroup,
-    loops_of,
-    means,
-    phase_after_turn,
-    sector_means,
-    sweep_groups,
-)
+from bushfit.report.plots.measured import SECTOR, Curve, SweepGroup, loops_of, means, sector_means, sweep_groups
 
 #: Height of a row of a map; least and largest height of a map; height of the scale of colours, of loops [cm].
-_LEVEL, _LEAST_MAP, _LARGEST_MAP, _SCALE, _LOOPS = 0.6, 1.7, 4.2, 2.6, 4.4
-#: Most rows of a map: each is then 1.7 mm high.
-_MOST_ROWS = 24
-#: Most cells of a row: each is then 1 mm wide.
-_MOST_COLUMNS = 60
+_LEVEL, _LEAST_MAP, _LARGEST_MAP, _SCALE, _LOOPS = 0.6, 1.9, 4.2, 0.5, 4.4
+#: Most rows of a map, each then 1.7 mm high, and most cells of a row, each then 1 mm wide.
+_MOST_ROWS, _MOST_COLUMNS = 24, 60
 #: Percentages at which the colour changes.
 _EDGES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 #: Share of the points that may be beyond the end of the scale, so that outliers do not stretch it.
@@ -48,7 +35,7 @@ _ROW_NAME: dict[str, Any] = {"rotation": 0, "ha": "right", "va": "center", "ma":
 
 
 @style.in_own_style
-def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any], title: str) -> Figure:
+def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any], title: str) -> style.Chart:
     """Measured minus model of all tests, before and after what was added: one column where nothing changes.
 
     Sweeps are maps over the stepped quantity (across) and the level (upwards); loops are curves over the phase of the
@@ -63,85 +50,89 @@ def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any]
     Returns:
         Figure with a row of panels per map and per place with loops.
     """
-    sides = _sides(table, diagnosis)
+    sides = column_titles(table, diagnosis)
     sweeps = table[table["kind"] == "sweep"]
     groups = sweep_groups(sweeps, result) if len(sweeps) else []
+    maps = [(group, map_rows(group)) for group in groups]
     loops = list(loops_of(table[table["kind"] == "loop"], result))
-    rows = [(group, part) for group in groups for part in ("storage", "loss")]
-    heights = [min(max(_LEVEL * len(_map_rows(group)), _LEAST_MAP), _LARGEST_MAP) for group, _ in rows]
-    heights += [_LOOPS] * len(loops)
-    summary = textwrap.wrap(_summary(diagnosis), 92)
-    figure = style.new_figure(title, sum(heights) + _SCALE * bool(rows) + style.LINE * (len(summary) + 2))
-    body: SubFigure = figure.subfigures(1, 1, squeeze=False)[0, 0]
-    body.suptitle("\n".join(summary), family=style.fonts(), parse_math=False, **style.NAMES)
-    grid = body.subplots(len(heights), len(sides), squeeze=False, height_ratios=heights)
-    if rows:
-        edges, colors = _scale(sweeps, sides)
-        for panels, (group, part) in zip(grid, rows, strict=False):
-            for axes, side in zip(panels, sides, strict=True):
-                _draw_map(axes, group, f"{part} {side} [%]", colors)
-            _label_maps(panels, group, part)
-        _draw_scale(body, [axes for panels in grid[: len(rows)] for axes in panels], edges, colors)
-    for panels, (place, of_place) in zip(grid[len(rows) :], loops, strict=True):
+    heights = [2.0 * min(max(_LEVEL * len(rows), _LEAST_MAP), _LARGEST_MAP) for _, rows in maps]
+    heights += [_SCALE] * bool(maps) + [_LOOPS] * len(loops)
+    figure = style.Chart(
+        f"{title}, {diagnosis['verdict']}: {diagnosis['summary']}", sum(heights) + 2.0 * len(heights) * style.LINE
+    )
+    grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    first: list[Axes] = []
+    if maps:
+        edges, colors = color_scale(sweeps, list(sides))
+        for row, (group, rows) in enumerate(maps):
+            panels = grid[row].subgridspec(2, len(sides), hspace=0.08, wspace=0.1).subplots(squeeze=False)
+            for of_part, part in zip(panels, ("storage", "loss"), strict=True):
+                for axes, side in zip(of_part, sides, strict=True):
+                    draw_map(axes, group, rows, f"{part} {side} [%]", colors)
+                _label_maps(of_part, group, rows, part)
+            first = first or list(panels[0])
+        _draw_scale(figure.add_subplot(grid[len(maps)]), edges, colors)
+    for row, (place, of_place) in enumerate(loops, start=len(heights) - len(loops)):
+        panels = grid[row].subgridspec(1, len(sides), wspace=0.1).subplots(squeeze=False)[0]
         _draw_loops(panels, place, of_place, list(sides))
-    for axes, name in zip(grid[0], sides.values(), strict=True):
+        first = first or list(panels)
+    for axes, name in zip(first, sides.values(), strict=True):
         lines = [line for part in name.splitlines() for line in textwrap.wrap(part, 80 // len(sides))]
         axes.set_title("\n".join(lines), weight="bold", pad=7.0, parse_math=False, **style.NAMES)
-    repeats = "A cell is the mean of the repeats. "
-    return style.explained(
-        figure,
-        f"Maps: measured minus model in percent of |K|, real part (storage) and imaginary part (loss). {repeats}Pale "
-        f"grey: within {_EDGES[0]:g} %. A bar in a cell: {_BARRED:g} % or more below the model. White: not measured."
-        * bool(rows),
+    held_out, note = diagnosis["gap"]["heldout"], ""
+    if held_out and None not in held_out.values():
+        note = f"Held-out data: {held_out['before']:.2f} × noise before, {held_out['after']:.2f} × noise after."
+    return figure.explain(
+        "Maps: measured minus model in percent of |K|, real part (storage) and imaginary part (loss). A cell is the "
+        f"mean of the repeats. Pale grey: within {_EDGES[0]:g} %. A bar in a cell: {_BARRED:g} % or more below the "
+        "model. White: not measured." * bool(maps),
         f"Loops: measured minus model in percent of half the force range, means over {SECTOR:g}° of the cycle."
         * bool(loops),
+        note=note,
     )
 
 
-def _sides(table: pd.DataFrame, diagnosis: Mapping[str, Any]) -> dict[str, str]:
-    """Title of each column of the figure: "before" and, if it differs, "after"."""
+def column_titles(table: pd.DataFrame, diagnosis: Mapping[str, Any]) -> dict[str, str]:
+    """Title of each column of the figure: "before" and, if it differs, "after".
+
+    Args:
+        table: as `tables.gap_table` makes it.
+        diagnosis: the document of diagnosis.json.
+    """
     changed = any(
         not np.allclose(table[name], table[str(name).replace("before", "after")], equal_nan=True)
         for name in table
         if str(name).endswith("before [%]")
     )
-    gaps = diagnosis["gap"]["calibration"]
-    tails = {side: f"\ndata fitted {gap:.2f} × noise" for side, gap in gaps.items() if gap is not None}
-    if not changed:
-        return {"before": "nothing added" + tails.get("before", "")}
     effects = diagnosis["effects"]
-    mistaken = any(effect["test"] for effect in effects)
-    added = " and ".join(effect["name"] for effect in effects)
-    names = {"before": "tests as recorded", "after": "with the record corrected"} if mistaken else {}
-    names = names or {"before": "before", "after": f"after adding {added}" if added else "after"}
+    names = {"before": "before", "after": "after"} if changed else {"before": "nothing added"}
+    if changed and any(effect["test"] for effect in effects):
+        names = {"before": "tests as recorded", "after": "with the record corrected"}
+    elif changed and effects:
+        names["after"] = f"after adding {' and '.join(effect['name'] for effect in effects)}"
+    gaps = diagnosis["gap"]["calibration"]
+    tails = {side: f"\ndata fitted {gaps[side]:.2f} × noise" for side in names if gaps[side] is not None}
     return {side: name + tails.get(side, "") for side, name in names.items()}
 
 
-def _summary(diagnosis: Mapping[str, Any]) -> str:
-    held_out = diagnosis["gap"]["heldout"]
-    text = f"{diagnosis['verdict']}: {diagnosis['summary']}"
-    if held_out and None not in held_out.values():
-        text += f". Held-out data: {held_out['before']:.2f} × noise before, {held_out['after']:.2f} × noise after"
-    return printable(text, lines=True)
-
-
-def _map_rows(group: SweepGroup) -> list[Curve]:
-    """The rows of a map: the curves of a group, or neighbouring curves together where there are too many."""
+def map_rows(group: SweepGroup) -> list[Curve]:
+    """Rows of a map: the curves of a group, or neighbouring curves together where there are too many."""
     curves = group.curves
     if len(curves) <= _MOST_ROWS:
         return list(curves)
     blocks = np.array_split(np.arange(len(curves)), _MOST_ROWS)
-    merged = []
-    for block in blocks:
-        rows = pd.concat([curves[index].rows for index in block])
-        merged.append(Curve(curves[block[0]].name, curves[block[0]].level, rows))
-    return merged
+    rows = [pd.concat([curves[index].rows for index in block]) for block in blocks]
+    return [curves[block[0]]._replace(rows=merged) for block, merged in zip(blocks, rows, strict=True)]
 
 
-def _scale(sweeps: pd.DataFrame, sides: Mapping[str, str]) -> tuple[Array, ScalarMappable]:
+def color_scale(sweeps: pd.DataFrame, sides: Sequence[str]) -> tuple[Array, ScalarMappable]:
     """Percentages at which the colour changes, and the colours: blue below the model, red above, grey between.
 
     The scale ends where 2 % of the points are beyond it.
+
+    Args:
+        sweeps: sweeps of the table of the gap.
+        sides: columns of the figure.
     """
     values = np.abs(sweeps[[f"{part} {side} [%]" for part in ("storage", "loss") for side in sides]].to_numpy())
     needed = int(np.searchsorted(_EDGES, np.nanquantile(values, 1.0 - _BEYOND))) + 1
@@ -153,24 +144,34 @@ def _scale(sweeps: pd.DataFrame, sides: Mapping[str, str]) -> tuple[Array, Scala
     return both, ScalarMappable(BoundaryNorm(both, len(colors), extend="both"), ListedColormap(colors))
 
 
-def _draw_map(axes: Axes, group: SweepGroup, header: str, colors: ScalarMappable) -> None:
-    """Draw a row of cells per level, each as wide as the step."""
-    rows = _map_rows(group)
-    x_values = np.concatenate([curve.rows[group.x_header] for curve in rows])
-    logarithmic = _is_logarithmic(x_values)
+def draw_map(axes: Axes, group: SweepGroup, rows: Sequence[Curve], header: str, colors: ScalarMappable) -> None:
+    """Draw a row of cells per level, each as wide as the step.
+
+    Args:
+        axes: panel.
+        group: group of sweeps, which gives the quantity across.
+        rows: rows of the map, the lowest first.
+        header: column of measured minus model [%].
+        colors: scale of colours.
+    """
+    x_values = np.unique(np.concatenate([row.rows[group.x_header] for row in rows]))
+    steps, ratios = np.diff(x_values), np.diff(np.log(x_values))
+    logarithmic = x_values.size > 2 and np.std(ratios) / np.mean(ratios) < np.std(steps) / np.mean(steps)
     ends = []
-    for row, curve in enumerate(rows):
-        x, values = _binned(*means(curve.rows, group.x_header, header))
-        low, high = _cells(x, logarithmic=logarithmic)
-        corners = (low, row - 0.5), (high, row - 0.5), (high, row + 0.5), (low, row + 0.5)
+    for y, row in enumerate(rows):
+        x, values = means(row.rows, group.x_header, header)
+        blocks = np.array_split(np.arange(x.size), min(x.size, _MOST_COLUMNS))
+        x, values = (np.array([column[block].mean() for block in blocks]) for column in (x, values))
+        low, high = cell_edges(x, logarithmic=bool(logarithmic))
+        corners = (low, y - 0.5), (high, y - 0.5), (high, y + 0.5), (low, y + 0.5)
         cells = np.stack([np.stack(np.broadcast_arrays(*corner), axis=1) for corner in corners], axis=1)
         look: dict[str, Any] = {"norm": colors.norm, "cmap": colors.cmap, "lw": 0.0, "antialiaseds": False}
         axes.add_collection(PolyCollection(list(cells), array=values, **look), autolim=False)
         below = values < -_BARRED
         inset = 0.3 * (high - low)[below]
-        axes.hlines(np.full(inset.size, row), low[below] + inset, high[below] - inset, color="white", lw=1.1)
+        axes.hlines(np.full(inset.size, y), low[below] + inset, high[below] - inset, color="white", lw=1.1)
         ends.append((low.min(), high.max()))
-    x_start, x_end = np.array(ends)[:, 0].min(), np.array(ends)[:, 1].max()
+    x_start, x_end = min(low for low, _ in ends), max(high for _, high in ends)
     axes.hlines(np.arange(1, len(rows)) - 0.5, x_start, x_end, color="white", lw=1.5)
     axes.set(ylim=(-0.5, len(rows) - 0.5))
     if logarithmic:
@@ -180,56 +181,41 @@ def _draw_map(axes: Axes, group: SweepGroup, header: str, colors: ScalarMappable
     axes.spines[:].set(visible=True, color=style.GREY)
 
 
-def _binned(x: Array, values: Array) -> tuple[Array, Array]:
-    """Means of neighbouring points, at most 60."""
-    blocks = np.array_split(np.arange(x.size), min(x.size, _MOST_COLUMNS))
-    return np.array([x[block].mean() for block in blocks]), np.array([values[block].mean() for block in blocks])
-
-
-def _is_logarithmic(values: Array) -> bool:
-    """Check for values that are spaced more evenly by ratio than by difference."""
-    distinct = np.unique(values)
-    if distinct.size < 3:
-        return False
-    ratios, steps = np.diff(np.log(distinct)), np.diff(distinct)
-    return bool(np.std(ratios) / np.mean(ratios) < np.std(steps) / np.mean(steps))
-
-
-def _cells(values: Array, *, logarithmic: bool) -> tuple[Array, Array]:
+def cell_edges(values: Array, *, logarithmic: bool) -> tuple[Array, Array]:
     """Lower and upper edge of the cell of each value, (n,) each: half way to its neighbours.
 
     Where one neighbour is much further away than the other, a point was left out and the nearer one decides.
     """
     x = np.log(values) if logarithmic else values
     steps = np.diff(x) if x.size > 1 else np.array([0.2 if logarithmic else 0.2 * x[0]])
-    step_below, step_above = (np.concatenate(ends)[: x.size] for ends in ((steps[:1], steps), (steps, steps[-1:])))
-    step_below, step_above = (
-        np.where(step_below > 1.75 * step_above, step_above, step_below),
-        np.where(step_above > 1.75 * step_below, step_below, step_above),
-    )
-    low, high = x - step_below / 2.0, x + step_above / 2.0
+    below, above = np.append(steps[:1], steps)[: x.size], np.append(steps, steps[-1:])[: x.size]
+    low = x - np.where(below > 1.75 * above, above, below) / 2.0
+    high = x + np.where(above > 1.75 * below, below, above) / 2.0
     return (np.exp(low), np.exp(high)) if logarithmic else (np.maximum(low, 0.0), high)
 
 
-def _label_maps(panels: Sequence[Axes], group: SweepGroup, part: str) -> None:
-    names = [style.file_name(curve.name, 24) for curve in _map_rows(group)]
+def _label_maps(panels: Sequence[Axes], group: SweepGroup, rows: Sequence[Curve], part: str) -> None:
+    """Name the levels left of a row of maps, and the quantity across below the maps of the loss."""
+    names = [style.file_name(row.name, 24) for row in rows]
     ticks = np.arange(0, len(names), math.ceil(len(names) / 10))
     for axes in panels:
         axes.set_yticks(ticks, [names[tick] for tick in ticks])
         axes.tick_params(labelleft=axes is panels[0], labelbottom=part == "loss")
         if part == "loss":
-            axes.set_xlabel(group.x_header, **style.NAMES)
+            axes.set_xlabel(group.x_header)
     style.label_left(panels[0], f"{group.place}\n{part}", **_ROW_NAME)
 
 
-def _draw_scale(figure: SubFigure, maps: Sequence[Axes], edges: Array, colors: ScalarMappable) -> None:
-    bar = figure.colorbar(colors, ax=maps, location="bottom", shrink=0.76, aspect=42, pad=0.03, extendfrac=0.04)
+def _draw_scale(axes: Axes, edges: Array, colors: ScalarMappable) -> None:
+    """Draw the scale of colours that all maps share in a panel of its own."""
+    axes.set_axis_off()
+    bar = axes.figure.colorbar(colors, cax=axes.inset_axes((0.12, 0.0, 0.76, 0.7)), orientation="horizontal")
     bar.ax.set_xticks(edges, [f"{edge:g}" for edge in edges], **style.WORDS)
-    bar.ax.tick_params(length=2, colors=style.INK)
+    bar.ax.tick_params(length=2)
     bar.outline.set(edgecolor=style.GREY, linewidth=0.6)
-    bar.set_label("measured minus model [% of |K|]", **style.NAMES)
-    for x, side, words in ((-0.05, "right", "measured\nbelow model"), (1.05, "left", "measured\nabove model")):
-        bar.ax.text(x, 0.5, words, transform=bar.ax.transAxes, ha=side, va="center", **style.NAMES)
+    bar.set_label("measured minus model [% of |K|]")
+    for x, side, text in ((-0.05, "right", "measured\nbelow model"), (1.05, "left", "measured\nabove model")):
+        bar.ax.text(x, 0.5, text, transform=bar.ax.transAxes, ha=side, va="center", **style.NAMES)
     middle = (edges[:-1] + edges[1:]) / 2.0
     barred = middle[middle < -_BARRED]
     bar.ax.plot(barred, np.full(barred.size, 0.5), "_", color="white", ms=6, mew=1.1)
@@ -239,10 +225,9 @@ def _draw_loops(panels: Sequence[Axes], place: Place, loops: dict[str, pd.DataFr
     """Draw the loops of a place over the phase of the cycle, before and after on one scale."""
     looks = style.styles(len(loops), "loop")
     for axes, side in zip(panels, sides, strict=True):
-        style.label_axes(axes, "phase after the upper turn [deg]", "")
+        style.label_axes(axes, "phase after upper turn [deg]", "")
         for loop, look in zip(loops.values(), looks, strict=True):
-            curve = sector_means(phase_after_turn(loop, place), loop[f"force {side} [%]"].to_numpy())
-            axes.plot(*curve, color=look.color, ls=look.dashes, lw=1.3)
+            axes.plot(*sector_means(loop, place, f"force {side} [%]"), color=look.color, ls=look.dashes, lw=1.3)
         axes.axhline(0.0, color=style.GREY, lw=0.6, zorder=1)
         style.widen_span(axes, 1.0)
         axes.set(xlim=(0.0, 360.0), xticks=range(0, 361, 90))

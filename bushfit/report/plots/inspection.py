@@ -10,21 +10,22 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
 from bushfit.effects.contract import Array
-from bushfit.geometry import TRANSLATION, Place
+from bushfit.geometry import TRANSLATION
 from bushfit.inspection.record import Inspection
 from bushfit.reading.measurement import Loop, Sweep, loss_factor
 from bushfit.reduction.resonance import LARGEST_ERROR, Resonance
 from bushfit.reduction.result import Reduction
 from bushfit.report.plots import style
 from bushfit.report.plots.fits import stiffness_scale
-from bushfit.report.plots.measured import TIME_BINS, ranges
-from bushfit.report.tables import columns_of
+from bushfit.report.plots.measured import header_of
 from bushfit.units import display_unit, format_range
 
 #: Colour of a history.
 _COLOR = "#3b528b"
 #: Most rows of a loop that are drawn over the displacement.
 _MOST_ROWS = 6000
+#: Bins of time in which a long record is drawn: more than a figure has pixels.
+_TIME_BINS = 1500
 #: Largest common scale over the range of a panel: the panel then fills a third of it.
 _ALIKE = 3
 #: Height of a history, and of the panels of noise and distortion [cm].
@@ -34,7 +35,7 @@ _MOST_HISTORIES = 4
 
 
 @style.in_own_style
-def inspection_figure(files: Sequence[Inspection], first: int = 0, count: int = 5) -> Figure:
+def inspection_figure(files: Sequence[Inspection], first: int = 0, count: int = 5) -> style.Chart:
     """Test files as recorded, a row of panels per file: loops over displacement and time, sweeps over frequency.
 
     Args:
@@ -47,22 +48,22 @@ def inspection_figure(files: Sequence[Inspection], first: int = 0, count: int = 
     """
     drawn_files, names = files[first : first + count], Counter(file.label for file in files)
     page = f", {first // count + 1} of {-(-len(files) // count)}" if len(files) > count else ""
-    figure = style.new_figure(f"Test files as recorded{page}", (style.ROW + 0.7) * len(drawn_files))
-    grid = figure.add_gridspec(len(drawn_files), 1)
+    figure = style.Chart(f"Test files as recorded{page}", (style.ROW + 0.7) * len(drawn_files))
+    grid = figure.add_gridspec(len(drawn_files), 2)
     for row, file in enumerate(drawn_files):
         name = f"{file.file.parent.name}/{file.label}" if names[file.label] > 1 else file.label
         title = f"{style.file_name(name, letters=48)}: {file.kind}, {file.direction or 'direction unknown'}"
         title += ", sign of the force reversed" * (file.entry.get("force_sign") == -1)
         title += f", {len(file.odd)} remarks" if file.odd else ""
         if isinstance(file.measured, Sweep):
-            panel = _draw_sweep(grid[row, 0], file.measured)
+            panel = _draw_sweep([figure.add_subplot(grid[row, column]) for column in (0, 1)], file.measured)
         elif file.measured is not None:
-            panel = _draw_history(figure, grid[row, 0], file.measured, loop=file.kind == "loop")
-        panel.set_title(title, fontsize=8.5, loc="left", color=style.GREY)
-    _scale_alike(figure.axes[:])
+            loop = figure.add_subplot(grid[row, 0]) if file.kind == "loop" else None
+            panel = _draw_history(figure, grid[row, 1] if loop else grid[row, :], file.measured, loop)
+        panel.set_title(title, fontsize=style.TEXT, loc="left", color=style.GREY)
+    _scale_alike(figure.axes)
     swept = any(isinstance(file.measured, Sweep) for file in drawn_files)
-    return style.explained(
-        figure,
+    return figure.explain(
         "Sweeps: points as measured, lines through the means of the repeats." * swept,
         "Panels of one direction share their scales if each fills a third of them." * (len(drawn_files) > 1),
     )
@@ -81,72 +82,64 @@ def _scale_alike(panels: Sequence[Axes]) -> None:
                 axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
 
 
-def _draw_history(figure: Figure, place: SubplotSpec, history: Loop, *, loop: bool) -> Axes:
-    """Draw both channels over time and, of a loop, force over displacement; return the first panel."""
+def _draw_history(figure: Figure, cell: SubplotSpec, history: Loop, loop: Axes | None) -> Axes:
+    """Draw both channels over time and, of a loop, force over displacement in a panel; return the first panel."""
     (length, to_length), unit_force, _ = history.direction.display
     force, to_force = display_unit(*unit_force, float(np.abs(history.force).max()))
     names = history.direction.motion.words
-    grid = place.subgridspec(2, 2 if loop else 1, width_ratios=[1.0, 1.2] if loop else None)
-    over_time = [figure.add_subplot(grid[0, -1])]
-    over_time.append(figure.add_subplot(grid[1, -1], sharex=over_time[0]))
+    over_time = cell.subgridspec(2, 1, hspace=0.15).subplots(sharex=True, squeeze=False)[:, 0]
     motion, load = to_length * history.displacement, to_force * history.force
     labels = f"{names[0]}\n[{length}]", f"{names[1]}\n[{force}]"
     for axes, values, label in zip(over_time, (motion, load), labels, strict=True):
-        if history.time.size <= 2 * TIME_BINS:
+        if history.time.size <= 2 * _TIME_BINS:
             axes.plot(history.time, values, lw=0.8, color=_COLOR)
         else:
-            axes.fill_between(*ranges(history.time, values), step="post", color=_COLOR, lw=0.6)
+            axes.fill_between(*time_ranges(history.time, values), step="post", color=_COLOR, lw=0.6)
         axes.set_label(str(history.direction))
         style.label_axes(axes, "time [s]" if history.timed else "time rebuilt [s]", label)
     figure.align_ylabels(over_time)
-    over_time[0].tick_params(labelbottom=False)
     over_time[0].set_xlabel("")
-    if not loop:
+    if loop is None:
         return over_time[0]
-    axes = figure.add_subplot(grid[:, 0], label=str(history.direction))
+    loop.set_label(str(history.direction))
     step = max(1, -(-history.time.size // _MOST_ROWS))
-    axes.plot(motion[::step], load[::step], ".", ms=1.2, mew=0, color=_COLOR, alpha=0.7)
-    style.label_axes(axes, f"{names[0]} [{length}]", f"{names[1]} [{force}]")
-    return axes
+    loop.plot(motion[::step], load[::step], ".", ms=1.2, mew=0, color=_COLOR, alpha=0.7)
+    style.label_axes(loop, f"{names[0]} [{length}]", f"{names[1]} [{force}]")
+    return loop
 
 
-def _draw_sweep(place: SubplotSpec, sweep: Sweep) -> Axes:
+def time_ranges(time: Array, values: Array) -> tuple[Array, Array, Array]:
+    """Start of each of 1500 bins of time that holds rows, and the smallest and largest value in it, (k,) each."""
+    first = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], _TIME_BINS + 1)[:-1]))
+    return time[first], np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
+
+
+def _draw_sweep(pair: Sequence[Axes], sweep: Sweep) -> Axes:
     """Draw stiffness and loss factor over what the sweep steps through; return the first panel."""
-    length = sweep.direction.display.displacement
-    factor, labels = stiffness_scale(sweep.direction, _largest(sweep.direction, sweep.stiffness))
+    place, length = sweep.direction, sweep.direction.display.displacement
+    magnitude = place.display.stiffness.factor * np.abs(sweep.stiffness)
+    factor, labels = stiffness_scale(place, float(magnitude.max()))
     by_amplitude = sweep.stepped == "amplitude"
     fixed_quantity, unit, scale = ("frequency", "Hz", 1.0) if by_amplitude else ("amplitude", *length)
-    table = pd.DataFrame(
-        {
-            "x": sweep.step * (length.factor if by_amplitude else 1.0),
-            "level": sweep.held,
-            "stiffness": factor * sweep.direction.display.stiffness.factor * np.abs(sweep.stiffness),
-            "loss": loss_factor(sweep.stiffness),
-        }
-    )
-    pair = place.subgridspec(1, 2).subplots(squeeze=False)[0]
-    looks = style.styles(table["level"].nunique(), fixed_quantity)
+    x = sweep.step * (length.factor if by_amplitude else 1.0)
+    table = pd.DataFrame({"x": x, "stiffness": factor * magnitude, "loss": loss_factor(sweep.stiffness)})
+    levels = np.unique(sweep.held)
     for axes, quantity, label in zip(pair, ("stiffness", "loss"), labels, strict=True):
-        for (_, rows), look in zip(table.groupby("level"), looks, strict=True):
+        for level, look in zip(levels, style.styles(levels.size, fixed_quantity), strict=True):
+            rows = table[sweep.held == level]
             means = rows.groupby("x")[quantity].mean()
             axes.plot(means.index, means, color=look.color, ls=look.dashes, lw=0.8)
             axes.plot(rows["x"], rows[quantity], look.marker, color=look.color, alpha=0.75, **style.POINT)
-        axes.set_label(str(sweep.direction))
-        x_label = columns_of(sweep.direction)[0] if by_amplitude else "frequency [Hz]"
-        style.label_axes(axes, x_label, label, table["x"].to_numpy())
+        axes.set_label(str(place))
+        style.label_axes(axes, header_of(place, "amplitude" if by_amplitude else "frequency"), label, x)
     if sweep.stepped:
-        levels = [format_range(unit, scale * level) for level in np.unique(table["level"])]
-        style.name_levels(pair[-1], levels, fixed_quantity, [True] * len(levels))
+        names = [format_range(unit, scale * level) for level in levels]
+        style.name_levels(pair[-1], names, fixed_quantity)
     return pair[0]
 
 
-def _largest(place: Place, stiffness: Array) -> float:
-    """Largest magnitude of complex stiffnesses [SI] in the unit of the tables of a place."""
-    return place.display.stiffness.factor * float(np.abs(stiffness).max())
-
-
 @style.in_own_style
-def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str) -> Figure:
+def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str) -> style.Chart:
     """Histories with the cycles used, stiffness and loss factor over frequency, and noise and harmonic distortion.
 
     Args:
@@ -157,31 +150,24 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
     Returns:
         Figure with a strip per history above four panels.
     """
-    drawn_histories = histories[:_MOST_HISTORIES]
-    figure = style.new_figure(title, _STRIP * len(drawn_histories) + style.ROW + _NOISE_ROW)
-    grid = figure.add_gridspec(
-        len(drawn_histories) + 2, 2, height_ratios=[_STRIP] * len(drawn_histories) + [style.ROW, _NOISE_ROW]
-    )
+    drawn = histories[:_MOST_HISTORIES]
+    heights = [_STRIP] * len(drawn) + [style.ROW, _NOISE_ROW]
+    figure = style.Chart(title, sum(heights))
+    grid = figure.add_gridspec(len(heights), 2, height_ratios=heights)
     steps = pd.DataFrame([vars(step) for step in reduction.steps]).sort_values("frequency", kind="stable")
     levels = np.unique(steps["level"])
     looks = dict(zip(levels, style.styles(len(levels), "amplitude"), strict=True))
-    for row, history in enumerate(drawn_histories):
+    for row, history in enumerate(drawn):
         strip = figure.add_subplot(grid[row, :])
         _draw_strip(strip, history, reduction, looks)
         if len(histories) > 1:  # the title names one
             name = style.file_name(history.name, letters=100)  # as many as fit on a line
             strip.set_title(name, fontsize=style.SMALL, loc="left", color=style.GREY, pad=2)
-    points = [figure.add_subplot(grid[len(drawn_histories), column]) for column in range(2)]
-    _draw_points(points, reduction, steps, looks)
-    quality = [figure.add_subplot(grid[len(drawn_histories) + 1, column], sharex=points[0]) for column in range(2)]
-    _draw_quality(quality, steps, looks)
-    left_out = (
-        f" The first {len(drawn_histories)} of {len(histories)} histories."
-        if len(histories) > len(drawn_histories)
-        else ""
-    )
-    return style.explained(
-        figure,
+    points = [figure.add_subplot(grid[-2, column]) for column in range(2)]
+    quality = [figure.add_subplot(grid[-1, column], sharex=points[0]) for column in range(2)]
+    _draw_points(points, quality, reduction, steps, looks)
+    left_out = f" The first {len(drawn)} of {len(histories)} histories." * (len(histories) > len(drawn))
+    return figure.explain(
         f"Top: displacement over time; coloured: steady cycles used, grey: ramps, pauses, transients.{left_out}",
         "Bars: twice the standard error. Noise: standard error of a point relative to |K|.",
         "Distortion: harmonics relative to the fundamental; filled symbols: force, open symbols: displacement.",
@@ -191,7 +177,7 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
 def _draw_strip(axes: Axes, history: Loop, reduction: Reduction, looks: dict[float, style.Style]) -> None:
     """Draw displacement over time, the cycles used in the colour of their level."""
     unit, factor = reduction.direction.display.displacement
-    time, low, high = ranges(history.time, factor * history.displacement)
+    time, low, high = time_ranges(history.time, factor * history.displacement)
     axes.fill_between(time, low, high, color="#c8c8c8", lw=0.4, step="post")
     for level, look in looks.items():
         steps = [step for step in reduction.steps if step.name == history.name and step.level == level]
@@ -203,46 +189,43 @@ def _draw_strip(axes: Axes, history: Loop, reduction: Reduction, looks: dict[flo
 
 
 def _draw_points(
-    pair: Sequence[Axes], reduction: Reduction, steps: pd.DataFrame, looks: dict[float, style.Style]
+    pair: Sequence[Axes],
+    quality: Sequence[Axes],
+    reduction: Reduction,
+    steps: pd.DataFrame,
+    looks: dict[float, style.Style],
 ) -> None:
-    """Draw stiffness and loss factor over frequency with bars of twice the standard error."""
+    """Draw stiffness and loss factor over frequency with bars of twice the standard error, and noise and distortion."""
     unit, length = reduction.direction.display.displacement
-    factor, names = stiffness_scale(reduction.direction, _largest(reduction.direction, steps["stiffness"].to_numpy()))
-    factor *= reduction.direction.display.stiffness.factor
+    to_table = reduction.direction.display.stiffness.factor
+    factor, labels = stiffness_scale(reduction.direction, to_table * float(steps["stiffness"].abs().max()))
     for level, look in looks.items():
         rows = steps[steps["level"] == level]
-        frequency, magnitude = rows["frequency"], (factor * rows["stiffness"].abs()).to_numpy()
+        frequency, magnitude = rows["frequency"], (factor * to_table * rows["stiffness"].abs()).to_numpy()
         factors = loss_factor(rows["stiffness"].to_numpy())
         errors = magnitude * rows["gain_error"], (1.0 + factors**2) * rows["phase_error"]
         for axes, value, error in zip(pair, (magnitude, factors), errors, strict=True):
             axes.plot(frequency, value, color=look.color, ls=look.dashes, lw=0.7, alpha=0.6)
             axes.vlines(frequency, value - 2 * error, value + 2 * error, color=look.color, lw=0.9)
             axes.plot(frequency, value, look.marker, color=look.color, **style.POINT)
-    for axes, name in zip(pair, names, strict=True):
-        style.label_axes(axes, "", name, steps["frequency"].to_numpy())
+        noise = 100.0 * np.hypot(rows["gain_error"], rows["phase_error"]) / 2**0.5
+        force, motion = 100.0 * rows["force_distortion"], 100.0 * rows["displacement_distortion"]
+        quality[0].plot(frequency, noise, look.marker, color=look.color, **style.POINT)
+        quality[1].plot(frequency, force, look.marker, color=look.color, **style.POINT)
+        quality[1].plot(frequency, motion, look.marker, color=look.color, ms=3.4, mfc="none", mew=0.7)
+    x = steps["frequency"].to_numpy()
+    for axes, label in zip(pair, labels, strict=True):
+        style.label_axes(axes, "", label, x)
         axes.tick_params(labelbottom=False)
+    for axes, label in zip(quality, ("noise [%]", "distortion [%]"), strict=True):
+        style.label_axes(axes, "frequency [Hz]", label, x)
+        axes.set_ylim(bottom=0.0)
     handles = [look.handle(True) for look in looks.values()]
     style.legend(pair[-1], handles, [format_range(unit, length * level) for level in looks], "amplitude")
 
 
-def _draw_quality(pair: Sequence[Axes], steps: pd.DataFrame, looks: dict[float, style.Style]) -> None:
-    for level, look in looks.items():
-        rows = steps[steps["level"] == level]
-        noise = np.hypot(rows["gain_error"], rows["phase_error"]) / 2**0.5
-        points = (
-            (pair[0], noise, style.POINT),
-            (pair[1], rows["force_distortion"], style.POINT),
-            (pair[1], rows["displacement_distortion"], {"ms": 3.4, "mfc": "none", "mew": 0.7}),
-        )
-        for axes, share, look_of_points in points:
-            axes.plot(rows["frequency"], 100 * share, look.marker, color=look.color, **look_of_points)
-    for axes, name in zip(pair, ("noise [%]", "distortion [%]"), strict=True):
-        style.label_axes(axes, "frequency [Hz]", name, steps["frequency"].to_numpy())
-        axes.set_ylim(bottom=0.0)
-
-
 @style.in_own_style
-def resonance_figure(resonance: Resonance, title: str) -> Figure:
+def resonance_figure(resonance: Resonance, title: str) -> style.Chart:
     """Transmissibility, amplitude reached, stiffness and loss factor of a resonance test over the frequency.
 
     Args:
@@ -252,37 +235,33 @@ def resonance_figure(resonance: Resonance, title: str) -> Figure:
     Returns:
         Figure with four panels.
     """
-    figure = style.new_figure(title, 2 * style.ROW)
+    figure = style.Chart(title, 2 * style.ROW)
     (ratio, amplitude), (stiffness, loss) = figure.subplots(2, 2, sharex=True)
     (unit, length), _, stiffness_units = TRANSLATION.display
     stiffness_unit, factor = display_unit(*stiffness_units, float(np.abs(resonance.stiffness).max()))
     color = style.styles(1, "amplitude")[0].color
-    upper = (
-        (ratio, np.abs(resonance.transmissibility), "transmissibility |T| [-]"),
-        (amplitude, length * resonance.amplitude, f"amplitude reached [{unit}]"),
+    magnitude, factors = factor * np.abs(resonance.stiffness), loss_factor(resonance.stiffness)
+    error = 2.0 * resonance.relative_error
+    quantities = (
+        (ratio, "", "transmissibility |T| [-]", np.abs(resonance.transmissibility), None),
+        (amplitude, "", f"amplitude reached [{unit}]", length * resonance.amplitude, None),
+        (stiffness, "frequency [Hz]", f"stiffness |K| [{stiffness_unit}]", magnitude, error * magnitude),
+        (loss, "frequency [Hz]", "loss factor [-]", factors, error * (1.0 + factors**2)),
     )
-    for axes, values, label in upper:
+    for axes, x_label, label, values, half in quantities:
         axes.plot(resonance.frequency, values, "o", color=color, **style.DOT)
-        style.label_axes(axes, "", label)
-        style.logarithmic(axes, values, "y")
+        style.label_axes(axes, x_label, label, resonance.test.frequency)
+        if half is None:
+            style.logarithmic(axes, values, "y")
+        else:
+            limits = axes.get_ylim()
+            axes.vlines(resonance.frequency, values - half, values + half, color=color, lw=0.7, alpha=0.6)
+            axes.set_ylim(limits)
     ratio.plot(resonance.test.frequency, np.abs(resonance.test.transmissibility), color=style.GREY, lw=0.7, zorder=1)
     frequency, largest = resonance.peak
     ratio.annotate(f"{frequency:.1f} Hz", (frequency, largest), (4, 0), textcoords="offset points", **style.WORDS)
-    magnitude, factors = factor * np.abs(resonance.stiffness), loss_factor(resonance.stiffness)
-    lower = (
-        (stiffness, magnitude, magnitude, f"stiffness |K| [{stiffness_unit}]"),
-        (loss, factors, 1.0 + factors**2, "loss factor [-]"),
-    )
-    for axes, values, scale, label in lower:
-        error = 2.0 * resonance.relative_error * scale
-        axes.plot(resonance.frequency, values, "o", color=color, **style.DOT)
-        low, high = axes.get_ylim()
-        axes.vlines(resonance.frequency, values - error, values + error, color=color, lw=0.7, alpha=0.6)
-        axes.set_ylim(low, high)
-        style.label_axes(axes, "frequency [Hz]", label, resonance.test.frequency)
     hidden = f"Points with an error of |K| beyond {100 * LARGEST_ERROR:g} % are not drawn."
-    return style.explained(
-        figure,
+    return figure.explain(
         "Grey line: acceleration of the mass over that of the base, as measured. Points: means of neighbouring rows.",
         "Bars: twice the standard error; it is large where the mass moves almost as the base does.",
         hidden * bool(resonance.left_out.size),

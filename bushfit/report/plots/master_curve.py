@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from bushfit.fitting.master_curve import SHIFT, Shifted, law
 from bushfit.model.arms import Arms, part_modulus
@@ -24,7 +23,7 @@ _BEYOND = 4.0
 
 
 @style.in_own_style
-def master_curve_figure(model: Model, shifted_sweeps: Sequence[Shifted], title: str) -> Figure:
+def master_curve_figure(model: Model, shifted_sweeps: Sequence[Shifted], title: str) -> style.Chart:
     """Stiffness and loss factor over reduced frequency, a row of panels per place.
 
     Args:
@@ -37,7 +36,7 @@ def master_curve_figure(model: Model, shifted_sweeps: Sequence[Shifted], title: 
     """
     places = list(dict.fromkeys(shifted.sweep.direction for shifted in shifted_sweeps))
     degrees = sorted({_degree(shifted) for shifted in shifted_sweeps})
-    figure = style.new_figure(title, style.ROW * len(places))
+    figure = style.Chart(title, style.ROW * len(places))
     grid, levels = figure.subplots(len(places), 2, squeeze=False), []
     for place, (stiffness, loss) in zip(places, grid, strict=True):
         of_place = [shifted for shifted in shifted_sweeps if shifted.sweep.direction is place]
@@ -62,17 +61,16 @@ def master_curve_figure(model: Model, shifted_sweeps: Sequence[Shifted], title: 
             style.logarithmic(axes, reach)
         style.label_axes(stiffness, "reduced frequency f a_T [Hz]", f"{place}\n|{words(place)[2]}| [{unit}]")
         style.label_axes(loss, "reduced frequency f a_T [Hz]", "loss factor [-]")
-        style.name_levels(loss, [f"{degree:g}" for degree in degrees], "temperature", [True] * len(degrees))
-    return style.explained(
-        figure,
+        style.name_levels(loss, [f"{degree:g}" for degree in degrees], "temperature")
+    return figure.explain(
         f"Line: model at 23 °C, {', '.join(levels)}. Points: measured at the temperatures in the legend [°C], shifted",
         "to 23 °C by the model.",
     )
 
 
 @style.in_own_style
-def shift_factors_figure(result: Result, shifted_sweeps: Sequence[Shifted], title: str) -> Figure:
-    """Shift factors over temperature by the law and of sweep sweep alone, and their difference.
+def shift_factors_figure(result: Result, shifted_sweeps: Sequence[Shifted], title: str) -> style.Chart:
+    """Shift factors over temperature by the law and of each sweep alone, and their difference.
 
     Args:
         result: fitted result with the error of the law.
@@ -82,7 +80,7 @@ def shift_factors_figure(result: Result, shifted_sweeps: Sequence[Shifted], titl
     Returns:
         Figure with two panels.
     """
-    figure = style.new_figure(title, style.ROW)
+    figure = style.Chart(title, style.ROW)
     factors, differences = figure.subplots(1, 2)
     kelvin = np.array([shifted.temperature for shifted in shifted_sweeps])
     fine = np.linspace(kelvin.min(), kelvin.max(), _FINE)
@@ -91,15 +89,14 @@ def shift_factors_figure(result: Result, shifted_sweeps: Sequence[Shifted], titl
     at_law = np.array([shifted.shift[0] for shifted in shifted_sweeps]) / np.log(10.0)
     color = style.styles(1, "amplitude")[0].color
     for axes, base, points in ((factors, line, single), (differences, 0.0 * line, single - at_law)):
-        axes.fill_between(fine - CELSIUS, base - Z95 * error, base + Z95 * error, color="#ebebeb", lw=0)
+        axes.fill_between(fine - CELSIUS, base - Z95 * error, base + Z95 * error, color=style.SHADE, lw=0)
         axes.plot(fine - CELSIUS, base, color=style.INK, lw=1.1)
         axes.errorbar(kelvin - CELSIUS, points, Z95 * unsure, fmt="o", color=color, lw=0.8, **style.POINT)
     style.label_axes(factors, "temperature [degC]", "log10 a_T [-]")
     style.label_axes(differences, "temperature [degC]", "log10 a_T, sweep minus law [-]")
-    return style.explained(
-        figure,
+    return figure.explain(
         f"Line: law, with a shift of {number(result.model.values[SHIFT], 3)} 1/K at 23 °C; grey: its 95 % band.",
-        "Points: shift factor of sweep sweep alone, with 95 % intervals.",
+        "Points: shift factor of each sweep alone, with 95 % intervals.",
     )
 
 
@@ -109,8 +106,8 @@ def _degree(shifted: Shifted) -> float:
 
 
 @style.in_own_style
-def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:
-    """Storage and loss modulus of sweep part and of its Maxwell arms, and the relative error within the band.
+def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> style.Chart:
+    """Storage and loss modulus of each part and of its Maxwell arms, and the relative error within the band.
 
     Args:
         model: model whose effects the arms replace.
@@ -120,7 +117,7 @@ def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:
     Returns:
         Figure with two panels.
     """
-    figure = style.new_figure(title, style.ROW)
+    figure = style.Chart(title, style.ROW)
     moduli, errors = figure.subplots(1, 2)
     low, high = arms[0].band
     omega = 2.0 * np.pi * np.geomspace(low / _BEYOND, high * _BEYOND, 400)
@@ -131,17 +128,16 @@ def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> Figure:
     looks = style.styles(len(arms), "loop")
     for part, whole, look in zip(arms, wholes, looks, strict=True):
         arm_modulus = part.complex_modulus(omega)
-        for share, dashes in ((np.real, "-"), (np.imag, (0, (5, 1.5)))):
+        for share, dashes in ((np.real, style.DASHES[0]), (np.imag, style.DASHES[1])):
             moduli.plot(frequency, factor * share(whole), color=style.GREY, lw=2.6, alpha=0.45, ls=dashes)
             moduli.plot(frequency, factor * share(arm_modulus), color=look.color, lw=1.1, ls=dashes)
         percent_error = 100.0 * np.abs(arm_modulus / whole - 1.0)[inside]
         errors.plot(frequency[inside], percent_error, color=look.color, lw=1.1)
     style.label_axes(moduli, "frequency [Hz]", f"modulus [{unit}]", frequency)
     style.label_axes(errors, "frequency [Hz]", "error of the modulus [%]", frequency)
-    moduli.axvspan(low, high, color="#ebebeb", lw=0, zorder=0)
+    moduli.axvspan(low, high, color=style.SHADE, lw=0, zorder=0)
     errors.set_ylim(bottom=0.0)
-    return style.explained(
-        figure,
+    return figure.explain(
         "Wide grey lines: model; coloured: Maxwell arms; solid: storage, dashed: loss. Shaded: band of the fit.",
         *(f"{part.sentence}." for part in arms),
     )

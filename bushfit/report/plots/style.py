@@ -1,4 +1,4 @@
-"""Size, type, colours and legends of all figures, and their way to a file.
+"""Charts: size, type, colours and legends of all figures, and their way to a file.
 
 The user's matplotlibrc has no influence: `in_own_style` draws with matplotlib's defaults.
 """
@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from threading import RLock
-from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar
+from typing import Any, Literal, NamedTuple, ParamSpec, Self, TypeVar
 
 import numpy as np
 from matplotlib import colormaps, rc_context, rcParamsDefault
@@ -21,7 +21,6 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -32,23 +31,18 @@ from bushfit.report.tables import shortened, spread
 
 #: Width of a figure [cm]: the text of a page of A4.
 _WIDTH = 16.0
-#: Height of a panel [cm]: two in a row are a little wider than high.
+#: Height of a panel with its labels [cm]: two in a row are a little wider than high.
 ROW = 5.4
-#: Height that title and explanation take, and a line of text [cm].
-FRAME, LINE = 2.0, 0.42
-#: Size of the labels of axes [point].
-TEXT = 8.5
-#: Size of ticks, legends and explanations [point]: the smallest that still reads well in print.
-SMALL = 7.5
-#: How a measured point is drawn.
+#: Height of a title and an explanation of two lines, and of a further line [cm].
+_FRAME, LINE = 2.0, 0.42
+#: Sizes of the labels of axes, and of ticks, legends and explanations [point]: the smallest that still reads in print.
+TEXT, SMALL = 8.5, 7.5
+#: How a measured point is drawn, and where there are thousands.
 POINT: dict[str, Any] = {"ms": 4.2, "mec": "white", "mew": 0.4}
-#: How a measured point is drawn where there are thousands.
 DOT: dict[str, Any] = {"ms": 2.4, "mew": 0}
-#: Colour of text and of lines that stand for no level.
-INK = "#1a1a1a"
-#: Colour of what explains.
-GREY = "#595959"
-#: How a figure's own words are written: names of axes, and what is smaller.
+#: Colours of text and of lines that stand for no level, of what explains, of shaded bands, and of outliers.
+INK, GREY, SHADE, RED = "#1a1a1a", "#595959", "#ebebeb", "#c1121f"
+#: How names of axes and smaller words are written.
 NAMES: dict[str, Any] = {"fontsize": TEXT, "color": INK}
 WORDS: dict[str, Any] = {"fontsize": SMALL, "color": INK}
 #: Resolution of a picture [dots per inch]: sharp in a report, and small enough to be mailed.
@@ -57,8 +51,6 @@ _DPI = 150
 _UNSAID = {"png": ["Software"], "svg": ["Creator", "Date"], "pdf": ["Creator", "Producer", "CreationDate"]}
 #: Most lines that a legend names: more do not fit beside a panel.
 MOST_NAMED = 8
-#: Options of a legend right of the panel.
-_LEGEND: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5), "frameon": False, "handlelength": 3.2}
 #: Colour scale of each kind of level, with its ends: no colour means two things.
 _SCALES = {
     "amplitude": ("viridis", 0.0, 0.8),
@@ -66,10 +58,11 @@ _SCALES = {
     "loop": ("plasma", 0.4, 0.85),
     "temperature": ("turbo", 0.05, 0.95),
 }
-#: Markers of levels, one after the other.
+#: Markers and dashes of levels, one after the other: eight and five, so that both together repeat after forty levels.
 _MARKERS = "os^Dv<p>"
-#: Dashes of levels, one after the other: five, so that marker and dashes together repeat after forty levels.
-_DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1.2, 1.2)), (0, (9, 2)))
+DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1.2, 1.2)), (0, (9, 2)))
+#: Intervals between the ticks of an axis at most.
+_MOST_TICKS = 6
 #: An axis that spans more than this ratio is logarithmic: chosen, a decade and a half.
 _LOG_RATIO = 40.0
 #: Letters in a line of the title and of the explanation, as many as the width of a figure holds, and of the name of a
@@ -86,11 +79,16 @@ _SETTINGS: dict[Any, Any] = {
 } | {
     "axes.grid": True,
     "axes.axisbelow": True,
+    "axes.labelsize": TEXT,
+    "axes.labelcolor": INK,
     "grid.color": "#d9d9d9",
     "grid.linewidth": 0.5,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.formatter.useoffset": False,
+    "legend.frameon": False,
+    "legend.fontsize": SMALL,
+    "legend.title_fontsize": SMALL,
     **{f"{axis}tick.labelsize": SMALL for axis in "xy"},
     **{f"{axis}tick.color": INK for axis in "xy"},
     "svg.hashsalt": "bushfit",
@@ -99,7 +97,7 @@ _SETTINGS: dict[Any, Any] = {
 #: matplotlib's settings belong to the process: one figure at a time changes them.
 _LOCK = RLock()
 _P = ParamSpec("_P")
-_Drawn = TypeVar("_Drawn", bound=Figure | None)
+_Drawn = TypeVar("_Drawn", bound="Chart | None")
 
 
 @contextmanager
@@ -121,6 +119,45 @@ def in_own_style(make: Callable[_P, _Drawn]) -> Callable[_P, _Drawn]:
     return styled
 
 
+class Chart(Figure):
+    """Figure as wide as a page, with a title above its panels and an explanation below them.
+
+    Args:
+        title: any text.
+        height: height of the panels with their labels [cm].
+
+    Attributes:
+        heading, footer: texts above and below the panels.
+        caption: explanation without the note, in one line.
+    """
+
+    def __init__(self, title: str, height: float) -> None:
+        self._lines = textwrap.wrap(printable(title, lines=True), _TITLE_LETTERS)
+        self._height = height + _FRAME + LINE * max(0, len(self._lines) - 1)
+        super().__init__(figsize=(_WIDTH / 2.54, self._height / 2.54), dpi=_DPI, facecolor="white")
+
+    def explain(self, *sentences: str, note: str = "") -> Self:
+        """Write title and explanation, and lay the panels out, once for all formats.
+
+        Args:
+            sentences: explanation of lines, shades and points.
+            note: further sentences, which a page shows elsewhere.
+
+        Returns:
+            The figure, ready to be drawn.
+        """
+        self.caption = printable(" ".join(filter(None, sentences)), lines=True)
+        lines = textwrap.wrap(f"{self.caption} {printable(note, lines=True)}", _NOTE_LETTERS)
+        height = self._height + LINE * max(0, len(lines) - 2)
+        self.set_figheight(height / 2.54)
+        bold: dict[str, Any] = {"fontsize": TEXT + 1.5, "weight": "bold", "family": fonts(), "parse_math": False}
+        self.heading = self.suptitle("\n".join(self._lines), y=1.0 - 0.25 / height, **bold)
+        small: dict[str, Any] = {"fontsize": SMALL, "color": GREY, "parse_math": False}
+        self.footer = self.supxlabel("\n".join(lines), x=0.01, y=0.2 / height, ha="left", **small)
+        self.tight_layout(pad=0.5, h_pad=0.9, w_pad=1.2)
+        return self
+
+
 class Style(NamedTuple):
     """How one level is drawn."""
 
@@ -134,22 +171,18 @@ class Style(NamedTuple):
 
 
 def styles(count: int, palette: str) -> list[Style]:
-    """Styles of so many levels, by colour alone where a colour bar names them; `what` chooses the colour scale."""
+    """Styles of so many levels, by colour alone where a colour bar names them.
+
+    Args:
+        count: number of levels.
+        palette: colour scale, named after what distinguishes the levels: "amplitude", "frequency", "temperature" or
+            "loop".
+    """
     name, first, last = _SCALES[palette]
     colors = colormaps[name](np.linspace(first, last, count))
     if count > MOST_NAMED and palette != "loop":
-        return [Style(color, _DASHES[0], _MARKERS[0]) for color in colors]
-    return [Style(c, _DASHES[i % len(_DASHES)], _MARKERS[i % len(_MARKERS)]) for i, c in enumerate(colors)]
-
-
-def new_figure(title: str, height: float) -> Figure:
-    """An empty figure as wide as a page; `height` is the height of its panels [cm], the title any text."""
-    lines = textwrap.wrap(printable(title, lines=True), _TITLE_LETTERS)
-    height += FRAME + LINE * max(0, len(lines) - 1)
-    size = _WIDTH / 2.54, height / 2.54
-    figure = Figure(figsize=size, dpi=_DPI, facecolor="white", layout=ConstrainedLayoutEngine(wspace=0.05))
-    figure.suptitle("\n".join(lines), fontsize=TEXT + 1.5, weight="bold", family=fonts(), parse_math=False)
-    return figure
+        return [Style(color, DASHES[0], _MARKERS[0]) for color in colors]
+    return [Style(c, DASHES[i % len(DASHES)], _MARKERS[i % len(_MARKERS)]) for i, c in enumerate(colors)]
 
 
 def fonts() -> list[str]:
@@ -158,24 +191,29 @@ def fonts() -> list[str]:
 
 
 def label_axes(axes: Axes, x_label: str, y_label: str, x: Array | None = None) -> None:
-    """Give a panel its labels, ticks and a grid.
+    """Give a panel its labels, few ticks, and a logarithmic x axis if it spans decades.
 
     Args:
         axes: panel.
         x_label, y_label: with units.
-        x: values along x; the axis is logarithmic if they span decades.
+        x: values along x; None for a linear axis.
     """
-    axes.set_xlabel(x_label, **NAMES)
+    axes.set_xlabel(x_label)
     label_left(axes, y_label)
+    if axes.get_xscale() == "linear":
+        axes.locator_params("x", nbins=_MOST_TICKS)
+    if axes.get_yscale() == "linear":
+        axes.locator_params("y", nbins=_MOST_TICKS)
+    axes.spines[:].set_in_layout(False)  # ticks and labels need more room anyway
     if x is not None and x.max() > _LOG_RATIO * x.min():
         logarithmic(axes, x)
 
 
-def label_left(axes: Axes, label: str, **place: Any) -> None:
+def label_left(axes: Axes, label: str, **options: Any) -> None:
     """Write the label left of a panel, in several lines if one is longer than the panel is high."""
     whole = re.sub(r"\[.*?\]", lambda unit: unit[0].replace(" ", "\u00a0"), printable(label, lines=True))
     lines = [part for line in whole.splitlines() for part in textwrap.wrap(line, _LABEL_LETTERS)]
-    axes.set_ylabel("\n".join(lines), family=fonts(), parse_math=False, **NAMES, **place)
+    axes.set_ylabel("\n".join(lines), family=fonts(), parse_math=False, **options)
 
 
 def logarithmic(axes: Axes, values: Array, axis_name: Literal["x", "y"] = "x") -> None:
@@ -183,8 +221,8 @@ def logarithmic(axes: Axes, values: Array, axis_name: Literal["x", "y"] = "x") -
 
     Args:
         axes: panel.
-        values: that the axis shows.
-        along: "x" or "y".
+        values: values that the axis shows.
+        axis_name: "x" or "y".
     """
     axis = {"x": axes.xaxis, "y": axes.yaxis}[axis_name]
     axes.set(**{f"{axis_name}scale": "log"})
@@ -194,12 +232,7 @@ def logarithmic(axes: Axes, values: Array, axis_name: Literal["x", "y"] = "x") -
 
 
 def widen_span(axes: Axes, minimum: float) -> None:
-    """Widen a y axis to at least this span, so that rounding errors do not fill the panel.
-
-    Args:
-        axes: panel.
-        minimum: smallest span of the y axis, in its unit.
-    """
+    """Widen a y axis to at least this span [its unit], so that rounding errors do not fill the panel."""
     low, high = axes.get_ylim()
     if high - low < minimum:
         axes.set_ylim((low + high - minimum) / 2.0, (low + high + minimum) / 2.0)
@@ -207,21 +240,16 @@ def widen_span(axes: Axes, minimum: float) -> None:
 
 def noise_band(axes: Axes) -> None:
     """Shade the band in which 95 % of the residuals should be."""
-    axes.axhspan(-Z95, Z95, color="#ebebeb", lw=0, zorder=0)
+    axes.axhspan(-Z95, Z95, color=SHADE, lw=0, zorder=0)
     axes.axhline(0.0, color=GREY, lw=0.6, zorder=1)
     widen_span(axes, 7.0)
 
 
 def mark_outliers(axes: Axes, x: Array, y: Array) -> None:
-    """Draw crosses at outliers, (n,) each, at the edge of the panel if they are beyond it.
-
-    Args:
-        axes: panel.
-        x, y: outliers in the units of the panel, (n,) each.
-    """
+    """Draw crosses at outliers, (n,) each in the units of the panel, at its edge if they are beyond it."""
     low, high = axes.get_ylim()
     if x.size:
-        axes.plot(x, np.clip(y, low, high), "x", color="#c1121f", ms=4.5, mew=1.2, zorder=5, clip_on=False)
+        axes.plot(x, np.clip(y, low, high), "x", color=RED, ms=4.5, mew=1.2, zorder=5, clip_on=False)
     axes.set_ylim(low, high)
 
 
@@ -230,55 +258,51 @@ def legend(
     handles: Sequence[Line2D],
     labels: Sequence[str],
     title: str,
-    *,
     extra_lines: Mapping[str, Line2D | tuple[Line2D, ...]] | None = None,
-    **place: Any,
 ) -> None:
-    """Add a legend to a panel, by default at its right.
+    """Add a legend right of a panel.
 
     Args:
         axes: panel.
         handles, labels: of the lines; of more than eight, eight are named, and the number of the others.
-        title: of the legend.
+        title: title of the legend.
         extra_lines: further lines by their labels.
-        place: options of matplotlib's legend.
     """
-    named = [(handles[place], labels[place]) for place in spread(len(handles), MOST_NAMED)]
+    named = [(handles[index], labels[index]) for index in spread(len(handles), MOST_NAMED)]
     if omitted := len(handles) - len(named):
         named.append((Line2D([], [], ls=""), f"and {omitted} more"))
     named += [(line, text) for text, line in (extra_lines or {}).items()]
-    lines, texts = zip(*named, strict=True)
-    axes.legend(lines, texts, fontsize=SMALL, title_fontsize=SMALL, **(_LEGEND | {"title": title} | place))
+    axes.legend(*zip(*named, strict=True), title=title, loc="center left", bbox_to_anchor=(1.01, 0.5), handlelength=3.2)
 
 
 def name_levels(
     axes: Axes,
     levels: Sequence[str],
     quantity: str,
-    marked: Sequence[bool],
+    marked: Sequence[bool] = (),
     extra_lines: Mapping[str, Line2D | tuple[Line2D, ...]] | None = None,
 ) -> None:
     """Name the levels of a panel by a legend, or of more than eight by a colour bar.
 
     Args:
         axes: panel.
-        levels: amplitudes or frequencies as texts, rising, (k,).
-        what: "amplitude" or "frequency", the title.
-        marked: whether each level has points, (k,).
+        levels: amplitudes, frequencies or temperatures as texts, rising, (k,).
+        quantity: "amplitude", "frequency" or "temperature": title and colour scale.
+        marked: whether each level has points, (k,); empty if all have.
         extra_lines: further lines by their labels.
     """
     looks = styles(len(levels), quantity)
     if len(levels) <= MOST_NAMED:
         order = 1 if quantity == "amplitude" else -1
-        handles = [look.handle(points) for look, points in zip(looks, marked, strict=True)]
-        legend(axes, handles[::order], levels[::order], quantity, extra_lines=extra_lines)
+        handles = [look.handle(points) for look, points in zip(looks, marked or [True] * len(looks), strict=True)]
+        legend(axes, handles[::order], levels[::order], quantity, extra_lines)
         return
     edges = np.arange(len(levels) + 1) - 0.5
     colors = ScalarMappable(BoundaryNorm(edges, len(levels)), ListedColormap([look.color for look in looks]))
-    bar = axes.figure.colorbar(colors, ax=axes, aspect=16, pad=0.04, drawedges=False)
+    bar = axes.figure.colorbar(colors, cax=axes.inset_axes((1.04, 0.0, 0.05, 1.0)), drawedges=False)
     ticks = spread(len(levels), MOST_NAMED)
     bar.set_ticks(ticks.tolist(), labels=[levels[tick] for tick in ticks], **WORDS)
-    bar.ax.tick_params(length=2, colors=INK, which="both")
+    bar.ax.tick_params(length=2, which="both")
     bar.minorticks_off()
     bar.ax.set_title(quantity, **WORDS)
     bar.outline.set(edgecolor=GREY, linewidth=0.6)
@@ -298,13 +322,6 @@ def first_sentences(sentences: Sequence[str]) -> str:
     return ". ".join([*texts, *([f"And {more} more warnings, in the model file and the report"] if more > 0 else [])])
 
 
-def explained(figure: Figure, *sentences: str) -> Figure:
-    """The figure with an explanation of lines, shades and points below its panels."""
-    text = textwrap.fill(printable(" ".join(filter(None, sentences)), lines=True), _NOTE_LETTERS)
-    figure.supxlabel(text, x=0.01, ha="left", fontsize=SMALL, color=GREY, parse_math=False)
-    return figure
-
-
 def to_image(figure: Figure, form: str = "png", *, outlines: bool = True) -> bytes:
     """The figure as PNG, SVG or PDF: the same bytes for the same figure, without date and version.
 
@@ -318,8 +335,8 @@ def to_image(figure: Figure, form: str = "png", *, outlines: bool = True) -> byt
         Content of the file.
     """
     buffer = io.BytesIO()
+    figure.set_dpi(_DPI)  # SVG and PDF leave that of their units behind
     with _own_settings(**{"svg.fonttype": "path" if outlines else "none"}):
-        # `savefig` would draw twice: once to lay out what a single drawing lays out as well
         canvas = get_registered_canvas_class(form)(figure)
         getattr(canvas, f"print_{form}")(buffer, metadata=dict.fromkeys(_UNSAID[form]))
     return buffer.getvalue()

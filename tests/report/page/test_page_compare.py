@@ -15,7 +15,7 @@ from reading_html import HARMFUL, LARGEST, assert_harmless, loads, parsed, spoil
 
 from bushfit.report.page import comparison_page, folder_pages
 from bushfit.report.page.index import index_page, read_batch
-from bushfit.report.results import Formats, encode_all
+from bushfit.report.results import Formats, encode_all, json_file
 
 NAMES = ["two", "families"]
 #: Keys of compare.json whose texts come from a user's files or names.
@@ -23,7 +23,7 @@ FOREIGN = {"name", "source", "words", "warnings", "command", "file", "note", "pa
 
 
 def page_of(document: Any) -> str:
-    return comparison_page({"compare": document}, {})
+    return comparison_page([json_file("compare", document)])
 
 
 def document_of(compared: Path, name: str) -> Any:
@@ -163,6 +163,6 @@ def test_many_bushings_stay_small(made: Path) -> None:
     document = dict(read_batch(made / "out")[0].make())
     usual = next(part for part in document["parts"] if part["result"] == "pass" and not part["differs"])
     document |= {"rows": 20_010, "parts": [*document["parts"], *[usual] * 19_980]}
-    page = index_page({"batch": document}, {})
+    page = index_page([json_file("batch", document)], made / "out")
     assert len(page.encode()) < LARGEST
     assert "batch.csv lists all 20010" in page

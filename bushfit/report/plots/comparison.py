@@ -1,0 +1,78 @@
+"""Results side by side: stiffness and loss factor of each, and their differences from the first."""
+
+import numpy as np
+from matplotlib.lines import Line2D
+
+from bushfit.report.compared import ContrastHeaders, SideBySide
+from bushfit.report.plots import style
+from bushfit.report.tables import numbers
+from bushfit.units import display_unit, format_range, split_header
+
+#: Width of a line [point].
+_STROKE = 1.3
+#: Markers on a line, or fewer: they distinguish lines in grey print.
+_MARKS = 5
+#: Smallest span of an axis of relative differences [%] and of differences of the loss factor.
+_LEAST_PERCENT, _LEAST_LOSS = 1.0, 0.005
+
+
+@style.in_own_style
+def comparison_figure(comparison: SideBySide) -> style.Chart:
+    """All results at every place they are compared at: two rows of panels a place, the differences below the values.
+
+    Drawn over frequency at the smallest and the largest amplitude, or over amplitude where there is one frequency.
+
+    Args:
+        comparison: validated comparison.
+
+    Returns:
+        Figure with four panels per place.
+    """
+    first, *others = comparison.names
+    figure = style.Chart(f"{', '.join(others)} against {first}", 2 * len(comparison.places) * style.ROW)
+    grid = figure.subplots(2 * len(comparison.places), 2, squeeze=False)
+    looks = dict(zip(comparison.names, style.styles(len(comparison.names), "loop"), strict=True))
+    for row, place in enumerate(comparison.places):
+        tables = comparison.differences_at(place)
+        heads = ContrastHeaders.from_table(tables[others[0]])
+        frequency, amplitude = numbers(tables[others[0]], "frequency [Hz]", heads.amplitude)
+        over_frequency = bool(np.ptp(frequency))
+        x_header, fixed_header = ("frequency [Hz]", heads.amplitude)[:: 1 if over_frequency else -1]
+        levels = np.unique(np.unique(amplitude if over_frequency else frequency)[[0, -1]])
+        values = [(first, tables[others[0]], "reference "), *((label, tables[label], "other ") for label in others)]
+        differences = [(label, tables[label], "") for label in others]
+        name, unit = split_header(heads.stiffness)
+        largest = max(float(np.nanmax(table[f"{side}{heads.stiffness}"], initial=0.0)) for _, table, side in values)
+        display, factor = display_unit(unit or "", 1.0, largest)
+        panels = (
+            (heads.stiffness, f"{place} {name} [{display}]", factor, values, 0.0),
+            ("loss factor [-]", f"{place} loss factor [-]", 1.0, values, 0.0),
+            (heads.relative, f"{name} minus {first} [% of {first}]", 100.0, differences, _LEAST_PERCENT),
+            (heads.loss, f"loss factor minus {first} [-]", 1.0, differences, _LEAST_LOSS),
+        )
+        for axes, (header, y_label, scale, sides, least_span) in zip(
+            grid[2 * row : 2 * row + 2].flat, panels, strict=True
+        ):
+            for label, table, side in sides:
+                ends = [f"{side}{header}{end}" for end in ("", ", low", ", high")]
+                x, level, *band = numbers(table, x_header, fixed_header, *ends)
+                look = looks[label]
+                for drawn_level, dashes in zip(levels, style.DASHES, strict=False):
+                    value, low, high = (scale * end[level == drawn_level] for end in band)
+                    line = axes.plot(x[level == drawn_level], value, color=look.color, ls=dashes, lw=_STROKE)[0]
+                    line.set(marker=look.marker, markevery=max(value.size // _MARKS, 1), **style.POINT)
+                    # bands of several results lie on each other
+                    axes.fill_between(x[level == drawn_level], low, high, color=look.color, alpha=0.18, lw=0)
+            style.label_axes(axes, x_header, y_label, numbers(tables[others[0]], x_header)[0])
+            if least_span:
+                axes.axhline(0.0, color=looks[first].color, lw=_STROKE)
+                style.widen_span(axes, least_span)
+        lines = [style.Style(look.color, "-", look.marker).handle(True) for look in looks.values()]
+        level_names = [format_range(split_header(fixed_header)[1] or "", float(level)) for level in levels]
+        dashed = [Line2D([], [], color=style.INK, lw=_STROKE, ls=dashes) for dashes in style.DASHES[: len(levels)]]
+        names = [f"{label}: {style.file_name(name)}" for label, name in comparison.names.items()]
+        style.legend(grid[2 * row, 1], lines, names, "", dict(zip(level_names, dashed, strict=True)))
+    return figure.explain(
+        "Shaded: 95 % bands. Lower panels: the band of each point by itself; compare.json and the terminal state what "
+        "holds at all points at once."
+    )
