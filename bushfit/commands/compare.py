@@ -28,7 +28,7 @@ from bushfit.prediction.comparison import compare as compare_two
 from bushfit.prediction.grid import common_grid, requested_grid
 from bushfit.reading.measurement import Source, Sweep
 from bushfit.report import plots
-from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparedPair, ComparisonFile, FamilyEntry
+from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFile, FamilyEntry
 from bushfit.report.compared import SideBySide, contrast_table
 from bushfit.report.page import comparison_page
 from bushfit.report.results import ResultFile, figure_file, json_file, page_file, table_file
@@ -103,81 +103,6 @@ class ComparisonOutput:
 
     def __repr__(self) -> str:
         return f"Comparison of {', '.join(entry.name for entry in self.entries)}"
-
-    @property
-    def labels(self) -> list[str]:
-        """Letters of the results in tables and sentences: A, B and so on."""
-        return list(ascii_uppercase[: len(self.entries)])
-
-    @cached_property
-    def words(self) -> list[str]:
-        """Sentences on what differs, one for each result and direction."""
-        pairs = zip(self.labels[1:], self.comparisons, strict=True)
-        return [f"{label} against A, {line}" for label, comparison in pairs for line in comparison.sentences()]
-
-    @cached_property
-    def advice(self) -> list[str]:
-        """Sentences on which family to use, and on how each family predicts what was held out."""
-        pairs = list(zip(self.labels, self.families, strict=False))
-        best = [_family_to_use(self.families, self.entries)] if self.families else []
-        return [*best, *(f"{label}, {family.name}: {family.words}" for label, family in pairs[1:])]
-
-    @cached_property
-    def warnings(self) -> list[str]:
-        """Warnings, each once, with the letters of the results that it is about."""
-        contrasts = [comparison.contrasts for comparison in self.comparisons]
-        predictions = [[pair.reference for pairs in contrasts for pair in pairs]]
-        predictions += [[pair.other for pair in pairs] for pairs in contrasts]
-        labels_of: dict[str, list[str]] = {}
-        for label, entry, predicted in zip(self.labels, self.entries, predictions, strict=True):
-            for line in warnings_of(entry.result, [prediction.warnings for prediction in predicted]):
-                labels_of.setdefault(line, []).append(label)
-        result_warnings = [f"{', '.join(labels)}: {line}" for line, labels in labels_of.items()]
-        return [*self.notes, *self._shared_tests(), *result_warnings]
-
-    def _shared_tests(self) -> list[str]:
-        """Warnings that results were fitted to the same files."""
-        if self.families:
-            return [
-                "families are fitted to the same tests: intervals of their differences assume independent tests and "
-                "are usually too wide; compare families by their probability and held-out error"
-            ]
-        pairs = zip(self.labels[1:], self.comparisons, strict=True)
-        return [
-            f"A and {label} were fitted to the same {', '.join(comparison.shared)}: intervals of their "
-            "difference assume independent tests and are usually too wide"
-            for label, comparison in pairs
-            if comparison.shared
-        ]
-
-    @cached_property
-    def document(self) -> ComparisonFile:
-        """Content of compare.json."""
-        entries, comparisons = (
-            zip(self.labels, self.entries, strict=True),
-            zip(self.labels[1:], self.comparisons, strict=True),
-        )
-        families = zip(self.labels, self.families, self.entries, strict=False)
-        return {
-            "schema": SCHEMA,
-            "compared": [_entry_document(label, entry) for label, entry in entries],
-            "pairs": [_pair_document(label, comparison) for label, comparison in comparisons],
-            "families": [_family_document(label, family, entry.result) for label, family, entry in families] or None,
-            "words": [*self.advice, *self.words],
-            "warnings": self.warnings,
-            "command": self.command,
-            "versions": {"bushfit": __version__, **versions()},
-        }
-
-    @cached_property
-    def files(self) -> Sequence[ResultFile]:
-        """Document, tables, figure and page."""
-        comparison = SideBySide.from_document(self.document)
-        names = ("parameters", *(["families"] if self.families else []), "differences")
-        files = [json_file("compare", self.document)]
-        files += [table_file(name, partial(lambda name: comparison.tables()[name], name)) for name in names]
-        files.append(figure_file("compare", lambda: plots.comparison.comparison_figure(comparison)))
-        return [*files, page_file("compare", comparison_page, files)]
 
 
 def compare(
@@ -307,7 +232,7 @@ def _compared(
     names = ("parameters", *(["families"] if families else []), "differences")
     files = [json_file("compare", document)]
     files += [table_file(name, partial(lambda name: shown.tables()[name], name)) for name in names]
-    files.append(figure_file("compare", lambda: plots.batch.comparison_figure(shown)))
+    files.append(figure_file("compare", lambda: plots.comparison.comparison_figure(shown)))
     files.append(page_file("compare", comparison_page, files))
     return ComparisonOutput(entries, comparisons, families, labels, advice, words, notes, warnings, document, files)
 

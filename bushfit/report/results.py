@@ -250,12 +250,14 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
         if not nearest.is_dir():
             raise NotADirectoryError(errno.ENOTDIR, "Not a directory", str(nearest))
         if not os.access(nearest, os.W_OK | os.X_OK):
-            raise PermissionError(errno.EACCES, "no right to write there", str(nearest))
+            raise PermissionError(errno.EACCES, "no permission to write there", str(nearest))
         existing = {name: folder / name for name in names if os.path.lexists(folder / name)}
         read = [file for file in inputs if file.exists()]
         for file in existing.values():
             if file.is_dir():
-                raise OutputError("a folder stands where a file goes", file=file, hint=f"move it away, or {elsewhere}")
+                raise OutputError(
+                    "a folder has the name of a result file", file=file, hint=f"move it away, or {elsewhere}"
+                )
             if file.exists() and any(file.samefile(path) for path in read):
                 raise OutputError("a result would replace an input of this run", file=file, hint=elsewhere)
         # digests before the record: a command that runs now records its files, then moves them here

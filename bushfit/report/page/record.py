@@ -209,5 +209,5 @@ def read_table(folder: Path, name: str) -> pd.DataFrame | None:
             "this table is not as bushfit writes it",
             file=file,
             found=str(error),
-            hint="write the results anew, or remove the file: the page then goes without it",
+            hint="write the results again, or remove the file: the page then omits it",
         ) from error

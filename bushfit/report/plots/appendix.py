@@ -140,6 +140,6 @@ def ellipses_figure(result: Result, title: str) -> style.Chart | None:
     axes.set(xlim=(-0.5, len(rows) - 1.5), ylim=(-0.5, len(rows) - 1.4))
     return figure.explain(
         "Ellipses: pairs of values inside are compatible with the tests (95 %). Broken lines: 95 % interval of each "
-        f"parameter, with its ends as ticks. Number: correlation, bold from {_STRONG:g}. Of such a pair the tests "
-        "determine a combination well and each parameter less well: compare the pair, not one of them."
+        f"parameter, with its ends as ticks. Number: correlation, bold from {_STRONG:g}. The tests determine a "
+        "combination of such a pair well and each parameter less well: compare the pair, not one parameter."
     )

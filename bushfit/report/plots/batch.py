@@ -106,8 +106,8 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> s
     return figure.explain(
         "Grey line: median of the batch.",
         "Bars: 95 % intervals." * few,
-        "Dashed: limits; red: out of them, the worst by name." * any(panel.allowed for panel in drawn),
-        "Triangles: further out than the panel reaches, the furthest by name and value.",
+        "Dashed: limits; red: outside the limits, the worst with its name." * any(panel.allowed for panel in drawn),
+        "Triangles: outside the panel; the farthest has its name and value.",
         f"The first {len(drawn)} of {len(panels)} quantities." * (len(panels) > len(drawn)),
     )
 

@@ -74,5 +74,5 @@ def comparison_figure(comparison: SideBySide) -> style.Chart:
         style.legend(grid[2 * row, 1], lines, names, "", dict(zip(level_names, dashed, strict=True)))
     return figure.explain(
         "Shaded: 95 % bands. Lower panels: the band of each point by itself; compare.json and the terminal state what "
-        "holds at all points at once."
+        "is valid for all points together."
     )

@@ -72,8 +72,7 @@ def sweeps_figure(result: Result, table: pd.DataFrame, title: str) -> style.Char
         points_note(table),
         "Lower panels: measured minus model, in units of noise. 95 % of the points should be in the grey band.",
         _OUTLIERS * bool((table["outlier"] == "yes").any()),
-        f"Of more than {MOST_CURVES} levels {MOST_CURVES} are drawn."
-        * any(len(group.curves) == MOST_CURVES for group in groups),
+        f"Only {MOST_CURVES} of the levels are drawn." * any(len(group.curves) == MOST_CURVES for group in groups),
     )
 
 

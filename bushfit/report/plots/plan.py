@@ -62,8 +62,8 @@ def plan_figure(plan: Plan) -> style.Chart:
     style.legend(grid[0, 1], dots, [f"sweep, {size} run{'s' * (size > 1)}" for size in sizes], "", loop)
     _draw_errors(grid[-1, 0], grid[-1, 1], plan, programmes)
     return figure.explain(
-        "Above: points of each run of the rig; a line joins the points of a sweep. Below: expected relative standard "
-        "errors of the parameters and of the stiffness at the wanted points after each programme. All values are "
+        "Above: points of each run; a line joins the points of a sweep. Below: expected relative standard errors "
+        "of the parameters and of the stiffness at the wanted points, after each programme. All values are "
         "computed from a model: nothing was tested.",
     )
 
