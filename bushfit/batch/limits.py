@@ -221,11 +221,11 @@ def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[st
         allowed[name] = bounds.fixed
         if bounds.sigma is None:
             continue
-        known = values.get(name, np.empty(0))
-        known = known[np.isfinite(known)]
-        median, deviation = scatter(known) if known.size else (0.0, 0.0)
-        if known.size < bounds.at_least:
-            notes.append(f"{name}: {known.size} parts, and at_least = {bounds.at_least}: sigma is not judged")
+        sample = values.get(name, np.empty(0))
+        sample = sample[np.isfinite(sample)]
+        median, deviation = scatter(sample) if sample.size else (0.0, 0.0)
+        if sample.size < bounds.at_least:
+            notes.append(f"{name}: {sample.size} parts, and at_least = {bounds.at_least}: sigma is not judged")
         elif deviation == 0.0:
             notes.append(f"{name}: more than half of the parts agree to the digit: sigma is not judged")
         else:

@@ -80,8 +80,8 @@ class RowSettings:
     def with_defaults(self, defaults: RowSettings) -> RowSettings:
         """These settings, with those of `defaults` where they are None, and without the other keys of their table."""
         names = [setting.name for setting in fields(RowSettings)]
-        stated = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
-        return RowSettings(**{**{name: getattr(defaults, name) for name in names}, **stated})
+        own_settings = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        return RowSettings(**{**{name: getattr(defaults, name) for name in names}, **own_settings})
 
     @property
     def diagnoses(self) -> bool:
@@ -191,7 +191,10 @@ def read_manifest(source: str, settings: RowSettings, *more: str) -> Manifest:
 
 
 def read_csv_entries(path: Path) -> list[Entry]:
-    """Read the entries of a CSV manifest, whose header names the keys.
+    """Read the entries of a CSV manifest.
+
+    Returns:
+        One entry for each line below the header, which names the keys.
 
     Raises:
         CampaignError: columns that are unknown or repeated, a quote that swallows the lines after it, or values that
@@ -289,15 +292,15 @@ def make_rows(entries: Sequence[Entry], base: Path, settings: RowSettings, sourc
             namesakes[plain] += 1
             folder = f"{plain} {namesakes[plain] + 1}"
         used_folders.add(folder.casefold())
-        stated = entry.with_defaults(RowSettings())
-        if stated not in completed:
+        row_settings = entry.with_defaults(RowSettings())
+        if row_settings not in completed:
             try:
-                completed[stated] = complete_settings(stated, settings, base, source)
+                completed[row_settings] = complete_settings(row_settings, settings, base, source)
             except CampaignError as error:
                 error.place = f"{entry.campaign}, {error.place}"
                 raise
         campaign = os.path.abspath(base / path)  # noqa: PTH100 - links stay as named
-        rows.append(Row(name, folder, entry.campaign, campaign, completed[stated], entry.subgroup))
+        rows.append(Row(name, folder, entry.campaign, campaign, completed[row_settings], entry.subgroup))
     return rows
 
 
@@ -328,11 +331,11 @@ def check_used(settings: RowSettings, rows: Collection[tuple[Command, ...]], sou
             )
 
 
-def complete_settings(stated: RowSettings, defaults: RowSettings, base: Path, source: str) -> RowSettings:
+def complete_settings(row_settings: RowSettings, defaults: RowSettings, base: Path, source: str) -> RowSettings:
     """Fill in every default of a row's settings, and check them against each other.
 
     Args:
-        stated: settings of the row.
+        row_settings: settings of the row.
         defaults: of the manifest and the command line.
         base: folder from which the model is counted.
         source: manifest, for errors.
@@ -343,7 +346,7 @@ def complete_settings(stated: RowSettings, defaults: RowSettings, base: Path, so
     Raises:
         CampaignError: settings that contradict each other, or that no command of the row uses.
     """
-    settings = stated.with_defaults(defaults)
+    settings = row_settings.with_defaults(defaults)
     commands = settings.commands or _DEFAULT_COMMANDS
     if "run" in commands and set(commands) != {"run"}:
         raise CampaignError(
@@ -352,9 +355,9 @@ def complete_settings(stated: RowSettings, defaults: RowSettings, base: Path, so
             place="commands",
             found=", ".join(commands),
             expected='commands = ["run"], or any of fit, diagnose, predict without it',
-            hint="--command run alone" if stated.commands is None else None,
+            hint="--command run alone" if row_settings.commands is None else None,
         )
-    check_used(stated, [commands], source)
+    check_used(row_settings, [commands], source)
     if commands == ("predict",) and not settings.model:
         expected = 'commands = ["fit", "predict"], or model = "model.json"'
         raise CampaignError("predict has no model to predict from", file=source, place="commands", expected=expected)

@@ -169,8 +169,8 @@ def run_commands(
             files["joint.json"] = files.pop("model.json")
     if "diagnose" in commands and data:
         options = {name: getattr(settings, name) for name in ("max_effects", "tolerance", "adopt", "without")}
-        stated = {name: value for name, value in options.items() if value is not None}
-        diagnosed = diagnose(data, model=start, joint=joint, **stated)
+        options_given = {name: value for name, value in options.items() if value is not None}
+        diagnosed = diagnose(data, model=start, joint=joint, **options_given)
         result, diagnosis = diagnosed.result, diagnosed.diagnosis
         files |= encode_all(diagnosed.files, formats)
     assert result is not None  # the manifest refuses rows without fit, diagnose or model

@@ -197,7 +197,7 @@ class BatchResult:
             Entry of `batch.json`, in the unit of the column.
         """
         values = self.figures[name][0] * column.factor
-        known, detectable = values[np.isfinite(values)], None
+        known_values, detectable = values[np.isfinite(values)], None
         if name in self.compared:
             is_compared = np.isfinite(self.compared[name][0])
             limit = smallest_deviation(int(is_compared.sum()), len(self.compared))
@@ -206,10 +206,10 @@ class BatchResult:
         fixed = (-np.inf, np.inf)
         if self.plan.limits and name in self.allowed[0] and name not in FIT_NAMES:
             fixed = self.plan.limits.bounds[name].fixed
-        median, sigma = scatter(known)
-        cp, cpk = capability(known, *(end * column.factor for end in fixed))
+        median, sigma = scatter(known_values)
+        cp, cpk = capability(known_values, *(end * column.factor for end in fixed))
         minimum, maximum = (end * column.factor if np.isfinite(end) else None for end in (low, high))
-        return QuantityTable(known.size, median, sigma, detectable, minimum, maximum, cp, cpk)
+        return QuantityTable(known_values.size, median, sigma, detectable, minimum, maximum, cp, cpk)
 
     def part_table(self, index: int, columns: Mapping[str, PartQuantity]) -> PartTable:
         """Make the entry of one part in `batch.json`.

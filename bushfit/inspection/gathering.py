@@ -12,6 +12,8 @@ import numpy as np
 from bushfit.campaign.campaign import TEST_FILES
 from bushfit.campaign.copies import group_copies
 from bushfit.errors import BushfitError, NoColumnError, NoTestError, printable
+from bushfit.fitting.measured_loop import MeasuredLoop
+from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.fitting.preparation import prepare_loops, prepare_sweeps
 from bushfit.geometry import Direction
 from bushfit.inspection.labels import temperatures_of
@@ -68,23 +70,16 @@ def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list
     Raises:
         NoTestError: a folder without a test.
     """
-    sources: list[TestSource] = []
-    left_out: list[str] = []
+    sources, left_out = list[TestSource](), list[str]()
     for path in paths:
-        if path.is_dir():
-            files, sentences = _list_folder(path)
-            left_out += sentences
-        else:
-            files = [TestSource(path)]
-        found: list[TestSource] = []
+        files, sentences = list_folder(path) if path.is_dir() else ([TestSource(path)], [])
+        left_out += sentences
+        count = len(sources)
         for file in files:
-            parts = distribute_options(_sheets_of(file, test_options), test_options)
-            tests, sentences = _keep_tests(parts) if len(parts) > 1 or not file.is_named else (parts, [])
-            if not tests and file.is_named:  # the error of the whole file says why
-                tests, sentences = distribute_options([file], test_options), []
-            found += tests
+            tests, sentences = split_sheets(file, test_options)
+            sources += tests
             left_out += sentences
-        if not found:
+        if len(sources) == count:
             raise NoTestError(
                 "no file of this folder contains a test",
                 file=path,
@@ -92,47 +87,77 @@ def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list
                 expected="loops or sweeps, as " + ", ".join(TEST_FILES[:4]) + " or .xlsx",
                 hint="bushfit inspect FILE shows how bushfit reads a file",
             )
-        sources += found
-    by_rows = [_tests_by_rows(source) for source in distribute_options(sources, test_options)]
-    left_out += [sentence for _, sentences in by_rows for sentence in sentences]
-    return [test for tests, _ in by_rows for test in tests], tuple(left_out)
+    tests = []
+    for source in distribute_options(sources, test_options):
+        split, sentences = split_rows(source)
+        tests += split
+        left_out += sentences
+    return tests, tuple(left_out)
 
 
-def with_contradictions(files: Sequence[Inspection]) -> list[Inspection]:
-    """Compare inspected files: add an oddity where files hold identical data or contradict each other.
-
-    Contradictions are looked for among tests of one part in one direction.
-
-    Args:
-        files: inspections, in order.
+def list_folder(folder: Path) -> tuple[list[TestSource], list[str]]:
+    """List the files of a folder and its subfolders by name.
 
     Returns:
-        The inspections, with the added oddities.
+        Those that may hold tests, and a sentence on each of the others.
     """
-    loops = [inspection.measured for inspection in files if isinstance(inspection.measured, Loop)]
-    sweeps = [inspection.measured for inspection in files if isinstance(inspection.measured, Sweep)]
-    names = {id(inspection.measured): str(inspection.file.parent / inspection.label) for inspection in files}
-    oddities: defaultdict[int, list[str]] = defaultdict(list)
-    groups: list[list[Loop] | list[Sweep]] = [*group_copies(loops), *group_copies(sweeps)]
-    for copies in groups:
-        for test in copies if len(copies) > 1 else ():
-            same_data = " and ".join(names[id(copy)] for copy in copies if copy is not test)
-            oddities[id(test)].append(f"the same data are in {same_data}: a campaign counts them once")
-    placed = [inspection for inspection in files if inspection.direction is not None and inspection.kind != "history"]
-    for part in dict.fromkeys(inspection.part for inspection in placed):
-        tests = [inspection.measured for inspection in placed if inspection.part == part]
-        loops = [test for test in tests if isinstance(test, Loop)]
-        sweeps = [test for test in tests if isinstance(test, Sweep)]
-        data_sets = [
-            *(prepare_loops(loops) if len(loops) > 1 else ()),
-            *(prepare_sweeps(sweeps) if len(sweeps) > 1 else ()),
-        ]
-        for data_set in data_sets:
-            oddities[id(data_set.test)] += [data_set.contradiction] if data_set.contradiction else []
-    return [replace(inspection, odd=(*inspection.odd, *oddities[id(inspection.measured)])) for inspection in files]
+    files, left_out = list[TestSource](), list[str]()
+    for path in sorted(folder.iterdir()):
+        path_text = printable(str(path))
+        if path.name.startswith((".", "~$")):
+            continue
+        if not path.exists():
+            left_out.append(f"{path_text}: a broken link")
+        elif printable(path.name) != path.name:
+            left_out.append(f"{path_text}: its name contains characters that are not text; rename it")
+        elif path.is_dir() and not path.is_symlink():
+            inner_files, inner_left_out = list_folder(path)
+            files += inner_files
+            left_out += inner_left_out
+        elif path.is_file() and path.suffix.lower() in TEST_FILES:
+            files.append(TestSource(path, is_named=False))
+        else:
+            left_out.append(f"{path}: {'a link to a folder' if path.is_dir() else 'no table, by its ending'}")
+    return files, left_out
 
 
-def _tests_by_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
+def split_sheets(file: TestSource, test_options: Mapping[str, Any]) -> tuple[list[TestSource], list[str]]:
+    """Select the sheets of a workbook that may hold a test, or the file itself if it has one sheet.
+
+    Args:
+        file: test file; one that the user named and that is no workbook with several sheets is not opened.
+        test_options: options that hold for all tests; with `sheet` the file is one test.
+
+    Returns:
+        The tests, and a sentence on each sheet or file without one.
+    """
+    sheets, whole = [], distribute_options([file], test_options)
+    with suppress(BushfitError):  # which the inspection of the file reports
+        sheets = [] if test_options.get("sheet") else list(parts_of(file.file))
+    parts = [replace(file, sheet=sheet.sheet) for sheet in sheets] if len(sheets) > 1 else [file]
+    if len(parts) == 1 and file.is_named:
+        return whole, []
+    tests, left_out, without = list[TestSource](), list[str](), set[str | None]()
+    for part in distribute_options(parts, test_options):
+        try:
+            recognize_table(part.file, part.test_options)
+        except NoTestError as error:
+            without.add(part.sheet)
+            why = f"{error.problem} ({error.found})" if error.found else f"{error.problem}; {error.hint}"
+            left_out.append(f"{part}: {why}")
+            continue
+        except BushfitError:  # which the inspection of the test reports
+            pass
+        tests.append(part)
+    if not tests and file.is_named:  # the error of the whole file says why
+        return whole, []
+    if without and len(parts) > 1:
+        of_book = labels_above(line for sheet in sheets if sheet.sheet in without for line in sheet.head())
+        tests = [replace(test, of_book=of_book) for test in tests]
+    return tests, left_out
+
+
+def split_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
     """Split a file into the tests that its columns mark: directions, parts and runs.
 
     The runs of a sweep are repeats. The runs of a loop are tests where time starts again in each.
@@ -140,21 +165,16 @@ def _tests_by_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
     Returns:
         The tests, and a sentence on the rows that are left out.
     """
-    test_options = source.test_options
-    whole_file_options = {
-        key: value for key, value in test_options.items() if key not in ("direction", "specimen_number")
-    }
+    test_options, tests, left_out = source.test_options, list[TestSource](), list[str]()
     try:
-        table, _ = recognize_table(source.file, whole_file_options)
+        table, _ = recognize_table(source.file, source.without("direction", "specimen_number").test_options)
         columns = dict(table.row_labels)
         if "run" in columns and "time" in table.roles:
             time = table.read({"time": table.roles["time"]}, fewest_rows=1)["time"]
             if np.all(np.diff(time) > 0.0):
                 del columns["run"]
-    except BushfitError:  # which the inspection of the file tells
+    except BushfitError:  # which the inspection of the file reports
         return [source], []
-    tests: list[TestSource] = []
-    left_out: list[str] = []
     for texts in dict.fromkeys(zip(*(texts for _, texts in columns.values()), strict=True)):
         keys: dict[str, Any] = dict(zip(columns, texts, strict=True))
         run = {"rows": {table.headers[columns["run"][0]]: keys.pop("run")}} if "run" in keys else {}
@@ -183,86 +203,70 @@ def distribute_options(sources: Sequence[TestSource], test_options: Mapping[str,
     tables: Mapping[str, Mapping[str, str]] = {key: test_options.get(key, {}) for key in ("columns", "units")}
     by_source = [{**test_options, **tables, **({"sheet": source.sheet} if source.sheet else {})} for source in sources]
     for key, role in ((key, role) for key, stated_by_role in tables.items() for role in stated_by_role):
-        needs = [_needs_option(source.file, key, role, keys) for source, keys in zip(sources, by_source, strict=True)]
+        needs = [needs_option(source.file, key, role, keys) for source, keys in zip(sources, by_source, strict=True)]
         for keys in (keys for keys, one in zip(by_source, needs, strict=True) if one is False and True in needs):
             keys[key] = {name: text for name, text in keys[key].items() if name != role}
     if test_options.get("temperature") and len(sources) > 1:
-        counts = {}
+        counts = dict[int, int]()
         for index, source in enumerate(sources):
-            with suppress(BushfitError):  # which the inspection of the file tells
+            with suppress(BushfitError):  # which the inspection of the file reports
                 counts[index] = temperatures_of(recognize_table(source.file, by_source[index])[0])
-        for index in (index for index, count in counts.items() if count == 0 and 2 in counts.values()):
-            by_source[index]["temperature"] = None
+        for index, count in counts.items():
+            if count == 0 and 2 in counts.values():
+                by_source[index]["temperature"] = None
     return [replace(source, test_options=keys) for source, keys in zip(sources, by_source, strict=True)]
 
 
-def _needs_option(file: Path, key: str, role: str, test_options: Mapping[str, Any]) -> bool | None:
-    """Return True if a file has the column of a role, or lacks its unit; None if it cannot be read."""
+def needs_option(file: Path, key: str, role: str, test_options: Mapping[str, Any]) -> bool | None:
+    """Check whether a stated column or unit applies to a file.
+
+    Args:
+        file: test file.
+        key: "columns" or "units".
+        role: of the column.
+        test_options: options of the test.
+
+    Returns:
+        True if the file has the column, or lacks its unit; None if it cannot be read.
+    """
     names = LOOP_COLUMNS if role in LOOP_COLUMNS else SWEEP_COLUMNS
-    mine = {"columns": {role: test_options["columns"][role]}} if key == "columns" else {"units": {}}
+    columns = {role: test_options["columns"][role]} if key == "columns" else test_options["columns"]
     try:
-        column = open_table(file, names, {**test_options, "units": {}, **mine}).roles.get(role)
+        column = open_table(file, names, {**test_options, "units": {}, "columns": columns}).roles.get(role)
     except NoColumnError:
         return False
-    except BushfitError:  # which the inspection of the file tells
+    except BushfitError:  # which the inspection of the file reports
         return None
-    if column is None:
-        return None
-    return key == "columns" or column.unit is None
+    return None if column is None else key == "columns" or column.unit is None
 
 
-def _list_folder(folder: Path) -> tuple[list[TestSource], list[str]]:
-    """List the files of a folder and its subfolders by name. Returns those that may hold tests, and a sentence on each
-    of the others."""
-    files: list[TestSource] = []
-    left_out: list[str] = []
-    for path in sorted(folder.iterdir()):
-        if path.name.startswith((".", "~$")):
-            continue
-        if not path.exists():
-            left_out.append(f"{printable(str(path))}: a broken link")
-        elif printable(path.name) != path.name:
-            left_out.append(f"{printable(str(path))}: its name contains characters that are not text; rename it")
-        elif path.is_dir() and not path.is_symlink():
-            inner_files, inner_left_out = _list_folder(path)
-            files += inner_files
-            left_out += inner_left_out
-        elif path.is_file() and path.suffix.lower() in TEST_FILES:
-            files.append(TestSource(path, is_named=False))
-        else:
-            left_out.append(f"{path}: {'a link to a folder' if path.is_dir() else 'no table, by its ending'}")
-    return files, left_out
+def with_contradictions(files: Sequence[Inspection]) -> list[Inspection]:
+    """Compare inspected files: add an oddity where files hold identical data or contradict each other.
 
+    Contradictions are looked for among tests of one part in one direction.
 
-def _sheets_of(source: TestSource, test_options: Mapping[str, Any]) -> list[TestSource]:
-    """Sheets of a workbook with several, if no option names one; else the file itself."""
-    if test_options.get("sheet"):
-        return [source]
-    try:
-        names = [part.sheet for part in parts_of(source.file)]
-    except BushfitError:  # which the inspection of the file tells
-        return [source]
-    return [replace(source, sheet=name) for name in names] if len(names) > 1 else [source]
+    Args:
+        files: inspections, in order.
 
-
-def _keep_tests(parts: Sequence[TestSource]) -> tuple[list[TestSource], list[str]]:
-    """Select the sheets, or the file, that may hold a test. Returns them, and a sentence on each of the others."""
-    tests: list[TestSource] = []
-    left_out: list[str] = []
-    without: set[str | None] = set()
-    for part in parts:
-        try:
-            recognize_table(part.file, part.test_options)
-        except NoTestError as error:
-            without.add(part.sheet)
-            why = f"{error.problem} ({error.found})" if error.found else f"{error.problem}; {error.hint}"
-            left_out.append(f"{part}: {why}")
-            continue
-        except BushfitError:  # which the inspection of the test tells
-            pass
-        tests.append(part)
-    if tests and tests[0].sheet and without:
-        sentences = [part for part in parts_of(tests[0].file) if part.sheet in without]
-        of_book = labels_above(line for part in sentences for line in part.head())
-        tests = [replace(test, of_book=of_book) for test in tests]
-    return tests, left_out
+    Returns:
+        The inspections, with the added oddities.
+    """
+    loops = [inspection.measured for inspection in files if isinstance(inspection.measured, Loop)]
+    sweeps = [inspection.measured for inspection in files if isinstance(inspection.measured, Sweep)]
+    names = {id(inspection.measured): str(inspection.file.parent / inspection.label) for inspection in files}
+    oddities: defaultdict[int, list[str]] = defaultdict(list)
+    groups: list[list[Loop] | list[Sweep]] = [*group_copies(loops), *group_copies(sweeps)]
+    for copies in groups:
+        for test in copies if len(copies) > 1 else ():
+            same_data = " and ".join(names[id(copy)] for copy in copies if copy is not test)
+            oddities[id(test)].append(f"the same data are in {same_data}: a campaign counts them once")
+    placed = [inspection for inspection in files if inspection.direction is not None and inspection.kind != "history"]
+    for part in dict.fromkeys(inspection.part for inspection in placed):
+        tests = [inspection.measured for inspection in placed if inspection.part == part]
+        loops = [test for test in tests if isinstance(test, Loop)]
+        sweeps = [test for test in tests if isinstance(test, Sweep)]
+        prepared: list[MeasuredLoop | MeasuredSweep] = [*prepare_loops(loops)] if len(loops) > 1 else []
+        prepared += [*prepare_sweeps(sweeps)] if len(sweeps) > 1 else []
+        for one in prepared:
+            oddities[id(one.test)] += [one.contradiction] if one.contradiction else []
+    return [replace(inspection, odd=(*inspection.odd, *oddities[id(inspection.measured)])) for inspection in files]

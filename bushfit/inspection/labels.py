@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from bushfit import units
 from bushfit.geometry import Place
 from bushfit.reading.names import Labels, StatedQuantity, labels_above, labels_in_names
 from bushfit.reading.sweeps import ONE_TEST
 from bushfit.reading.table import Table
+from bushfit.units import parse_quantity
 
 #: Conditions of a test, which a campaign carries on, in words.
 _CONDITIONS = {key: key for key in ("temperature", "preload", "date", "operator")} | {"specimen_number": "specimen"}
@@ -141,35 +141,20 @@ def wrong_labels(
         One sentence for each wrong label.
     """
     unit, factor = direction.display.displacement
-    expected = direction.motion.displacement_unit
-    amplitudes_in_name = [
-        units.parse_quantity(quantity.text, expected) / (2.0 if quantity.convention == "peak-to-peak" else 1.0)
-        for quantity in labels.of_dimension(expected)
-    ]
-    if amplitudes_in_name and not any(_is_close(value, x) for value in amplitudes_in_name for x in amplitudes):
-        double = any(_is_close(value, 2.0 * x) for value in amplitudes_in_name for x in amplitudes)
-        found = _listed([factor * x for x in amplitudes])
-        named = _join_quantities(labels.of_dimension(expected))
-        doubt = ": the name may be peak-to-peak" if double else ""
-        yield f"the name states {named}, the amplitude is {found} {unit} zero-to-peak{doubt}"
-    frequencies_in_name = labels.of_dimension("Hz")
-    if frequencies_in_name and not any(
-        _is_close(units.parse_quantity(quantity.text, "Hz"), f) for quantity in frequencies_in_name for f in frequencies
-    ):
-        yield f"the name states {_join_quantities(frequencies_in_name)}, the frequency is {_listed(frequencies)} Hz"
-
-
-def _is_close(value: float, reference: float) -> bool:
-    return abs(value - reference) <= _AGREEMENT * reference
-
-
-def _join_quantities(quantities: Sequence[StatedQuantity]) -> str:
-    return " or ".join(
-        dict.fromkeys(f"{quantity.text} {quantity.convention or ''}".rstrip() for quantity in quantities)
+    quantities = (
+        ("amplitude", direction.motion.displacement_unit, amplitudes, factor, f"{unit} zero-to-peak"),
+        ("frequency", "Hz", frequencies, 1.0, "Hz"),
     )
-
-
-def _listed(values: Sequence[float]) -> str:
-    """Up to four values, or the range of more."""
-    texts = list(dict.fromkeys(f"{value:.4g}" for value in values))
-    return ", ".join(texts) if len(texts) <= 4 else f"{texts[0]} to {texts[-1]}"
+    for name, expected, values, to_display, written in quantities:
+        labelled = labels.of_dimension(expected)
+        counted = [1.0 + (label.convention == "peak-to-peak") for label in labelled]
+        sizes = [parse_quantity(label.text, expected) / count for label, count in zip(labelled, counted, strict=True)]
+        ratios = np.divide.outer(np.array(sizes), np.asarray(values))
+        if not labelled or np.any(np.abs(ratios - 1.0) <= _AGREEMENT):
+            continue
+        is_double = name == "amplitude" and np.any(np.abs(ratios - 2.0) <= 2.0 * _AGREEMENT)
+        in_name = dict.fromkeys(f"{label.text} {label.convention or ''}".rstrip() for label in labelled)
+        in_file = list(dict.fromkeys(f"{to_display * value:.4g}" for value in values))
+        in_file = in_file if len(in_file) <= 4 else [f"{in_file[0]} to {in_file[-1]}"]
+        doubt = ": the name may be peak-to-peak" if is_double else ""
+        yield f"the name states {' or '.join(in_name)}, the {name} is {', '.join(in_file)} {written}{doubt}"

@@ -1,15 +1,13 @@
 """Contents of a hysteresis loop or a raw stepped-sine history: cycles or steps, noise, and faults of its channels."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from bushfit.effects.contract import Array
 from bushfit.effects.mistakes import MISTAKES
 from bushfit.fitting.drive import TOLD_MEAN, Drive, drive_of
 from bushfit.fitting.loop_cycles import waveform
-from bushfit.geometry import Unit
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.plausible import implausible_sizes
 from bushfit.inspection.record import Findings, format_frequencies
@@ -56,7 +54,13 @@ _LONGEST_CYCLE = 3000.0
 
 
 def describe_sampling(history: Loop) -> str:
-    """Describe the time steps of a record, such as "even, every 0.01 s"."""
+    """Describe the time steps of a record.
+
+    Returns:
+        Such as "even, every 0.01 s".
+    """
+    if not history.timed:
+        return "no time in the file"
     steps = np.diff(history.time)
     usual = float(np.median(steps))
     if np.ptp(steps) < _EVEN_CLOCK * usual:
@@ -77,8 +81,8 @@ class RecordedChannel(NamedTuple):
         return number(self.factor * self.values[row], 4)
 
 
-def odd_channels(history: Loop) -> Iterator[str]:
-    """Warn of faults in the channels of a record: gaps, a stuck recorder, cut-off tops, outliers.
+def odd_channels(history: Loop) -> list[str]:
+    """Find faults in the channels of a record: gaps, a stuck recorder, cut-off tops, outliers.
 
     Args:
         history: a loop or a raw history.
@@ -89,71 +93,10 @@ def odd_channels(history: Loop) -> Iterator[str]:
     names, units = history.direction.motion.words, history.direction.display
     motion = RecordedChannel(names[0], *units.displacement, history.displacement)
     force = RecordedChannel(names[1], *units.force, history.force)
-    yield from _gaps(motion, history.time, timed=history.timed)
-    yield from _stuck(motion, force)
+    odd = [*gaps(motion, history), *stuck_rows(motion, force)]
     for channel in (motion, force):
-        yield from _cut_off(channel)
-        yield from _outliers(channel, history.time)
-
-
-def _gaps(motion: RecordedChannel, time: Floats, *, timed: bool) -> Iterator[str]:
-    """Warn of gaps in the recorded time, or in the motion where no time was recorded."""
-    steps = np.diff(time) if timed else np.abs(np.diff(motion.values))
-    widest = np.quantile(steps, 0.99)  # gaps left out
-    wide = steps > max(_GAP_STEPS * np.median(steps), _GAP_WIDEST_STEPS * widest)
-    if not timed:
-        outliers = lone_outliers(time, motion.values)
-        wide &= (steps > least_prominence(motion.values)) & ~(outliers[1:] | outliers[:-1])
-    if wide.any():
-        first, count = int(np.argmax(wide)), int(wide.sum())
-        description = (
-            f"{steps[first]:.3g} s without a row, else mostly {np.median(steps):.3g} s"
-            if timed
-            else f"the {motion.name} jumps from {motion.format_row(first)} to {motion.format_row(first + 1)} "
-            f"{motion.unit} at once"
-        )
-        channel = "time" if timed else "the motion"
-        yield f"{count} gap{'s' * (count > 1)} in {channel}, the first after data row {first + 1}: {description}"
-
-
-def _stuck(motion: RecordedChannel, force: RecordedChannel) -> Iterator[str]:
-    """Warn of rows in which the recorder repeats its values while the motion goes on."""
-    is_still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], is_still.astype(np.int8), [0]))))
-    starts, ends = edges[::2], edges[1::2]
-    after = np.minimum(ends + 1, motion.values.size - 1)  # a record may end stuck: then nothing went on
-    travel = np.abs(motion.values[after] - motion.values[starts])
-    stuck = (ends - starts + 1 >= _STUCK_ROWS) & (travel > _STUCK_MOTION * np.ptp(motion.values))
-    if stuck.any():
-        longest = int(np.argmax(np.where(stuck, ends - starts, 0)))
-        yield (
-            f"{ends[longest] - starts[longest] + 1} rows from data row {starts[longest] + 1} on repeat one "
-            f"{motion.name} and {force.name}, although the motion continued"
-        )
-
-
-def _cut_off(channel: RecordedChannel) -> Iterator[str]:
-    """Warn of each end of its range at which a channel is cut off."""
-    values, span = channel.values, float(np.ptp(channel.values))
-    rounding = 1e-9 * span
-    steps = np.abs(np.diff(values))
-    finest = float(steps[steps > rounding].min(initial=span))
-    width = max(1.01 * finest, _JUST_BELOW * span)  # one step of the converter, rounded
-    for side, row in (("top", int(np.argmax(values))), ("bottom", int(np.argmin(values)))):
-        depth = np.abs(values - values[row])
-        flat_rows = int(np.count_nonzero(depth <= rounding))
-        below = int(np.count_nonzero(depth <= width)) - flat_rows
-        if flat_rows >= _FLAT_ROWS and flat_rows >= _FLAT_RATIO * below:
-            yield (
-                f"the {channel.name} is cut off at its {side}: {flat_rows} rows hold exactly {channel.format_row(row)} "
-                f"{channel.unit}"
-            )
-
-
-def _outliers(channel: RecordedChannel, time: Floats) -> Iterator[str]:
-    """Warn of single rows far from their neighbours."""
-    rows = np.flatnonzero(lone_outliers(time, channel.values))
-    if rows.size:
+        odd += cut_off_ends(channel)
+        rows = np.flatnonzero(lone_outliers(history.time, channel.values))
         listed = ", ".join(
             f"data row {row + 1} ({channel.format_row(row)} {channel.unit} between {channel.format_row(row - 1)} and "
             f"{channel.format_row(row + 1)})"
@@ -161,7 +104,69 @@ def _outliers(channel: RecordedChannel, time: Floats) -> Iterator[str]:
         )
         more = f" and {rows.size - 3} more" if rows.size > 3 else ""
         outlier = "outliers" if rows.size > 1 else "an outlier"
-        yield f"the {channel.name} has {outlier} at {listed}{more}"
+        odd += [f"the {channel.name} has {outlier} at {listed}{more}"] if rows.size else []
+    return odd
+
+
+def gaps(motion: RecordedChannel, history: Loop) -> list[str]:
+    """Find gaps in the recorded time, or in the motion where no time was recorded.
+
+    Returns:
+        One sentence on them; empty without gaps.
+    """
+    steps = np.diff(history.time) if history.timed else np.abs(np.diff(motion.values))
+    widest = np.quantile(steps, 0.99)  # gaps left out
+    wide = steps > max(_GAP_STEPS * np.median(steps), _GAP_WIDEST_STEPS * widest)
+    if not history.timed:
+        outliers = lone_outliers(history.time, motion.values)
+        wide &= (steps > least_prominence(motion.values)) & ~(outliers[1:] | outliers[:-1])
+    if not wide.any():
+        return []
+    first, count = int(np.argmax(wide)), int(wide.sum())
+    channel, size = "time", f"{steps[first]:.3g} s without a row, else mostly {np.median(steps):.3g} s"
+    if not history.timed:
+        ends = f"{motion.format_row(first)} to {motion.format_row(first + 1)} {motion.unit}"
+        channel, size = "the motion", f"the {motion.name} jumps from {ends} at once"
+    return [f"{count} gap{'s' * (count > 1)} in {channel}, the first after data row {first + 1}: {size}"]
+
+
+def stuck_rows(motion: RecordedChannel, force: RecordedChannel) -> list[str]:
+    """Find rows in which the recorder repeats its values while the motion goes on.
+
+    Returns:
+        One sentence on the longest run of them; empty without such rows.
+    """
+    is_still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], is_still.astype(np.int8), [0]))))
+    starts, ends = edges[::2], edges[1::2]
+    after = np.minimum(ends + 1, motion.values.size - 1)  # a record may end stuck: then nothing went on
+    travel = np.abs(motion.values[after] - motion.values[starts])
+    stuck = (ends - starts + 1 >= _STUCK_ROWS) & (travel > _STUCK_MOTION * np.ptp(motion.values))
+    if not stuck.any():
+        return []
+    longest = int(np.argmax(np.where(stuck, ends - starts, 0)))
+    rows = f"{ends[longest] - starts[longest] + 1} rows from data row {starts[longest] + 1} on"
+    return [f"{rows} repeat one {motion.name} and {force.name}, although the motion continued"]
+
+
+def cut_off_ends(channel: RecordedChannel) -> list[str]:
+    """Find the ends of its range at which a channel is cut off.
+
+    Returns:
+        One sentence for each such end.
+    """
+    values, span, odd = channel.values, float(np.ptp(channel.values)), list[str]()
+    rounding, steps = 1e-9 * span, np.abs(np.diff(values))
+    finest = float(steps[steps > rounding].min(initial=span))
+    width = max(1.01 * finest, _JUST_BELOW * span)  # one step of the converter, rounded
+    for side, row in (("top", int(np.argmax(values))), ("bottom", int(np.argmin(values)))):
+        depth = np.abs(values - values[row])
+        flat_rows = int(np.count_nonzero(depth <= rounding))
+        below = int(np.count_nonzero(depth <= width)) - flat_rows
+        if flat_rows >= max(_FLAT_ROWS, _FLAT_RATIO * below):
+            extreme = f"{channel.format_row(row)} {channel.unit}"
+            odd.append(f"the {channel.name} is cut off at its {side}: {flat_rows} rows hold exactly {extreme}")
+    return odd
 
 
 def describe_loop(loop: Loop, labels: Labels) -> Findings:
@@ -177,37 +182,30 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     Raises:
         FitError: no whole cycle, or a loop that runs the wrong way round.
     """
-    drive = drive_of(loop)
-    units = loop.direction.display
-    (length, to_length), half_force = units.displacement, np.ptp(loop.force) / 2.0
-    force, to_force = display_unit(*units.force, float(half_force))
-    names = loop.direction.motion.words
+    drive, units, names = drive_of(loop), loop.direction.display, loop.direction.motion.words
+    (length, to_length), half_force = units.displacement, float(np.ptp(loop.force)) / 2.0
+    force, to_force = display_unit(*units.force, half_force)
     half_motion = np.ptp(loop.displacement) / 2.0
     amplitude, mean_motion, mean_force = drive.amplitude, drive.coefficients[0].real, float(drive.force.mean())
+    noise = number(100 * drive.noise / half_force, 2)
     facts = {
         "cycles": f"{drive.cycles:.3g}, {'the first from rest' if drive.from_rest else 'treated as steady'}",
         "frequency": f"{drive.frequency:.4g} Hz, {waveform(drive.coefficients)}",
-        "sampling": f"{describe_sampling(loop) if loop.timed else 'no time in the file'}, "
-        f"{loop.time.size / drive.cycles:.4g} rows a cycle",
+        "sampling": f"{describe_sampling(loop)}, {loop.time.size / drive.cycles:.4g} rows a cycle",
         "amplitude": f"{number(to_length * amplitude, 4)} {length} zero-to-peak",
-        # as far down as the amplitude is told: what lies below is noise
+        # down to the last digit of the amplitude: what lies below is noise
         f"mean {names[0]}": f"{format_aligned([to_length * amplitude, to_length * mean_motion], 4)[1]} {length}",
         f"mean {names[1]}": f"{format_aligned([to_force * half_force, to_force * mean_force], 4)[1]} {force}",
-        "noise": f"{number(100 * drive.noise / half_force, 2)} % of half the {names[1]}'s range, a row"
-        f"{drive.correlated}",
+        "noise": f"{noise} % of half the {names[1]}'s range, a row{drive.correlated}",
     }
+    sizes = (np.array([size]) for size in (drive.frequency, amplitude, half_force / amplitude))
     odd = [
         *wrong_labels(labels, loop.direction, [amplitude, half_motion], [drive.frequency]),
-        *implausible_sizes(
-            loop.direction,
-            np.array([drive.frequency]),
-            np.array([amplitude]),
-            np.array([float(half_force) / amplitude]),
-        ),
+        *implausible_sizes(loop.direction, *sizes),
         *odd_channels(loop),
         *drive.notes,
-        *_changing(drive),
-        *_ripple(drive),
+        *changing_cycles(drive),
+        *ripple(drive),
     ]
     if drive.frequency * _LONGEST_CYCLE < 1.0:  # longer than any laboratory waits: what may the file say instead?
         mistakes = [mistake.in_words(drive.loop) for mistake in MISTAKES.values() if mistake.time < 1.0]
@@ -235,25 +233,20 @@ def describe_history(history: Loop, labels: Labels) -> Findings:
         MeasurementError: no steady sine in it.
     """
     reduction = reduce([history])
-    steps = reduction.steps
-    unit, factor = history.direction.display.displacement
+    steps, (unit, factor) = reduction.steps, history.direction.display.displacement
     levels = sorted({step.level for step in steps})
     frequencies = sorted({step.nominal_frequency for step in steps})
+    rows = min(step.rows_per_cycle for step in steps)
     facts = {
         "steps": f"{len(steps)} with steady cycles, {max(step.repeat for step in steps)} at most at one point",
         "frequencies": format_frequencies(frequencies),
         "amplitudes": f"{', '.join(f'{factor * level:.4g}' for level in levels)} {unit} zero-to-peak, as reached",
-        "sampling": f"{describe_sampling(history)}, "
-        f"{min(step.rows_per_cycle for step in steps):.3g} rows a cycle at least",
+        "sampling": f"{describe_sampling(history)}, {rows:.3g} rows a cycle at least",
         "noise": f"{100 * max(step.gain_error for step in steps):.2g} % of |K| at most, a point",
     }
-    odd = [
-        *(history.source.notes if history.source else ()),
-        *wrong_labels(labels, history.direction, levels, frequencies),
-        *odd_channels(history),
-        *reduction.warnings,
-    ]
-    return facts, odd
+    labelled = wrong_labels(labels, history.direction, levels, frequencies)
+    notes = history.source.notes if history.source else ()
+    return facts, [*notes, *labelled, *odd_channels(history), *reduction.warnings]
 
 
 def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> Findings:
@@ -273,66 +266,89 @@ def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> F
     drives = [drive_of(loop) for loop in loops]
     unit, factor = record.direction.display.displacement
     amplitudes, frequencies = [drive.amplitude for drive in drives], [drive.frequency for drive in drives]
-    cycles = [drive.cycles for drive in drives]
-    used = sum(drive.loop.displacement.size for drive in drives)
+    cycles = sorted(drive.cycles for drive in drives)
+    left_out = 1 - sum(drive.loop.displacement.size for drive in drives) / record.displacement.size
+    sizes, rates, ends = (
+        list(dict.fromkeys(f"{value:.3g}" for value in values))
+        for values in ([factor * size for size in amplitudes], frequencies, (cycles[0], cycles[-1]))
+    )
     facts = {
-        "programme": f"{len(loops)} loops in one record: {_listed([factor * size for size in amplitudes])} {unit} "
-        f"at {_listed(frequencies)} Hz, {_listed([min(cycles), max(cycles)], ' to ')} cycles used of each; "
-        f"{100 * (1 - used / record.displacement.size):.2g} % of the rows left out"
+        "programme": f"{len(loops)} loops in one record: {', '.join(sizes)} {unit} at {', '.join(rates)} Hz, "
+        f"{' to '.join(ends)} cycles used of each; {100 * left_out:.2g} % of the rows left out"
     }
     odd = [*wrong_labels(labels, record.direction, amplitudes, frequencies), *odd_channels(record)]
     for place, (loop, drive) in enumerate(zip(loops, drives, strict=True), start=1):
-        left_out = loop.part.left_out if loop.part else None
-        motion = (
-            f"{number(factor * drive.amplitude, 4)} {unit} at {drive.frequency:.4g} Hz, {waveform(drive.coefficients)}"
-        )
+        rest = loop.part.left_out if loop.part else None
+        size, course = number(factor * drive.amplitude, 4), waveform(drive.coefficients)
         noise = f"noise {number(100 * drive.noise / drive.half_range, 2)} % of half the range, a row{drive.correlated}"
-        facts[f"loop {place}"] = "; ".join(filter(None, (motion, noise, left_out)))
-        odd += [
-            f"loop {place}: {note}" for note in (*drive.notes, *_changing(drive), *_ripple(drive)) if note != left_out
-        ]
-    facts["sampling"] = describe_sampling(record) if record.timed else "no time in the file"
+        words = f"{size} {unit} at {drive.frequency:.4g} Hz, {course}", noise, rest
+        facts[f"loop {place}"] = "; ".join(filter(None, words))
+        notes = (*drive.notes, *changing_cycles(drive), *ripple(drive))
+        odd += [f"loop {place}: {note}" for note in notes if note != rest]
+    facts["sampling"] = describe_sampling(record)
     return facts, odd
 
 
-def _listed(values: Sequence[float], between: str = ", ") -> str:
-    """Values in their order, each once: "0.2, 0.5, 1"."""
-    return between.join(dict.fromkeys(f"{value:.3g}" for value in values))
+def changing_cycles(drive: Drive) -> list[str]:
+    """Find a force amplitude, a mean force or a mean motion that changes from the first to the last cycles of a loop.
 
+    Loops of one cycle, or with too few rows in a cycle, are not checked.
 
-def _settling(force: Array, error: float, smallest: float, name: str, unit: Unit) -> Iterator[str]:
-    """Warn of a force amplitude [N or N m], (cycles,), that changes by more than `smallest` and chance."""
-    change, last_change = force[-1] - force[0], force[-1] - force[-2]
+    Returns:
+        One sentence for each change beyond chance.
+    """
+    loop, count, odd = drive.loop, int(drive.cycles + 0.01), list[str]()
+    phase = (loop.time - loop.time[0]) * drive.frequency
+    numbers = sorted({*range(min(count, _MOST_END_CYCLES)), *range(max(count - _MOST_END_CYCLES, 0), count)})
+    outliers = drive.outliers["force"].rows
+    parts = [np.setdiff1d(np.flatnonzero((phase >= n) & (phase < n + 1)), outliers) for n in numbers]
+    rows = min((part.size for part in parts), default=0)
+    order = resolved_order(rows, 7)  # a loop of rubber has next to nothing beyond
+    if count < 2 or rows < 4 * order:
+        return []
+    both = np.stack((loop.force, loop.displacement), axis=1)
+    fitted = [cycle_harmonics(phase[part], both[part], order) for part in parts]
+    means = np.array([mean for mean, *_ in fitted])
+    amplitude = np.array([abs(first[0]) for _, first, _ in fitted])
+    error = max(drive.noise, *(scatter[0] for *_, scatter in fitted)) * np.sqrt(1.0 / rows)  # of the force [N or N m]
+    (motion, force, _), units = loop.direction.motion.words, loop.direction.display
+    smallest = _SMALLEST_CHANGE * np.ptp(loop.force) / 2.0
     # the standard error of an amplitude is sqrt(2) `error`, that of a difference of two is 2 `error`
+    change, last_change = amplitude[-1] - amplitude[0], amplitude[-1] - amplitude[-2]
     if abs(change) > max(_REAL_CHANGE * 2.0 * error, smallest):
-        unit_name, factor = display_unit(*unit, float(force[-1]))
-        last, first = format_aligned([factor * force[-1], factor * force[0]], 4)
-        settled = abs(last_change) < max(_REAL_CHANGE * error, smallest / 2.0) and force.size > 2
-        yield (
-            f"the cycles {'settle' if settled else 'are still settling'}: the {name} amplitude goes from "
-            f"{first} {unit_name} in the first cycle to {last} in the last "
-            f"({number(100 * change / force[0], 2, '+')} %)"
+        force_unit, factor = display_unit(*units.force, float(amplitude[-1]))
+        last, first = format_aligned([factor * amplitude[-1], factor * amplitude[0]], 4)
+        percent = number(100 * change / amplitude[0], 2, "+")
+        is_settled = abs(last_change) < max(_REAL_CHANGE * error, smallest / 2.0) and amplitude.size > 2
+        odd.append(
+            f"the cycles {'settle' if is_settled else 'are still settling'}: the {force} amplitude goes from "
+            f"{first} {force_unit} in the first cycle to {last} in the last ({percent} %)"
         )
+    # a time that was made from the motion turns its noise into drift
+    smallest_drift = 2.0 * _SMALLEST_CHANGE * drive.amplitude if loop.timed else least_prominence(loop.displacement)
+    limits = max(_REAL_CHANGE * 1.5 * error, smallest), smallest_drift
+    for name, unit, mean, limit in zip(
+        (force, motion), (units.force, units.displacement), means.T, limits, strict=True
+    ):
+        if abs(mean[-1] - mean[0]) > limit:
+            last, first = format_aligned([unit.factor * mean[-1], unit.factor * mean[0]], 3, minimum_digits=1)
+            odd.append(f"the {name} drifts: its mean goes from {first} to {last} {unit.name}")
+    return odd
 
 
-def _drifting(mean: Array, smallest: float, name: str, unit: Unit) -> Iterator[str]:
-    """Warn of a mean that changes over the cycles by more than `smallest`."""
-    if abs(mean[-1] - mean[0]) > smallest:
-        last, first = format_aligned([unit.factor * mean[-1], unit.factor * mean[0]], 3, minimum_digits=1)
-        yield f"the {name} drifts: its mean goes from {first} to {last} {unit.name}"
+def ripple(drive: Drive) -> list[str]:
+    """Find a fast sine on the motion: hum, a hunting servo, a flickering sensor.
 
-
-def _ripple(drive: Drive) -> Iterator[str]:
-    """Warn of a fast sine on the motion: hum, a hunting servo, a flickering sensor.
+    Returns:
+        One sentence on the ripple; empty without one.
 
     Notes:
         The largest line in the spectrum of what the motion's slow harmonics leave, with a Hann window. White noise
         makes lines up to about five times the median.
     """
-    loop = drive.loop
-    steps = np.diff(loop.time)
+    loop, steps = drive.loop, np.diff(drive.loop.time)
     if not loop.timed or steps.size < _FEWEST_RIPPLE_ROWS or np.ptp(steps) > 2.0 * _EVEN_CLOCK * np.median(steps):
-        return
+        return []
     phase = (loop.time - loop.time[0]) * drive.frequency
     is_triangle = waveform(drive.coefficients) == "a triangle"
     slow = drive.coefficients if is_triangle else drive.coefficients[: _RIPPLE_ORDER + 1]
@@ -343,40 +359,11 @@ def _ripple(drive: Drive) -> Iterator[str]:
     frequency = np.fft.rfftfreq(rest.size, float(np.mean(steps)))
     lines[frequency < _RIPPLE_ORDER * drive.frequency] = 0.0
     line = int(np.argmax(lines))
-    if lines[line] > max(_SMALLEST_RIPPLE * drive.amplitude, _RIPPLE_LINE * float(np.median(lines))):
-        unit, factor = loop.direction.display.displacement
-        yield (
-            f"a ripple of about {number(factor * lines[line], 2)} {unit} at {frequency[line]:.3g} Hz "
-            f"({number(100 * lines[line] / drive.amplitude, 2)} % of the amplitude) is on the motion: mains hum, "
-            "or an oscillating controller? The loop is the slow motion"
-        )
-
-
-def _changing(drive: Drive) -> Iterator[str]:
-    """Warn of force amplitude, mean force or mean motion that change from the first to the last cycles of a loop.
-
-    Loops of one cycle, or with too few rows in a cycle, are not checked.
-    """
-    loop, count = drive.loop, int(drive.cycles + 0.01)
-    if count < 2:
-        return
-    phase = (loop.time - loop.time[0]) * drive.frequency
-    numbers = sorted({*range(min(count, _MOST_END_CYCLES)), *range(max(count - _MOST_END_CYCLES, 0), count)})
-    outliers = drive.outliers["force"].rows
-    parts = [np.setdiff1d(np.flatnonzero((phase >= n) & (phase < n + 1)), outliers) for n in numbers]
-    rows = min(part.size for part in parts)
-    order = resolved_order(rows, 7)  # a loop of rubber has next to nothing beyond
-    if rows < 4 * order:
-        return
-    both = np.stack((loop.force, loop.displacement), axis=1)
-    fitted = [cycle_harmonics(phase[part], both[part], order) for part in parts]
-    mean_force, mean_motion = np.array([mean for mean, *_ in fitted]).T
-    amplitude = np.array([abs(first[0]) for _, first, _ in fitted])
-    error = max(drive.noise, *(scatter[0] for *_, scatter in fitted)) * np.sqrt(1.0 / rows)  # of the force [N or N m]
-    (motion, force, _), units = loop.direction.motion.words, loop.direction.display
-    smallest = _SMALLEST_CHANGE * np.ptp(loop.force) / 2.0
-    yield from _settling(amplitude, error, smallest, force, units.force)
-    yield from _drifting(mean_force, max(_REAL_CHANGE * 1.5 * error, smallest), force, units.force)
-    # a time that was made from the motion turns its noise into drift
-    smallest_drift = 2.0 * _SMALLEST_CHANGE * drive.amplitude if loop.timed else least_prominence(loop.displacement)
-    yield from _drifting(mean_motion, smallest_drift, motion, units.displacement)
+    if lines[line] <= max(_SMALLEST_RIPPLE * drive.amplitude, _RIPPLE_LINE * float(np.median(lines))):
+        return []
+    unit, factor = loop.direction.display.displacement
+    return [
+        f"a ripple of about {number(factor * lines[line], 2)} {unit} at {frequency[line]:.3g} Hz "
+        f"({number(100 * lines[line] / drive.amplitude, 2)} % of the amplitude) is on the motion: mains hum, "
+        "or an oscillating controller? The loop is the slow motion"
+    ]

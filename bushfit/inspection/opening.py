@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields
-from itertools import chain
+from itertools import chain, product
 from pathlib import Path
 from typing import Any
 
@@ -59,12 +59,11 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
     """
     opened: list[tuple[Table, bool]] = []
     failed: list[tuple[Mapping[str, Sequence[str]], BushfitError]] = []
-    kinds = [(names, motion) for names in (SWEEP_COLUMNS, LOOP_COLUMNS) for motion in (TRANSLATION, STRAINING)]
     try:
         content = open_content(file, test_options)
     except BushfitError as error:
         raise NoTestError(**vars(error)) from None
-    for names, motion in kinds:
+    for names, motion in product((SWEEP_COLUMNS, LOOP_COLUMNS), (TRANSLATION, STRAINING)):
         is_sweep = names is SWEEP_COLUMNS
         try:
             table = open_table(content, names, test_options, motion)
@@ -72,11 +71,17 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
             failed.append((of_motion(names, motion), error))
             continue
         opened.append((table, is_sweep))
-        if _missing(table, is_sweep=is_sweep) is None:
+        if missing_role(table, is_sweep=is_sweep) is None:
             return table, is_sweep
         if is_sweep:
             refuse_ambiguous_damping(table)
-    _refuse_resonance(file, test_options)
+    resonance: Table | None = None
+    with suppress(BushfitError):  # whose columns are not those of a resonance test
+        resonance = open_table(content, RESONANCE_COLUMNS, test_options)
+    if resonance and is_resonance(resonance):
+        hint = f'bushfit reduce {quote_path(file)} --mass "..." converts it to a sweep'
+        problem, expected = "this is a resonance test, not a sweep", "loops and sweeps"
+        raise resonance.error(problem, kind=NoTestError, expected=expected, hint=hint)
     if not opened:
         errors = [error for _, error in failed]
         raise NoTestError(**vars(next((one for one in errors if one.problem != "there is no header"), errors[0])))
@@ -85,32 +90,29 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
         if len(best.roles) <= max(1, len(Vocabulary(usual, {}).roles(best.headers))):
             raise failure
     understood = ", ".join(role.replace("_", " ") for role in best.roles)
-    lacking = _missing(best, is_sweep=is_sweep) or "force"
-    unit = {"displacement": "m", "force": "N", "stiffness": "N/m", "storage_stiffness": "N/m", "phase": "rad"}.get(
-        lacking, "1"
-    )
+    lacking = missing_role(best, is_sweep=is_sweep) or "force"
+    units = {"displacement": "m", "force": "N", "stiffness": "N/m", "storage_stiffness": "N/m", "phase": "rad"}
+    column = best.columns_key(lacking, units.get(lacking, "1"))
     raise best.header_error(
         "the columns are not those of a test",
         kind=NoTestError,
         found=", ".join(best.headers) + f" (understood: {understood})" if understood else None,
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
-        hint=hint_of_derived(best) or f"correct the header, or name the column: {best.columns_key(lacking, unit)}",
+        hint=hint_of_derived(best) or f"correct the header, or name the column: {column}",
     )
 
 
-def _refuse_resonance(file: Path, test_options: Mapping[str, Any]) -> None:
-    """Refuse a resonance test; the hint says how to reduce it to a sweep."""
-    try:
-        table = open_table(file, RESONANCE_COLUMNS, test_options)
-    except BushfitError:  # then it is none
-        return
-    if is_resonance(table):
-        raise table.error(
-            "this is a resonance test, not a sweep",
-            kind=NoTestError,
-            expected="loops and sweeps",
-            hint=f'bushfit reduce {quote_path(file)} --mass "..." converts it to a sweep',
-        )
+def missing_role(table: Table, *, is_sweep: bool) -> str | None:
+    """First role of a column that a test needs and the table lacks; None if it is complete.
+
+    Frequency or amplitude of a sweep may be constant, and stated outside of the table.
+    """
+    roles = set(table.roles)
+    if not is_sweep:
+        return next((role for role in ("displacement", "force") if role not in roles), None)
+    pairs = [pair for pair in PAIRS if pair[0] != "force_amplitude" or {"frequency", "amplitude"} <= roles]
+    nearest = max(pairs, key=lambda pair: len(roles & set(pair)))
+    return next((role for role in nearest if role not in roles), None)
 
 
 def test_place(file: Path, table: Table, test_options: Mapping[str, Any]) -> Place | None:
@@ -175,19 +177,6 @@ def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) ->
     return Direction(test_options["direction"])
 
 
-def _missing(table: Table, *, is_sweep: bool) -> str | None:
-    """First role of a column that a test needs and the table lacks; None if it is complete.
-
-    Frequency or amplitude of a sweep may be constant, and stated outside of the table.
-    """
-    roles = set(table.roles)
-    if not is_sweep:
-        return next((role for role in ("displacement", "force") if role not in roles), None)
-    pairs = [pair for pair in PAIRS if pair[0] != "force_amplitude" or {"frequency", "amplitude"} <= roles]
-    nearest = max(pairs, key=lambda pair: len(roles & set(pair)))
-    return next((role for role in nearest if role not in roles), None)
-
-
 def open_content(file: Path, test_options: Mapping[str, Any]) -> OpenedFile:
     """Open a test file with its format as the user states it.
 
@@ -243,34 +232,31 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
         MeasurementError, UnitError, CampaignError, FitError: a file or an option that cannot be used.
     """
     table, is_sweep = recognize_table(file, test_options)
-    direction = test_place(file, table, test_options)
-    # which of two translations it is makes no difference to reading
-    read_as = direction or Direction.AXIAL
-    entry = _entry(SweepFile if is_sweep else LoopFile, test_options, table, direction)
+    place = test_place(file, table, test_options)
+    read_as = place or Direction.AXIAL  # which of two translations it is makes no difference to reading
+    entry = campaign_entry(table, place, test_options, is_sweep=is_sweep)
     by_name = labels_of_file(file, table.source.sheet or "", test_options)
     label_keys, label_facts, counted = keys_from_labels(table, read_as, entry, by_name, of_book, is_sweep=is_sweep)
     if "at_amplitude" in label_keys:
         entry.pop("amplitude", None)  # counted already
     entry |= label_keys
-    turned: list[str] = []
+    kind: Kind = "sweep"
     measured: Loop | Sweep
-    kind: Kind
     if is_sweep:
-        measured = read_sweep(**_keywords(file, read_as, entry, SweepFile))
-        kind, (facts, oddities) = "sweep", describe_sweep(measured, by_name)
+        measured = read_sweep(**reader_arguments(file, read_as, entry, SweepFile))
+        facts, odd = describe_sweep(measured, by_name)
+        if amplitude := table.roles.get("amplitude"):
+            counted = amplitude.convention is not None
+            if "peak-to-peak" in (amplitude.convention, entry.get("amplitude")):
+                facts["amplitudes"] += f', half of "{amplitude.header}", which is peak-to-peak'
     else:
-        measured, entry, turned = _read_loop(file, read_as, entry, table)
-        kind, (facts, oddities) = _classify_recording(
-            measured, by_name, _keywords(file, read_as, entry, LoopFile)["test"]
-        )
-    columns = _columns(table, is_sweep=is_sweep)
+        measured, entry, turned = read_either_sign(file, read_as, entry, table)
+        settings = reader_arguments(file, read_as, entry, LoopFile)["test"]
+        kind, (facts, odd) = classify_recording(measured, by_name, settings)
+        odd = turned + odd
+    columns = seen_columns(table, is_sweep=is_sweep)
     facts |= label_facts
-    if is_sweep and (amplitude := table.roles.get("amplitude")):
-        counted = amplitude.convention is not None
-        if "peak-to-peak" in (amplitude.convention, entry.get("amplitude")):
-            facts["amplitudes"] += f', half of "{amplitude.header}", which is peak-to-peak'
-    all_oddities = tuple(turned + oddities)
-    return Inspection(file, kind, direction, _written(table), columns, facts, all_oddities, entry, measured, counted)
+    return Inspection(file, kind, place, written_with(table), columns, facts, tuple(odd), entry, measured, counted)
 
 
 def read_history(file: Path, test_options: Mapping[str, Any]) -> tuple[Loop, Direction | None]:
@@ -294,96 +280,143 @@ def read_history(file: Path, test_options: Mapping[str, Any]) -> tuple[Loop, Dir
             hint="name it in the campaign under [[sweeps]]",
         )
     direction = test_direction(file, table, test_options)
-    entry = _entry(LoopFile, test_options, table, direction)
-    return read_loop(**_keywords(file, direction or Direction.AXIAL, entry, LoopFile)), direction
+    entry = campaign_entry(table, direction, test_options, is_sweep=False)
+    return read_loop(**reader_arguments(file, direction or Direction.AXIAL, entry, LoopFile)), direction
 
 
-def _entry(
-    schema: type[LoopFile | SweepFile], test_options: Mapping[str, Any], table: Table, place: Place | None
+def campaign_entry(
+    table: Table, place: Place | None, test_options: Mapping[str, Any], *, is_sweep: bool
 ) -> dict[str, Any]:
-    """Stated keys for the table of a file in a campaign, without those that the file itself states."""
-    roles = LOOP_COLUMNS if schema is LoopFile else SWEEP_COLUMNS
-    keys = {field.name for field in fields(schema)} - {"direction"}
-    entry = {key: value for key, value in test_options.items() if key in keys and value not in (None, {})}
+    """Keys that a campaign has to state for a test.
+
+    Args:
+        table: of the test.
+        place: its direction or specimen; None if unknown.
+        test_options: options of the test.
+        is_sweep: whether it is a sweep.
+
+    Returns:
+        The fitting options, without those that the file itself states.
+    """
+    roles, schema = (SWEEP_COLUMNS, SweepFile) if is_sweep else (LOOP_COLUMNS, LoopFile)
+    needless = {"direction", "specimen", "columns", "units"} | {f"at_{role}" for role in table.roles}
+    needless |= {"rate", "frequency", "waveform"} if "time" in table.roles else set()
+    needless |= {"temperature"} if test_options.get("temperature") and temperatures_of(table) == 1 else set()
+    keys = {field.name for field in fields(schema)} - needless
+    entry: dict[str, Any] = {"specimen": place.name} if isinstance(place, Specimen) else {}
+    entry |= {key: value for key, value in test_options.items() if key in keys and value not in (None, {})}
     for key in ("columns", "units"):
-        if by_role := {role: text for role, text in entry.pop(key, {}).items() if role in roles}:
+        if by_role := {role: text for role, text in test_options.get(key, {}).items() if role in roles}:
             entry[key] = by_role
-    needless = {"specimen"} | {f"at_{role}" for role in table.roles}
-    if "time" in table.roles:
-        needless |= {"rate", "frequency", "waveform"}
-    needless |= {"temperature"} if "temperature" in entry and temperatures_of(table) == 1 else set()
-    entry = {key: value for key, value in entry.items() if key not in needless}
-    return {**({"specimen": place.name} if isinstance(place, Specimen) else {}), **entry}
+    return entry
 
 
-def _keywords(
-    file: Path, direction: Place, entry: Mapping[str, Any], schema: type[LoopFile] | type[SweepFile]
+def reader_arguments(
+    file: Path, place: Place, entry: Mapping[str, Any], schema: type[LoopFile] | type[SweepFile]
 ) -> dict[str, Any]:
-    """Keyword arguments of the reader for a file with these keys in a campaign."""
-    specimens = [direction] if isinstance(direction, Specimen) else []
-    tested = {} if specimens else {"direction": str(direction)}
+    """Keyword arguments of the reader for a file with these keys in a campaign.
+
+    Args:
+        file: test file.
+        place: direction or specimen.
+        entry: keys of its table in a campaign.
+        schema: of that table.
+
+    Returns:
+        Arguments of `read_loop` or `read_sweep`.
+    """
+    specimens = [place] if isinstance(place, Specimen) else []
+    tested = {} if specimens else {"direction": str(place)}
     test = validate_tables({**entry, "file": str(file), **tested}, file, schema)
     with error_location(file, "at_amplitude"):  # which alone is converted there
         return {**next(reader_keywords(Path(), [test], specimens)), "name": file.stem}
 
 
-def _read_loop(
-    file: Path, direction: Place, entry: dict[str, Any], table: Table
+def read_either_sign(
+    file: Path, place: Place, entry: dict[str, Any], table: Table
 ) -> tuple[Loop, dict[str, Any], list[str]]:
-    """Read a loop; a force of reversed sign is turned. Returns the loop, its keys in a campaign, and oddities."""
+    """Read a loop; a force of reversed sign is turned.
+
+    Args:
+        file: test file.
+        place: direction or specimen.
+        entry: keys of its table in a campaign.
+        table: of the file.
+
+    Returns:
+        The loop, its keys in a campaign, and a sentence on a force that was turned.
+    """
     try:
-        return read_loop(**_keywords(file, direction, entry, LoopFile)), entry, []
+        return read_loop(**reader_arguments(file, place, entry, LoopFile)), entry, []
     except MeasurementError as error:
-        if "force_sign" in entry:
-            raise
-        entry = {**entry, "force_sign": -1}
+        turned = {**entry, "force_sign": -1}
         try:
-            turned = read_loop(**_keywords(file, direction, entry, LoopFile))
+            if "force_sign" in entry:
+                raise
+            loop = read_loop(**reader_arguments(file, place, turned, LoopFile))
         except BushfitError:
             raise error from None
     odd = (
         f'"{table.roles["force"].header}" falls where "{table.roles["displacement"].header}" rises: the force '
         "has the opposite sign; state force_sign = -1 in the campaign"
     )
-    return turned, entry, [odd]
+    return loop, turned, [odd]
 
 
-def _classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tuple[Kind, Findings]:
-    """Kind of a recording (loop, programme of loops, or raw history), with its facts and oddities."""
+def classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tuple[Kind, Findings]:
+    """Tell loops, programmes of loops and raw histories apart.
+
+    Args:
+        measured: recording in SI.
+        by_name: labels in the names of its file and sheet.
+        test: its keys in a campaign.
+
+    Returns:
+        Kind of the recording, with its facts and oddities.
+    """
     steps = steady_sines(measured)
     points = {(round(np.log(frequency), 2), round(np.log(amplitude), 1)) for frequency, amplitude, _ in steps}
-    frequencies = [frequency for frequency, *_ in steps] or [0.0]
-    fast = max(frequencies) > _QUASI_STATIC
-    if len(points) > 1 and fast:
+    fastest = max((frequency for frequency, *_ in steps), default=0.0)
+    is_fast = fastest > _QUASI_STATIC
+    if len(points) > 1 and is_fast:
         with suppress(MeasurementError):  # no steady sine after all
             return "history", describe_history(measured, by_name)
     loops = programme(measured, test)
     if len(loops) > 1:
         return "loop", describe_programme(measured, loops, by_name)
     facts, odd = describe_loop(loops[0], by_name)
-    if fast or len(points) > 1:
-        description = f"at {max(frequencies):.3g} Hz" if fast else "of several amplitudes"
+    if is_fast or len(points) > 1:
+        description = f"at {fastest:.3g} Hz" if is_fast else "of several amplitudes"
         odd.append(f"a motion {description} is read as a loop; if it is a stepped sine, run bushfit reduce")
     return "loop", (facts, odd)
 
 
-def _columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
-    """Columns of a file in order, with the range of their values in the unit of the file."""
-    of_sweeps = {*chain(*PAIRS), "frequency", "amplitude", "temperature", "repeat"}
-    ranged = of_sweeps if is_sweep else set(table.roles)
-    ranged = {role for role in ranged if role in table.roles and table.holds_numbers(table.roles[role].index)}
-    wanted = {role: column for role, column in table.roles.items() if role in ranged}
+def seen_columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
+    """List the columns of a file.
+
+    Returns:
+        The columns in order, with the range of their values in the unit of the file.
+    """
+    ranged = {*chain(*PAIRS), "frequency", "amplitude", "temperature", "repeat"} if is_sweep else {*table.roles}
+    wanted = {
+        role: column for role, column in table.roles.items() if role in ranged and table.holds_numbers(column.index)
+    }
     values = table.read(wanted, fewest_rows=1)  # the scales of `roles` are 1: not in SI
     columns = [ColumnSeen(header, None, None) for header in table.headers]
     for key, (index, _) in table.row_labels.items():
         columns[index] = ColumnSeen(table.headers[index], key.replace("_", " "), None)
     for role, column in table.roles.items():
-        low, high = (float(values[role].min()), float(values[role].max())) if role in values else (None, None)
-        columns[column.index] = ColumnSeen(column.header, role.replace("_", " "), column.unit, low, high)
+        ends = (float(values[role].min()), float(values[role].max())) if role in values else (None, None)
+        columns[column.index] = ColumnSeen(column.header, role.replace("_", " "), column.unit, *ends)
     return tuple(columns)
 
 
-def _written(table: Table) -> dict[str, str]:
+def written_with(table: Table) -> dict[str, str]:
+    """Describe how a file is written.
+
+    Returns:
+        Encoding, delimiter, decimal mark and place of the header, by label.
+    """
     source, layout = table.source, table.layout
     if isinstance(source, Channels):
         written = {"format": source.format} | ({"group": source.sheet} if source.sheet else {})

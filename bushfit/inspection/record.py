@@ -1,7 +1,7 @@
 """Result of the inspection of a test file, and the text of a campaign for inspected files."""
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import chain, count
@@ -169,14 +169,11 @@ def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[
         files: inspections of its tests.
         folder: folder of the campaign; files are named relative to it.
     """
-    head = _key_lines({"name": name, **(bushing or {})})
-    order = [inspection for kind in _TABLES for inspection in files if inspection.kind == kind]
-    tables = [*_specimens(files), *(file_text(inspection, folder) for inspection in order)]
-    report = (
-        '# [report] fills the head of the report: customer = "...", part_number = "...", drawing, '
-        "laboratory, date, logo\n"
-    )
-    return "\n".join([*(["[bushing]"] if bushing else []), *head, "", *tables, report])
+    head = [*(["[bushing]"] if bushing else []), *key_lines({"name": name, **(bushing or {})}), ""]
+    tests = [inspection for kind in _TABLES for inspection in files if inspection.kind == kind]
+    report = "# [report] fills the head of the report: "
+    report += 'customer = "...", part_number = "...", drawing, laboratory, date, logo\n'
+    return "\n".join([*head, *campaign_tables(tests, folder), report])
 
 
 def campaigns_of_parts(
@@ -197,24 +194,23 @@ def campaigns_of_parts(
     Raises:
         CampaignError: a file without the number of its specimen.
     """
-    of_parts: list[Any] = [inspection.entry.get("specimen_number") for inspection in files]
-    if None in of_parts:
+    of_parts = dict[str, list[Inspection]]()
+    for inspection in files:
+        of_parts.setdefault(inspection.part or "", []).append(inspection)
+    if unknown := of_parts.pop("", []):
         raise CampaignError(
             "the part of this test is not stated",
-            file=files[of_parts.index(None)].file,
-            found=f"parts {', '.join(dict.fromkeys(filter(None, of_parts)))} in others",
+            file=unknown[0].file,
+            found=f"parts {', '.join(of_parts)} in others",
             expected="a number of the specimen in every file, or the tests of one part",
             hint="--specimen-number selects the tests of one part, and applies to files without such a column",
         )
     texts = {listed_in: f"# a campaign of each part: bushfit batch {listed_in}\n"}
-    for number, part in enumerate(dict.fromkeys(of_parts), start=1):
+    for number, (part, tests) in enumerate(of_parts.items(), start=1):
         file = f"{folder_name(part)}.toml"
         file = f"{number}_{file}" if file.casefold() in map(str.casefold, texts) else file
-        tests = [
-            inspection for number_of_test, inspection in zip(of_parts, files, strict=True) if number_of_test == part
-        ]
         texts[file] = campaign_text(f"{name} {part}", bushing, tests, folder)
-        entry = _key_lines({"campaign": file, "name": f"{name} {part}"})
+        entry = key_lines({"campaign": file, "name": f"{name} {part}"})
         texts[listed_in] += "\n".join(["", "[[bushings]]", *entry, ""])
     return texts
 
@@ -228,60 +224,56 @@ def with_specimens_named(files: Sequence[Inspection]) -> list[Inspection]:
     Returns:
         The same inspections, renamed where two specimens had one name.
     """
-    named: dict[Specimen, Specimen] = {}
-    for body in (inspection.direction for inspection in files):
-        if isinstance(body, Specimen) and body not in named:
-            taken_names = {specimen.name for specimen in named.values()}
-            names = chain([body.name], (f"{body.name}_{number}" for number in count(2)))
-            named[body] = replace(body, name=next(name for name in names if name not in taken_names))
-    return [
-        replace(inspection, direction=body, entry={**inspection.entry, "specimen": body.name})
-        if isinstance(inspection.direction, Specimen) and (body := named[inspection.direction])
-        else inspection
-        for inspection in files
-    ]
+    named, renamed = dict[Specimen, Specimen](), list[Inspection]()
+    for inspection in files:
+        specimen = inspection.direction
+        if isinstance(specimen, Specimen):
+            if specimen not in named:
+                used = {specimen_named.name for specimen_named in named.values()}
+                names = chain([specimen.name], (f"{specimen.name}_{number}" for number in count(2)))
+                named[specimen] = replace(specimen, name=next(name for name in names if name not in used))
+            body = named[specimen]
+            inspection = replace(inspection, direction=body, entry={**inspection.entry, "specimen": body.name})
+        renamed.append(inspection)
+    return renamed
 
 
-def _specimens(files: Sequence[Inspection]) -> Iterator[str]:
-    for body in dict.fromkeys(
-        inspection.direction for inspection in files if isinstance(inspection.direction, Specimen)
-    ):
-        yield "\n".join([*specimen_lines(body), ""])
+def key_lines(keys: Mapping[str, Any]) -> list[str]:
+    """Keys and their values in TOML, a line each."""
+    return [f"{key} = {toml_value(value)}" for key, value in keys.items()]
 
 
-def _key_lines(keys: Mapping[str, Any]) -> Iterator[str]:
-    """Keys and their values, a line each."""
-    return (f"{key} = {toml_value(value)}" for key, value in keys.items())
+def campaign_tables(files: Sequence[Inspection], folder: Path | None = None) -> list[str]:
+    """Tables of a campaign for its specimens and tests; for a raw history, a comment on what to do first.
+
+    Args:
+        files: inspections.
+        folder: folder of the campaign; without it, the full paths of files are written.
+
+    Returns:
+        Texts in TOML.
+    """
+    specimens = dict.fromkeys(one.direction for one in files if isinstance(one.direction, Specimen))
+    tables = ["\n".join([*specimen_lines(specimen), ""]) for specimen in specimens]
+    for inspection in files:
+        name, place = inspection.file.resolve().as_posix(), inspection.direction
+        with suppress(ValueError):  # another drive, where no path leads
+            name = Path(os.path.relpath(inspection.file, folder)).as_posix() if folder else name
+        if inspection.kind == "history":
+            file_name = printable(name)
+            typed = f'"{file_name}"' if " " in file_name else file_name
+            command = f"bushfit reduce {typed} --direction {place or '...'}"
+            tables.append(f"# {file_name} is a raw history: {command} converts it to a sweep\n")
+            continue
+        lines = [f"[[{_TABLES[inspection.kind]}]]", f"file = {toml_value(name)}"]
+        if not isinstance(place, Specimen):
+            direction = f'"{place}"' if place else '"..."  # axial or radial: the file does not state it'
+            lines.append(f"direction = {direction}")
+        tables.append("\n".join([*lines, *key_lines(inspection.entry), ""]))
+    return tables
 
 
 def pasted_text(files: Sequence[Inspection]) -> str:
     """Tables to paste into a campaign in any folder: files are named by their full path."""
     head = "# files with their full path; bushfit init writes paths relative to the campaign\n"
-    tables = [*_specimens(files), *(file_text(inspection) for inspection in files)]
-    return head * any(inspection.kind in _TABLES for inspection in files) + "\n".join(tables)
-
-
-def file_text(inspection: Inspection, folder: Path | None = None) -> str:
-    """Table of one file in a campaign; for a raw history, a comment on what to do first.
-
-    Args:
-        inspection: of the file.
-        folder: folder of the campaign; without it, the full path is written.
-
-    Returns:
-        Text in TOML.
-    """
-    name = inspection.file.resolve().as_posix()
-    with suppress(ValueError):  # another drive, where no path leads
-        name = Path(os.path.relpath(inspection.file, folder)).as_posix() if folder else name
-    direction = (
-        f'"{inspection.direction}"' if inspection.direction else '"..."  # axial or radial: the file does not state it'
-    )
-    if inspection.kind == "history":
-        name = printable(name)
-        word = f'"{name}"' if " " in name else name
-        direction_word = inspection.direction or "..."
-        return f"# {name} is a raw history: bushfit reduce {word} --direction {direction_word} converts it to a sweep\n"
-    lines = [f"[[{_TABLES[inspection.kind]}]]", f"file = {toml_value(name)}"]
-    lines += [] if isinstance(inspection.direction, Specimen) else [f"direction = {direction}"]
-    return "\n".join([*lines, *_key_lines(inspection.entry), ""])
+    return head * any(inspection.kind in _TABLES for inspection in files) + "\n".join(campaign_tables(files))

@@ -56,11 +56,11 @@ def describe_sweep(sweep: Sweep, labels: Labels) -> Findings:
     """
     unit, factor = sweep.direction.display.displacement
     frequencies, levels = np.unique(sweep.frequency), np.unique(sweep.amplitude)
-    noise = sweep_noise([sweep])
+    noise, distance = sweep_noise([sweep]), distance_from_repeats(sweep)
+    level_texts = [f"{factor * level:.4g}" for level in levels[:_MOST_LEVELS]] + ["..."] * (levels.size > _MOST_LEVELS)
     facts = {
         "frequencies": format_frequencies(frequencies),
-        "amplitudes": f"{', '.join(f'{factor * level:.4g}' for level in levels[:_MOST_LEVELS])}"
-        f"{', ...' if levels.size > _MOST_LEVELS else ''} {unit} zero-to-peak",
+        "amplitudes": f"{', '.join(level_texts)} {unit} zero-to-peak",
         "repeats": f"{np.unique(sweep.repeat).size}",
         "noise": noise.describe(),
     }
@@ -68,20 +68,22 @@ def describe_sweep(sweep: Sweep, labels: Labels) -> Findings:
         *MeasuredSweep(sweep, noise).notes,
         *implausible_sizes(sweep.direction, sweep.frequency, sweep.amplitude, np.abs(sweep.stiffness)),
         *wrong_labels(labels, sweep.direction, levels.tolist(), frequencies.tolist()),
-        *_copied_rows(sweep, noise),
-        *_close_levels(sweep),
-        *_missing_frequencies(sweep),
-        *_outliers(sweep, noise),
-        *_odd_blocks(sweep),
-        *_missed_level(sweep),
-        *_odd_loss(sweep),
+        *copied_rows(sweep, noise),
+        *odd_levels(sweep),
+        *missing_frequencies(sweep),
+        *outlying_points(sweep, noise, distance),
+        *outlying_blocks(sweep, distance),
+        *odd_losses(sweep),
     ]
     return facts, odd
 
 
-def _copied_rows(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
-    """Warn of rows equal to others at the same frequency and amplitude, where noise would hardly make as many equal by
-    chance in as many digits as the file has."""
+def copied_rows(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
+    """Warn of rows equal to others at the same frequency and amplitude.
+
+    Returns:
+        One sentence, where noise would hardly make as many rows equal by chance in as many digits as the file has.
+    """
     # nine digits leave out what the conversion of units leaves in the last ones
     magnitude, phase = (
         np.array([float(f"{value:.9g}") for value in values])
@@ -107,67 +109,65 @@ def _copied_rows(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
         )
 
 
-def _close_levels(sweep: Sweep) -> Iterator[str]:
-    """Warn of amplitudes at one frequency that are too close for levels, where no passes mark them as repeats."""
+def odd_levels(sweep: Sweep) -> Iterator[str]:
+    """Warn of levels that may be repeats of one, and of a level that was missed.
+
+    Returns:
+        A sentence on amplitudes at one frequency that are too close for levels, where no passes mark them as repeats;
+        and one on the point that missed the amplitude of its level by most.
+    """
     passes, of_frequency = np.unique(sweep.repeat).size, sweep.frequency.size / np.unique(sweep.frequency).size
     steps = [
-        (float(sweep.frequency[rows[0]]), float(np.diff(np.log(levels)).min()))
+        (float(np.diff(np.log(levels)).min()), float(sweep.frequency[rows[0]]))
         for rows in rows_alike(sweep.frequency)
         if (levels := np.unique(sweep.amplitude[rows])).size > 1
     ]
-    frequency, smallest = min(steps, key=lambda step: step[1], default=(0.0, np.inf))
+    smallest, frequency = min(steps, default=(np.inf, 0.0))
     if smallest < _SMALLEST_STEP and round(of_frequency) != passes:
         yield (
-            f"two amplitudes at {frequency:.4g} Hz differ by {number(100 * np.expm1(smallest), 2)} % and are "
-            "treated as two "
-            "levels; if they are repeats, number them in a column repeat"
+            f"two amplitudes at {frequency:.4g} Hz differ by {number(100 * np.expm1(smallest), 2)} % and are treated "
+            "as two levels; if they are repeats, number them in a column repeat"
         )
+    relative_miss = np.abs(sweep.amplitude_reached / sweep.amplitude - 1.0)
+    row = int(np.argmax(relative_miss))
+    if relative_miss[row] > MISSED_LEVEL:
+        both = sweep.amplitude_reached[row], sweep.amplitude[row]
+        reached, level = (shown_amplitude(sweep.direction, size) for size in both)
+        yield f"{reached} was reached where the level is {level} ({sweep.frequency[row]:.4g} Hz)"
 
 
-def _missing_frequencies(sweep: Sweep) -> Iterator[str]:
-    """Warn of each block, a repeat of a level, without frequencies that most others have."""
-    blocks = np.stack((sweep.amplitude, sweep.repeat.astype(float)), axis=1)
-    names, block = np.unique(blocks, axis=0, return_inverse=True)
-    frequencies, column = np.unique(sweep.frequency, return_inverse=True)
-    measured = np.zeros((len(names), frequencies.size), dtype=bool)
-    measured[block.ravel(), column] = True
+def missing_frequencies(sweep: Sweep) -> Iterator[str]:
+    """Warn of blocks, repeats of a level, without frequencies that most others have.
+
+    Returns:
+        One sentence for each such block.
+    """
+    frequencies, blocks = np.unique(sweep.frequency), rows_alike(sweep.amplitude, sweep.repeat.astype(float))
+    measured = np.array([np.isin(frequencies, sweep.frequency[rows]) for rows in blocks])
     usual = measured.mean(axis=0) > 0.5
-    for (level, repeat), has in zip(names, measured, strict=True):
-        absent = frequencies[usual & ~has]
-        if absent.size and len(names) > 1:
-            of_repeat = f", repeat {repeat:.0f}," if np.unique(sweep.repeat).size > 1 else ""
-            listed = ", ".join([*(f"{f:.4g}" for f in absent[:_MOST_LISTED]), *["..."] * (absent.size > _MOST_LISTED)])
-            yield f"{shown_amplitude(sweep.direction, level)}{of_repeat} lacks {listed} Hz, which most others have"
+    for rows, has in zip(blocks, measured, strict=True):
+        absent = [f"{frequency:.4g}" for frequency in frequencies[usual & ~has]]
+        if absent and len(blocks) > 1:
+            of_repeat = f", repeat {sweep.repeat[rows[0]]}," if np.unique(sweep.repeat).size > 1 else ""
+            listed = ", ".join(absent[:_MOST_LISTED] + ["..."] * (len(absent) > _MOST_LISTED))
+            level = shown_amplitude(sweep.direction, sweep.amplitude[rows[0]])
+            yield f"{level}{of_repeat} lacks {listed} Hz, which most others have"
 
 
-def _outliers(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
-    """Warn of points far from their repeats or, where these are fewer than three, from the curve of their run."""
-    from_repeats = _from_repeats(sweep)
-    distance = np.nan_to_num(from_repeats)
-    for rows in _blocks(sweep):
-        distance[rows] -= _complex_median(distance[rows])
-    random = np.array([noise.random[sweep.name, float(level)] for level in sweep.held])
-    parts = np.stack((distance.real, distance.imag), axis=1)
-    far = np.any((np.abs(parts) > _FAR * random) & (np.abs(parts) > _SMALLEST_OUTLIER), axis=1)
-    curve = _from_curve(sweep)
-    alone = np.isnan(from_repeats) & (np.abs(curve) > _SMALLEST_FROM_CURVE)
-    parts[alone] = np.stack((curve[alone].real, curve[alone].imag), axis=1)
-    outliers = np.flatnonzero(far | alone)
-    for row in outliers[:_MOST_LISTED]:
-        level = shown_amplitude(sweep.direction, sweep.amplitude[row])
-        repeat = "" if alone[row] else f", repeat {sweep.repeat[row]}"
-        reference = "the smooth curve through the others" if alone[row] else "its repeats"
-        yield (
-            f"data row {row + 1} ({sweep.frequency[row]:.4g} Hz, {level}{repeat}) is "
-            f"{number(100 * np.expm1(parts[row, 0]), 2, '+')} % in |K| and {np.degrees(parts[row, 1]):+.2g} deg off "
-            f"{reference}"
-        )
-    if outliers.size > _MOST_LISTED:
-        yield f"{outliers.size - _MOST_LISTED} more points deviate as much"
+def distance_from_repeats(sweep: Sweep) -> Array:
+    """Distance of ln K from the median of its repeats, nan where there are fewer than three, (n,)."""
+    log_stiffness, distance = np.log(sweep.stiffness), np.full(sweep.frequency.size, np.nan + 0j)
+    for rows in rows_alike(sweep.frequency, sweep.amplitude):
+        if rows.size > 2:
+            distance[rows] = log_stiffness[rows] - complex_median(log_stiffness[rows])
+    return distance
 
 
-def _from_curve(sweep: Sweep) -> Array:
-    """Distance of ln K from the smooth curve of its run, for points far beyond the scatter of the others; else 0, (n,).
+def distance_from_curve(sweep: Sweep) -> Array:
+    """Distance of ln K from the smooth curve of its run.
+
+    Returns:
+        Distance of the points that are far beyond the scatter of the others; else 0, (n,).
 
     Notes:
         Two curves with the least sum of distances are tried, which a few outliers do not bend, even at an end of the
@@ -194,27 +194,53 @@ def _from_curve(sweep: Sweep) -> Array:
     return distance
 
 
-def _from_repeats(sweep: Sweep) -> Array:
-    """Distance of ln K from the median of its repeats, nan where there are fewer than three, (n,)."""
-    log_stiffness, distance = np.log(sweep.stiffness), np.full(sweep.frequency.size, np.nan + 0j)
-    for rows in rows_alike(sweep.frequency, sweep.amplitude):
-        if rows.size > 2:
-            distance[rows] = log_stiffness[rows] - _complex_median(log_stiffness[rows])
-    return distance
+def outlying_points(sweep: Sweep, noise: SweepNoise, from_repeats: Array) -> Iterator[str]:
+    """Warn of points far from their repeats or, where these are fewer than three, from the curve of their run.
+
+    Args:
+        sweep: in SI.
+        noise: of the sweep.
+        from_repeats: distance of ln K from the median of its repeats, (n,).
+
+    Returns:
+        A sentence on each of the first four, and on the number of the others.
+    """
+    distance = np.nan_to_num(from_repeats)
+    for rows in rows_alike(sweep.repeat.astype(float), sweep.amplitude):  # what a block has in common is no outlier
+        distance[rows] -= complex_median(distance[rows])
+    random, curve = (
+        np.array([noise.random[sweep.name, float(level)] for level in sweep.held]),
+        distance_from_curve(sweep),
+    )
+    parts = np.stack((distance.real, distance.imag), axis=1)
+    far = np.any((np.abs(parts) > _FAR * random) & (np.abs(parts) > _SMALLEST_OUTLIER), axis=1)
+    alone = np.isnan(from_repeats) & (np.abs(curve) > _SMALLEST_FROM_CURVE)
+    parts[alone] = np.stack((curve[alone].real, curve[alone].imag), axis=1)
+    outliers = np.flatnonzero(far | alone)
+    for row in outliers[:_MOST_LISTED]:
+        level = shown_amplitude(sweep.direction, sweep.amplitude[row])
+        repeat = "" if alone[row] else f", repeat {sweep.repeat[row]}"
+        reference = "the smooth curve through the others" if alone[row] else "its repeats"
+        yield (
+            f"data row {row + 1} ({sweep.frequency[row]:.4g} Hz, {level}{repeat}) is "
+            f"{number(100 * np.expm1(parts[row, 0]), 2, '+')} % in |K| and {np.degrees(parts[row, 1]):+.2g} deg off "
+            f"{reference}"
+        )
+    if outliers.size > _MOST_LISTED:
+        yield f"{outliers.size - _MOST_LISTED} more points deviate as much"
 
 
-def _blocks(sweep: Sweep) -> list[Array]:
-    """Rows of the blocks: repeats of a level over all frequencies."""
-    return rows_alike(sweep.repeat.astype(float), sweep.amplitude)
+def outlying_blocks(sweep: Sweep, from_repeats: Array) -> Iterator[str]:
+    """Warn of blocks, repeats of a level, that differ from the others as a whole, and of a drift over the repeats.
 
-
-def _odd_blocks(sweep: Sweep) -> Iterator[str]:
-    """Warn of blocks that differ from the others as a whole, and of a drift over the repeats."""
-    distance = _from_repeats(sweep)
-    blocks = [rows for rows in _blocks(sweep) if not np.isnan(distance[rows]).any()]
+    Returns:
+        One sentence for each such block, and one on the drift.
+    """
+    blocks = rows_alike(sweep.repeat.astype(float), sweep.amplitude)
+    blocks = [rows for rows in blocks if not np.isnan(from_repeats[rows]).any()]
     if len(blocks) < _FEWEST_BLOCKS:
         return
-    gain = np.array([_complex_median(distance[rows]).real for rows in blocks])
+    gain = np.array([np.median(from_repeats[rows].real) for rows in blocks])
     usual = MEDIAN_TO_SIGMA * float(np.median(np.abs(gain[gain != 0.0]))) if np.any(gain) else 0.0
     for rows, block_gain in zip(blocks, gain, strict=True):
         if abs(block_gain) > max(_FAR * usual, _SMALLEST_BLOCK_OFFSET):
@@ -229,24 +255,16 @@ def _odd_blocks(sweep: Sweep) -> Iterator[str]:
         drift = correlation * float(np.std(gain) / np.std(repeat) * np.ptp(repeat))  # of the line through the gains
         t = abs(correlation) * np.sqrt(freedom / max(1.0 - correlation**2, 1e-20))
         if 2.0 * stdtr(freedom, -t) < _CHANCE and abs(drift) > _SMALLEST_DRIFT:
-            yield (
-                f"|K| drifts by {number(100 * drift, 2, '+')} % from the first repeat to the last: warming up, or "
-                "settling?"
-            )
+            change = number(100 * drift, 2, "+")
+            yield f"|K| drifts by {change} % from the first repeat to the last: warming up, or settling?"
 
 
-def _missed_level(sweep: Sweep) -> Iterator[str]:
-    """Warn of the point that missed the amplitude of its level by most."""
-    relative_miss = sweep.amplitude_reached / sweep.amplitude - 1.0
-    row = int(np.argmax(np.abs(relative_miss)))
-    if abs(relative_miss[row]) > MISSED_LEVEL:
-        both = sweep.amplitude_reached[row], sweep.amplitude[row]
-        reached, level = (shown_amplitude(sweep.direction, size) for size in both)
-        yield f"{reached} was reached where the level is {level} ({sweep.frequency[row]:.4g} Hz)"
+def odd_losses(sweep: Sweep) -> Iterator[str]:
+    """Warn of losses below zero, and of a loss that hardly any rubber has.
 
-
-def _odd_loss(sweep: Sweep) -> Iterator[str]:
-    """Warn of losses below zero, and of a loss that hardly any rubber has, with what the file may state instead."""
+    Returns:
+        A sentence for each, with what the file may state instead.
+    """
     negative = np.flatnonzero(sweep.stiffness.imag < 0.0)
     if negative.size:
         level = shown_amplitude(sweep.direction, sweep.amplitude[negative[0]])
@@ -256,11 +274,11 @@ def _odd_loss(sweep: Sweep) -> Iterator[str]:
         )
     mistakes = [mistake for mistake in MISTAKES.values() if mistake.doubt and mistake.possible(sweep)]
     if mistakes:
-        unless = ", or ".join(mistake.in_words(sweep) for mistake in mistakes)
-        loss = float(np.median(loss_factor(sweep.stiffness)))
-        yield f"the loss factor is {number(loss, 2)} in the median, unusual for rubber; possible causes: {unless}"
+        causes = ", or ".join(mistake.in_words(sweep) for mistake in mistakes)
+        loss = number(float(np.median(loss_factor(sweep.stiffness))), 2)
+        yield f"the loss factor is {loss} in the median, unusual for rubber; possible causes: {causes}"
 
 
-def _complex_median(values: Array) -> complex:
+def complex_median(values: Array) -> complex:
     """Median of the real and of the imaginary parts."""
     return complex(np.median(values.real), np.median(values.imag))

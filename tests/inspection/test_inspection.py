@@ -18,7 +18,7 @@ from bushfit.geometry import Direction, Specimen
 from bushfit.inspection.gathering import gather
 from bushfit.inspection.loops import describe_loop
 from bushfit.inspection.opening import inspect_file
-from bushfit.inspection.record import file_text
+from bushfit.inspection.record import campaign_tables
 from bushfit.model.model import Model
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
@@ -384,4 +384,4 @@ def test_a_programme_of_loops_is_described(paper_model: Model, tmp_path: Path, *
     assert seen.facts["programme"] == said
     assert seen.facts["loop 2"].startswith("0.5 mm at 0.1 Hz, a sine; ")
     assert seen.facts["loop 2"].endswith("before its steady cycles are left out; 4 cycles are used")
-    assert tomllib.loads(file_text(seen, tmp_path))["loops"][0]["file"] == "axial.csv"
+    assert tomllib.loads("\n".join(campaign_tables([seen], tmp_path)))["loops"][0]["file"] == "axial.csv"
