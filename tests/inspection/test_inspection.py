@@ -211,7 +211,7 @@ def test_repeats_that_nothing_tells_are_asked_for(sweep: Sweep, tmp_path: Path, 
         ("loop_axial_2mm.csv", ("the name states 2 mm, the amplitude is 1 mm zero-to-peak: the name may be p",)),
         (
             "loop_axial_0p5mm_0.2Hz.csv",
-            ("the name states 0.5 mm, the amplitude", "the name says 0.2 Hz, the frequency"),
+            ("the name states 0.5 mm, the amplitude", "the name states 0.2 Hz, the frequency"),
         ),
     ],
 )
