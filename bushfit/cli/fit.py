@@ -120,6 +120,7 @@ def _finish(output: Output, folder: Path, fitted: FitOutput, model: Path | None,
         verdict = f"the model {'misses' if misses else 'meets'} the tests: {figures} (1 is noise alone)"
         if misses:
             action = f"bushfit diagnose {file} finds what the model lacks"
+            action = action if result.fitted else f"free a parameter in [fit] of {file}, and fit again"
     if fitted.files[0].name == "static":
         action = f"bushfit fit-dynamic {file} --static {written} fits m and alpha"
     elif left_open := result.left_open:

@@ -1,0 +1,230 @@
+"""Random mutations of files and options of every command: each ends right or with one clear error, and loses no file."""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+from commandline import call
+from spoiled import FILES
+
+from bushfit.cli import cli
+
+ROOT = Path(__file__).parents[2]
+#: Processor time that a case may take [s].
+SECONDS = 10.0
+MANIFEST = """
+[[bushings]]
+campaign = "campaign.toml"
+[[bushings]]
+campaign = "camp*.toml"
+name = "b"
+model = "model.json"
+commands = ["predict"]
+"""
+FOLDER = ROOT / "data/reports/mystery_mount"
+INPUTS = {
+    **FILES, "list.toml": MANIFEST, "list.csv": "name,campaign,commands\na,campaign.toml,fit\n",
+    "limits.toml": (ROOT / "configs/limits.toml").read_text(encoding="utf-8"),
+    **{f"res/{file.name}": file.read_text(encoding="utf-8") for file in FOLDER.iterdir() if file.suffix in (".json", ".csv")},
+}  # fmt: skip
+SIZES = ("--inner-radius", "10 mm", "--outer-radius", "18 mm", "--length", "34 mm")
+#: Command lines of each command, of which one is taken at a time.
+LINES: dict[str, list[tuple[str, ...]]] = {
+    **{name: [("campaign.toml",)] for name in ("run", "diagnose", "fit")},
+    "fit-static": [("campaign.toml",), ("campaign.toml", "--dynamic", "model.json")],
+    "fit-dynamic": [("campaign.toml", "--static", "model.json")],
+    "predict": [("model.json",), ("model.json", "--campaign", "campaign.toml")],
+    "compare": [("model.json", "model.json"), ("campaign.toml", "--families", "kraus")],
+    "report": [("res",)],
+    "batch": [("list.toml", "--limits", "limits.toml"), ("list.csv",), ("campaign.toml", "--limits", "limits.toml")],
+    "inspect": [("loop.csv",), ("sweep.csv",), ("shaker.csv",), (".",)],
+    "init": [("loop.csv", "sweep.csv", "--direction", "axial", *SIZES), (".", *SIZES)],
+    "reduce": [("loop.csv", "--direction", "axial"), ("shaker.csv", "--mass", "0.5 kg", "--direction", "axial")],
+    "plan": [("campaign.toml", "--hours", "1"), ("model.json", "--hours", "1")],
+    "simulate": [("more.toml",), ("model.json",)],
+    "export": [("model.json", "--format", name) for name in ("nastran", "abaqus", "adams", "csv", "xlsx")],
+    "schema": [("model",), ("campaign",), ("",)],
+}
+VALUES = [
+    "", "0", "-1", "1", "3.5", "1e400", "nan", "true", "[]", "{}", "[[1]]", '"x"', '"10 mm"', '"-5 N"', '"1e300 m"', '"axial"',
+    '"DMA"', '"../x"', '"\\u0000"', '"\u202e\x9b"', '["5 Hz", "5 Hz"]', '"100 %"', "9" * 400, '"' + "a" * 400 + '"',
+    "1979-05-27", '"loop.csv"', '"model.json"', '"1 MPa*s^alpha"', '"61 Shore A"', "1000000",
+]  # fmt: skip
+HEADINGS = [
+    "[fit]", "[rig]", "[predict]", "[simulate]", "[compound]", "[report]", "[[specimens]]", "[[sweeps]]", "[fit.mu]", "[x]",
+    '[fit."inertia.mass"]', "[simulate.effects.friction]", "[[bushings]]",
+]  # fmt: skip
+CELLS = [
+    "", "0", "-1", "1e400", "nan", "inf", "#REF!", "x", "1,5", '"', " ", "1e-320", "9" * 20, "\x00", "\u202e", "=1+1", "5", "1e6",
+    "|", "\t", "time [s]", "force [N]", "frequency [Hz]", "stiffness [N/mm]", "phase [deg]", "Kraft [kN]",
+]  # fmt: skip
+LEAVES: list[Any] = [
+    None, True, 0, -1, 1, 1e308, 1e-308, "", "x", "NaN", [], {}, [[1]], {"a": 1}, "mu", "Pa", "\u202e", 10**30, 0.5, ["mu"],
+    "axial", "inertia",
+]  # fmt: skip
+OPTIONS = [
+    "axial", "torsion", "DMA", "inertia", "kraus+inertia", "", "x", "5:155:10 Hz", "0.1, 0.5 mm", "10 mm", "1 %", "-1", "0", "nan",
+    "1e999 Hz", "1 kg", "0.1 g", "2", "sine", "5:1e9:0.001 Hz", "-300 degC", "force=N", "force=x", "axial 25 Hz 0.1 mm", "xlsx",
+    "soft_l1", "model.json", "campaign.toml", "peak_to_peak:sweep", "\u202e", "a" * 500, "inertia.mass=1 kg", "500 N axial",
+]  # fmt: skip
+PIECES = [b"", b"\0", b'"', b",", b"[", b"]", b"=", b"\n", b"9" * 300, b"\xff", b"{", b"#", b"nan", b"-", b";"]
+
+
+def mutated(rng: random.Random, name: str, text: str) -> bytes:
+    """A file with one to four changes: of bytes, or of lines, cells or entries by its ending."""
+    if rng.random() < 0.2:
+        data = bytearray(text.encode())
+        for _ in range(rng.randint(1, 4)):
+            start = rng.randrange(len(data) + 1)
+            data[start : start + rng.choice([0, 1, 3, 20, 200])] = rng.choice(PIECES)
+        return bytes(data)
+    change = {".toml": toml_changed, ".json": json_changed}.get(Path(name).suffix, table_changed)
+    for _ in range(rng.randint(1, 4)):
+        text = change(rng, text)
+    return text.encode("utf-8", "surrogatepass")
+
+
+def toml_changed(rng: random.Random, text: str) -> str:
+    lines = text.split("\n")
+    at, keys = rng.randrange(len(lines)), [line.partition("=")[0] for line in lines if "=" in line] or ["x "]
+    kind = rng.randrange(5)
+    if kind == 0 and len(lines) > 1:
+        del lines[at]
+    elif kind == 1:
+        lines.insert(at, rng.choice(HEADINGS))
+    elif kind == 2:
+        lines.insert(at, rng.choice(lines))
+    else:
+        lines[at] = f"{lines[at].partition('=')[0] if '=' in lines[at] else rng.choice(keys)}= {rng.choice(VALUES)}"
+    return "\n".join(lines)
+
+
+def table_changed(rng: random.Random, text: str) -> str:
+    rows = [row.split(",") for row in text.rstrip("\n").split("\n")]
+    at, column = rng.choice([0, rng.randrange(len(rows))]), rng.randrange(len(rows[0]) or 1)
+    kind = rng.randrange(6)
+    if kind == 0 and len(rows) > 1:
+        del rows[at]
+    elif kind == 1:
+        rows.insert(at, rows[at])
+    elif kind == 2:
+        rows[1:] = rows[:0:-1]
+    elif kind == 3:
+        rows[1:] = [[*row[:column], rng.choice(CELLS), *row[column + 1 :]] for row in rows[1:]]
+    else:
+        rows[at] = [*rows[at][:column], rng.choice(CELLS), *rows[at][column + 1 :]]
+    return "\n".join(",".join(row) for row in rows) + "\n"
+
+
+def json_changed(rng: random.Random, text: str) -> str:
+    document = json.loads(text)
+    places = list(entries(document))
+    if places:
+        table, key = rng.choice(places)
+        if rng.random() < 0.25:
+            del table[key]
+        else:
+            table[key] = rng.choice(LEAVES)
+    return json.dumps(document)
+
+
+def entries(node: Any) -> Iterator[tuple[Any, Any]]:
+    """Each table or list of a document with each of its keys."""
+    for key in node if isinstance(node, dict) else range(len(node)) if isinstance(node, list) else ():
+        yield node, key
+        yield from entries(node[key])
+
+
+def options(rng: random.Random, command: str) -> list[str]:
+    """Up to three options of a command with random values."""
+    found = cli.get_command(click.Context(cli), command)
+    assert found is not None
+    known = [option for option in found.params if isinstance(option, click.Option)]
+    words = []
+    for option in rng.choices(known, k=rng.randint(0, 3)):
+        if option.name not in ("output", "scheduler", "jobs", "junit", "help", "as_json"):
+            choices = [str(choice) for choice in getattr(option.type, "choices", ())]
+            words += [option.opts[0], *([] if option.is_flag else [rng.choice([*choices, *OPTIONS])])]
+    return words
+
+
+@contextmanager
+def time_limit() -> Iterator[None]:
+    """Raise a TimeoutError after so much processor time, where the system can."""
+
+    def stop(*_: object) -> None:
+        raise TimeoutError(f"more than {SECONDS:g} s of processor time")
+
+    if not hasattr(signal, "setitimer"):
+        yield
+        return
+    before = signal.signal(signal.SIGVTALRM, stop)
+    signal.setitimer(signal.ITIMER_VIRTUAL, SECONDS)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)
+
+
+def tried(command: str, seed: int, folder: Path) -> tuple[list[str], str]:
+    """One case, its command line and what is wrong with its end: "" where nothing is."""
+    rng = random.Random(f"{command} {seed}")
+    shutil.rmtree(folder, ignore_errors=True)
+    line = rng.choice(LINES[command])
+    used = [name for name in INPUTS if name in line or ("res" in line) == name.startswith("res/")]
+    files = {name: text.encode() for name, text in INPUTS.items()}
+    if rng.random() < 0.8:
+        files |= {name: mutated(rng, name, INPUTS[name]) for name in rng.sample(used, rng.randint(1, 2))}
+    files["x/mine.txt"] = b"mine"
+    for name, content in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+    words = [
+        command,
+        *line,
+        *(options(rng, command) if rng.random() < 0.5 else []),
+        "-o",
+        "x/c" if command == "init" else "x",
+    ]
+    words += ["--jobs", "1"] if command == "batch" else []
+    words += [] if command in ("schema", "report") else ["--no-plots"]
+    try:
+        with time_limit():
+            done = call(folder, *words)
+    except Exception as error:
+        return words, f"{type(error).__name__}: {error}"
+    said = done.stdout + done.stderr + "".join(file.read_text("utf-8") for file in folder.glob("x/batch.csv"))
+    if "a fault in bushfit" in said or "Traceback" in said:
+        return words, said[-500:]
+    if (done.returncode == 2 and done.stderr.count("rror: ") < 1) or done.returncode not in (0, 1, 2):
+        return words, f"status {done.returncode} without an error: {done.stderr}"
+    if any(sign in said for sign in "\x1b\x9b\u202e\x00"):
+        return words, "a character that steers the terminal"
+    lost = [
+        name
+        for name, content in files.items()
+        if not (folder / name).exists() or (folder / name).read_bytes() != content
+    ]
+    return words, f"lost: {lost}" if lost else ""
+
+
+def faults(command: str, seeds: range, folder: Path, budget: float = float("inf")) -> tuple[int, list[str]]:
+    """Number of cases that were tried within the time [s], and what was wrong."""
+    begin, found = time.monotonic(), []
+    for count, seed in enumerate(seeds, start=1):
+        words, fault = tried(command, seed, folder)
+        if fault:
+            found.append(f"{command}, case {seed}: {words}\n{fault}")
+        if time.monotonic() - begin > budget:
+            return count, found
+    return len(seeds), found
