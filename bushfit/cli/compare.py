@@ -112,16 +112,18 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
         action = f"next: bushfit fit {quote_path(Path(compared.entries[0].source))}{effects}"
         sentences = [*advice, *compared.notes, *(compared.words if output.verbose else ())]
     else:
-        different = [
-            f"{label} in {', '.join(names)}"
-            for label, comparison in zip(labels, compared.comparisons, strict=True)
-            if (names := [row.name for row in comparison.parameters if row.holm is not None and row.holm < _CHANCE])
-        ]
+        different = []
+        for label, comparison in zip(labels, compared.comparisons, strict=True):
+            names = [row.name for row in comparison.parameters if row.holm is not None and row.holm < _CHANCE]
+            if not names and comparison.joint and comparison.joint[0] < _CHANCE:
+                names = ["all parameters together"]
+            if names:
+                different.append(f"{label} in {', '.join(names)}")
         verdict = f"differences from {first} beyond chance: {'; '.join(different)}"
         action = "use each result for its own part; differences.csv lists stiffness and loss factor at each point"
         if not different:
             verdict = f"no parameter differs from that of {first} by more than chance"
-            action = "the results may replace each other within the intervals below"
+            action = "the compounds agree within the intervals below"
         sentences = [*compared.notes, *compared.words]
     output.print_headline(name, verdict, action)
     for sentence in sentences:
