@@ -130,6 +130,6 @@ def print_predictions(output: Output, predicted: PredictionOutput) -> None:
                 value, *limits = format_aligned([row[name], *band], digits)
                 cells.append(f"{value} ({' to '.join(limits)})" if band[0] < band[1] else value)
             rows.append(cells)
-        title = f"{owner}{prediction.direction}, corners, with 95 % bands"
+        title = f"{owner}{prediction.direction}, corners of the grid, with 95 % bands"
         output.print_table(title, list(table.columns[:4]), rows, text_columns=0)
     output.warn(predicted.warnings)

@@ -55,7 +55,7 @@ def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Usab
             "test by test: NRMSE and mean error of the model in |K| [%] (+: stiffer than measured), reduced "
             "chi-square (chi2)"
         )
-        columns, rows = ("test", "place", "points", "NRMSE", "chi2", "mean", ""), []
+        columns, rows = ("test", "direction", "points", "NRMSE", "chi2", "mean", ""), []
         for test in (test for test in tests if test in worst):
             name = test.test if test.held is None else f"  {_run_label(test)}"
             gain = f"{round(100 * test.gain, 2) + 0.0:+.2f}"  # no -0

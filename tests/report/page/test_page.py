@@ -65,7 +65,7 @@ def test_the_first_block_is_what_a_customer_reads(results: Results) -> None:
         for number in (f"{loss.imag / loss.real:.3g} ", f"{static:.4g} N/mm at 0.1 Hz", f"{dynamic / static:.2f} ±"):
             assert number in row
     for words in (
-        *("95 % of 144 held-out points", "fitted to tests of this place", "Verdict: consistent"),
+        *("95 % of 144 held-out points", "fitted to tests in this direction", "Verdict: consistent"),
         *("predicted from axial tests; the measured sweep agrees within its noise", "Use it within the tested range"),
     ):
         assert words in first
