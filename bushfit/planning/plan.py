@@ -129,7 +129,7 @@ def describe_purpose(search: PlanSearch, test: int) -> str:
     if request.aim == "rivals":
         chi_square, closer = problem.nearest_rivals(counts), problem.nearest_rivals(reduced)
         if closer * _NOTABLE_RATIO <= chi_square:
-            apart = f"{number(closer, 2)} apart in expected chi-square without it, {number(chi_square, 2)} with it"
+            apart = f"expected chi-square {number(closer, 2)} without it, {number(chi_square, 2)} with it"
             return f"rivals {apart}"
     elif problem.goals:
         widened = [
@@ -216,6 +216,7 @@ def plan_warnings(search: PlanSearch, planned: Programme, missed: Sequence[str |
         yield f"no test of this rig would distinguish {' from '.join(names)}: they are left out"
     if planned.rival_chi_square is not None and planned.rival_chi_square < RIVALS_APART:
         yield (
-            f"the nearest rivals are {number(planned.rival_chi_square, 2)} apart in expected chi-square, less than the "
+            f"the expected chi-square between the nearest rivals is {number(planned.rival_chi_square, 2)}, less "
+            "than the "
             f"{number(RIVALS_APART, 3)} that distinguishes them in nine of ten cases"
         )

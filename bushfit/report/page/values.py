@@ -88,7 +88,7 @@ def basis(record: ReportRecord, place: str) -> str:
     """Sentence on the tests that the prediction of a place rests on."""
     fitted = record.result.measured.directions if record.result.measured else ()
     if place in fitted:
-        return "fitted to tests of this place"
+        return "fitted to tests in this direction"
     tests = [test for test in record.result.tests if test.place == place and test.held is None and not test.fitted]
     source = f"predicted from {' and '.join(fitted)} tests" if fitted else "calculated from given parameters"
     if not tests:
