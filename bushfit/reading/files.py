@@ -24,17 +24,21 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
+#: Quoted cell of a header with a line end, such as "Force(line end)[N]".
+_QUOTED_LINE_END = re.compile(rb'(?:^|(?<=[,;\t\r\n]))"[^"\r\n,;\t]+(?:\r?\n[^"\r\n,;\t]+){1,2}"(?=[,;\t\r\n])')
 #: Share of zeros among every other byte from which a text is taken for UTF-16; ASCII has nearly all of them zero.
 _LEAST_ZERO_SHARE = 0.3
 #: Runs of bytes beyond ASCII that are compared; chosen: many times those of a header.
 _MOST_RUNS = 1 << 16
-#: Known words in Chinese and Japanese; chosen: of two characters or more, which are no chance.
-_EASTERN = frozenset(
-    word
+#: Encodings that are detected by known words alone: Japanese, Korean, Central European, Cyrillic.
+_RARE = ("cp932", "cp949", "cp1250", "cp1251")
+#: Names of columns with letters beyond ASCII; chosen: of two characters or more, which are no chance.
+_KNOWN_WORDS = frozenset(
+    word.lower()
     for table in WORDS.values()
     for words in table.values()
     for word in words
-    if len(word) > 1 and min(word) > "\u3000"
+    if len(word) > 1 and not word.isascii()
 )
 #: A run of bytes beyond ASCII.
 _HIGH_RUN = re.compile(rb"[\x80-\xff]+")
@@ -144,6 +148,13 @@ def sha256(data: bytes) -> Future[str]:
     return digest
 
 
+def join_quoted(data: bytes) -> bytes:
+    """Return a text in UTF-8 with blanks instead of the line ends inside the quoted cells of its header."""
+    head = data[:HEAD_BYTES]
+    joined = _QUOTED_LINE_END.sub(lambda match: b" ".join(match[0].split()), head)
+    return data if joined == head else joined + data[HEAD_BYTES:]
+
+
 def to_utf8(data: bytes, file: Path, stated_encoding: str | None = None) -> tuple[bytes, str]:
     """Convert a text to UTF-8.
 
@@ -194,8 +205,8 @@ def detect(data: bytes) -> str:
     Notes:
         Test files are ASCII but for a few letters of their header, too few for detectors that count letters, such as
         charset-normalizer and chardet. Here the bytes decide, in this order: a byte order mark; zeros beside ASCII
-        (UTF-16); valid UTF-8; more known words in Shift-JIS than in GB18030; pairs of common Chinese characters
-        (GB18030); and Western Latin for the rest (cp1252, or Latin-1 if cp1252 lacks a byte).
+        (UTF-16); valid UTF-8; the encoding in which most names of columns are found; pairs of common Chinese
+        characters (GB18030); and Western Latin for the rest (cp1252, or Latin-1 if cp1252 lacks a byte).
     """
     for mark, encoding in _MARKS:
         if data.startswith(mark):
@@ -210,13 +221,14 @@ def detect(data: bytes) -> str:
         return "utf-8"
     runs = _HIGH_RUN.findall(data)[:_MOST_RUNS]
     is_chinese = 2 * sum(_COMMON_CHINESE.fullmatch(run) is not None for run in runs) > len(runs)
-    order = ("gb18030", "cp1252") if is_chinese else ("cp1252", "gb18030")
-    decoded = {encoding: data[:HEAD_BYTES].decode(encoding, "ignore") for encoding in ("gb18030", "cp932")}
-    known = {encoding: sum(word in text for word in _EASTERN) for encoding, text in decoded.items()}
-    for encoding in ("cp932", *order) if known["cp932"] > known["gb18030"] else order:
-        with suppress(UnicodeDecodeError):
-            data.decode(encoding)
-            return encoding
+    usual = ["gb18030", "cp1252"] if is_chinese else ["cp1252", "gb18030"]
+    heads = {encoding: data[:HEAD_BYTES].decode(encoding, "ignore").lower() for encoding in (*usual, *_RARE)}
+    counts = {encoding: sum(word in head for word in _KNOWN_WORDS) for encoding, head in heads.items()}
+    for encoding in sorted(counts, key=lambda encoding: -counts[encoding]):
+        if encoding in usual or counts[encoding]:
+            with suppress(UnicodeDecodeError):
+                data.decode(encoding)
+                return encoding
     return "latin-1"
 
 

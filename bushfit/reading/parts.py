@@ -13,7 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from bushfit.errors import BushfitError, MeasurementError, did_you_mean
-from bushfit.reading.files import sha256, to_utf8, view_bytes
+from bushfit.reading.files import join_quoted, sha256, to_utf8, view_bytes
 from bushfit.reading.instruments import format_of, read_groups, word_for_part
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.source import RowSource, Sheet, Text
@@ -85,7 +85,8 @@ def open_file(file: Path, file_format: FileFormat) -> OpenedFile:
             raise MeasurementError(
                 "this is no workbook", file=file, found=f'sheet = "{file_format.sheet}"', expected=expected
             )
-        return OpenedFile(file, checksum, file_format, [Text(*to_utf8(data, file, file_format.encoding))])
+        text, encoding = to_utf8(data, file, file_format.encoding)
+        return OpenedFile(file, checksum, file_format, [Text(join_quoted(text), encoding)])
     if (name := file_format.sheet) is None:
         return OpenedFile(file, checksum, file_format, [part for part, visible in parts if visible])
     names = [part.sheet for part, _ in parts]
