@@ -17,7 +17,7 @@ import sys
 import tempfile
 import uuid
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -25,7 +25,7 @@ from xml.etree import ElementTree as ET
 from bushfit.errors import OutputError
 from bushfit.export.contract import Exported, Order
 from bushfit.export.in_time import FIELDS, TABLES, UNIT_FIELDS, TimeModel, time_model
-from bushfit.geometry import Place, Unit
+from bushfit.geometry import Unit
 from bushfit.reading.tablefile import folder_name
 from bushfit.version import __version__
 
@@ -80,7 +80,11 @@ def export(order: Order) -> Exported:
         path: library,
         **{f"sources/{file}": source for file, source in sources.items()},
     }
-    return Exported({f"{name}.fmu": _zip_archive(content)}, model.losses, model.arms)
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file, data in content.items():  # without dates, so that equal contents give equal bytes
+            archive.writestr(zipfile.ZipInfo(file), data, zipfile.ZIP_DEFLATED)
+    return Exported({f"{name}.fmu": buffer.getvalue()}, model.losses, model.arms)
 
 
 def compile_library(sources: Mapping[str, bytes], name: str) -> tuple[str, bytes]:
@@ -203,7 +207,15 @@ def model_description(order: Order, model: TimeModel, name: str, guid: str) -> b
         ET.SubElement(source_files, "File", {"name": file})
     definitions = ET.SubElement(root, "UnitDefinitions")
     ET.SubElement(root, "DefaultExperiment", {"startTime": "0", "stopTime": "1", "stepSize": "0.001"})
-    variables, displays = ET.SubElement(root, "ModelVariables"), display_units(model.places)
+    variables = ET.SubElement(root, "ModelVariables")
+    displays = {  # of displacements and forces by SI unit, where the two differ
+        unit: display
+        for place in model.places
+        for unit, display in zip(
+            (place.motion.displacement_unit, place.motion.force_unit), place.display[:2], strict=True
+        )
+        if unit != "1" and display.factor != 1.0
+    }
     add_variables(variables, model, displays)
     for unit in sorted({real.attrib["unit"] for real in variables.iter("Real") if "unit" in real.attrib}):
         definition = ET.SubElement(definitions, "Unit", {"name": unit})
@@ -260,24 +272,5 @@ def add_variables(variables: ET.Element, model: TimeModel, displays: Mapping[str
         )
 
 
-def display_units(places: Sequence[Place]) -> dict[str, Unit]:
-    """Display units of displacements and forces by SI unit, where the two differ."""
-    pairs = [
-        pair
-        for place in places
-        for pair in zip((place.motion.displacement_unit, place.motion.force_unit), place.display[:2], strict=True)
-    ]
-    return {unit: display for unit, display in pairs if unit != "1" and display.factor != 1.0}
-
-
 def _xml_text(text: str) -> str:
     return _NO_XML.sub("_", text)
-
-
-def _zip_archive(content: Mapping[str, bytes]) -> bytes:
-    """A zip archive without dates, so that equal contents give equal bytes."""
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, data in content.items():
-            archive.writestr(zipfile.ZipInfo(name), data, zipfile.ZIP_DEFLATED)
-    return buffer.getvalue()

@@ -57,7 +57,7 @@ def radial_strain(a: float, b: float) -> float:
     >>> round(radial_strain(0.010, 0.018), 1)
     274.0
     """
-    q = _q(a, b)
+    q = _area(a, b) / (a * a + b * b)
     series = (q ** (2 * j + 3) / (2 * j + 3) for j in range(30))  # the next one is 1e-17 of the sum at the largest q
     difference = _log_ratio(a, b) - q if q > _LARGEST_Q_OF_SERIES else math.fsum(series)
     return 1.0 / math.sqrt(_area(a, b) * difference)
@@ -85,7 +85,8 @@ def radial_stiffness(a: float, b: float, length: float) -> float:
     >>> round(radial_stiffness(0.010, 0.018, 0.034), 4)
     2.8431
     """
-    if not (_is_inside(a / b, RADIUS_RATIO_RANGE) and _is_inside(length / b, SLENDERNESS_RANGE)):
+    ranges = ((a / b, RADIUS_RATIO_RANGE), (length / b, SLENDERNESS_RANGE))
+    if not all(low * (1.0 - _ROUNDING) <= value <= high * (1.0 + _ROUNDING) for value, (low, high) in ranges):
         raise ModelError(
             "the radial formula (Eqs. 11, 12) was not checked for this shape",
             place="inner_radius, outer_radius, length",
@@ -93,6 +94,7 @@ def radial_stiffness(a: float, b: float, length: float) -> float:
             expected="inner/outer 0.1 to 0.97 and length/outer 0.05 to 100",
             hint="check the units of the geometry; the axial direction has no such limit",
         )
+    q = _area(a, b) / (a * a + b * b)
     alpha = math.sqrt(60.0) / length
     inner, outer = alpha * a, alpha * b
     once, twice = math.exp(inner - outer), math.exp(2.0 * (inner - outer))
@@ -104,7 +106,7 @@ def radial_stiffness(a: float, b: float, length: float) -> float:
         - inner * (3.0 * b**2 + a**2) * (i1a * k0b * twice + i0b * k1a)
     )
     denominator = inner * outer * (b**2 + a**2) * (i1b * k1a - i1a * k1b * twice)
-    return 10.0 * math.pi * length / (3.5 * _log_ratio(a, b) - 1.5 * _q(a, b) + float(numerator / denominator))
+    return 10.0 * math.pi * length / (3.5 * _log_ratio(a, b) - 1.5 * q + float(numerator / denominator))
 
 
 def torsion_strain(a: float, b: float) -> float:
@@ -142,12 +144,3 @@ def _log_ratio(a: float, b: float) -> float:
 def _area(a: float, b: float) -> float:
     """b^2 - a^2 [m^2], with full precision for thin bushings too."""
     return (b - a) * (b + a)
-
-
-def _q(a: float, b: float) -> float:
-    """(b^2 - a^2)/(b^2 + a^2)."""
-    return _area(a, b) / (a * a + b * b)
-
-
-def _is_inside(value: float, limits: tuple[float, float]) -> bool:
-    return limits[0] * (1.0 - _ROUNDING) <= value <= limits[1] * (1.0 + _ROUNDING)

@@ -49,10 +49,8 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
     problem = PlanningProblem.from_request(knowledge, request)
     search = PlanSearch(problem, request.hours)
     shorter = [PlanSearch(problem, share * request.hours) for share in _SHARES.get(request.aim, ())]
-    for any_quality in (False, True) if problem.goals else (True,):  # unsound plans only if no sound one reaches
-        first = bisect_left(
-            shorter, True, key=lambda search: search.reaches_aim() and (any_quality or search.is_sound())
-        )
+    for soundly in (True, False) if problem.goals else (False,):  # unsound plans only if no sound one reaches
+        first = bisect_left(shorter, True, key=lambda search: search.reaches_aim(soundly=soundly))
         if first < len(shorter):
             search = shorter[first]
             break

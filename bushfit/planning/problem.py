@@ -78,7 +78,7 @@ class PlanningProblem:
         wanted = {points.place: WantedPoints.from_knowledge(knowledge, points) for points in request.points}
         names = (*knowledge.names, *knowledge.bounded)
         goals = [
-            Goal.of_prediction(target, wanted[target.place]) if target.place else Goal.of_parameter(target, names)
+            Goal.from_target(target, names, wanted[target.place] if target.place else None)
             for target in request.targets
         ]
         budget = _budget(request, tests)

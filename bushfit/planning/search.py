@@ -12,12 +12,14 @@ from bushfit.effects import qualified_name
 from bushfit.effects.contract import Array
 from bushfit.fitting.repeats import FEWEST_STEPS
 from bushfit.geometry import Place, Specimen
+from bushfit.model.result import Range, Result
 from bushfit.planning.candidates import standard_tests
 from bushfit.planning.contract import DetectableAmount, Programme, Test
 from bushfit.planning.criterion import Budget, Criterion, DriftEffect, best_runs, order_runs
 from bushfit.planning.information import eliminate_line_errors
 from bushfit.planning.problem import DETECTABLE, RIVALS_APART, PlanningProblem
-from bushfit.planning.targets import Goal, describe_untested
+from bushfit.planning.targets import Goal
+from bushfit.prediction.caveats import unfitted
 
 #: Weight of the logarithm of each lack of power beside the logarithm of the variance, and the weight that is used if
 #: the first leaves a lack; chosen.
@@ -110,25 +112,41 @@ class PlanSearch:
         """Number of runs of each test, (tests,), among runs given by the numbers of their tests."""
         return np.bincount(np.array(runs, dtype=int), minlength=len(self.problem.tests))
 
-    def reaches_aim(self) -> bool:
-        """True if the tests separate the rivals with a margin of two, or meet the targets that can be met."""
-        problem = self.problem
+    def reaches_aim(self, *, soundly: bool = False) -> bool:
+        """True if the tests separate the rivals with a margin of two, or meet the targets that can be met.
+
+        Args:
+            soundly: whether effects have to show as in the standard programme, and repeats to determine the scatter.
+        """
+        problem, counts = self.problem, self.counts
         if problem.request.aim == "rivals":
-            return problem.nearest_rivals(self.counts) >= 2.0 * RIVALS_APART
-        covariance = problem.error_covariance(self.counts)
+            return problem.nearest_rivals(counts) >= 2.0 * RIVALS_APART
+        covariance = problem.error_covariance(counts)
         reached = all(goal.reached(covariance, problem.limit_covariance) for goal in problem.goals)
         testable = [goal for goal in problem.goals if goal.target.place in problem.request.places]
-        return bool(problem.goals) and reached and not any(self.untested(goal, self.counts) for goal in testable)
-
-    def is_sound(self) -> bool:
-        """True if all effects show as in the standard programme, and repeats determine the scatter."""
-        return not self.less_visible_effects(self.counts) and self.determines_scatter(self.counts)
+        if not problem.goals or not reached or any(self.untested(goal, counts) for goal in testable):
+            return False
+        return not soundly or (not self.less_visible_effects(counts) and self.determines_scatter(counts))
 
     def untested(self, goal: Goal, counts: Array) -> str | None:
-        """Sentence on the error that a goal's interval lacks because its direction is not tested; None without one."""
+        """Sentence on the error that a goal's interval lacks because its direction is not tested.
+
+        Args:
+            goal: of a target.
+            counts: number of runs of each test, (tests,), beside the tests so far.
+
+        Returns:
+            The sentence; None if the interval lacks no error.
+        """
+        place, knowledge = goal.target.place, self.problem.knowledge
+        measured = knowledge.result.measured if knowledge.result else None
         planned = (self.problem.tests[test] for test in np.flatnonzero(counts))
-        tested = [str(test.direction) for test in (*self.problem.knowledge.tests, *planned)]
-        return describe_untested(self.problem.knowledge, goal.target.place, tested) if goal.target.place else None
+        tested = [*(measured.directions if measured else ())]
+        tested += [str(test.direction) for test in (*knowledge.tests, *planned)]
+        if place is None or str(place) in tested:
+            return None
+        fitted = replace(measured or Range((1.0, 1.0), (1.0, 1.0)), directions=tuple(dict.fromkeys(tested)))
+        return next(unfitted(Result(knowledge.model, knowledge.names, measured=fitted), place), None)
 
     def less_visible_effects(self, counts: Array) -> list[str]:
         """Effects that these runs show less well than the standard programme."""
@@ -259,7 +277,11 @@ class PlanSearch:
         information = model.total(counts)
         covariance = model.error_covariance(information)[0]
         free_variance = np.diag(np.linalg.inv(information.parameters[0]))
-        stiffness, loss = np.concatenate([part.standard_errors(covariance) for part in problem.wanted], axis=1)
+        errors = []
+        for points in problem.wanted:
+            gain, phase = np.sqrt(np.einsum("cnk,kl,cnl->cn", points.slopes, covariance, points.slopes))
+            errors.append(np.hypot([gain, phase * (1.0 + np.square(points.loss_factor))], points.model_error))
+        stiffness, loss = np.concatenate(errors, axis=1)
         shift = covariance_root(information.parameters[0]) @ drift.shift(runs) / np.sqrt(free_variance)
         # tests alone leave combinations open whose information is rounding; without tests no error is of use
         values, vectors = np.linalg.eigh(information.parameters[0] - model.prior)

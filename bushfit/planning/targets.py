@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import new_sweep
-from bushfit.geometry import Place
 from bushfit.model.covariance import Z95, Covariance
-from bushfit.model.result import Range, Result
+from bushfit.model.result import Result
 from bushfit.planning.contract import Knowledge, Points, Target
 from bushfit.planning.information import relative_slopes
-from bushfit.prediction.caveats import unfitted
 from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import loss_factor
 from bushfit.units import format_range, number
@@ -61,11 +59,6 @@ class WantedPoints:
         loss = loss_factor(knowledge.model.stiffness(place, frequency, amplitude))
         return cls(points, loss, slopes, np.array(model_error), np.array(undecided))
 
-    def standard_errors(self, error_covariance: Array) -> Array:
-        """Standard errors of |K|, relative, and of the loss factor, (2, n), from the parameters' covariance, (k, k)."""
-        gain, phase = np.sqrt(np.einsum("cnk,kl,cnl->cn", self.slopes, error_covariance, self.slopes))
-        return np.hypot([gain, phase * (1.0 + np.square(self.loss_factor))], self.model_error)
-
 
 @dataclass(frozen=True, eq=False)
 class Goal:
@@ -86,14 +79,17 @@ class Goal:
     points: Points | None = None
 
     @classmethod
-    def of_parameter(cls, target: Target, names: Iterable[str]) -> Goal:
-        """Goal of one of the named parameters."""
-        row = np.array([[float(name == target.quantity) for name in names]])
-        return cls(target, row, np.zeros(1), np.zeros(1))
+    def from_target(cls, target: Target, names: Sequence[str], wanted: WantedPoints | None) -> Goal:
+        """Make the goal of a target.
 
-    @classmethod
-    def of_prediction(cls, target: Target, wanted: WantedPoints) -> Goal:
-        """Goal of the stiffness or the loss factor at wanted points."""
+        Args:
+            target: a parameter, or the stiffness or loss factor of a direction.
+            names: of the k parameters.
+            wanted: points of the direction; None of a parameter.
+        """
+        if wanted is None:
+            row = np.array([[float(name == target.quantity) for name in names]])
+            return cls(target, row, np.zeros(1), np.zeros(1))
         (gain, phase), loss = wanted.slopes, wanted.loss_factor
         if target.quantity == "stiffness":
             return cls(target, gain, wanted.model_error[0], wanted.undecided[0], wanted.points)
@@ -176,25 +172,6 @@ class Goal:
             frequency, amplitude = float(self.points.frequency[worst]), float(self.points.amplitude[worst])
             location = f" at {format_range('Hz', frequency)} and {format_range(unit, factor * amplitude)}"
         return f"{percent(size)}{location} is {cause}"
-
-
-def describe_untested(knowledge: Knowledge, place: Place, tested: Iterable[str]) -> str | None:
-    """Sentence on the error that intervals of an untested direction lack.
-
-    Args:
-        knowledge: before the tests.
-        place: direction or specimen.
-        tested: directions of the tests so far and of those planned.
-
-    Returns:
-        The sentence; None if the intervals lack no error.
-    """
-    measured = knowledge.result.measured if knowledge.result else None
-    directions = dict.fromkeys([*(measured.directions if measured else ()), *tested])
-    if str(place) in directions:
-        return None
-    fitted = replace(measured or Range((1.0, 1.0), (1.0, 1.0)), directions=tuple(directions))
-    return next(iter(unfitted(Result(knowledge.model, knowledge.names, measured=fitted), place)), None)
 
 
 def percent(half: float, digits: int = 2) -> str:
