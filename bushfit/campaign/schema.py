@@ -323,7 +323,7 @@ class SimulatedResonance(SimulatedTest):
     def __post_init__(self) -> None:
         if self.direction.motion is not TRANSLATION:
             expected = "a direction with a displacement, or a specimen in shear"
-            raise ValueError(CampaignError("no mass swings on this", found=str(self.direction), expected=expected))
+            raise ValueError(CampaignError("this cannot carry a mass", found=str(self.direction), expected=expected))
         usable = [f for f in self.frequencies if 1.0 / LARGEST_SHAKEN <= f <= LARGEST_SHAKEN]
         if len(usable) < max(FEWEST_ROWS, len(self.frequencies)):
             expected = f"at least {FEWEST_ROWS}, through the resonance"

@@ -167,8 +167,8 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
     if rivals := document["rivals"]:
         chi_squares = ", ".join(f"{number(rivals[key], 3)} by the {key} tests" for key in ("planned", "standard"))
         output.print(
-            f"{' and '.join(rivals['effects'])}: {chi_squares} in expected chi-square; "
-            f"{number(rivals['enough'], 3)} would distinguish them in nine of ten cases"
+            f"expected chi-square between {' and '.join(rivals['effects'])}: {chi_squares}; "
+            f"{number(rivals['enough'], 3)} distinguishes them in nine of ten cases"
         )
     if document["enough"]:
         output.print(document["enough"])

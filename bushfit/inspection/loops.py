@@ -364,6 +364,6 @@ def ripple(drive: Drive) -> list[str]:
     unit, factor = loop.direction.display.displacement
     return [
         f"a ripple of about {number(factor * lines[line], 2)} {unit} at {frequency[line]:.3g} Hz "
-        f"({number(100 * lines[line] / drive.amplitude, 2)} % of the amplitude) is on the motion: mains hum, "
-        "or an oscillating controller? The loop is the slow motion"
+        f"({number(100 * lines[line] / drive.amplitude, 2)} % of the amplitude) is superposed on the motion: "
+        "mains hum, or an oscillating controller? The slow motion is read as the loop"
     ]

@@ -136,8 +136,8 @@ class Inspection:
         if self.is_counting_open:
             missing = "nothing says" if "at_amplitude" in self.entry else "the header does not state"
             assumptions.append(
-                f"{missing} how amplitudes are counted: zero-to-peak is assumed; --amplitude peak-to-peak states "
-                "the other"
+                f"{missing} how amplitudes are counted: zero-to-peak is assumed; if they are peak-to-peak, add "
+                "--amplitude peak-to-peak"
             )
         return "; ".join(assumptions) or None
 

@@ -183,9 +183,9 @@ def _radial_error(bushing: Bushing) -> str:
     if bushing.correction is None:
         return "which was not compared with finite elements of this shape"
     if bushing.shape == "calibrated":
-        return "up to 1 % in stiffness and 3 % in strain against finite elements"
+        return "up to 1 % in stiffness and 3 % in strain compared with finite elements"
     stiffness, strain = (number(100.0 / factor - 100.0, 2, "+") for factor in bushing.correction[:2])
-    error = f"for this shape {stiffness} % in stiffness and {strain} % in strain against finite elements"
+    error = f"for this shape {stiffness} % in stiffness and {strain} % in strain compared with finite elements"
     return f'{error}; shape = "calibrated" in the campaign corrects it'
 
 

@@ -159,7 +159,7 @@ def sweep_columns(
     counted = columns["amplitude"].convention if "amplitude" in columns else None
     if counted and convention and counted != convention:
         raise table.header_error(
-            "header and campaign state different counts of the amplitude",
+            "header and campaign disagree on how amplitudes are counted",
             column=columns["amplitude"],
             found=f'{counted} in the header, amplitude = "{convention}" in the campaign',
             expected="one convention",

@@ -67,7 +67,7 @@ IN_MORE = [
     ('specimen = "DMA"', 'specimen = "DMB"', "more.toml, simulate.sweeps #2: this specimen is not in the campaign", "one of DMA"),
     ('specimen = "DMA"', 'specimen = "DMA"\ndirection = "axial"', "more.toml, simulate.sweeps #2: a specimen has no such direction", 'direction = "shear", or none'),
     ('specimen = "DMA"\n', "", "more.toml, simulate.sweeps #2: a test without a direction", 'or specimen = "DMA"'),
-    ('direction = "radial"', 'direction = "torsion"', "more.toml, simulate.resonances #1: no mass swings on this", "a direction with a displacement, or a specimen in shear"),
+    ('direction = "radial"', 'direction = "torsion"', "more.toml, simulate.resonances #1: this cannot carry a mass", "a direction with a displacement, or a specimen in shear"),
     ('"500 Hz"', '"60 Hz"', "more.toml, simulate.resonances #1: no frequencies of a shaker", "at least 12, through the resonance"),
 ]
 #: (name, content of the campaign, what the error says ...)

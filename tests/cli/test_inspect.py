@@ -120,8 +120,18 @@ def test_the_unit_tells_frequency_from_force(typed: Run, tmp_path: Path, header:
 @pytest.mark.parametrize(
     ("header", "options", "said", "unsaid"),
     [
-        ("amplitude [mm]", (), "zero-to-peak is assumed; --amplitude peak-to-peak", "half of"),
-        ("Pegel [mm]", ("--column", "amplitude=Pegel"), "zero-to-peak is assumed; --amplitude", "half of"),
+        (
+            "amplitude [mm]",
+            (),
+            "zero-to-peak is assumed; if they are peak-to-peak, add --amplitude peak-to-peak",
+            "half of",
+        ),
+        (
+            "Pegel [mm]",
+            ("--column", "amplitude=Pegel"),
+            "zero-to-peak is assumed; if they are peak-to-peak, add --amplitude",
+            "half of",
+        ),
         ("Amplitude SS [mm]", (), '0.05 mm zero-to-peak, half of "Amplitude SS [mm]", which is peak', "is assumed"),
         ("Pegel", ("--column", "amplitude=Pegel", "--unit", "amplitude=mmpp"), 'half of "Pegel"', "is assumed"),
         ("amplitude [mm]", ("--amplitude", "peak-to-peak"), 'half of "amplitude [mm]"', "is assumed"),

@@ -13,7 +13,7 @@ from bushfit.report.tables import spread
 from bushfit.units import number
 
 #: Colours of the plan, of the standard programme and of present knowledge, distinct in grey print.
-_COLORS = {"planned": "#1b6ca8", "standard programme": "#d98324", "known now": style.GREY}
+_COLORS = {"planned": "#1b6ca8", "standard programme": "#d98324", "before": style.GREY}
 #: Diameter of the marker of one run [point]; that of n runs grows with the root of n, so that its area counts them.
 _ONE_RUN = 2.8
 
@@ -70,7 +70,7 @@ def plan_figure(plan: Plan) -> style.Chart:
 
 def _draw_errors(parameters: Axes, stiffness: Axes, plan: Plan, programmes: dict[str, Programme]) -> None:
     """Draw errors of the parameters, and the error of the stiffness at each wanted point from the smallest up."""
-    errors = {name: programme.errors for name, programme in programmes.items()} | {"known now": plan.knowledge.errors}
+    errors = {name: programme.errors for name, programme in programmes.items()} | {"before": plan.knowledge.errors}
     rows = np.arange(len(plan.knowledge.names))
     for (name, values), marker in zip(errors.items(), "os^", strict=True):
         parameters.plot(100.0 * values, rows, marker, color=_COLORS[name], **style.POINT)
@@ -83,7 +83,7 @@ def _draw_errors(parameters: Axes, stiffness: Axes, plan: Plan, programmes: dict
         share = 100.0 * (np.arange(values.size) + 0.5) / values.size
         step = max(values.size // 5, 1)
         stiffness.plot(share, values, color=_COLORS[name], lw=1.3, marker=marker, markevery=step, **style.POINT)
-    style.label_axes(stiffness, "share of the points wanted [%]", "error of stiffness [%]")
+    style.label_axes(stiffness, "share of the wanted points [%]", "error of stiffness [%]")
     stiffness.set_ylim(bottom=0.0)
     marks = zip(_COLORS.values(), "os^", strict=True)
     style.legend(stiffness, [Line2D([], [], color=color, marker=mark, ls="") for color, mark in marks], [*_COLORS], "")

@@ -194,7 +194,7 @@ def test_what_may_be_the_rigs_has_a_double_line_that_the_legend_names(paper_mode
             assert np.all(other.get_ydata() > 1.02 * one.get_ydata())
             np.testing.assert_array_equal(other.get_ydata(), white.get_ydata())
     assert legend(figure.axes[1])[3:] == ["bushing", "if it is the rig's"]
-    assert "Double lines: the model if it is the rig's" in note(figure)
+    assert "Double lines: the model if the unresolved effect belongs to the rig" in note(figure)
 
 
 def test_units_follow_direction_and_size(
