@@ -144,7 +144,7 @@ class DiagnosisWriter:
         gap = self._described(after) if not best.levels else None
         if gap:
             entries = [*entries, Named(UNNAMED, gap.evidence)]
-            remainder.append(f"something without a name, {gap.words}")
+            remainder.append(f"something without a name, {gap.sentence}")
         elif self.first.unnamed:
             remainder.append("something without a name")
         words += f"; the rest: {', '.join([*remainder, *filter(None, [doubt])])}" if remainder or doubt else ""
@@ -216,7 +216,7 @@ class DiagnosisWriter:
         spot = self.first.best if self.first and finding.verdict == "unexplained" else None
         if not spot and (found := self._described(self.base)):
             largest = [place.name for place in self.first.best.places] if self.first else []
-            words = f"no known effect closes the gap: {found.words}{lead}"
+            words = f"no known effect closes the gap: {found.sentence}{lead}"
             words += f"; it is largest at {_all(largest)}" if largest else ""
             names = [Named(UNNAMED, found.evidence)]
             return self._finished("described", words, found.after, names, gap=found)
@@ -301,7 +301,7 @@ class DiagnosisWriter:
             tuple(names),
             regions,
             regions if after is base else locate(after),
-            gap.held if gap else hold_out(base, after, bounds),
+            gap.holdout if gap else hold_out(base, after, bounds),
             next_test,
             tuple(self.candidates),
             base,

@@ -19,10 +19,9 @@ from test_schemas import complaints
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import Residuals, RigSettings
-from bushfit.diagnosis.described import GapDescription, describe, weighed
+from bushfit.diagnosis.described import GapDescription, describe
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.fingerprint import Fingerprint, fingerprint
-from bushfit.diagnosis.terms import Measure, Terms
+from bushfit.diagnosis.power_law import Measure, PowerLaw, Term, nearest_power_law
 from bushfit.effects.contract import Array, Level
 from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.errors import ModelError
@@ -68,7 +67,7 @@ def result(described: GapDescription) -> Result:
 
 def test_it_stands_where_it_was_not_fitted(described: GapDescription) -> None:
     """The excess over the noise floor halves in whole runs that were held out, by a band narrower than half the gap."""
-    held, correction = described.held, described.after.model.unnamed
+    held, correction = described.holdout, described.after.model.unnamed
     assert correction is not None
     print(held, correction.uncertainty, correction.size, correction.lengths)
     assert held.before is not None
@@ -259,7 +258,7 @@ def test_bands_hold_the_truth_whichever_it_is(measured: Measured, paper_model: M
 
 
 #: A term's stiffness, complex [N/m], by frequency [Hz], amplitude [m] and the stiffness without it.
-Term = Callable[[Array, Array, Array], Array]
+Added = Callable[[Array, Array, Array], Array]
 #: Campaigns with terms of random phase and powers.
 RANDOM = 30
 
@@ -270,7 +269,7 @@ def with_stiffness(campaign: Campaign, stiffness: Sequence[Array]) -> Campaign:
     return replace(campaign, sweeps=tuple(replace(sweep, stiffness=k) for sweep, k in pairs), loops=())
 
 
-def with_term(campaign: Campaign, term: Term) -> Campaign:
+def with_term(campaign: Campaign, term: Added) -> Campaign:
     """The sweeps of a campaign with a term in parallel."""
     added = (term(sweep.frequency, sweep.amplitude, sweep.stiffness) for sweep in campaign.sweeps)
     return with_stiffness(
@@ -278,19 +277,19 @@ def with_term(campaign: Campaign, term: Term) -> Campaign:
     )
 
 
-def power_law(size: float, phase_deg: float, p: float, q: float) -> Term:
+def power_law(size: float, phase_deg: float, p: float, q: float) -> Added:
     """The same stiffness in every direction, of a size [N/m] at 50 Hz and 0.2 mm."""
     turn = size * np.exp(1j * np.radians(phase_deg))
     return lambda frequency, amplitude, _: turn * (frequency / 50.0) ** p * (amplitude / 2e-4) ** q
 
 
-def found_in(campaign: Campaign, fitted: Fitted) -> Fingerprint | None:
+def found_in(campaign: Campaign, fitted: Fitted) -> PowerLaw | None:
     evidence, data = fitted(campaign), PreparedCampaign.from_campaign(campaign)
     start = start_values(campaign.bushing, data.sweeps, {})
-    return fingerprint(evidence, *weighed(evidence, campaign.rig), start, {})
+    return nearest_power_law(evidence, campaign.rig, start, {})
 
 
-def surely(campaign: Campaign, fitted: Fitted) -> Fingerprint:
+def surely(campaign: Campaign, fitted: Fitted) -> PowerLaw:
     found = found_in(campaign, fitted)
     assert found is not None
     return found
@@ -313,14 +312,14 @@ def test_laws_are_found_with_their_phase_and_powers(
     """Of 3 % of the stiffness, each within three and a half standard errors, and called what they act like."""
     found = surely(with_term(measured(), power_law(*law)), fitted)
     assert found.measure == "stiffness"
-    assert found.is_power_law
+    assert found.is_likely
     for (value, low, high), true in zip(
         (found.phase_deg, found.frequency_power, found.amplitude_power), law[1:], strict=True
     ):
         off = (true - value + 180.0) % 360.0 - 180.0
         assert abs(off) < 3.5 * (high - low) / 3.92, (value, low, high, true)
-    assert ("acts like" in found.words) == bool(words)
-    assert words in found.words
+    assert ("acts like" in found.sentence) == bool(words)
+    assert words in found.sentence
 
 
 @pytest.mark.parametrize("measure", ["stiffness", "modulus", "gain"])
@@ -331,16 +330,17 @@ def test_derivatives_beside_a_large_term(
     """Of residuals of sweeps and loops with a tenth of the stiffness added, against central differences."""
     campaign = measured()
     evidence = fitted(replace(campaign, fit=replace(campaign.fit, residuals=residuals)))
-    terms, model = Terms(evidence, measure), evidence.model
-    value = (0.06 + 0.08j) * np.exp((terms.points - terms.points.mean(axis=0)) @ (0.5, 0.1))
-    value *= np.mean(np.abs(terms.stiffness(model) / terms.unit(model)))
+    term, model = Term(evidence, measure), evidence.model
+    value = (0.06 + 0.08j) * np.exp(term.points @ (0.5, 0.1))
+    value *= np.mean(np.abs(term.stiffness(model) / term.unit(model)))
     coordinates, step = evidence.solution.coordinates, 1e-5
     middle = coordinates.point(model.values)
-    for row, own in zip(terms.jacobian(value, model), np.eye(middle.size) * step, strict=True):
-        ends = [terms.residual(value, model.with_values(coordinates.values(middle + off))) for off in (own, -own)]
+    _, rows, columns = term.linearised(model, value, value[None])
+    for row, own in zip(rows, np.eye(middle.size) * step, strict=True):
+        ends = [term.residual(value, model.with_values(coordinates.values(middle + off))) for off in (own, -own)]
         assert row == pytest.approx((ends[0] - ends[1]) / (2.0 * step), rel=1e-5, abs=1e-5 * np.abs(row).max())
-    ends = [terms.residual(value * (1.0 + off), model) for off in (step, -step)]
-    row = terms.columns(value[None], model, value)[0]
+    ends = [term.residual(value * (1.0 + off), model) for off in (step, -step)]
+    row = columns[0, 0]
     assert row == pytest.approx((ends[0] - ends[1]) / (2.0 * step), rel=1e-5, abs=1e-5 * np.abs(row).max())
 
 
@@ -349,7 +349,7 @@ def test_a_resonance_is_no_power_law(measured: Measured, fitted: Fitted) -> None
         ratio = frequency / 80.0
         return 120e3 * ratio**2 / (1.0 - ratio**2 + 0.3j * ratio) * np.ones_like(amplitude)
 
-    assert not surely(with_term(measured(), resonance), fitted).is_power_law
+    assert not surely(with_term(measured(), resonance), fitted).is_likely
 
 
 @pytest.mark.slow

@@ -1,0 +1,360 @@
+"""Power law of frequency and amplitude nearest to a gap without a name, beside all parameters.
+
+Notes:
+    The term is A e^(i phi) (f/f0)^p (X/X0)^q. For each pair of powers on a grid its two parts, in phase and in
+    quadrature, are a group of columns around the parameters of the most probable pair. The evidence of each pair and
+    its amounts form the posterior from which phase and powers are drawn. A smooth process of any form, weighed in the
+    same way, decides whether the gap is a power law at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from math import log
+from typing import Literal
+
+import numpy as np
+from scipy.special import logsumexp
+
+from bushfit.campaign.schema import RigSettings
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.explanations import unnamed
+from bushfit.diagnosis.linear_model import Group, LinearModel
+from bushfit.diagnosis.priors import TELLS
+from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
+from bushfit.effects.contract import Array
+from bushfit.fitting.coordinates import Bounds, Coordinates, coordinate_bounds, jacobian, residual
+from bushfit.fitting.preparation import MeasuredTest
+from bushfit.geometry import STRAINING
+from bushfit.model.covariance import Z95
+from bushfit.model.model import Model
+from bushfit.units import number
+
+#: Unit of a term: N/m (or N m/rad) over displacement, Pa over strain, or shares of the stiffness over strain.
+Measure = Literal["stiffness", "modulus", "gain"]
+#: A value and the ends of its 95 % interval.
+Interval = tuple[float, float, float]
+
+#: Logarithm of odds below which a size of the rig's errors does not count; chosen for time: a twentieth of the best.
+_NEAR = 3.0
+#: Largest power, of either sign; chosen: beyond, a term acts at one end of the tests only.
+_LARGEST_POWER = 4.0
+#: Pairs of powers along an axis of the grid, and standard errors that it reaches to either side of the likeliest.
+_GRID, _REACH = 13, 4.0
+#: Times at most that the grid is made anew about the likeliest pair and the parameters beside it, and the step of a
+#: power, in standard errors, with which both rest.
+_ROUNDS, _RESTS = 20, 0.1
+#: Longest step of a parameter between these, in coordinates, and how far inside its limits one stays: usual for fits.
+_LONGEST, _INSIDE = 1.0, 1e-6
+#: Dampings of a step, relative to the information on a parameter; usual for such methods.
+_DAMPINGS = (0.0, 0.03, 0.1, 0.3, 1.0, 3.0)
+#: Draws of the posterior; chosen: they determine the ends of an interval within a fiftieth of its length.
+_DRAWS = 10_000
+#: Half width of an interval beyond which a power, or the phase [deg], is not determined.
+_POWER_WIDTH, _PHASE_WIDTH = 0.75, 60.0
+#: Standard errors within which a known law may lie for the term to act like it, in phase and powers each.
+_LIKE = 2.5
+#: Known laws: phase [deg], power of frequency, power of amplitude, measures, text.
+_LAWS: tuple[tuple[float, float, float, tuple[Measure, ...], str], ...] = (
+    (90, 1, 0, ("stiffness", "modulus"), "a damper"),
+    (180, 2, 0, ("stiffness", "modulus"), "a mass"),
+    (0, 0, 2, ("stiffness", "modulus"), "a spring that stiffens with the cube of the displacement"),
+    (0, 0, 0, ("stiffness", "modulus"), "a spring in parallel"),
+    (180, 0, 0, ("stiffness", "modulus"), "a spring that is missing"),
+    (90, 0, -1, ("stiffness", "modulus"), "dry friction"),
+    (90, 0, 0, ("stiffness", "modulus", "gain"), "a loss that is the same at every frequency"),
+    (90, 1, 0, ("gain",), "a delay of the displacement"),
+    (-90, 1, 0, ("gain",), "a delay of the force"),
+)
+_MEASURES: dict[Measure, str] = {
+    "stiffness": "the same stiffness in every direction",
+    "modulus": "a modulus over strain",
+    "gain": "a share of the stiffness",
+}
+_QUARTERS = {
+    0: "in phase",
+    90: "in quadrature",
+    180: "in antiphase",
+    -180: "in antiphase",
+    -90: "in negative quadrature",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class PowerLaw:
+    """Power law A e^(i phi) (f/f0)^p (X/X0)^q, with 95 % intervals.
+
+    Args:
+        measure: unit of the term with the highest evidence: stiffness, modulus or share of the stiffness.
+        alternatives: other units that the tests cannot distinguish; the intervals average over all by probability.
+        phase_deg: phi [deg].
+        frequency_power: p.
+        amplitude_power: q.
+        is_likely: True if the evidence of the power law exceeds that of a smooth curve of any form.
+    """
+
+    measure: Measure
+    alternatives: tuple[Measure, ...]
+    phase_deg: Interval
+    frequency_power: Interval
+    amplitude_power: Interval
+    is_likely: bool
+
+    @property
+    def determined(self) -> list[bool]:
+        """True for each of phase, frequency power and amplitude power that the tests determine."""
+        widths = (_PHASE_WIDTH, _POWER_WIDTH, _POWER_WIDTH)
+        intervals = (self.phase_deg, self.frequency_power, self.amplitude_power)
+        return [high - low < 2.0 * width for (_, low, high), width in zip(intervals, widths, strict=True)]
+
+    @property
+    def sentence(self) -> str:
+        """Text of the term, as "in quadrature, grows as f^0.8, independent of amplitude: acts like a damper"."""
+        phase, low, high = self.phase_deg
+        near = next((text for quarter, text in _QUARTERS.items() if low <= quarter <= high), "")
+        parts = [near or f"{number(phase, 2)} deg ahead of the displacement"]
+        if high - low > 2.0 * _PHASE_WIDTH:
+            parts = ["at a phase that these tests do not determine"]
+        powers = ((self.frequency_power, "f", "frequency"), (self.amplitude_power, "X", "amplitude"))
+        for determined, ((value, low, high), symbol, axis) in zip(self.determined[1:], powers, strict=True):
+            if not determined:
+                parts.append(f"its change with {axis} is not determined")
+            elif low <= 0.0 <= high:
+                parts.append(f"independent of {axis}")
+            else:
+                parts.append(f"{'grows' if value > 0 else 'falls'} as {symbol}^{number(value, 2)}")
+        parts.append("as " + " or ".join(_MEASURES[measure] for measure in (self.measure, *self.alternatives)))
+        like = self._known_law() if all(self.determined) else ""
+        return ", ".join(parts) + (f": acts like {like}" if like else "")
+
+    def _known_law(self) -> str:
+        """Names of the nearest known laws; "" if none is near in phase and powers."""
+        ends = np.array([self.phase_deg, self.frequency_power, self.amplitude_power])[:, 1:]
+        errors = np.maximum(np.ptp(ends, axis=1) / 2.0 / Z95, 1e-9)
+        distances = {}
+        for *law, measures, text in _LAWS:
+            if {self.measure, *self.alternatives} & {*measures}:
+                deviation = ends.mean(axis=1) - law
+                deviation[0] = (deviation[0] + 180.0) % 360.0 - 180.0
+                distances[text] = float(np.max(np.abs(deviation) / errors))
+        nearest = min(distances.values())
+        return " or ".join(text for text in distances if distances[text] == nearest) if nearest < _LIKE else ""
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """A stiffness beside the model's, at the operating points of tests of the bushing and specimens, without coupons.
+
+    Args:
+        evidence: the fitted model and the tests.
+        measure: unit of the term.
+    """
+
+    evidence: Evidence
+    measure: Measure
+
+    @cached_property
+    def tests(self) -> list[tuple[MeasuredTest, slice]]:
+        """Tests that the term acts on, each with the slice of its points among all points."""
+        tests = [test for test in self.evidence.data_sets if test.direction.motion is not STRAINING]
+        ends = np.cumsum([0, *(test.frequency.size for test in tests)]).tolist()
+        return [(test, slice(*pair)) for test, pair in zip(tests, zip(ends, ends[1:], strict=False), strict=True)]
+
+    @property
+    def has_one_meaning(self) -> bool:
+        """False without a test, and if one stiffness would be added to displacement and to rotation."""
+        motions = {test.direction.motion for test, _ in self.tests}
+        return len(motions) == 1 if self.measure == "stiffness" else bool(motions)
+
+    @cached_property
+    def points(self) -> Array:
+        """Logarithms of frequency and motion (displacement, rotation or strain) about their means, (p, 2)."""
+        model, over_strain = self.evidence.model, self.measure != "stiffness"
+        axes = [
+            (test.frequency, test.amplitude * (model.unit_strain(test.direction) if over_strain else 1.0))
+            for test, _ in self.tests
+        ]
+        points = np.log(np.concatenate(axes, axis=-1).T)
+        return points - points.mean(axis=0)
+
+    def stiffness(self, model: Model) -> Array:
+        """Complex stiffness of a model at each point, (p,) [N/m or N m/rad]."""
+        return np.concatenate(
+            [model.stiffness(test.direction, test.frequency, test.amplitude, kind=test.kind) for test, _ in self.tests]
+        )
+
+    def unit(self, model: Model) -> Array:
+        """Stiffness of one unit of the term at each point, (p,) [N/m or N m/rad]."""
+        if self.measure == "gain":
+            return self.stiffness(model)
+        per_unit = model.stiffness_per_modulus if self.measure == "modulus" else lambda _: 1.0
+        return np.concatenate([np.full(test.frequency.size, per_unit(test.direction)) for test, _ in self.tests])
+
+    def scaled(self, shapes: Array, model: Model) -> Array:
+        """Scale shapes of the term, (c, p), so that the largest change of |K| is 100 %."""
+        return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
+
+    def residual(self, value: Array, model: Model) -> Array:
+        """Whitened residuals of a model with the term of a value at the points, complex (p,), exact, (n,)."""
+        residuals, added = residual(model, self.evidence.data_sets), value * self.unit(model)
+        for test, points in self.tests:
+            residuals[self.evidence.place[test]] = test.residual_with(added[points], model)
+        return residuals
+
+    def linearised(self, model: Model, value: Array, shapes: Array) -> tuple[Array, Array, Array]:
+        """Linearise the residuals around a term.
+
+        Args:
+            model: at its parameters.
+            value: of the term at the points, complex (p,).
+            shapes: (c, p).
+
+        Returns:
+            Residuals without the term, (n,); derivatives by the coordinates of the parameters, (k, n); and by terms of
+            the given shapes, in phase and in quadrature, (c, 2, n).
+        """
+        names, place = self.evidence.solution.coordinates.names, self.evidence.place
+        added, changes = value * self.unit(model), np.concatenate((shapes, 1j * shapes)) * self.unit(model)
+        residuals, rows = self.residual(value, model), np.array(jacobian(model, self.evidence.data_sets, names))
+        slopes = Coordinates.of_parameters(model, names).slopes(model.values)[:, None]
+        columns = np.zeros((len(changes), residuals.size))
+        for test, points in self.tests:
+            columns[:, place[test]] = test.residual_change(changes[:, points], model, added[points])
+            residuals[place[test]] -= test.residual_change(added[points], model, added[points])
+            as_share = self.measure == "gain"
+            rows[:, place[test]] = slopes * test.jacobian_with(added[points], model, names, as_share=as_share)
+        return residuals, rows, columns.reshape(2, len(shapes), -1).swapaxes(0, 1)
+
+
+def nearest_power_law(
+    fitted: Evidence, rig: RigSettings, start: Mapping[str, float], bounds: Bounds
+) -> PowerLaw | None:
+    """Estimate the power law nearest to the gap of a fitted model.
+
+    Args:
+        fitted: the fitted model and the tests.
+        rig: stated class of the rig.
+        start: starting values read from the data; the gap may have distorted those of the fit.
+        bounds: limits of parameters inside their general limits.
+
+    Returns:
+        The power law; None if the tests show none.
+    """
+    bare, begun = scattering_alone(fitted), fitted.model.with_values(start)
+    rows, smooth_curves = bare.solution.jacobian, [curve.group for curve in unnamed(bare) if curve.group]
+    plain = LinearModel(bare.residual, rows, np.zeros(len(rows)), rig_errors(bare, rig), smooth_curves)
+    plain = replace(plain, chosen_nodes=plain.likely(_NEAR))
+    terms = [term for measure in _MEASURES if (term := Term(bare, measure)).has_one_meaning]
+    settled = (_settled_grid(fitted, term, plain, begun, bounds) for term in terms)
+    grids = [grid for grid in settled if grid]
+    grids.sort(key=lambda grid: -grid.log_evidence)
+    if not grids or grids[0].log_evidence < grids[0].linear.log_evidence:
+        return None
+    log_ratios = np.array([grid.log_evidence - grids[0].log_evidence for grid in grids])
+    alternatives = tuple(
+        grid.measure for grid, log_ratio in zip(grids[1:], log_ratios[1:], strict=True) if -log_ratio < 0.5 * TELLS
+    )
+    counts = np.round(_DRAWS * np.exp(log_ratios)).astype(int).tolist()
+    draws = np.concatenate([grid.draws(count) for grid, count in zip(grids, counts, strict=True)], axis=-1)
+    turn = np.exp(1j * draws[0])
+    middle = np.angle(turn.mean())
+    draws[0] = np.degrees(middle + np.angle(turn * np.exp(-1j * middle)))
+    phase, p, q = (tuple(quantiles) for quantiles in np.quantile(draws, (0.5, 0.025, 0.975), axis=-1).T.tolist())
+    law = logsumexp(log_ratios) + grids[0].log_evidence - log(len(grids))
+    curves = replace(grids[0].linear, groups=plain.groups).group_evidence  # around the same parameters and term
+    smooth = logsumexp([evidence.log_evidence for evidence in curves]) - log(len(curves))
+    return PowerLaw(grids[0].measure, alternatives, phase, p, q, bool(law > smooth))
+
+
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """Pairs of powers of frequency and amplitude with their evidence.
+
+    Args:
+        measure: unit of the term.
+        linear: linear model with one group for each pair.
+        powers: of the pairs, (g, 2).
+        step: of the grid along each axis; 0 along an axis on which the tests do not differ, (2,).
+    """
+
+    measure: Measure
+    linear: LinearModel
+    powers: Array
+    step: Array
+
+    @cached_property
+    def log_evidences(self) -> Array:
+        """Log evidence of each pair, (g,)."""
+        return np.array([evidence.log_evidence for evidence in self.linear.group_evidence])
+
+    @property
+    def share(self) -> Array:
+        """Probability of each pair, (g,)."""
+        return np.exp(self.log_evidences - logsumexp(self.log_evidences))
+
+    @property
+    def log_evidence(self) -> float:
+        """Log evidence of the tests averaged over all pairs, each equally probable."""
+        filled = np.log(np.where(self.step > 0.0, self.step / (2.0 * _LARGEST_POWER), 1.0)).sum()
+        return float(logsumexp(self.log_evidences) + filled)
+
+    def draws(self, count: int) -> Array:
+        """Phase [rad] and powers drawn from the posterior, (3, count)."""
+        random = np.random.default_rng(0)
+        chosen = random.choice(len(self.powers), count, p=self.share)
+        width = np.where(self.step > 0.0, self.step, 2.0 * _LARGEST_POWER)  # an axis without a change is unknown
+        powers = self.powers[chosen] + width * (random.random((count, 2)) - 0.5)
+        parts = np.empty((count, 2))
+        for pair in np.unique(chosen):
+            mask = chosen == pair
+            parts[mask] = random.multivariate_normal(*self.linear.amounts(int(pair)), mask.sum(), method="eigh")
+        return np.stack((np.arctan2(parts[:, 1], parts[:, 0]), *powers.T))
+
+
+def _settled_grid(fitted: Evidence, term: Term, plain: LinearModel, model: Model, bounds: Bounds) -> _Grid | None:
+    """Grid about the most probable pair of powers, iterated with the parameters; None without convergence."""
+    changes = np.ptp(term.points, axis=0) > 0.0
+    # at first around the measured stiffness, by which a term of any size is linear
+    value = np.concatenate([test.measured - test.noise_free(model).measured for test, _ in term.tests])
+    value = value / term.unit(model)
+    ends, middle = np.outer((-_LARGEST_POWER, _LARGEST_POWER), changes), np.full(2, np.inf)
+    for _ in range(_ROUNDS):
+        powers = np.array(list(product(*map(np.unique, np.linspace(ends[0], ends[1], _GRID).T))))
+        step = np.ptp(ends, axis=0) / (_GRID - 1)
+        shapes = term.scaled(np.exp(powers @ term.points.T), model)
+        residuals, rows, columns = term.linearised(model, value, shapes)
+        groups = [Group(pair, np.ones(2), together=True) for pair in columns]
+        grid = _Grid(term.measure, replace(plain, residual=residuals, jacobian=rows, groups=groups), powers, step)
+        before, middle = middle, grid.share @ powers
+        spread = np.sqrt(grid.share @ np.square(powers - middle))
+        shift = np.abs(middle - before)
+        if (shift <= _RESTS * spread).all() and (step <= spread).all():
+            return grid
+        reach = _REACH * spread + step + np.where(np.isfinite(shift), shift, 0.0)
+        limits = np.outer((-_LARGEST_POWER, _LARGEST_POWER), changes)
+        ends = np.clip(np.stack((middle - reach, middle + reach)), *limits)
+        model, value = _stepped(Term(fitted, term.measure), model, value, np.exp(middle @ term.points.T)[None], bounds)
+    return None
+
+
+def _stepped(term: Term, model: Model, value: Array, shape: Array, bounds: Bounds) -> tuple[Model, Array]:
+    """One damped Gauss-Newton step of the parameters and of the term of a shape."""
+    shape = term.scaled(shape, model)
+    residuals, rows, columns = term.linearised(model, value, shape)
+    design, coordinates = np.concatenate((rows, columns[0])), term.evidence.solution.coordinates
+    low, high = coordinate_bounds(coordinates, bounds)
+    misfit, best = np.inf, (model, value)
+    for damping in _DAMPINGS:
+        damped = damping * np.diag(np.linalg.norm(design, axis=1))[: len(rows)]
+        step = -np.linalg.lstsq(np.vstack((design.T, damped)), np.pad(residuals, (0, len(rows))), rcond=None)[0]
+        point = coordinates.point(model.values) + np.clip(step[:-2], -_LONGEST, _LONGEST)
+        candidate = model.with_values(coordinates.values(np.clip(point, low + _INSIDE, high - _INSIDE)))
+        candidate_value = (step[-2] + 1j * step[-1]) * shape[0]
+        norm = float(np.linalg.norm(term.residual(candidate_value, candidate)))
+        if norm >= misfit:
+            break
+        misfit, best = norm, (candidate, candidate_value)
+    return best
