@@ -111,8 +111,8 @@ def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
                 chosen.setdefault(name, {})[sweep] = mask
     both = [LeaveOut.from_fit(fit.jacobian[fit.moving], fit.residual) for fit in (solution, fitted)]
     residuals = dict[str, Array]()
-    for name, masks in chosen.items():
-        part = HoldOutPart(name, [masks.get(test, np.zeros(test.size // test.parts, dtype=bool)) for test in tests])
+    for name, by_sweep in chosen.items():
+        part = HoldOutPart(name, [by_sweep.get(test, np.zeros(test.size // test.parts, dtype=bool)) for test in tests])
         rows = part.rows(tests)
         pairs = [(fit, np.pad(rows, (0, fit.residual.size - rows.size))) for fit in both]
         if not any(fit.open(mask).any() for fit, mask in pairs):  # else the rest does not determine the model
@@ -144,6 +144,6 @@ def _validity(correction: Unnamed, whole: Evidence) -> str:
         for patch in correction.patches
     )
     misfit = max((region.excess for region in locate(whole) if region.kind == "loop"), default=0.0)
-    stays = f" (their form stays off by {number(misfit, 2)} times the noise)" if misfit else ""
+    stays = f" (their form still differs by {number(misfit, 2)} times the noise)" if misfit else ""
     loops = f", of loops the first harmonic only{stays}" if split_by_kind(whole.data_sets)[0] else ""
     return f"valid only between these tests ({patches}){loops}, and of this bushing"

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
+from itertools import pairwise, product
 from math import log
 from typing import Literal
 
@@ -161,7 +161,7 @@ class Term:
         """Tests that the term acts on, each with the slice of its points among all points."""
         tests = [test for test in self.evidence.data_sets if test.direction.motion is not STRAINING]
         ends = np.cumsum([0, *(test.frequency.size for test in tests)]).tolist()
-        return [(test, slice(*pair)) for test, pair in zip(tests, zip(ends, ends[1:], strict=False), strict=True)]
+        return [(test, slice(*pair)) for test, pair in zip(tests, pairwise(ends), strict=True)]
 
     @property
     def has_one_meaning(self) -> bool:
