@@ -107,14 +107,14 @@ class Odds:
 
     Args:
         nothing: probability that nothing is missing beyond noise and tolerance.
-        told: explanations in words with their probabilities if anything is missing; the most probable first.
+        explanations: in words with their probabilities if anything is missing; the most probable first.
         models: fitted model of each explanation; None if it was not fitted.
         labels: names of the parts of each explanation, joined by " + ".
         apart: whether the tests cannot decide between the explanations, so that each is an alternative.
     """
 
     nothing: float
-    told: tuple[tuple[str, float], ...] = ()
+    explanations: tuple[tuple[str, float], ...] = ()
     models: tuple[Model | None, ...] = ()
     labels: tuple[str, ...] = ()
     apart: bool = False
@@ -132,7 +132,7 @@ class Odds:
         cov = result.covariance
         current_values = np.array([result.model.values[name] for name in cov.names])
         matrix, alternatives = cov.matrix.copy(), list[Alternative]()
-        for (_, probability), model in zip(self.told, self.models, strict=True):
+        for (_, probability), model in zip(self.explanations, self.models, strict=True):
             if model is None:
                 continue
             difference = (
@@ -228,7 +228,7 @@ class Diagnosis:
             "verdict": self.verdict,
             "summary": self.summary,
             "nothing": self.odds.nothing,
-            "odds": [{"words": words, "probability": share} for words, share in self.odds.told],
+            "odds": [{"words": words, "probability": share} for words, share in self.odds.explanations],
             "effects": [self._effect(named) for named in self.effects],
             "where": [_region_entry(region) for region in self.where],
             "remainder": [_region_entry(region) for region in self.remainder],

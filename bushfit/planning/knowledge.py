@@ -112,7 +112,7 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
     fits = _add_effects(plain, names, fixed, data.bounds)
     _check_rivals(names, fits)
     probabilities = defaultdict[str, float](float)
-    for label, (_, share) in zip(diagnosis.odds.labels, diagnosis.odds.told, strict=True):
+    for label, (_, share) in zip(diagnosis.odds.labels, diagnosis.odds.explanations, strict=True):
         for name in label.split(" + "):
             probabilities[name] += share
     smallest = min(probabilities.values(), default=1.0)

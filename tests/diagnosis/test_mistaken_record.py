@@ -152,4 +152,4 @@ def test_verdict_does_not_depend_on_how_sweeps_are_parted(root: Path, tmp_path: 
     one, many = map(diagnosed, parted(root / "data/practice/case_000", tmp_path))
     assert many.verdict == one.verdict == "unexplained"
     assert many.effects == one.effects == ()
-    assert [found.odds.told[0][0].count("Hz in axial") for found in (one, many)] == [1, 1]
+    assert [found.odds.explanations[0][0].count("Hz in axial") for found in (one, many)] == [1, 1]

@@ -51,7 +51,7 @@ def test_what_is_there_is_all_but_sure(diagnosed: Diagnosed, truth: Effects) -> 
     assert names(diagnosis) == set(truth)
     assert diagnosis.odds.nothing < 1e-6
     assert set(diagnosis.odds.labels[0].split(" + ")) == set(truth)
-    assert diagnosis.odds.told[0][1] > 0.97
+    assert diagnosis.odds.explanations[0][1] > 0.97
     assert diagnosis.result.model.effects[:3] == BASE
     assert diagnosis.calibration[1] < 1.1 < 1.2 < diagnosis.calibration[0]
 

@@ -143,7 +143,7 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
     added = {name for name in task.hidden if name in result.model.effects}
     asked = [name for name in truth.values if effect_name_of(name) in added]
     intervals = {name: result.interval(name) for name in asked}
-    (_, odds), leader = next(zip(diagnosis.odds.told, diagnosis.odds.labels, strict=True), (("", 0.0), ""))
+    (_, odds), leader = next(zip(diagnosis.odds.explanations, diagnosis.odds.labels, strict=True), (("", 0.0), ""))
     covered = [ends[0] <= truth.values[name] <= ends[1] for name, ends in intervals.items() if ends is not None]
     return Outcome(
         task,
