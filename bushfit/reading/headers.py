@@ -335,8 +335,9 @@ def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
     name, unit = units.split_header(text)
     yield name, unit, True
     if unit is None:
-        for end in reversed(list(_NAME_END.finditer(name))):  # strain_dyn_pct is no strain in dyn %
-            yield name[: end.start()], name[end.end() :].replace("_", " "), False
+        for end in reversed(list(_NAME_END.finditer(name))):
+            if not (text := name[end.end() :].replace("_", " ")).startswith("dyn"):  # dynamic, and no dyne
+                yield name[: end.start()], text, False
 
 
 def _folded(text: str) -> str:

@@ -208,7 +208,6 @@ EXPORTS: dict[str, Export] = {
             ("near 354", 360 - PHASE, "wrapped"), ("near 366", 360 + PHASE, "wrapped"), ("near 186", 180 + PHASE, "force_sign"),
         )
     },
-    "phases as stated": Export(sweep(USUAL + "Phase [deg]", F, A, K, -PHASE), stated={"phase_sign": -1}),
     "loss factors negative": Export(sweep(USUAL + "tan delta", F, A, K, -ETA), words=["phase_sign"]),
     "loss stiffness negative": Export(sweep("f [Hz]|A [mm]|K' [N/mm]|K'' [N/mm]", F, A, STIFFNESS.real, -STIFFNESS.imag), words=["phase_sign"]),
     # time
@@ -238,7 +237,7 @@ EXPORTS: dict[str, Export] = {
         for headers in ("t [s]|LVDT 2 [mm]|Load Cell [N]", "Time (s)|x (mm)|Fz (N)", "t[s]|s1[mm]|MGC Kanal 3[N]")
     },
     "two columns by unit": Export(
-        loop("Time [s]|LVDT 1 [mm]|Fx [N]|Fz [N]", TIME, DISPLACEMENT, 0.1 * FORCE, FORCE), None, ['columns = { force = "Fx [N]" }', 'columns = { force = "Fz [N]" }'],
+        loop("Time [s]|LVDT 1 [mm]|Fx [N]|Fz [N]", TIME, DISPLACEMENT, 0.1 * FORCE, FORCE), None, ['--column "force=Fx [N]"', '--column "force=Fz [N]"'],
     ),
     **{
         f"unit {unit}": Export(sweep(f"Frequency [{hz}]|Amplitude [mm]|K* [{unit}]|tan delta", factor * F, A, K, ETA))
@@ -319,6 +318,70 @@ EXPORTS: dict[str, Export] = {
         "Frequency   Dyn Ampl   Dyn Stiff   Loss Angle", "     Hz       mm p-p     N/mm        deg",
         *(f"{f:10.3f} {2 * a:10.4f} {k:14.7f} {p:12.7f}" for f, a, k, p in zip(F, A, K, PHASE, strict=True)),
     ])),
-    "Japanese": Export(sweep("周波数[Hz]|変位振幅[mm]|動的ばね定数[N/mm]|損失係数", F, A, K, ETA).encode("cp932"), stated={"encoding": "cp932"}),
+    # instruments and languages
+    "MTS EDS": Export(
+        "MTS Elastomer\nSpecimen: BUSH-12\n\n" + sweep(
+            "Target Frequency|Frequency|Dyn Disp Amp|Dyn Force Amp|Mean Disp|Mean Force|K*|K'|K''|Phase|Damping C|Energy",
+            F, F, A, K * A, 0 * F + 0.1, 0 * F + 300, K, STIFFNESS.real, STIFFNESS.imag, PHASE, DAMPING, F, mark=",",
+        ).replace("Energy\n", "Energy\nHz,Hz,mm,N,mm,N,N/mm,N/mm,N/mm,deg,N·s/mm,N·mm\n"), words=["by its unit"],
+    ),
+    "WaveMatrix": Export(
+        loop("Total Time (s)|Step|Position(8800 (0,1):Position) (mm)|Load(8800 (0,1):Load) (kN)", TIME, ["1"] * 600, DISPLACEMENT, FORCE / 1e3), "loop"
+    ),
+    "NETZSCH": Export(
+        "#INSTRUMENT:\tDMA 242E\n#SEPARATOR:\tSEMICOLON\n\n##Temp./°C;f/Hz;Strain ampl./%;E'/MPa;E''/MPa\n"
+        + "\n".join(table([], 0 * F + 25, F, 10 * A, G.real, G.imag, mark=";")[1:]), reference=MODULUS,
+    ),
+    "TRIOS steps": Export(
+        "Filename,x.tri\n" + "".join(
+            f"\n[step]\nFrequency sweep - {n}\nAngular frequency,Step time,Oscillation strain,Storage modulus,Loss modulus\nrad/s,s,%,MPa,MPa\n"
+            + "\n".join(table([], 2 * np.pi * F[s], F[s], 10 * A[s], G[s].real, G[s].imag, mark=",")[1:]) + "\n"
+            for n, s in enumerate((slice(0, 5), slice(5, 10)), 1)
+        ), reference=MODULUS,
+    ),
+    "RheoCompass in German and UTF-16": Export(
+        (
+            "Projekt:\tEPDM\n\nAbschnittsdaten:\tMesspkt.\tKreisfrequenz\tScherdeformation\tSpeichermodul\tVerlustmodul\n\t\t[rad/s]\t[%]\t[Pa]\t[Pa]\n"
+            + "\n".join(table([], [""] * 10, F, 2 * np.pi * F, 10 * A, 1e6 * G.real, 1e6 * G.imag)[1:]).replace(".", ",")
+        ).encode("utf-16"), reference=MODULUS,
+    ),
+    "catman": Export(
+        "HBM catman\nKanäle: 3\n\nZeit  1 - Standardmessrate\tWeg_WA20\tKraft_U10M\n[s]\t[mm]\t[kN]\n"
+        + "\n".join(table([], TIME, DISPLACEMENT, FORCE / 1e3)[1:]).replace(".", ","), "loop",
+    ),
+    "dSPACE": Export(
+        "raster,HostService\npath,,Root/Disp,Root/Force\nname,Time,Disp,Force\nunit,s,mm,N\ntrace_values\n"
+        + "\n".join(table([], [""] * 600, TIME, DISPLACEMENT, FORCE, mark=",")[1:]), "loop", ["trace_values"],
+    ),
+    "decibels": Export(sweep("f [Hz]|A [mm]|K* [dB re 1 N/mm]|Phase [deg]", F, A, 20 * np.log10(K), PHASE)),
+    "decibels without a reference": Export(sweep("f [Hz]|A [mm]|K* [dB]|Phase [deg]", F, A, 20 * np.log10(K), PHASE), None, ["logarithms of the stiffness", '--unit "stiffness=N/mm"']),
+    "decibels, as the hint says": Export(
+        sweep("f [Hz]|A [mm]|K* [dB]|Phase [deg]", F, A, 20 * np.log10(K), PHASE), stated={"units": {"stiffness": "N/mm"}}
+    ),
+    "complex numbers": Export(sweep("f [Hz]|A [mm]|K* [N/mm]", F, A, [f"{k.real:.6f} + {k.imag:.6f}i" for k in STIFFNESS], mark=";")),
+    "a compliance": Export(sweep("f [Hz]|A [mm]|J' [mm/N]|J'' [mm/N]", F, A, 1 / K, 1 / K), None, ["K* = 1 / J*"]),
+    "a decrement": Export(sweep(USUAL + "Log. decrement [-]", F, A, K, np.pi * ETA), None, ["by pi"]),
+    "carets": Export(sweep(USUAL + "tan delta", F, A, K, ETA, mark="^")),
+    "dynamic motion and force": Export(sweep("Freq./Hz|Weg dyn. SS/mm|Kraft dyn. SS/N|Verlustwinkel/Grad", F, 2 * A, 2 * K * A, PHASE, mark=";").replace("Freq.", "Freq").replace("dyn.", "dyn")),
+    "real and imaginary by words": Export(sweep("Freq [Hz]|Amp [mm]|Dyn Stiff Real [N/mm]|Dyn Stiff Imag [N/mm]", F, A, STIFFNESS.real, STIFFNESS.imag), words=["by its unit"]),
+    "wide table, levels without decimals": Export(
+        "".join(
+            f"{title}\nFrequenz [Hz];0.1 mm;0.5 mm;1 mm\n" + "".join(f"{f:g};{v[n]:.9g};{v[5 + n]:.9g};{v[5 + n]:.9g}\n" for n, f in enumerate(F[:5])) + "\n"
+            for title, v in (("Dynamische Steifigkeit [N/mm]", K), ("Verlustwinkel [°]", PHASE))
+        ).replace(".", ","),
+        reference={name: np.concatenate([v, v[5:]]) for name, v in (("frequency", F), ("stiffness", 1e3 * STIFFNESS))} | {"amplitude": 1e-3 * np.repeat([0.1, 0.5, 1.0], 5)},
+    ),
+    "an overflow and means": Export(
+        sweep(USUAL + "tan delta", F, A, K, ETA, mark=";") + "90;0.1;OVR;0.1\nDurchschnitt;0.3;1400;0.1\nx;0.1;20;0.1\n", words=["3 rows left out"]
+    ),
+    "header cells with line ends": Export('"Frequency\n(Hz)","Amplitude\n(mm)","K*\n(N/mm)","Phase\n(deg)"\n' + "\n".join(table([], F, A, K, PHASE, mark=",")[1:])),
+    **{
+        f"encoding {encoding}": Export(sweep(header, F, A, K, last, mark=";").encode(encoding))
+        for encoding, header, last in (
+            ("cp932", "周波数[Hz]|振幅[mm]|動ばね定数[N/mm]|損失係数", ETA), ("gb18030", "频率(Hz)|振幅(mm)|动刚度(N/mm)|损耗角(°)", PHASE),
+            ("cp1250", "Częstotliwość [Hz]|Amplituda [mm]|Sztywność dynamiczna [N/mm]|Kąt strat [°]", PHASE),
+            ("cp1251", "Частота, Гц|Амплитуда, мм|Жёсткость, Н/мм|Угол потерь, град", PHASE), ("cp1252", "Fréquence [Hz]|Amplitude crête [mm]|Raideur [N/mm]|Facteur de perte", ETA),
+        )
+    },
     "times too coarse": Export(loop("Time [s]|Displacement [mm]|Force [N]", ["0"] * 300 + ["1"] * 300, DISPLACEMENT, FORCE), None, ["more digits"]),
 }  # fmt: skip

@@ -14,33 +14,13 @@ from machines import MACHINES
 from bushfit import units
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction, Specimen
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Heading, Vocabulary
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Floats, Loop, Sweep
-from bushfit.reading.numerals import Numerals
 from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.table import Table
-
-LOOPS, SWEEPS = Vocabulary(LOOP_COLUMNS, {}), Vocabulary(SWEEP_COLUMNS, {})
-
-
-@pytest.mark.parametrize(
-    ("vocabulary", "header", "heading"),
-    [
-        (LOOPS, "Prüfkraft [kN]", Heading("force", "kN")), (LOOPS, "PRUEFKRAFT in N", Heading("force", "N")),
-        (LOOPS, "F / kN", Heading("force", "kN")), (LOOPS, "Axial displacement_mm", Heading("displacement", "mm")),
-        (LOOPS, "力\uff08N\uff09", Heading("force", "N")), (LOOPS, "f [Hz]", None), (LOOPS, "force of habit", None),
-        (LOOPS, "x" * 201, None), (SWEEPS, "f [Hz]", Heading("frequency", "Hz")),
-        (SWEEPS, "F [N]", Heading("force_amplitude", "N")),
-        (Vocabulary(LOOP_COLUMNS, {"force": "Kanal 3"}), "kanal_3 [N]", Heading("force", "N")),
-        (Vocabulary(LOOP_COLUMNS, {"force": "Kanal 3"}), "force [N]", None),
-    ],
-)  # fmt: skip
-def test_what_a_header_says_of_its_column(vocabulary: Vocabulary, header: str, heading: Heading | None) -> None:
-    assert vocabulary.heading(header) == heading
-
 
 PEAK_TO_PEAK = [
     "Amplitude pk-pk [mm]", "amplitude (p-p) (mm)", "Amplitude peak-to-peak [mm]", "amplitude_pp_mm",
@@ -69,19 +49,6 @@ def test_a_header_says_how_amplitudes_count(header: str, tmp_path: Path) -> None
     assert set(amplitudes(tmp_path, header)) == {0.5 if doubled else 1.0}
     with pytest.raises(MeasurementError, match="header and campaign disagree on how amplitudes are counted"):
         amplitudes(tmp_path, header, amplitude="zero-to-peak" if doubled else "peak-to-peak")
-
-
-@pytest.mark.parametrize(
-    ("header", "named", "counted"),
-    [
-        ("Amplitude SS [mm]", "Amplitude SS", 0.5), ("Pegel p-p [mm]", "Pegel p-p [mm]", 0.5),
-        ("Pegel [mm pp]", "Pegel", 0.5), ("Schwingbreite [mm]", "Schwingbreite", 0.5),
-        ("Doppelamplitude [mm] ", "Doppelamplitude [mm]", 0.5), ("Pegel 0-p [mm]", "Pegel 0-p", 1.0),
-        ("range [mm]", "range", 1.0), ("Stress level [mm]", "Stress level", 1.0),
-    ],
-)  # fmt: skip
-def test_a_header_that_is_named_says_it_too(header: str, named: str, counted: float, tmp_path: Path) -> None:
-    assert set(amplitudes(tmp_path, header, {"amplitude": named})) == {counted}
 
 
 @pytest.mark.parametrize(
@@ -115,22 +82,6 @@ def test_the_header_names_most_columns_unless_it_is_stated(
     (tmp_path / "loop.csv").write_text(text)
     found = Table.open(tmp_path / "loop.csv", LOOP_COLUMNS, file_format=FileFormat(**stated)).layout
     assert (found.header_line, found.headers) == (line, headers)
-
-
-@pytest.mark.parametrize(
-    ("decimal", "thousands", "text", "number"),
-    [
-        (".", None, "-1.5e3", -1500.0), (".", None, "\u22122.5", -2.5), (".", None, "1,5", None),
-        (".", None, "1.", 1.0), (",", None, ",5", 0.5), (",", ".", "1.234.567,8", 1234567.8),
-        (",", ".", "1.23,4", None), (".", "'", "1\u2019234", 1234.0), (",", " ", "1\u202f234,5", 1234.5),
-        (".", ",", "0,123", None), (".", None, "\u0661", None), (".", None, "nan", None),
-        (".", None, "1" * 401, None),
-    ],
-)  # fmt: skip
-def test_a_cell_is_a_number_in_its_way_or_none(
-    decimal: str, thousands: str | None, text: str, number: float | None
-) -> None:
-    assert Numerals(decimal, thousands).value(text) == number
 
 
 UNCLEAR: dict[str, tuple[str, dict[str, str], float | None]] = {

@@ -14,33 +14,6 @@ from bushfit.geometry import Specimen
 from bushfit.reading.measurement import Sweep
 
 
-@pytest.mark.parametrize(
-    ("columns", "second"),
-    [
-        ("stiffness [N/mm],loss factor [-]", "{k},{eta}"),
-        ("stiffness [kN/m],tan_delta", "{k},{eta}"),
-        ("Stiffness [N/mm],Loss-Factor [%]", "{k},{eta_percent}"),
-        ("dynamic_stiffness_N/mm,phase_deg", "{k},{phase}"),
-        ("storage stiffness [N/mm],loss stiffness [N/mm]", "{real},{imaginary}"),
-        ("K' [N/mm],tan delta", "{real},{eta}"),
-        ("storage stiffness [kN/m],phase [deg]", "{real},{phase}"),
-    ],
-)
-def test_sweeps_in_every_pair(columns: str, second: str, tmp_path: Path) -> None:
-    stiffness = np.array([600.0, 610.0, 620.0, 630.0]) * np.exp(0.1j)
-    rows = [
-        f"{5 + 10 * i},0.1,"
-        + second.format(
-            k=abs(k), eta=k.imag / k.real, eta_percent=100 * k.imag / k.real,
-            phase=np.degrees(np.angle(k)), real=k.real, imaginary=k.imag,
-        )
-        for i, k in enumerate(stiffness)
-    ]  # fmt: skip
-    sweep = sweep_from("\n".join([f"frequency [Hz],amplitude [mm],{columns}", *rows]), tmp_path)
-    np.testing.assert_allclose(sweep.stiffness, stiffness * 1e3, rtol=1e-12)
-    np.testing.assert_allclose(sweep.frequency, [5, 15, 25, 35])
-
-
 def test_repeats_and_errors_of_the_points_are_read(tmp_path: Path) -> None:
     doubled = "\n".join([SWEEP_HEADER, *SWEEP_ROWS, *SWEEP_ROWS])
     assert sweep_from(doubled, tmp_path).repeat.tolist() == [1] * 8 + [2] * 8
@@ -132,14 +105,6 @@ def test_a_coupon_gives_strain_and_modulus(tmp_path: Path) -> None:
     assert set(sweep_from(without, tmp_path, direction=TENSOR, at_amplitude=1e-3).amplitude) == {2e-3}
 
 
-@pytest.mark.parametrize(
-    ("unit", "scale"), [("%", 0.01), ("-", 1.0), ("mm/m", 1e-3), ("µε", 1e-6), ("microstrain", 1e-6)]
-)
-def test_strains_in_every_unit(unit: str, scale: float, tmp_path: Path) -> None:
-    text = COUPON.replace("strain_dyn_pct", f"Shear strain amplitude [{unit}]")
-    np.testing.assert_allclose(sweep_from(text, tmp_path, direction=DMA).amplitude, scale * np.array([0.011, 0.1, 1.1]))
-
-
 def at_temperatures(*temperatures: float, unit: str = "degC") -> str:
     rows = [f"{f},0.1,{500 + f + t:.3f},0.1,{t}" for t in temperatures for f in (5, 15, 25)]
     return "\n".join([f"{SWEEP_HEADER},Temperature [{unit}]", *rows])
@@ -167,14 +132,6 @@ def test_the_temperature_of_a_file_is_its_condition_if_it_has_a_unit(
     source = sweep_from(at_temperatures(value, value).replace(" [degC]", unit), tmp_path).source
     assert source is not None
     assert source.conditions.get("temperature_degC") == (degrees and pytest.approx(degrees))
-
-
-@pytest.mark.parametrize(
-    "header", ["angular frequency [rad/s]", "omega [1/s]", "Kreisfrequenz [1/s]", "frequency [rad/s]"]
-)
-def test_radians_per_second_become_hertz(header: str, tmp_path: Path) -> None:
-    found = sweep_from(SWEEP.replace("frequency [Hz]", header), tmp_path).frequency
-    np.testing.assert_allclose(found, np.tile([5.0, 15.0, 25.0, 35.0], 2) / (2.0 * np.pi))
 
 
 PHASE = SWEEP.replace("loss factor [-]", "phase [deg]")
