@@ -142,7 +142,8 @@ def _print_gap(output: Output, document: Mapping[str, Any]) -> None:
     held_out = gap["heldout"]
     cells = [f"{held_out[when]:.2f}" for when in ("before", "after")] if held_out else ["not testable", ""]
     rows = (("held out", *cells), ("data fitted", *(f"{value:.2f}" for value in gap["calibration"].values())))
-    output.print_table("gap, in units of noise (1: noise alone)", ("", "before", "after"), rows)
+    title = "gap, in units of noise (1: noise alone)" + "; no effect was added" * (document["verdict"] == "ambiguous")
+    output.print_table(title, ("", "before", "after"), rows)
     if usable:
         how = "of the points, each predicted without its own run" if usable["held_out"] else "of the fitted points"
         error = f"{number(100 * usable['stiffness'], 2)} % in stiffness and {number(usable['loss_factor'], 2)}"

@@ -308,7 +308,8 @@ def changing_cycles(drive: Drive) -> list[str]:
         return []
     both = np.stack((loop.force, loop.displacement), axis=1)
     fitted = [cycle_harmonics(phase[part], both[part], order) for part in parts]
-    means = np.array([mean for mean, *_ in fitted])
+    # the first cycle from rest has another mean, by the memory of the rubber
+    means = np.array([mean for mean, *_ in fitted])[int(drive.from_rest) :]
     amplitude = np.array([abs(first[0]) for _, first, _ in fitted])
     error = max(drive.noise, *(scatter[0] for *_, scatter in fitted)) * np.sqrt(1.0 / rows)  # of the force [N or N m]
     (motion, force, _), units = loop.direction.motion.words, loop.direction.display
