@@ -2,7 +2,7 @@
 
 import importlib.metadata
 import json
-from collections.abc import Mapping, Set
+from collections.abc import Mapping
 from dataclasses import asdict, astuple
 from functools import cache
 from pathlib import Path
@@ -69,12 +69,48 @@ def from_document(document: object, file: Path | None = None) -> Result:
     Raises:
         ModelError: another schema, a key that is missing or invalid, or values that are not a valid model.
     """
-    tables = _require_object(document, file, "a model")
+    content = _require_object(document, file, "a model")
     hint = "use a file written by bushfit fit-static, fit-dynamic, fit or diagnose"
-    require_schema(tables, file, "a model", SCHEMA, hint=hint)
-    checked = validate_tables(tables, file, ModelFile, kind=ModelError)
+    require_schema(content, file, "a model", SCHEMA, hint=hint)
+    tables = validate_tables(content, file, ModelFile, kind=ModelError)
+    bushing = Bushing(*astuple(tables.bushing)) if tables.bushing else None
+    entries, fit, covariance = tables.parameters, tables.fit, Covariance()
+    values = {name: entry.value for name, entry in entries.items()}
     with error_location(file):
-        return _to_result(checked)
+        model = Model(bushing, tables.effects, values, tables.unnamed)
+        if table := tables.covariance:
+            if not set(table.names) <= model.parameters.keys():
+                raise ModelError("the covariance does not belong to the parameters", place="covariance")
+            matrix, *spread = (np.reshape(part, 2 * [len(table.names)]) for part in (table.matrix, *table.spread))
+            covariance = Covariance(table.names, matrix, tuple(spread))
+        alternatives = []
+        for rank, row in enumerate(tables.alternatives, 1):
+            with error_location(place=f"alternatives, #{rank}"):
+                unnamed = tables.unnamed if UNNAMED in row.effects else None
+                alternatives.append(Alternative(Model(bushing, row.effects, row.values, unnamed), row.probability))
+        result = Result(
+            model,
+            fitted=tuple(name for name, entry in entries.items() if entry.vary),
+            covariance=covariance,
+            quality=fit.quality if fit else None,
+            measured=fit.measured if fit else None,
+            warnings=tables.warnings,
+            inputs=tuple(Source(Path(test.file), test.sha256, test.conditions) for test in tables.provenance.inputs),
+            outliers=tables.outliers,
+            profile={name: entry.profile95 for name, entry in entries.items() if entry.profile95},
+            at_bound={name: entry.at_bound for name, entry in entries.items() if entry.at_bound},
+            specimens=tuple(Specimen(*astuple(specimen)) for specimen in tables.specimens),
+            tests=fit.tests if fit else (),
+            usable=fit.usable if fit else (),
+            unresolved=tuple(name for name in tables.unresolved if name in model.effects),
+            model_error=tables.model_error,
+            campaign=tables.campaign,
+            alternatives=tuple(alternatives),
+        )
+        with error_location(place="fit, directions"):
+            for name in result.measured.directions if result.measured else ():
+                result.place(name)
+    return result
 
 
 def to_document(result: Result) -> dict[str, Any]:
@@ -83,17 +119,39 @@ def to_document(result: Result) -> dict[str, Any]:
     Returns:
         Content of the model file, as dictionaries, lists, texts and numbers.
     """
-    model, covariance = result.model, result.covariance
-    inputs = (InputTable(str(source.file), source.sha256, dict(source.conditions)) for source in result.inputs)
+    model, covariance, fit = result.model, result.covariance, None
     matrices = [tuple(map(tuple, matrix.tolist())) for matrix in (covariance.matrix, *covariance.spread)]
+    if result.quality and (measured := result.measured):
+        fit = FitTable(
+            **asdict(result.quality),
+            frequency_Hz=measured.frequency,
+            strain=measured.strain,
+            directions=measured.directions,
+            temperature_K=measured.temperature,
+            tests=result.tests,
+            usable=result.usable,
+        )
+    parameters = {
+        name: ParameterTable(
+            value=float(model.values[name]),
+            unit=parameter.unit,
+            stderr=covariance.stderr(name),
+            ci95=result.interval(name),
+            vary=name in result.fitted,
+            profile95=result.profile.get(name),
+            at_bound=result.at_bound.get(name),
+        )
+        for name, parameter in model.parameters.items()
+    }
+    inputs = (InputTable(str(source.file), source.sha256, dict(source.conditions)) for source in result.inputs)
     tables = ModelFile(
         schema=SCHEMA,
         bushing=BushingTable(*astuple(model.bushing)) if model.bushing else None,
         effects=tuple(effect.name for effect in model.records),
-        parameters={name: _parameter_table(result, name) for name in model.parameters},
+        parameters=parameters,
         specimens=tuple(SpecimenTable(*astuple(specimen)) for specimen in result.specimens),
         covariance=CovarianceTable(covariance.names, matrices[0], tuple(matrices[1:])),
-        fit=_fit_table(result),
+        fit=fit,
         unresolved=result.unresolved,
         unnamed=model.unnamed,
         model_error=result.model_error,
@@ -145,79 +203,6 @@ def versions() -> dict[str, str]:
     return {name: importlib.metadata.version(name) for name in _PACKAGES}
 
 
-def _parameter_table(result: Result, name: str) -> ParameterTable:
-    return ParameterTable(
-        value=float(result.model.values[name]),
-        unit=result.model.parameters[name].unit,
-        stderr=result.covariance.stderr(name),
-        ci95=result.interval(name),
-        vary=name in result.fitted,
-        profile95=result.profile.get(name),
-        at_bound=result.at_bound.get(name),
-    )
-
-
-def _fit_table(result: Result) -> FitTable | None:
-    """Quality and range of the fit; None without a fit."""
-    quality, measured = result.quality, result.measured
-    if quality is None or measured is None:
-        return None
-    return FitTable(
-        **asdict(quality),
-        frequency_Hz=measured.frequency,
-        strain=measured.strain,
-        directions=measured.directions,
-        temperature_K=measured.temperature,
-        tests=result.tests,
-        usable=result.usable,
-    )
-
-
-def _to_result(tables: ModelFile) -> Result:
-    """Result of validated tables."""
-    bushing, entries, fit = tables.bushing, tables.parameters, tables.fit
-    values = {name: entry.value for name, entry in entries.items()}
-    model = Model(Bushing(*astuple(bushing)) if bushing else None, tables.effects, values, tables.unnamed)
-    inputs = tables.provenance.inputs
-    result = Result(
-        model,
-        fitted=tuple(name for name, entry in entries.items() if entry.vary),
-        covariance=_to_covariance(tables.covariance, model.parameters.keys()) if tables.covariance else Covariance(),
-        quality=fit.quality if fit else None,
-        measured=fit.measured if fit else None,
-        warnings=tables.warnings,
-        inputs=tuple(Source(Path(table.file), table.sha256, table.conditions) for table in inputs),
-        outliers=tables.outliers,
-        profile={name: entry.profile95 for name, entry in entries.items() if entry.profile95},
-        at_bound={name: entry.at_bound for name, entry in entries.items() if entry.at_bound},
-        specimens=tuple(Specimen(*astuple(table)) for table in tables.specimens),
-        tests=fit.tests if fit else (),
-        usable=fit.usable if fit else (),
-        unresolved=tuple(name for name in tables.unresolved if name in model.effects),
-        model_error=tables.model_error,
-        campaign=tables.campaign,
-        alternatives=tuple(_to_alternative(row, rank, model) for rank, row in enumerate(tables.alternatives, 1)),
-    )
-    with error_location(place="fit, directions"):
-        for name in result.measured.directions if result.measured else ():
-            result.place(name)
-    return result
-
-
-def _to_alternative(table: AlternativeTable, rank: int, model: Model) -> Alternative:
-    with error_location(place=f"alternatives, #{rank}"):
-        unnamed = model.unnamed if UNNAMED in table.effects else None
-        return Alternative(Model(model.bushing, table.effects, table.values, unnamed), table.probability)
-
-
-def _to_covariance(table: CovarianceTable, parameters: Set[str]) -> Covariance:
-    if not set(table.names) <= parameters:
-        raise ModelError("the covariance does not belong to the parameters", place="covariance")
-    size = len(table.names)
-    matrix, *spread = (np.reshape(part, (size, size)) for part in (table.matrix, *table.spread))
-    return Covariance(table.names, matrix, tuple(spread))
-
-
 def _require_object(document: object, file: Path | None, kind: str) -> dict[str, Any]:
     if isinstance(document, dict):
         return document
@@ -242,13 +227,13 @@ def _read_json(file: Path) -> Any:
     raise ModelError("this is not valid JSON", file=file, place=place, found=found, expected="a model file", hint=hint)
 
 
+def _refuse_constant(constant: str) -> NoReturn:
+    raise ValueError(f"{constant}, which is no number")
+
+
 def _refuse_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     table = dict(pairs)
     if len(table) < len(pairs):
         keys = [key for key, _ in pairs]
         raise ValueError(f'the key "{next(key for key in keys if keys.count(key) > 1)}" twice')
     return table
-
-
-def _refuse_constant(constant: str) -> NoReturn:
-    raise ValueError(f"{constant}, which is no number")

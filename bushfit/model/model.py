@@ -17,7 +17,7 @@ from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import STRAINING, Bushing, Direction, Place
-from bushfit.model.stack import adjusted_values, stack_force, stack_stiffness
+from bushfit.model.stack import adjusted_values, layered_stiffness, rubber_stiffness, stack_force
 from bushfit.model.structure import Structure, seen_by
 from bushfit.units import display_unit
 
@@ -258,10 +258,12 @@ class Model:
         amplitude = np.asarray(amplitude, dtype=float)
         if omega.shape != amplitude.shape:
             omega, amplitude = np.broadcast_arrays(omega, amplitude)
-        points = np.atleast_1d(omega)
-        setting = self.setting(direction, kind, under)
-        respond = stack_stiffness(self, setting, self.values if values is None else values)
-        stiffness = respond(points, np.atleast_1d(amplitude))
+        points, setting = np.atleast_1d(omega), self.setting(direction, kind, under)
+        values = self.values if values is None else values
+        if layers := self.layers(setting):
+            stiffness = layered_stiffness(self, setting, values, layers, points, np.atleast_1d(amplitude))
+        else:
+            stiffness = rubber_stiffness(self, setting, values, points, np.atleast_1d(amplitude))
         if stiffness.shape[-points.ndim :] != points.shape:
             stiffness = stiffness + np.zeros(points.shape)
         return stiffness if omega.ndim else stiffness[..., 0]

@@ -7,12 +7,11 @@ ones, and good to a millionth, which is more than the steps and errors of a fit 
 """
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import cast
 
 import numpy as np
 
-from bushfit.effects import Branch, Parameter, place_suffix, qualified_name
+from bushfit.effects import Branch, place_suffix, qualified_name
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Value, Values
 from bushfit.effects.history import History
 from bushfit.geometry import Place
@@ -22,10 +21,6 @@ from bushfit.model.structure import seen_by
 #: Step of the differences, relative to the value (log parameters) or to the typical size (linear ones);
 #: chosen: the differences are good to about a millionth.
 _RELATIVE_STEP = 1e-6
-
-#: Gives the response of a branch by values and test, and its analytic derivatives by its parameters' short names; None
-#: in their place where it has none.
-Face = Callable[[Branch], tuple[Callable[..., Array], Callable[..., dict[str, Array]] | None]]
 
 
 def stiffness_and_slopes(
@@ -57,14 +52,19 @@ def stiffness_and_slopes(
     >>> slopes.round(4)
     array([[0.3634+0.j]])
     """
-    respond = partial(model.stiffness, direction, frequency, amplitude, kind=kind, under=under)
     if not model.only_branches:
-        return _differences_at(direction, model, names, lambda values: respond(values=values))
-    omega = 2.0 * np.pi * frequency
-    strain = amplitude * model.unit_strain(direction)
-    total = np.zeros((len(names), frequency.size), dtype=complex)
-    _add(total, model, names, lambda branch: (branch.modulus, branch.modulus_sensitivities), (omega, strain))
-    return respond(), model.stiffness_per_modulus(direction) * total
+        return _differences_at(
+            direction,
+            model,
+            names,
+            lambda values: model.stiffness(direction, frequency, amplitude, kind=kind, values=values, under=under),
+        )
+    test = 2.0 * np.pi * frequency, amplitude * model.unit_strain(direction)
+    slopes = np.zeros((len(names), frequency.size), dtype=complex)
+    for branch in model.structure.branches:
+        _add_slopes(slopes, model, names, branch, branch.modulus, branch.modulus_sensitivities, test)
+    stiffness = model.stiffness(direction, frequency, amplitude, kind=kind, under=under)
+    return stiffness, model.stiffness_per_modulus(direction) * slopes
 
 
 def force_and_slopes(
@@ -83,36 +83,45 @@ def force_and_slopes(
     Returns:
         Force, (n,), and derivatives, (k, n).
     """
-    respond = partial(model.force, direction, displacement, kind="loop", under=under)
     if not model.only_branches:
-        return _differences_at(direction, model, names, lambda values: respond(values=values))
+        return _differences_at(
+            direction,
+            model,
+            names,
+            lambda values: model.force(direction, displacement, kind="loop", values=values, under=under),
+        )
     per_displacement = model.unit_strain(direction)
-    test = (displacement.scaled(per_displacement),)
-    total = np.zeros((len(names), displacement.value.shape[-1]))
-    _add(total, model, names, lambda branch: (branch.stress, branch.stress_sensitivities), test)
-    return respond(), model.stiffness_per_modulus(direction) / (2.0 * per_displacement) * total
+    slopes, test = np.zeros((len(names), displacement.value.shape[-1])), (displacement.scaled(per_displacement),)
+    for branch in model.structure.branches:
+        _add_slopes(slopes, model, names, branch, branch.stress, branch.stress_sensitivities, test)
+    force = model.force(direction, displacement, kind="loop", under=under)
+    return force, model.stiffness_per_modulus(direction) / (2.0 * per_displacement) * slopes
 
 
-def _add(total: Array, model: Model, names: Sequence[str], face: Face, test: tuple[object, ...]) -> None:
-    """Add the derivatives of all branches by parameters to `total`, (len(names), n); `test` follows the values."""
+def _add_slopes(
+    slopes: Array,
+    model: Model,
+    names: Sequence[str],
+    branch: Branch,
+    respond: Callable[..., Array],
+    sensitivities: Callable[..., dict[str, Array]] | None,
+    test: tuple[object, ...],
+) -> None:
+    """Add the derivatives of a branch by parameters to `slopes`, (len(names), n).
 
-    def response(branch: Branch, values: Values) -> Array:
-        return face(branch)[0](seen_by(branch, values), *test)
-
+    The response and its analytic derivatives, if the branch has them, take the values and the test.
+    """
     row = {name: i for i, name in enumerate(names)}
-    for branch in model.records:
-        assert isinstance(branch, Branch)
-        qualified = {parameter.name: qualified_name(branch, parameter) for parameter in branch.parameters}
-        varied = [name for name in (*qualified.values(), *branch.uses) if name in row]
-        if not varied:
-            continue
-        if sensitivities := face(branch)[1]:
-            analytic = sensitivities(seen_by(branch, model.values), *test)
-            slopes = {name: analytic[short] for short, name in qualified.items() if name in row}
-        else:
-            slopes = dict(zip(varied, differences(model, varied, partial(response, branch))[1], strict=True))
-        for name, slope in slopes.items():
-            total[row[name]] += slope
+    qualified = {parameter.name: qualified_name(branch, parameter) for parameter in branch.parameters}
+    varied = [name for name in (*qualified.values(), *branch.uses) if name in row]
+    if varied and sensitivities:
+        analytic = sensitivities(seen_by(branch, model.values), *test)
+        for short, name in qualified.items():
+            if name in row:
+                slopes[row[name]] += analytic[short]
+    elif varied:
+        by_value = differences(model, varied, lambda values: respond(seen_by(branch, values), *test))[1]
+        slopes[[row[name] for name in varied]] += by_value
 
 
 def _differences_at(
@@ -143,15 +152,11 @@ def differences(model: Model, names: Sequence[str], respond: Callable[[Values], 
     stacked: dict[str, Value] = dict(model.values)
     steps = np.empty((count, 1))
     for i, name in enumerate(names):
-        column = np.full((count + 1, 1), model.values[name])
-        column[i] += _step(model.parameters[name], model.values[name])
-        stacked[name], steps[i] = column, column[i] - model.values[name]
+        parameter, value = model.parameters[name], model.values[name]
+        step = _RELATIVE_STEP * (abs(value) if parameter.log and value else parameter.typical)
+        column = np.full((count + 1, 1), value)
+        column[i] += step if value + step <= parameter.bounds[1] else -step
+        stacked[name], steps[i] = column, column[i] - value
     responses = respond(cast(Values, stacked))
     responses = np.broadcast_to(responses, (count + 1, responses.shape[-1]))
     return responses[count], (responses[:count] - responses[count]) / steps
-
-
-def _step(parameter: Parameter, value: float) -> float:
-    """Step of a difference [unit of the parameter], downward where a step up would leave the bounds."""
-    step = _RELATIVE_STEP * (abs(value) if parameter.log and value else parameter.typical)
-    return step if value + step <= parameter.bounds[1] else -step

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulatedTest, SimulateSettings
+from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulatedTest, SimulateSettings
 from bushfit.campaign.session import planned_session
 from bushfit.effects.contract import Array, Circumstances
 from bushfit.geometry import Specimen
-from bushfit.model import rig
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.reading.measurement import Loop, Source, Sweep
@@ -88,51 +87,31 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
     """
     planned = [test for kind in (clean.loops, clean.sweeps, clean.resonances) for test, _ in kind]
     under = planned_session(clean.truth.bushing, planned, plan.repeats)[len(clean.loops) :]
+    random, gains, loops = np.random.default_rng(plan.seed), dict[SimulatedLoop, float](), []
+    for number, (loop, record) in enumerate(clean.loops, start=1):
+        if loop not in gains:  # the gain error of each level, which its repeats share
+            gains[loop] = 1.0 + plan.level_gain_error * random.standard_normal() if plan.level_gain_error else 1.0
+        rows, largest = record.time.size, max(amplitude for _, amplitude in loop.parts)
+        displacement = record.displacement + plan.displacement_noise * largest * random.standard_normal(rows)
+        noise = plan.force_noise * np.ptp(record.force) / 2.0 * _filtered_noise(rows, plan, random)
+        name, force = f"loop_{loop.direction}_{number}", gains[loop] * record.force + noise
+        loops.append(Loop(name, loop.direction, record.time, displacement, force, temperature=loop.temperature))
     named = zip(_names("sweep", [test for test, _ in clean.sweeps]), clean.sweeps, under, strict=False)
-    random, gains = np.random.default_rng(plan.seed), dict[SimulatedLoop, float]()
-    loops = tuple(
-        _loop(test, force, number, plan, random, gains) for number, (test, force) in enumerate(clean.loops, start=1)
-    )
-    sweeps = tuple(
-        _sweep(clean.truth, test, k, name, plan, random, circumstances) for name, (test, k), circumstances in named
-    )
+    sweeps = [_sweep(clean.truth, test, k, name, plan, random, conditions) for name, (test, k), conditions in named]
     shaken = [resonance for resonance in clean.resonances for _ in range(plan.repeats)]
-    resonances = tuple(
-        (test.mass, _resonance(test, ratio, name, plan, random))
-        for name, (test, ratio) in zip(_names("resonance", [t for t, _ in shaken]), shaken, strict=True)
-    )
+    resonances = []
+    for name, (test, ratio) in zip(_names("resonance", [test for test, _ in shaken]), shaken, strict=True):
+        frequency, measured = np.array(test.frequencies), _with_noise(ratio[None], plan, random)[0]
+        base, source = np.full(ratio.shape, test.base_acceleration), Source(Path(f"{name}.csv"), "")
+        resonances.append((test.mass, ResonanceTest(name, test.direction, frequency, measured, base, source)))
     specimens = dict.fromkeys(test.direction for test in planned if isinstance(test.direction, Specimen))
-    return Simulated(clean.truth, plan, loops, sweeps, resonances, tuple(specimens))
+    return Simulated(clean.truth, plan, tuple(loops), tuple(sweeps), tuple(resonances), tuple(specimens))
 
 
 def _names(kind: str, tests: Sequence[SimulatedTest]) -> list[str]:
     """Names of the tests and their files: kind and direction or specimen, with a number if names are equal."""
     stems = [f"{kind}_{folder_name(str(test.direction))}" for test in tests]
     return [stem if stems.count(stem) == 1 else f"{stem}_{place}" for place, stem in enumerate(stems, start=1)]
-
-
-def _loop(
-    test: SimulatedLoop,
-    clean: rig.Record,
-    number: int,
-    plan: SimulateSettings,
-    random: Generator,
-    gains: dict[SimulatedLoop, float],
-) -> Loop:
-    """Record of a loop; `gains` stores the gain error of each level, which its repeats share."""
-    largest = max(amplitude for _, amplitude in test.parts)
-    if test not in gains:
-        gains[test] = 1.0 + plan.level_gain_error * random.standard_normal() if plan.level_gain_error else 1.0
-    gain = gains[test]
-    return Loop(
-        f"loop_{test.direction}_{number}",
-        test.direction,
-        clean.time,
-        clean.displacement + plan.displacement_noise * largest * random.standard_normal(clean.time.size),
-        gain * clean.force
-        + plan.force_noise * np.ptp(clean.force) / 2.0 * filtered_noise(clean.time.size, plan, random),
-        temperature=test.temperature,
-    )
 
 
 def _sweep(
@@ -144,20 +123,30 @@ def _sweep(
     random: Generator,
     under: Circumstances,
 ) -> Sweep:
-    """All repeats of a sweep; for a stepped amplitude, with the levels that a reader determines."""
-    plan = replace(plan, repeats=test.repeats or plan.repeats)
-    shape = (len(test.levels), plan.repeats, len(test.steps))
+    """All repeats of a sweep; for a stepped amplitude, with the levels that a reader determines.
+
+    Notes:
+        Amplitudes that are not reached differ from those requested by a lognormal ratio; half of its variance is common
+        to each frequency. All repeats of a level share a gain and a phase error.
+    """
+    repeats = test.repeats or plan.repeats
+    shape = (len(test.levels), repeats, len(test.steps))
     frequency, level = (np.broadcast_to(values[:, None], shape).ravel() for values in test.points)
-    repeat = np.broadcast_to(np.arange(1, plan.repeats + 1)[:, None], shape).ravel()
+    repeat = np.broadcast_to(np.arange(1, repeats + 1)[:, None], shape).ravel()
     stiffness, reached = np.broadcast_to(clean[:, None], shape), None
     if test.reached:
-        reached = level * amplitude_ratios(test, plan, random)
+        of_frequency = random.standard_normal(len(test.frequencies))
+        of_frequency = of_frequency if test.stepped == "frequency" else of_frequency[:, None, None]
+        ratios = np.exp(test.reached * np.sqrt(0.5) * (of_frequency + random.standard_normal(shape)))
+        reached = level * ratios.ravel()
     if test.reached or truth.knows_circumstances:
         planned = frequency, level, stiffness.ravel(), Circumstances(test.temperature)
         nearby = near(truth, test.direction, *planned, under)
         stiffness = nearby(level if reached is None else reached).reshape(shape)
-    stiffness = stiffness * level_errors(len(test.levels), plan, random)
-    measured = np.stack([with_noise(stiffness[:, number], plan, random) for number in range(plan.repeats)], axis=1)
+    if plan.level_gain_error or plan.level_phase_error:
+        gain, phase = random.standard_normal((2, shape[0], 1, 1))
+        stiffness = stiffness * (1.0 + plan.level_gain_error * gain) * np.exp(1j * plan.level_phase_error * phase)
+    measured = np.stack([_with_noise(stiffness[:, number], plan, random) for number in range(repeats)], axis=1)
     if test.stepped == "amplitude" and reached is not None:
         level = runs_of(frequency, reached, repeat).amplitude
     return Sweep(
@@ -173,31 +162,8 @@ def _sweep(
     )
 
 
-def _resonance(
-    test: SimulatedResonance, clean: Array, name: str, plan: SimulateSettings, random: Generator
-) -> ResonanceTest:
-    """Record of one run with the gain and phase errors of its two accelerometers."""
-    return ResonanceTest(
-        name,
-        test.direction,
-        np.array(test.frequencies),
-        with_noise(clean[None], plan, random)[0],
-        np.full(clean.shape, test.base_acceleration),
-        Source(Path(f"{name}.csv"), ""),
-    )
-
-
-def filtered_noise(rows: int, plan: SimulateSettings, random: Generator) -> Array:
-    """Stationary noise of unit variance, as a first-order autoregressive process.
-
-    Args:
-        rows: number of rows.
-        plan: settings with the correlation between neighbouring rows.
-        random: generator.
-
-    Returns:
-        Noise [1], (rows,).
-    """
+def _filtered_noise(rows: int, plan: SimulateSettings, random: Generator) -> Array:
+    """Stationary noise of unit variance, (rows,), as a first-order autoregressive process."""
     noise = random.standard_normal(rows)
     if not plan.force_correlation:
         return noise
@@ -207,53 +173,10 @@ def filtered_noise(rows: int, plan: SimulateSettings, random: Generator) -> Arra
     return lfilter([1.0], [1.0, -plan.force_correlation], noise)
 
 
-def with_noise(clean: Array, plan: SimulateSettings, random: Generator) -> Array:
-    """Add noise to runs.
-
-    Args:
-        clean: complex stiffness, (runs, steps).
-        plan: settings with the noise of points and the gain and phase errors of runs.
-        random: generator.
-
-    Returns:
-        Complex stiffness with noise, (runs, steps).
-    """
+def _with_noise(clean: Array, plan: SimulateSettings, random: Generator) -> Array:
+    """Runs with a gain and a phase error each, and with the noise of points, complex (runs, steps)."""
     runs = (clean.shape[0], 1)
     gain = plan.gain_error * random.standard_normal(runs)
     phase = plan.phase_error * random.standard_normal(runs)
     scatter = plan.noise * (random.standard_normal(clean.shape) + 1j * random.standard_normal(clean.shape))
     return clean * (1.0 + gain) * np.exp(1j * phase) * (1.0 + scatter)
-
-
-def level_errors(levels: int, plan: SimulateSettings, random: Generator) -> Array:
-    """Factors of the gain and phase errors that all repeats of a level share.
-
-    Args:
-        levels: number of levels.
-        plan: settings with the errors.
-        random: generator.
-
-    Returns:
-        Complex factors, (levels, 1, 1).
-    """
-    if not (plan.level_gain_error or plan.level_phase_error):
-        return np.ones((levels, 1, 1))
-    gain, phase = random.standard_normal((2, levels, 1, 1))
-    return (1.0 + plan.level_gain_error * gain) * np.exp(1j * plan.level_phase_error * phase)
-
-
-def amplitude_ratios(test: SimulatedSweep, plan: SimulateSettings, random: Generator) -> Array:
-    """Ratios of the amplitude reached to the amplitude requested, lognormal.
-
-    Args:
-        test: sweep with the relative standard deviation `reached`; half of its variance is common to each frequency.
-        plan: settings with the number of repeats.
-        random: generator.
-
-    Returns:
-        (levels * repeats * steps,).
-    """
-    at_frequency = random.standard_normal(len(test.frequencies))
-    at_frequency = at_frequency if test.stepped == "frequency" else at_frequency[:, None, None]
-    at_point = random.standard_normal((len(test.levels), plan.repeats, len(test.steps)))
-    return np.exp(test.reached * np.sqrt(0.5) * (at_frequency + at_point)).ravel()

@@ -98,25 +98,27 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
 
 
 def _clean_loop(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.Record:
-    """Record of a loop or programme without noise."""
+    """Record of a loop, or of a programme from rest, without noise, with one row per `_STEPS_PER_ROW` time steps."""
     if len(test.parts) > 1:
-        return _clean_programme(truth, test, under)
-    ((frequency, amplitude),) = test.parts
-    run_in, swell = _run_in(truth, test.direction, amplitude)
-    measured = rig.record(
-        truth,
-        test.direction,
-        frequency,
-        amplitude,
-        cycles=test.cycles,
-        run_in=run_in,
-        swell=swell,
-        steps_per_cycle=_ROWS_PER_CYCLE * _STEPS_PER_ROW,
-        waveform=test.waveform,
-        kind="loop",
-        under=under,
-    )
-    return _thinned(measured)
+        record = _clean_programme(truth, test, under)
+    else:
+        ((frequency, amplitude),) = test.parts
+        run_in, swell = _run_in(truth, test.direction, amplitude)
+        record = rig.record(
+            truth,
+            test.direction,
+            frequency,
+            amplitude,
+            cycles=test.cycles,
+            run_in=run_in,
+            swell=swell,
+            steps_per_cycle=_ROWS_PER_CYCLE * _STEPS_PER_ROW,
+            waveform=test.waveform,
+            kind="loop",
+            under=under,
+        )
+    rows = slice(None, None, _STEPS_PER_ROW)
+    return rig.Record(record.time[rows], record.displacement[rows], record.force[rows])
 
 
 def _run_in(truth: Model, place: Place, amplitude: float) -> tuple[int, tuple[int, float]]:
@@ -156,13 +158,7 @@ def _clean_programme(truth: Model, test: SimulatedLoop, under: Circumstances) ->
         phase = np.arange(round(test.cycles / (frequency * step))) * (frequency * step)
         motions += [amplitude * rig.wave(test.waveform, phase), rest]
     motion = np.concatenate([*motions[:-1], [0.0]])
-    return _thinned(rig.imposed(truth, test.direction, motion, step, test.parts[0][0], under=under))
-
-
-def _thinned(record: rig.Record) -> rig.Record:
-    """Record with one row per `_STEPS_PER_ROW` time steps."""
-    rows = slice(None, None, _STEPS_PER_ROW)
-    return rig.Record(record.time[rows], record.displacement[rows], record.force[rows])
+    return rig.imposed(truth, test.direction, motion, step, test.parts[0][0], under=under)
 
 
 def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Array:
