@@ -307,17 +307,3 @@ def test_a_stack_of_values_equals_one_after_the_other(
         for row, each in zip(both, models, strict=True):
             expected = each.force(direction, history, kind="loop", under=UNDER)
             np.testing.assert_allclose(row, expected, rtol=1e-10, atol=1e-10 * np.ptp(expected))
-
-
-@pytest.mark.parametrize("other", ["clearance", "force_saturation", "rig_compliance"])
-def test_a_stack_of_its_amount_alone_does_so_in_sweeps(effect: Effect, other: str, rng: np.random.Generator) -> None:
-    """What bends the waveform asks whole cycles, in which the amount may act where it does not in the stiffness."""
-    _, model, direction, _, amplitude = drawn(rng, effect.name, other)
-    amount = qualified_name(effect, effect.amount)
-    amounts = model.values[amount] * np.array([0.9, 1.0, 1.1])
-    frequency, amplitudes = np.array([0.1, 40.0, 155.0, 155.0]), amplitude * np.array([1.0, 0.5, 1.5, 0.0])
-    at = (direction, frequency, amplitudes)
-    both = model.stiffness(*at, values={**model.values, amount: amounts[:, None]}, under=UNDER)
-    for row, each in zip(np.broadcast_to(both, (3, 4)), amounts, strict=True):
-        alone = model.with_values({amount: float(each)}).stiffness(*at, under=UNDER)
-        np.testing.assert_allclose(row, alone, rtol=1e-10)

@@ -97,15 +97,6 @@ def test_rig_and_bushing_share_the_motion(alone: Model, history: History) -> Non
     assert np.max(np.abs(again - force)) < 1e-9 * np.max(np.abs(force))
 
 
-def test_instrument_masses_springs_and_offsets_do_not_act_in_torsion() -> None:
-    model = added("bump_stop", added("clearance", delta=5e-5), gap=1e-4, stiffness=1e6)
-    model = added("fixture_resonance", added("inertia", model, mass=0.1), mass=0.1)
-    model = added("force_offset", added("rig_compliance", model, compliance=1e-7), offset=10.0)
-    at = (Direction.TORSION, FREQUENCY, AMPLITUDE)
-    assert np.array_equal(model.stiffness(*at), PLAIN.stiffness(*at))
-    assert np.array_equal(model.force(Direction.TORSION, LOOP), PLAIN.force(Direction.TORSION, LOOP))
-
-
 @pytest.mark.parametrize("effect", [effect for effect in LIBRARY.values() if effect.corrects], ids=lambda one: one.name)
 def test_what_corrects_a_formula_scales_that_direction_and_no_other(effect: Effect) -> None:
     (parameter,) = effect.parameters
@@ -115,22 +106,6 @@ def test_what_corrects_a_formula_scales_that_direction_and_no_other(effect: Effe
         plain = PLAIN.stiffness(direction, FREQUENCY, AMPLITUDE)
         np.testing.assert_allclose(model.stiffness(direction, FREQUENCY, AMPLITUDE), factor * plain, rtol=1e-14)
         np.testing.assert_allclose(model.force(direction, LOOP), factor * PLAIN.force(direction, LOOP), rtol=1e-14)
-
-
-def test_a_late_displacement_is_an_early_force() -> None:
-    """From rest the force runs ahead of the record, to its very end."""
-    time = np.arange(1, 40 * 500 + 1) / (500 * 100.0)
-    history = History(2e-4 * np.sin(2.0 * np.pi * 100.0 * time), time[0], periodic=False, frequency=100.0)
-    early, prompt = (model.force("axial", history) for model in (added("delay", tau=-1e-4), PLAIN))
-    np.testing.assert_allclose(early[:-5], prompt[5:], rtol=1e-9)
-    np.testing.assert_allclose(early[-5:], prompt[-500:-495], rtol=1e-9)
-
-
-@pytest.mark.parametrize("amplitude", [0.0, 1e-9, 0.99e-4, 1e-4])
-def test_nothing_happens_within_the_gap(amplitude: float) -> None:
-    stop = added("bump_stop", gap=1e-4, stiffness=1e7)
-    assert np.array_equal(stop.stiffness("axial", 50.0, amplitude), PLAIN.stiffness("axial", 50.0, amplitude))
-    assert np.all(added("clearance", delta=1e-4).stiffness("axial", 50.0, amplitude) == 0.0)
 
 
 @pytest.mark.parametrize("shift", [0.01, 0.03, 0.13])
@@ -184,15 +159,6 @@ def test_friction_recovers_after_a_larger_strain() -> None:
     same(broken, PLAIN, 0.0)
 
 
-def test_a_loop_clock_that_runs_slow_is_a_faster_loop() -> None:
-    off = added("loop_clock", rate=math.log(10.0))
-    expected = PLAIN.stiffness("axial", 10.0 * FREQUENCY, AMPLITUDE)
-    np.testing.assert_allclose(off.stiffness(*AXIAL, kind="loop"), expected, rtol=1e-12)
-    fast = replace(LOOP, step=LOOP.step / 10.0, frequency=10.0 * LOOP.frequency)
-    np.testing.assert_allclose(off.force("axial", LOOP, kind="loop"), PLAIN.force("axial", fast), rtol=1e-12)
-    same(off, PLAIN, 0.0)
-
-
 def test_a_spring_alone_under_a_force_channel_that_saturates() -> None:
     """Its force is a sine, of which the describing function tells what lies beyond the level."""
     spring = Model(PLAIN.bushing, ("elastic",), {"mu": 1e6})
@@ -200,23 +166,6 @@ def test_a_spring_alone_under_a_force_channel_that_saturates() -> None:
     found = added("force_saturation", spring, share=0.3, level=40.0).stiffness(*AXIAL)
     np.testing.assert_allclose(found, k * (1.0 - 0.3 * first_harmonic(np.abs(k) * AMPLITUDE, 40.0)), rtol=1e-12)
     np.testing.assert_array_equal(np.abs(found) < np.abs(k), np.abs(k) * AMPLITUDE > 40.0)
-
-
-@pytest.mark.parametrize(
-    "model",
-    [added("clearance", delta=2e-5), added("force_saturation", share=0.3, level=180.0)],
-    ids=lambda model: model.effects[-1],
-)
-def test_circumstances_of_each_point_reach_the_rubber_through_a_bent_waveform(model: Model) -> None:
-    """Play asks for whole cycles of the bushing below it, a row for each operating point; a force channel that
-    saturates only for those that come near its level, here the last two of three."""
-    model = added("mullins_levels", added("drift", model, gain=0.1), share=0.1)
-    model = added("temperature", model, softening=0.01)
-    under = Circumstances(np.array([290.0, 300.0, 305.0]), np.array([0.0, 0.3, 1.0]), np.array([0.0, 0.02, 0.05]))
-    together = model.stiffness(*AXIAL, under=under)
-    points = enumerate(zip(FREQUENCY, AMPLITUDE, strict=True))
-    alone = [model.stiffness("axial", f, x, under=under.select(i)) for i, (f, x) in points]
-    np.testing.assert_allclose(together, alone, rtol=1e-12)
 
 
 SLIDERS = {"sigma": 2.5e4, "e_s": 0.015, "spread": 1.3}

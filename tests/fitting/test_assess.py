@@ -15,7 +15,7 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, ParameterSetting, SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.agreement import LeaveOut
-from bushfit.fitting.assess import FitStage, covariance, lack_of_fit, measured_range, misfit, quality
+from bushfit.fitting.assess import FitStage, covariance
 from bushfit.fitting.coordinates import jacobian
 from bushfit.fitting.preparation import MeasuredLoop, new_loop
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -45,33 +45,6 @@ def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(
     known = [replace(each, gain_error=0.0) if isinstance(each, MeasuredLoop) else each for each in data_sets]
     certain = covariance(model, [FitStage(FIVE, known)])  # of gain
     np.testing.assert_allclose([certain.stderr(name) for name in FIVE], plain, rtol=0.1)
-
-
-def test_quality_and_reach_are_those_of_the_data(measured: PreparedCampaign, result: Result) -> None:
-    data_sets = measured.select_tests(None)
-    found = quality(result.model, data_sets, 5)
-    assert found.points == sum(data_set.counted for data_set in data_sets)
-    assert found.reduced_chi_square == pytest.approx(1.0, abs=0.1)
-    assert found.nrmse == pytest.approx(found.noise, rel=0.15)
-    reach = measured_range(result.model, data_sets)
-    assert reach.frequency == pytest.approx((0.1, 155.0), rel=1e-3)
-    assert reach.strain == pytest.approx((0.0062, 0.062), rel=0.01)
-    assert reach.directions == (Direction.AXIAL,)
-
-
-def test_a_model_that_misses_the_data_is_told_and_one_that_does_not_is_not(
-    measured: PreparedCampaign, result: Result
-) -> None:
-    data_sets = measured.select_tests(None)
-    assert lack_of_fit(result.model, data_sets, 5) is None
-    assert misfit(result.model, data_sets, 5) == []
-    off = result.model.with_values({"mu": 1.05 * result.model.values["mu"]})
-    reduced = lack_of_fit(off, data_sets, 5)
-    assert reduced is not None
-    assert reduced > 2.0
-    (sentence,) = misfit(off, data_sets, 5, ", and so on")
-    assert "intervals are invalid" in sentence
-    assert sentence.endswith("standard errors are scaled up, and so on")
 
 
 def test_a_parameter_that_no_test_sees_has_an_error_beyond_all_bounds(
@@ -237,17 +210,6 @@ def test_a_run_held_out_is_a_refit_without_it(levelled: Campaign) -> None:
         np.testing.assert_allclose(step / errors, moved / errors, atol=0.5)
 
 
-def test_what_the_rest_leaves_open_is_not_held_out() -> None:
-    random = np.random.default_rng(1)
-    jacobian = np.zeros((2, 20))
-    jacobian[0] = random.standard_normal(20)
-    jacobian[1, :5] = 1.0
-    whole = LeaveOut.from_fit(jacobian, 0.1 * random.standard_normal(20))
-    assert whole.step(np.arange(5)) is None
-    assert whole.step(np.arange(5, 10)) is not None
-    assert LeaveOut.from_fit(np.zeros((0, 20)), np.ones(20)).step(np.arange(3)).shape == (0,)  # type: ignore[union-attr]
-
-
 def test_usable_within_what_95_of_a_hundred_points_show(levelled: Campaign) -> None:
     result = fit_joint(PreparedCampaign.from_campaign(level_off(levelled, 1, 5e-4, 1.05)))
     by_place = {place.place: place for place in result.usable}
@@ -271,18 +233,3 @@ def test_what_the_rest_cannot_tell_counts_as_fitted(levelled: Campaign, paper_mo
     every = {name: ParameterSetting(value=value, vary=False) for name, value in paper_model.values.items()}
     result = fit_joint(PreparedCampaign.from_campaign(replace(levelled, fit=FitSettings(parameters=every))))
     assert all(place.held_out for place in result.usable)
-
-
-def test_a_robust_fit_counts_no_outliers(levelled: Campaign) -> None:
-    sweep = levelled.sweeps[0]
-    spoiled = sweep.stiffness.copy()
-    spoiled[10] *= 2.0
-    data = PreparedCampaign.from_campaign(
-        replace(levelled, sweeps=(replace(sweep, stiffness=spoiled),), fit=FitSettings(loss="soft_l1"))
-    )
-    result = fit_joint(data)
-    whole = runs(result, "axial")[None]
-    assert whole.points == sweep.frequency.size - 1
-    assert whole.nrmse < 0.02
-    (place,) = result.usable
-    assert place.stiffness < 0.02

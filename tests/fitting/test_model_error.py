@@ -173,22 +173,6 @@ def test_a_band_opens_by_the_model_error_beyond_the_tests(off_by_waves: tuple[Ca
     assert np.hypot(narrow, own) == pytest.approx(wider, rel=1e-3)
 
 
-def test_neither_the_order_of_tests_nor_a_scale_of_force_matters(off_by_waves: tuple[Campaign, Result]) -> None:
-    campaign, result = off_by_waves
-    other = replace(campaign, sweeps=campaign.sweeps[::-1])
-    stiffer = replace(
-        campaign,
-        loops=tuple(replace(loop, force=4.0 * loop.force) for loop in campaign.loops),
-        sweeps=tuple(replace(sweep, stiffness=4.0 * sweep.stiffness) for sweep in campaign.sweeps),
-    )
-    turned, scaled = (fit_joint(PreparedCampaign.from_campaign(each)) for each in (other, stiffer))
-    for name in FIVE:
-        factor = 4.0 if name in ("mu", "m", "sigma_fmax") else 1.0
-        error = 0.02 * (result.covariance.stderr(name) or 0.0)
-        assert turned.model.values[name] == pytest.approx(result.model.values[name], abs=error)
-        assert scaled.model.values[name] == pytest.approx(factor * result.model.values[name], abs=factor * error)
-
-
 @pytest.mark.parametrize("held", [(), ("m", "alpha", "sigma_fmax", "eps_half")], ids=["one on its bound", "no other"])
 def test_parameters_on_their_bounds_beside_a_model_error(rig: Rig, paper_model: Model, held: tuple[str, ...]) -> None:
     campaign = spoiled(rig(3, shared=True), waves(0.03, 3))

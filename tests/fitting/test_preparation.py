@@ -88,11 +88,6 @@ def test_unsure_noise_moves_the_covariance_by_its_derivatives(sweep: MeasuredSwe
         np.testing.assert_allclose(found, influence @ whitening @ whole @ whitening.T, atol=1e-9, err_msg=kind)
 
 
-def test_the_right_model_of_a_sweep_leaves_no_residual(sweep: MeasuredSweep, paper_model: Model) -> None:
-    assert np.max(np.abs(sweep.residual(paper_model))) < 1e-10
-    assert np.max(sweep.relative(paper_model)) < 1e-12
-
-
 @pytest.mark.parametrize("kind", ["complex", "magnitude_loss_factor", "loop", "loop of correlated rows"])
 def test_the_jacobian_is_that_of_the_residual(rig: Rig, sweep: MeasuredSweep, paper_model: Model, kind: str) -> None:
     data_set: MeasuredTest
@@ -129,14 +124,6 @@ def test_the_right_model_of_a_loop_leaves_noise_alone(loop: MeasuredLoop, paper_
     np.testing.assert_allclose(np.abs(residual[counted]), weighed, rtol=1e-9)
     assert np.array_equal(loop.distance(paper_model), np.abs(residual))
     assert np.max(np.abs(loop.noise_free(paper_model).residual(paper_model))) < 1e-9
-
-
-def test_of_a_loop_that_stands_on_its_first_harmonic_no_other_departs(loop: MeasuredLoop, paper_model: Model) -> None:
-    """A model 3 % too stiff departs by 3 % in the slope, and in nothing that was left out."""
-    fundamental = loop.fundamental()
-    assert np.flatnonzero(np.linalg.norm(fundamental.contrasts(), axis=1)).tolist() == [1, 2]
-    stiffer = paper_model.with_values({"mu": 1.03 * paper_model.values["mu"]})
-    assert 0.005 < fundamental.smooth_misfit(stiffer) < 0.04
 
 
 def test_rows_without_weight_count_for_nothing_and_are_still_shown(loop: MeasuredLoop, paper_model: Model) -> None:
@@ -214,13 +201,6 @@ def test_dynamic_amplitudes_choose_the_levels(measured: PreparedCampaign) -> Non
     absent = PreparedCampaign.from_campaign(replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(3e-4,))))
     with pytest.raises(FitError, match="no sweep at these amplitudes"):
         _ = absent.smallest_sweep
-
-
-def test_a_direction_without_tests_is_refused_with_those_there_are(measured: PreparedCampaign) -> None:
-    with pytest.raises(FitError, match=r"no test in the directions[\s\S]*axial, radial[\s\S]*torsion"):
-        measured.select_tests([Direction.TORSION])
-    with pytest.raises(FitError, match="there is nothing to fit"):
-        PreparedCampaign.from_campaign(replace(measured.campaign, loops=(), sweeps=())).select_tests(None)
 
 
 def test_magnitudes_in_coarse_steps_are_told(campaign: Campaign) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,8 @@ import pytest
 from tries import SEEDS
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import FitSettings, ParameterSetting, RigSettings, SimulatedLoop, SimulatedSweep
+from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
 from bushfit.effects import BASE
-from bushfit.errors import FitError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import fit_joint
@@ -127,13 +125,6 @@ def test_one_loop_bounds_mu_from_above_alone(rig: Rig, paper_model: Model) -> No
     assert max(abs(value) for _, _, value in result.covariance.correlations()) <= 1.0 + 1e-9
 
 
-def test_a_single_parameter_has_no_profile(rig: Rig, paper_model: Model) -> None:
-    held = {name: ParameterSetting(paper_model.values[name], vary=False) for name in FIVE[1:]}
-    campaign = replace(rig(0, **plan(1e-3)), fit=FitSettings(parameters=held))
-    with pytest.raises(FitError, match="two parameters or more"):
-        profiled(campaign)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("shared", [False, True], ids=["independent", "shared"])
 def test_profiles_hold_the_truth_as_often_as_they_say(rig: Rig, paper_model: Model, shared: bool) -> None:
@@ -199,41 +190,10 @@ def test_what_is_lacking_is_said_with_what_is_known_and_what_would_help(rig: Rig
         assert any(line.startswith("the most helpful further test") and further in line for line in lines)
 
 
-@pytest.mark.parametrize(
-    ("band", "amplitudes", "reason"),
-    [
-        ((40.0, 50.0, 60.0), (1e-4, 5e-4), "frequencies span only 40 to 60 Hz; there is no loop: "),
-        (BAND, (4e-4, 6e-4), "amplitudes span only "),
-        (BAND, (1e-4, 5e-4), "there is no loop: "),
-    ],
-)
-def test_a_span_is_a_reason_only_where_it_is_narrow(
-    rig: Rig, band: tuple[float, ...], amplitudes: tuple[float, ...], reason: str
-) -> None:
-    lines = warnings(rig(3, **ROUGH, sweeps=(sweep(*amplitudes, band=band),)))
-    assert next(line for line in lines if "standard errors:" in line).startswith(reason)
-
-
 def test_an_effect_that_is_not_there_is_said_to_be_no_different_from_zero(rig: Rig) -> None:
     lines = warnings(rig(1, **ROUGH, sweeps=(sweep(1e-4, 5e-4),)), effects=(*BASE, "viscous"))
     assert "viscous.eta is no different from zero: these tests do not show viscous" in lines
     assert not any("standard errors:" in line and "viscous" in line for line in lines)
-
-
-def test_directions_that_share_no_parameter_have_sentences_of_their_own(rig: Rig) -> None:
-    result = fit_joint(PreparedCampaign.from_campaign(rig(1, **ROUGH, sweeps=(sweep(1e-4, 5e-4),))))
-    friction, springpot = [line for line in result.warnings if "standard errors:" in line]
-    assert "sigma_fmax and eps_half are determined only as a ratio" in friction
-    assert "m and alpha cannot be determined separately" in springpot
-    stderr, value = result.covariance.stderr("sigma_fmax"), result.model.values["sigma_fmax"]
-    assert stderr is not None
-    assert f"sigma_fmax {100 * stderr / value:.2g} %" in friction
-
-
-def test_complete_tests_leave_nothing_open(rig: Rig, paper_model: Model, other_models: dict[str, Model]) -> None:
-    for model, shared, seed in product((paper_model, *other_models.values()), (False, True), range(3)):
-        assert warnings(rig(seed, model, shared=shared)) == ()
-    assert warnings(rig(1, sweeps=(sweep(1e-4, 2e-4, 5e-4),))) == ()
 
 
 @pytest.mark.parametrize(("largest", "proposed"), [(1e-4, True), (3e-3, False)])

@@ -13,14 +13,13 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, SimulatedLoop, SimulatedSweep
 from bushfit.fitting.drive import drive_of
 from bushfit.fitting.loop_harmonics import MOST_ROWS
-from bushfit.fitting.outliers import outlier_limit
 from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static
+from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
-from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.measurement import Sweep
 
 Rig = Callable[..., Campaign]
 SHARE = 0.03
@@ -171,40 +170,3 @@ def test_one_outlier_of_a_short_sweep_without_repeats_is_found_at_any_row(
         found.append([entry.row - 1 for entry in robust(with_factor(campaign, [row], factor)).outliers])
     assert all(rows in ([row], []) for row, rows in zip(tried, found, strict=True))
     assert found.count([]) <= missed
-
-
-def test_outliers_side_by_side_do_not_hide_each_other_from_their_repeats(rig: Rig) -> None:
-    for seed in range(3):
-        rows = 20 + seed + np.arange(3)
-        found = robust(with_factor(rig(seed), rows, 1.1)).outliers
-        assert [entry.row - 1 for entry in found] == rows.tolist()
-
-
-def test_a_fit_of_one_level_names_the_row_of_the_file(rig: Rig) -> None:
-    """A file that begins at its largest amplitude: the smallest, which fit-dynamic takes, stands at its end."""
-    campaign = rig()
-    sweep = campaign.sweeps[0]
-    down = np.argsort(-sweep.amplitude, kind="stable")
-    columns = {name: getattr(sweep, name)[down] for name in ("frequency", "amplitude", "stiffness", "repeat")}
-    falling = replace(campaign, sweeps=(replace(sweep, **columns, reached=None), *campaign.sweeps[1:]), fit=SOFT)
-    data = PreparedCampaign.from_campaign(with_factor(falling, [down.size - 7], 1.1))
-    dynamic, joint = fit_dynamic(data, fit_static(data)), fit_joint(data)
-    assert [entry.row for entry in dynamic.outliers] == [entry.row for entry in joint.outliers] == [down.size - 6]
-    marked = data.without(dynamic.outliers).sweeps[0]
-    assert marked.order[marked.weights == 0.0].tolist() == [down.size - 7]
-
-
-def test_the_limit_grows_with_the_rows_and_with_what_is_not_known() -> None:
-    assert outlier_limit(1, 1, np.inf) == pytest.approx(2.5758, rel=1e-3)
-    assert outlier_limit(10_000, 2, np.inf) == pytest.approx(np.sqrt(2.0 * np.log(1e6)), rel=1e-3)
-    assert outlier_limit(100, 2, 10) > 1.5 * outlier_limit(100, 2, 1000)
-
-
-def test_a_loop_of_few_rows_keeps_its_corners() -> None:
-    """Forty rows a cycle of a triangle: its corners stand out from their neighbours, and are no outliers."""
-    phase = np.arange(120) / 40.0
-    triangle = 1e-3 * (2.0 / np.pi) * np.arcsin(np.sin(2.0 * np.pi * phase))
-    noise = np.random.default_rng(0).standard_normal((2, 120)) * 1e-3
-    loop = Loop("l", Direction.AXIAL, phase / 0.1, triangle + 1e-3 * noise[0], 460.0 * (1e3 * triangle + noise[1]))
-    shifted = replace(loop, force=np.roll(loop.force, -1))
-    assert all(found.rows.size == 0 for found in drive_of(shifted).outliers.values())

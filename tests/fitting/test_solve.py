@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign, load_campaign
-from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE, with_base
 from bushfit.errors import FitError
 from bushfit.fitting.coordinates import Bounds, Coordinates, residual
@@ -22,10 +21,8 @@ from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import cautions
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
-from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
-from bushfit.simulation.measured import simulate
 
 #: Campaigns, with the places of their tests.
 TESTS: dict[str, tuple[str, ...] | None] = {
@@ -67,13 +64,6 @@ def test_a_parameter_pushed_against_a_bound_rests_on_it_and_is_named(
     free = solve(FitProblem(paper_model, axial, FIVE))
     assert not free.at_bound
     assert free.chi_square < solution.chi_square
-
-
-def test_a_solver_that_runs_out_of_evaluations_says_so(axial: list[MeasuredTest], paper_model: Model) -> None:
-    start = paper_model.with_values({name: 5.0 * paper_model.values[name] for name in ("mu", "sigma_fmax")})
-    assert solve(FitProblem(start, axial, FIVE), evaluations=2, strict=False).stopped
-    with pytest.raises(FitError, match="did not converge"):
-        solve(FitProblem(start, axial, FIVE), evaluations=2)
 
 
 def test_a_fit_that_is_stopped_where_chi_square_is_flat_is_one_and_is_told(
@@ -163,47 +153,12 @@ def test_it_never_climbs_and_counts_its_evaluations(paper_model: Model, data_set
     assert path[-1].expected_fall < 0.01 < path[0].expected_fall
 
 
-def test_what_is_not_seen_stays(paper_model: Model, data_sets: list[MeasuredTest]) -> None:
-    """An effect of no amount has no shape that data could tell."""
-    model = started(paper_model, data_sets, "maxwell")
-    first = Descent.start(FitProblem(model, data_sets, tuple(model.parameters), {"maxwell.mu1": (0.0, 1e-9)})).finished(
-        100
-    )
-    assert first.model.values["maxwell.tau"] == pytest.approx(model.values["maxwell.tau"], rel=1e-9)
-    assert first.solution.at_bound["maxwell.mu1"] in ("min", "max")
-
-
 def test_too_few_points_are_refused(data_sets: list[MeasuredTest], paper_model: Model) -> None:
     sweep = data_sets[-1].test
     columns = {name: getattr(sweep, name)[:2] for name in ("frequency", "amplitude", "stiffness", "repeat")}
     few = replace(data_sets[-1], sweep=replace(sweep, **columns))  # type: ignore[call-arg]
     with pytest.raises(FitError, match="too few points"):
         Descent.start(FitProblem(paper_model, [few], tuple(paper_model.parameters)))
-
-
-def test_it_follows_the_bend_of_a_valley(paper_model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A delay and a Maxwell arm that stand in for a dashpot trade off with one another and with the springpot: straight
-    steps creep along the valley that this makes of chi-square. Both ways end in its lowest place."""
-    damped = paper_model.with_effect("viscous").with_values({"viscous.eta": 500.0})
-    loop = SimulatedLoop(Direction.AXIAL, 1e-3, 0.1)
-    sweep = SimulatedSweep(Direction.AXIAL, (1e-4, 2e-4, 5e-4), (5.0, 20.0, 60.0, 150.0))
-    taken = []
-    for seed in range(6):
-        settings = SimulateSettings(
-            loops=(loop,), sweeps=(sweep,), repeats=2, noise=0.003, force_noise=0.003, seed=seed
-        )
-        data = PreparedCampaign.from_campaign(simulate(damped, settings).campaign())
-        data_sets = [*data.loops, *data.sweeps]
-        model = started(paper_model, data_sets, "delay", "maxwell")
-        bent = Descent.start(FitProblem(model, data_sets, tuple(model.parameters))).finished(400)
-        with monkeypatch.context() as straight:
-            straight.setattr("bushfit.fitting.descent._SAME_WAY", 2.0)
-            known = Descent.start(FitProblem(model, data_sets, tuple(model.parameters))).finished(400)
-        assert bent.converged
-        assert bent.chi_square < known.chi_square + 0.05
-        taken.append((bent.evaluations, known.evaluations))
-    print(f"evaluations along the bend and straight: {taken}")
-    assert sum(along for along, _ in taken) < 0.85 * sum(straight for _, straight in taken)
 
 
 def elsewhere(model: Model, names: list[str], rng: np.random.Generator) -> Model:

@@ -22,16 +22,14 @@ from bushfit.commands.fit import fit, temperature_files
 from bushfit.commands.predict import predict as predict_campaign
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
-from bushfit.errors import FitError, ModelError
+from bushfit.errors import ModelError
 from bushfit.fitting.master_curve import master_curve
 from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static
+from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction, Place, Specimen
 from bushfit.model.model import Model
-from bushfit.model.result import Result
 from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Stepped, Sweep
-from bushfit.report.results import ResultFile
 from bushfit.simulation.measured import measure, simulate
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 from bushfit.units import CELSIUS
@@ -87,20 +85,6 @@ def test_coupons_are_fitted_beside_the_axial_tests(both: Campaign) -> None:
     assert result.measured is not None
     assert result.measured.directions == ("axial", "DMA")
     assert {test.place for test in result.tests if not test.fitted} == {"radial"}
-
-
-def test_two_steps_with_a_coupon(coupons: Campaign) -> None:
-    """fit-dynamic takes the sweep of the frequency; of one of the amplitude the smallest at each frequency."""
-    frequency = PreparedCampaign.from_campaign(coupons).smallest_sweep
-    assert set(frequency.amplitude) == {1e-3}
-    amplitude = PreparedCampaign.from_campaign(replace(coupons, sweeps=coupons.sweeps[:1])).smallest_sweep
-    assert amplitude.frequency.tolist() == [10.0, 100.0]
-    static = fit_joint(PreparedCampaign.from_campaign(coupons))
-    assert fit_dynamic(PreparedCampaign.from_campaign(coupons), static).model.values["alpha"] == pytest.approx(
-        0.24, rel=0.1
-    )
-    with pytest.raises(FitError, match="fit-static needs a loop"):
-        fit_static(PreparedCampaign.from_campaign(coupons))
 
 
 def test_effects_of_the_campaign_are_in_every_fit(coupons: Campaign, paper_model: Model) -> None:
@@ -185,15 +169,6 @@ def test_shift_factors_are_those_of_the_law_where_it_holds(clean: Undisturbed) -
     assert own[2] - own[0] == pytest.approx(half, rel=1e-3)
 
 
-def test_the_error_of_a_sweep_s_own_shift_factor_is_what_it_scatters_by(clean: Undisturbed, truth: Model) -> None:
-    off = []
-    for seed in range(SEEDS):
-        sweeps = PreparedCampaign.from_campaign(measure(clean, replace(PLAN, seed=seed)).campaign()).sweeps
-        off += [(each.own[0] - each.shift[0]) / each.own[1] for each in master_curve(Result(truth), sweeps)]
-    print(f"{len(off)} shift factors off by {np.std(off):.2f} of their standard errors")
-    assert 0.8 < np.std(off) < 1.25
-
-
 def test_a_sweep_off_the_law_says_so(truth: Model) -> None:
     """That at 8 degC as if its chamber had been 8 K warmer than it says."""
     tested = [replace(sweep, temperature=CELSIUS + 16.0) if sweep is SWEEPS[1] else sweep for sweep in SWEEPS]
@@ -205,24 +180,6 @@ def test_a_sweep_off_the_law_says_so(truth: Model) -> None:
     off = np.array([(each.own[0] - each.shift[0]) / each.own[1] for each in found])
     assert abs(off[1]) > 4.0 * max(abs(off[0]), abs(off[-1]))
     assert off[1] < -4.0
-
-
-def tables_of(campaign: Campaign) -> dict[str, ResultFile]:
-    """Tables of a fit with the effect of temperature, by name."""
-    files = fit(campaign, effects=("temperature",)).files
-    return {file.name: file for file in files if file.kind == "table"}
-
-
-def test_a_sweep_of_amplitudes_has_no_shift_factor(truth: Model) -> None:
-    """It goes into the fit, and neither its table nor its picture is promised or made."""
-    amplitudes = tuple(np.geomspace(5e-5, 1e-3, 8).tolist())
-    stepped = SimulatedSweep(Direction.AXIAL, amplitudes, (1.0, 30.0), stepped="amplitude", temperature=300.0)
-    campaign = simulate(truth, replace(PLAN, loops=(), sweeps=(stepped,))).campaign()
-    assert [*tables_of(campaign)] == ["sweeps"]
-    mixed = simulate(truth, replace(PLAN, loops=(), sweeps=(stepped, *SWEEPS))).campaign()
-    tables = tables_of(mixed)
-    assert [*tables] == ["sweeps", "master_curve", "shift_factors"]
-    assert len(tables["shift_factors"].make()) == len(SWEEPS)
 
 
 def test_only_tests_of_its_temperature_stand_beside_a_prediction(clean: Undisturbed) -> None:

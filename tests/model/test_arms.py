@@ -47,16 +47,6 @@ def test_arms_keep_within_their_error_and_give_off_no_energy(alpha: float, decad
     assert error_of(arms, alpha) <= accuracy * 1.03
 
 
-def test_a_maxwell_arm_is_found_as_it_is_and_a_dashpot_as_one_faster_than_the_band(paper_model: Model) -> None:
-    model = paper_model.with_effect("maxwell", {"maxwell.mu1": 5e4, "maxwell.tau": 2e-3})
-    springpots, arm = model_arms(model, (5.0, 155.0))
-    assert (springpots.stands_for, arm.stands_for, arm.size) == ("springpot", "maxwell", "maxwell.mu1")
-    np.testing.assert_allclose([arm.modulus, arm.time], [[5e4], [2e-3]], rtol=1e-4)
-    _, arm = model_arms(paper_model.with_effect("viscous", {"viscous.eta": 100.0}), (5.0, 155.0))
-    assert arm.time.size == 1
-    assert arm.modulus[0] * arm.time[0] == pytest.approx(100.0, rel=0.01)
-
-
 def test_the_springpot_and_the_spring_in_series_are_one_part(paper_model: Model) -> None:
     model = paper_model.with_effect("fractional_zener", {"fractional_zener.c": 0.3})
     (part,) = model_arms(model, (1.0, 1000.0), 0.005)

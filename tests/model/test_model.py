@@ -35,18 +35,6 @@ def test_the_whole_reference_table(paper_model: Model, root: Path) -> None:
         assert np.max(gaps) < 2e-4
 
 
-def test_one_call_broadcasts(paper_model: Model) -> None:
-    frequency, amplitude = np.linspace(5.0, 155.0, 16), np.array([[1e-4], [2e-4], [5e-4]])
-    grid = paper_model.stiffness("axial", frequency, amplitude)
-    assert (grid.shape, grid.dtype) == ((3, 16), complex)
-    assert grid[1, 4] == paper_model.stiffness("axial", frequency[4], amplitude[1, 0])
-    assert grid[1, 4].shape == ()
-    stacked = {**paper_model.values, "mu": np.array([[1e6], [2e6]])}
-    both = paper_model.stiffness("axial", frequency, 1e-4, values=stacked)
-    assert both.shape == (2, 16)
-    np.testing.assert_allclose(both[1], paper_model.with_values({"mu": 2e6}).stiffness("axial", frequency, 1e-4))
-
-
 def test_a_model_does_not_change(paper_model: Model) -> None:
     given = dict(paper_model.values)
     model = Model(paper_model.bushing, BASE, given)
@@ -58,15 +46,6 @@ def test_a_model_does_not_change(paper_model: Model) -> None:
         model.effects = ()  # type: ignore[misc]
     other = model.with_effect("inertia", {"inertia.mass": 0.1})
     assert (model.effects, other.effects) == (BASE, (*BASE, "inertia"))
-
-
-def test_order_of_adding_does_not_matter(paper_model: Model) -> None:
-    mass, soft = ("inertia", {"inertia.mass": 0.1}), ("rig_compliance", {"rig_compliance.compliance": 5e-8})
-    one = paper_model.with_effect(*mass).with_effect(*soft)
-    other = paper_model.with_effect(*soft).with_effect(*mass)
-    assert one.effects != other.effects
-    assert one.equation() == other.equation()
-    assert one.stiffness("axial", 100.0, 1e-4) == other.stiffness("axial", 100.0, 1e-4)
 
 
 def measured(model: Model, at: tuple[Direction, float, float], steps: int, run_in: int) -> complex:
@@ -96,20 +75,6 @@ def test_lock_in_drops_mean_and_overtones() -> None:
     force = 7.0 + 6.0 * np.cos(phase + 0.3) + 4.0 * np.cos(3.0 * phase) + 1.0 * np.sin(2.0 * phase)
     found = rig.lock_in(rig.Record(time, displacement, force), 5.0)
     assert found == pytest.approx(3.0 * np.exp(0.3j), rel=1e-10)
-
-
-def test_a_triangle_is_not_a_sine(paper_model: Model) -> None:
-    """The two of one amplitude meet at the peaks, where friction has gone as far, but not between them."""
-    phase = np.array([0.0, 0.125, 0.25, 0.5, 0.75, 1.0, 1.25])
-    np.testing.assert_allclose(rig.wave("triangle", phase), [0.0, 0.5, 1.0, 0.0, -1.0, 0.0, 1.0], atol=1e-12)
-    sine, triangle = (
-        rig.record(paper_model, Direction.AXIAL, 0.1, 1e-3, cycles=1, run_in=4, waveform=waveform)
-        for waveform in ("sine", "triangle")
-    )
-    assert triangle.displacement.max() == pytest.approx(1e-3, rel=1e-9)
-    assert triangle.force.max() == pytest.approx(sine.force.max(), rel=1e-2)
-    middle = np.argmin(np.abs(sine.displacement - 5e-4))
-    assert abs(triangle.displacement[middle] - 5e-4) > 5e-5
 
 
 PACKAGES = (effects, geometry, model)

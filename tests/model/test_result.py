@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,10 +11,9 @@ import pytest
 from scipy.stats import t
 
 from bushfit.model.covariance import Z95, Covariance
-from bushfit.model.document import SCHEMA
-from bushfit.model.file import from_document, load_result, model_document, to_document
+from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
-from bushfit.model.result import Alternative, Result
+from bushfit.model.result import Result
 
 
 def test_covariance_root(result: Result) -> None:
@@ -82,18 +80,3 @@ def test_what_is_left_out_where_it_is_not_so(result: Result, document: dict[str,
     del document["fit"]["directions"]
     assert result.measured is not None
     assert from_document(document).measured == replace(result.measured, directions=())
-
-
-def test_a_model_alone_is_a_result(paper_model: Model, tmp_path: Path) -> None:
-    file = tmp_path / "m.json"
-    file.write_text(json.dumps({"schema": SCHEMA, **model_document(paper_model)}))
-    result = load_result(file)
-    assert result.model == paper_model
-    assert result.quality is None
-    assert result.interval("mu") is None
-
-
-def test_alternatives_come_back(result: Result) -> None:
-    other = result.model.with_effect("viscous", {"viscous.eta": 50.0})
-    document = json.loads(json.dumps(to_document(replace(result, alternatives=(Alternative(other, 0.3),)))))
-    assert from_document(document).alternatives == (Alternative(other, 0.3),)

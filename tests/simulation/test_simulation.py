@@ -11,7 +11,6 @@ import pytest
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE, LIBRARY, get_effect, qualified_name
-from bushfit.fitting.preparation import prepare_loops, sources
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction, Specimen
@@ -133,17 +132,6 @@ def test_an_amplitude_sweep_has_the_stiffness_at_the_amplitudes_reached(coupon: 
     np.testing.assert_allclose(sweep.stiffness, closed, rtol=2e-3)
 
 
-def test_amplitudes_are_missed_at_a_frequency_and_at_a_point(coupon: Undisturbed) -> None:
-    off = []
-    for seed in range(200):
-        (sweep,) = measure(coupon, SimulateSettings(repeats=2, seed=seed)).sweeps
-        off.append(np.log(sweep.amplitude_reached.reshape(3, 2, -1) / STRAINS))
-    missed = np.array(off)
-    assert np.std(missed) == pytest.approx(0.02, rel=0.05)
-    assert np.std(missed.mean(axis=(2, 3))) == pytest.approx(0.02 * np.sqrt(0.5), rel=0.1)
-    assert np.unique(missed).size == missed.size
-
-
 def test_a_frequency_sweep_that_misses_its_amplitudes_has_levels_and_what_was_reached(paper_model: Model) -> None:
     plan = SimulateSettings(repeats=2, sweeps=(replace(SWEEP, reached=0.02),))
     (sweep,) = simulate(paper_model, plan).sweeps
@@ -164,15 +152,6 @@ def test_a_resonance_test_reduces_to_the_stiffness_at_the_amplitude_reached(pape
         assert np.ptp(np.log(sweep.amplitude)) > np.log(5.0)
         closed = paper_model.stiffness(sweep.direction, sweep.frequency, sweep.amplitude)
         np.testing.assert_allclose(sweep.stiffness, closed, rtol=2e-3)
-
-
-def test_a_resonance_test_is_one_run_a_repeat(paper_model: Model) -> None:
-    plan = SimulateSettings(repeats=400, noise=0.01, gain_error=0.03, resonances=(SHAKEN,))
-    clean = undisturbed(paper_model, plan)
-    measured = [test.transmissibility for _, test in measure(clean, plan).resonances]
-    off = np.array(measured) / clean.resonances[0][1] - 1.0
-    assert np.std(off.real.mean(axis=1)) == pytest.approx(0.03, rel=0.1)
-    assert np.std(off.imag) == pytest.approx(0.01, rel=0.05)
 
 
 def written(simulated: Simulated, folder: Path) -> Campaign:
@@ -222,40 +201,3 @@ def test_tests_are_read_back_and_what_is_fitted_to_them_is_the_truth(paper_model
     assert (truth.model.bushing, truth.specimens) == (bushing, in_memory.specimens)
     text = (tmp_path / "campaign.toml").read_text()
     assert [name for name in FIVE if f"{name} =" in text] == []
-
-
-def test_tests_of_one_thing_have_names_of_their_own_that_files_can_have(paper_model: Model, tmp_path: Path) -> None:
-    sweep = SimulatedSweep(Specimen('a/b "c"', "modulus"), STRAINS[:3], (10.0,), stepped="amplitude")
-    other = replace(sweep, direction=Specimen("CON", "modulus"))
-    campaign = written(simulate(paper_model, SimulateSettings(sweeps=(sweep, sweep, other))), tmp_path)
-    assert [each.name for each in campaign.sweeps] == ["sweep_a_b _c__1", "sweep_a_b _c__2", "sweep__CON"]
-    assert [specimen.name for specimen in campaign.specimens] == ['a/b "c"', "CON"]
-
-
-def test_a_programme_is_one_file_of_several_loops(paper_model: Model, tmp_path: Path) -> None:
-    sizes, rates = (2e-4, 1e-3), (0.1, 0.3)
-    loop = SimulatedLoop(Direction.AXIAL, cycles=4, amplitudes=sizes, frequencies=rates, pause=5.0)
-    simulated = simulate(paper_model, SimulateSettings(loops=(loop,)))
-    (record,) = simulated.loops
-    assert record.time[-1] == pytest.approx(2 * 4 / 0.1 + 2 * 4 / 0.3 + 3 * 5.0, abs=0.02)
-    read, in_memory = written(simulated, tmp_path).loops, simulated.campaign().loops
-    for loops in (read, in_memory):
-        assert [part.name for part in loops] == [f"loop_axial_1_part_{number}" for number in (1, 2, 3, 4)]
-        assert [np.ptp(part.displacement) / 2.0 for part in loops] == pytest.approx([*sizes, *sizes], rel=1e-3)
-    assert sources(prepare_loops(read)) == (read[0].source,)
-
-
-def test_the_rig_is_warm_and_drifts_as_planned(paper_model: Model, tmp_path: Path) -> None:
-    """Temperatures are stated in the campaign that is written, and turns are those it gives when it is read back."""
-    values = {"temperature.softening": 5e-3, "temperature.shift": 0.02, "drift.gain": 0.1}
-    truth = paper_model.with_effect("temperature", values).with_effect("drift", values)
-    tests = (replace(LOOP, temperature=300.0), replace(SWEEP, temperature=305.0))
-    simulated = simulate(truth, SimulateSettings(repeats=2, loops=tests[:1], sweeps=tests[1:]))
-    data = PreparedCampaign.from_campaign(written(simulated, tmp_path))
-    (loop,), (sweep,) = data.loops, data.sweeps
-    assert loop.circumstances.temperature == pytest.approx(300.0)
-    assert (loop.circumstances.turn, sweep.circumstances.turn[-1]) == (0.0, 1.0)
-    off = np.abs(sweep.stiffness(truth) / sweep.measured - 1.0).max(), np.abs(loop.relative(truth)).max()
-    print(f"without noise, sweep off the closed form by {off[0]:.1e}, loop by {off[1]:.1e}")
-    assert max(off) < 5e-4
-    assert np.abs(sweep.stiffness(paper_model) / sweep.measured - 1.0).max() > 0.03
