@@ -52,12 +52,19 @@ def level_errors(
         level's unit error, whitened. What the fit absorbs is projected out (Patterson and Thompson, 1971). The scoring
         is Fisher's, in the space of the levels.
     """
-    columns, kinds, before = level_columns(data_sets)
+    rows, kinds, before, size = list[Array](), np.empty(0), (0.0, 0.0), sum(test.size for test in data_sets)
+    for sweep, block in zip(data_sets, rows_of(data_sets), strict=True):
+        if isinstance(sweep, MeasuredSweep):
+            units = level_errors_of(sweep)
+            before, kinds = sweep.noise.level, np.append(kinds, np.arange(len(units)) % 2)  # gain, phase, in turn
+            rows.append(np.zeros((len(units), size)))
+            rows[-1][:, block] = units
     nothing = LevelErrors(before, 0, 0.0, matters=False)
-    if not columns.size:
+    if not rows:
         return nothing
-    span, size, _ = np.linalg.svd(absorbed.T, full_matrices=False)
-    span = span[:, size > _LEFT * size.max(initial=0.0)]
+    columns = np.concatenate(rows)
+    span, strength, _ = np.linalg.svd(absorbed.T, full_matrices=False)
+    span = span[:, strength > _LEFT * strength.max(initial=0.0)]
     remainder = columns - (columns @ span) @ span.T
     values, vectors = np.linalg.eigh(remainder @ remainder.T)
     determined = values > _LEFT * np.square(np.linalg.norm(columns, axis=1)).max()
@@ -95,26 +102,8 @@ def level_errors(
     return LevelErrors((gain, phase), int(freedoms.min()) if freedoms.size else 0, fall, matters)
 
 
-def level_columns(data_sets: Sequence[MeasuredTest]) -> tuple[Array, Array, tuple[float, float]]:
-    """Whitened unit error of each level in gain and in phase, (c, n), which of the two it is, (c,), and the error that
-    is counted already.
-
-    Returns:
-        Columns (c, n), 0 for gain or 1 for phase (c,), and the gain and phase error in the noise already.
-    """
-    rows, kinds, before = [], [], (0.0, 0.0)
-    size = sum(data_set.size for data_set in data_sets)
-    for sweep, block in zip(data_sets, rows_of(data_sets), strict=True):
-        if isinstance(sweep, MeasuredSweep):
-            before, columns = sweep.noise.level, level_errors_of(sweep)
-            rows.append(np.zeros((len(columns), size)))
-            rows[-1][:, block] = columns
-            kinds += [0, 1] * (len(columns) // 2)
-    return np.concatenate(rows or [np.empty((0, size))]), np.array(kinds), before
-
-
 def level_errors_of(sweep: MeasuredSweep) -> Array:
-    """Whitened unit error of each level of a sweep, in gain and then in phase, (2 levels, n)."""
+    """Whitened unit error of each level of a sweep, in gain and in phase in turn, (2 levels, n)."""
     return np.array(
         [column for held_value in np.unique(sweep.held) for column in sweep.moved_together(sweep.held == held_value)]
     )

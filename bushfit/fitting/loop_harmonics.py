@@ -107,24 +107,18 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
 
 def _cleared(coefficients: Array, noise: float, phase: Array, displacement: Array, inliers: Array) -> Array:
     """The harmonics of a motion without those that noise explains; those of a triangle where its rows, (n,), agree
-    with one as well, but for noise, as with its own."""
-    triangle = _triangle(coefficients[0], coefficients[1])
+    with one as well, but for noise, as with its own. A triangle's harmonics fall so slowly that its corners need all.
+    """
+    order, fundamental = np.arange(1, GRID // 2, 2), coefficients[1]
+    turn, triangle = 1j * fundamental / abs(fundamental), np.zeros(GRID // 2, dtype=complex)
+    triangle[0] = coefficients[0]
+    triangle[order] = -1j * abs(fundamental) * (-1.0) ** (order // 2) / order**2 * turn**order
     different = coefficients.size > 3 and abs(coefficients[3] - triangle[3]) >= 3.0 * noise
     if not different and np.std((displacement - series(triangle, phase))[inliers]) < _TRIANGLE_RATIO * noise:
         return triangle
     threshold = 4.0 * noise * np.sqrt(2.0 / phase.size)  # standard errors
     keep = (np.abs(coefficients) > threshold) | (np.arange(coefficients.size) < 2)
     return np.where(keep, coefficients, 0.0)[: int(np.flatnonzero(keep)[-1]) + 1]
-
-
-def _triangle(mean: complex, fundamental: complex) -> Array:
-    """Complex harmonics of a triangle, by mean and fundamental; they fall so slowly that its corners need all."""
-    order = np.arange(1, GRID // 2, 2)
-    turn = 1j * fundamental / abs(fundamental)
-    coefficients = np.zeros(GRID // 2, dtype=complex)
-    coefficients[0] = mean
-    coefficients[order] = -1j * abs(fundamental) * (-1.0) ** (order // 2) / order**2 * turn**order
-    return coefficients
 
 
 def less_slow(phase: Array, residual: Array) -> tuple[Array, int]:

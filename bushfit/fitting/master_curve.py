@@ -45,8 +45,18 @@ class Shifted:
 
 def master_curve(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[Shifted, ...]:
     """The sweeps over frequency whose temperature is known, coldest first, by a model with an effect of temperature."""
-    swept = (_shifted(result, sweep) for sweep in sweeps if can_shift(sweep.sweep))
-    return tuple(sorted(swept, key=lambda each: each.temperature))
+    model, curves = result.model, []
+    for sweep in sweeps:
+        if can_shift(sweep.sweep):
+            pace = np.broadcast_to(model.shift_factor(sweep.circumstances), sweep.frequency.shape)
+            at_reference = model.stiffness(sweep.direction, sweep.frequency * pace, sweep.amplitude)
+            reduced = sweep.measured * at_reference / sweep.stiffness(model)
+            temperature = float(np.mean(sweep.temperature))
+            shift, error = (float(value.item()) for value in law(result, np.array([temperature])))
+            further, unsure = _further_shift(model, sweep)
+            laws = (shift, error), (shift + further, unsure)
+            curves.append(Shifted(sweep, temperature, *laws, sweep.frequency * pace, reduced))
+    return tuple(sorted(curves, key=lambda curve: curve.temperature))
 
 
 def can_shift(sweep: Sweep) -> bool:
@@ -70,35 +80,21 @@ def law(result: Result, temperature: Array) -> tuple[Array, Array]:
     return shift(value), np.abs(slope) * (error or np.nan)
 
 
-def _shifted(result: Result, sweep: MeasuredSweep) -> Shifted:
-    model, frequency = result.model, sweep.frequency
-    pace = np.broadcast_to(model.shift_factor(sweep.circumstances), frequency.shape)
-    at_reference = model.stiffness(sweep.direction, frequency * pace, sweep.amplitude)
-    reduced = sweep.measured * at_reference / sweep.stiffness(model)
-    temperature = float(np.mean(sweep.temperature))
-    shift, error = law(result, np.array([temperature]))
-    more, unsure = _more(model, sweep)
-    mine = float(shift[0]), float(error[0])
-    return Shifted(sweep, temperature, mine, (mine[0] + more, unsure), frequency * pace, reduced)
-
-
-def _more(model: Model, sweep: MeasuredSweep) -> tuple[float, float]:
+def _further_shift(model: Model, sweep: MeasuredSweep) -> tuple[float, float]:
     """Further shift of a sweep's time scale beyond that of the model [neper], and its standard error.
 
     Notes: Gauss-Newton steps in the one number, with equal weights, because the residuals are mostly not noise;
     nan where the stiffness does not change with frequency.
     """
-    more, place, under = 0.0, sweep.direction, sweep.circumstances
+    shift, place, under = 0.0, sweep.direction, sweep.circumstances
 
-    def over_measured(log_factor: float) -> Array:
-        return (
-            model.stiffness(place, sweep.frequency * np.exp(log_factor), sweep.amplitude, under=under) / sweep.measured
-        )
+    def over_measured(shift: float) -> Array:
+        return model.stiffness(place, sweep.frequency * np.exp(shift), sweep.amplitude, under=under) / sweep.measured
 
     for _ in range(_STEPS):
-        slope = (over_measured(more + _APART) - over_measured(more - _APART)) / (2.0 * _APART)
-        remainder, size = over_measured(more) - 1.0, float(np.linalg.norm(slope))
+        slope = (over_measured(shift + _APART) - over_measured(shift - _APART)) / (2.0 * _APART)
+        remainder, size = over_measured(shift) - 1.0, float(np.linalg.norm(slope))
         if not size:
             return np.nan, np.nan
-        more -= float(np.clip(np.vdot(slope, remainder).real / size**2, -_LARGEST, _LARGEST))
-    return more, float(np.linalg.norm(remainder) / np.sqrt(max(2 * remainder.size - 1, 1)) / size)
+        shift -= float(np.clip(np.vdot(slope, remainder).real / size**2, -_LARGEST, _LARGEST))
+    return shift, float(np.linalg.norm(remainder) / np.sqrt(max(2 * remainder.size - 1, 1)) / size)

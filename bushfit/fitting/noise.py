@@ -118,7 +118,11 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     lines = of_lines(())
     if disturbed_steps := disturbed(lines.values()):
         lines = of_lines(disturbed_steps)
-    slopes = _slopes(sweeps, lines)
+    slopes, by_name = dict[str, tuple[float, float]](), {sweep.name: sweep for sweep in sweeps}
+    for stepped in {sweep.stepped for sweep in sweeps}:  # one law for all sweeps that step the same
+        names = [name for name, sweep in by_name.items() if sweep.stepped == stepped]
+        if slope := _slope([line for key, line in lines.items() if key[0] in names and line.steps.size]):
+            slopes |= dict.fromkeys(names, slope)
     for key, line in lines.items():
         if key[0] in slopes and line.steps.size:
             exponent, reference = slopes[key[0]]
@@ -126,7 +130,10 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     repeated = [line for line in lines.values() if line.shared_freedom]
     measured = repeated or [line for line in lines.values() if line.calmer is not None]
     variances, scatter_freedom = _pooled(lines, measured)
-    stated_noise = {sweep.name: noise for sweep in sweeps if (noise := _stated_noise(sweep)) is not None}
+    stated_noise = {name: sweep.noise for name, sweep in by_name.items() if sweep.noise is not None}
+    for name, sweep in by_name.items():
+        if sweep.noise is None and sweep.relative_error is not None:
+            stated_noise[name] = float(np.sqrt(np.mean(np.square(sweep.relative_error))))
     if stated_noise:
         scatter_freedom, slopes = 0, {}
     random = {
@@ -135,32 +142,22 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     }
     if repeated:
         level, freedom = of_class(rig, (0.0, 0.0)), max(round(sum(line.shared_freedom for line in repeated)), _ENOUGH)
-        of_each = {key[0]: [line for line_set, line in lines.items() if line_set[0] == key[0]] for key in lines}
-        shared_by = {name: _shared(line_set, rig) for name, line_set in of_each.items()}
-        largest = np.maximum(largest_error(rig), largest_error(UNSTATED))  # [rig] states what repeats share
-        excesses = {name: _excess_sentence(error, rig) for name, error in shared_by.items() if np.any(error > largest)}
+        largest, excesses = (
+            np.maximum(largest_error(rig), largest_error(UNSTATED)),
+            {},
+        )  # [rig] states what repeats share
+        for name in by_name:
+            error = _shared([line for key, line in lines.items() if key[0] == name], rig)
+            if np.any(error > largest):
+                excesses[name] = (
+                    f"repeats differ as a whole by an error of {words_of(_pair(error))}, more than a rig of this class "
+                    f"causes ({class_words(rig)}): measure again, or state the class under [rig]"
+                )
         shared = _pair(_shared(repeated, rig))
         return SweepNoise(random, shared, "repeats", freedom, scatter_freedom, slopes, level, beyond=excesses)
     if all(sweep.noise is not None for sweep in sweeps):
         return SweepNoise(random, of_class(rig, (0.0, 0.0)), "stated", 0, scatter_freedom)
     return SweepNoise(random, of_class(rig), "assumed", 0, scatter_freedom)
-
-
-def _stated_noise(sweep: Sweep) -> float | None:
-    """The noise that the campaign states of a sweep, or the root mean square of what its file states of each point."""
-    if sweep.noise is not None or sweep.relative_error is None:
-        return sweep.noise
-    return float(np.sqrt(np.mean(np.square(sweep.relative_error))))
-
-
-def _slopes(sweeps: Sequence[Sweep], lines: Mapping[LineKey, LineNoise]) -> dict[str, tuple[float, float]]:
-    """How the scatter of a rig goes with what is stepped, see `_slope`: one law for all sweeps that step the same."""
-    found = dict[str, tuple[float, float]]()
-    for stepped in {sweep.stepped for sweep in sweeps}:
-        names = {sweep.name for sweep in sweeps if sweep.stepped == stepped}
-        if slope := _slope([line for key, line in lines.items() if key[0] in names and line.steps.size]):
-            found |= dict.fromkeys(names, slope)
-    return found
 
 
 def _slope(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
@@ -206,9 +203,13 @@ def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -
     if not measured:
         return {key: line.variance for key, line in lines.items()}, round(min(line.freedom for line in lines.values()))
     well_known = [line for line in measured if line.freedom >= _OWN_SCATTER]
-    equal = _of_equal_noise(well_known or measured)
+    compared = sorted(well_known or measured, key=lambda line: -float(line.variance.sum()))
+    for place, line in enumerate(compared):  # a single outlier may set a line apart
+        if line.calmer is not None and line.calmer.size and _unequal(compared):
+            compared[place] = replace(line, scatter=line.calmer, freedom=len(line.calmer))
+    equal = not _unequal(compared)
     few = [line for line in measured if well_known and line.freedom < _OWN_SCATTER]
-    counted = [*equal, *few] if equal else measured
+    counted = [*compared, *few] if equal else measured
     freedoms = [line.freedom for line in counted]
     pooled, freedom = np.average([line.variance for line in counted], axis=0, weights=freedoms), sum(freedoms)
     unequal = 2.0 * fdtrc(freedom, freedom, pooled.max() / max(pooled.min(), FLOOR**2)) < _BY_CHANCE
@@ -218,11 +219,6 @@ def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -
         return dict.fromkeys(lines, pooled), round(freedom)
     by_line = {key: line.variance if line.freedom >= _OWN_SCATTER else pooled for key, line in lines.items()}
     return by_line, round(min(line.freedom for line in well_known))
-
-
-def _excess_sentence(error: Array, rig: RigSettings) -> str:
-    words = f"more than a rig of this class causes ({class_words(rig)}): measure again, or state the class under [rig]"
-    return f"repeats differ as a whole by an error of {words_of(_pair(error))}, {words}"
 
 
 def _shared(lines: Sequence[LineNoise], rig: RigSettings) -> Array:
@@ -242,15 +238,6 @@ def _pair(values: Array) -> tuple[float, float]:
     """Gain and phase, (2,), as plain numbers."""
     gain, phase = values.tolist()
     return gain, phase
-
-
-def _of_equal_noise(lines: Sequence[LineNoise]) -> list[LineNoise]:
-    """Lines of equal noise, those that a single outlier sets apart without it; none where they are unequal."""
-    ordered = sorted(lines, key=lambda line: -float(line.variance.sum()))
-    for place, line in enumerate(ordered):
-        if line.calmer is not None and line.calmer.size and _unequal(ordered):
-            ordered[place] = replace(line, scatter=line.calmer, freedom=len(line.calmer))
-    return [] if _unequal(ordered) else ordered
 
 
 def _unequal(lines: Sequence[LineNoise]) -> bool:

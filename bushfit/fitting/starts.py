@@ -77,7 +77,10 @@ def start_values(
     if not slow.all() and np.ptp(log_omega) >= _LEAST_RANGE:
         least_loss = _LEAST_SHARE * modulus.imag.clip(min=0.0) + 1e-9 * mu  # above zero, for its logarithm
         viscous_loss = np.maximum(modulus.imag - friction.imag, least_loss)
-        m, alpha = _springpot(log_omega, modulus.real[smallest], viscous_loss[smallest], _LEAST * mu)
+        alpha = float(np.clip(_slope(log_omega, np.log(viscous_loss[smallest])), *_ALPHA_RANGE))
+        middle = float(np.exp(log_omega.mean()))
+        growth = max(_slope(log_omega, modulus.real[smallest]), _LEAST * mu)
+        m = 2.0 * growth / (alpha * middle**alpha * np.cos(np.pi * alpha / 2.0))
     found = {"mu": mu, "m": m, "alpha": alpha, "sigma_fmax": sigma_fmax, "eps_half": eps_half}
     found = {name: value for name, value in found.items() if name not in fixed}
     inside = {name: float(np.clip(value, *get_parameter(name).bounds)) for name, value in found.items()}
@@ -88,14 +91,6 @@ def start_values(
             hint="if these are the units and the dimensions, give start values in [fit] of the campaign",
         )
     return {**inside, **fixed}
-
-
-def _springpot(log_omega: Array, storage: Array, loss: Array, least_growth: float) -> tuple[float, float]:
-    """m [Pa s^alpha] and alpha from the slopes of storage and loss modulus [Pa] over ln omega, (n,) each."""
-    alpha = float(np.clip(_slope(log_omega, np.log(loss)), *_ALPHA_RANGE))
-    middle = float(np.exp(log_omega.mean()))
-    growth = max(_slope(log_omega, storage), least_growth)
-    return 2.0 * growth / (alpha * middle**alpha * np.cos(np.pi * alpha / 2.0)), alpha
 
 
 def _slope(x: Array, y: Array) -> float:
