@@ -92,6 +92,11 @@ class BatchResult:
         return figures
 
     @cached_property
+    def is_poor(self) -> Array:
+        """True for each part whose model misses its tests, (n,)."""
+        return np.array([bool(describe_poor_fit(record, self.plan.limits)) for record in self.records])
+
+    @cached_property
     def quantities(self) -> dict[str, PartQuantity]:
         """All quantities of the batch by name."""
         return list_quantities(self.figures, self.plan.task.points)
@@ -128,10 +133,9 @@ class BatchResult:
         Left out are the quality of a fit, parameters at a bound, and what a poor fit determines.
         """
         compared = dict[str, tuple[Array, Array]]()
-        is_poor = np.array([bool(describe_poor_fit(record, self.plan.limits)) for record in self.records])
         for name in (name for name in self.quantities if name in self.figures and name not in FIT_NAMES):
             value, low, high, stderr = self.figures[name]
-            is_unknown = is_poor | np.array([name in record.at_bound for record in self.records])
+            is_unknown = self.is_poor | np.array([name in record.at_bound for record in self.records])
             errors = np.where(np.isfinite(stderr), stderr, (high - low) / (2.0 * Z95))
             compared[name] = np.where(is_unknown, np.nan, value), errors
         compared[_CURVE] = self.curve_deviation, np.full(len(self.records), np.nan)
@@ -147,7 +151,8 @@ class BatchResult:
         """The results as `batch.json` has them."""
         columns = {name: quantity.tabled for name, quantity in self.quantities.items() if name in self.figures}
         parts = [self.part_table(index, columns) for index in range(len(self.records))]
-        count = int(max((np.isfinite(values).sum() for values, _ in self.compared.values()), default=0))
+        counts = {name: int(np.isfinite(values).sum()) for name, (values, _) in self.compared.items()}
+        count = max((counts[name] for name in counts if name != _CURVE), default=counts.get(_CURVE, 0))
         failed = [part.name for part in parts if part.error]
         missed = [part.name for part in parts if part.misses]
         not_judged = [part.name for part in parts if part.result == "not judged"]
@@ -197,7 +202,9 @@ class BatchResult:
             Entry of `batch.json`, in the unit of the column.
         """
         values = self.figures[name][0] * column.factor
-        known_values, detectable = values[np.isfinite(values)], None
+        is_known = np.isfinite(values)
+        is_usable = is_known & ~self.is_poor if name not in FIT_NAMES else is_known
+        known_values, detectable = values[is_usable if is_usable.any() else is_known], None
         if name in self.compared:
             is_compared = np.isfinite(self.compared[name][0])
             limit = smallest_deviation(int(is_compared.sum()), len(self.compared))
@@ -243,7 +250,7 @@ class BatchResult:
         return PartTable(
             name=row.name,
             folder=f"{ROWS_FOLDER}/{row.folder}" if record.status == "done" else "",
-            error=" ".join(record.error.split()),
+            error="; ".join(line.strip() for line in record.error.splitlines()),
             result=result,
             misses=misses,
             doubtful=doubtful,

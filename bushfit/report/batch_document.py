@@ -16,7 +16,7 @@ LimitResult = Literal["pass", "conditional pass", "not judged", "conditional fai
 class QuantityTable:
     """Scatter, limits and capability of a quantity over the parts, in the unit of its column."""
 
-    parts: Annotated[int, Field(description="Parts of which the quantity is known.")]
+    parts: Annotated[int, Field(description="Parts of which it is known, without those of a poor fit.")]
     median: Annotated[float, Field(description="Median of the parts.")]
     sigma: Annotated[float, Field(description="Standard deviation from the median absolute deviation.")]
     detectable: Annotated[

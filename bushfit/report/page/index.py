@@ -105,7 +105,7 @@ def index_page(files: Sequence[ResultFile], folder: Path, base: str = "") -> str
         "errors": listed.get("error", [])[:_MOST_NAMED],
         "differing": listed.get("differs", [])[:_MOST_NAMED],
         "most_named": _MOST_NAMED,
-        "parts_compared": max((table.parts for table in batch.quantities.values()), default=0),
+        "parts_compared": max((table.parts for table in batch.quantities.values() if table.detectable), default=0),
         "quantities": [
             (table, units[header][0], "" if units[header][1] in (None, "-") else f" {units[header][1]}")
             for header, table in batch.quantities.items()
@@ -137,7 +137,7 @@ class Curves:
     Args:
         headers: columns of the points, (k,).
         values: |K| in the unit of the headers, (n, k), NaN for parts without a curve.
-        usual: parts that do not differ, (n,) bool.
+        usual: parts that neither differ nor have a poor fit, (n,) bool.
     """
 
     headers: Sequence[str]
@@ -149,7 +149,7 @@ class Curves:
         """Curves of a batch; None if it has none."""
         unknown = [np.nan] * len(batch.curve_points)
         values = np.array([unknown if part.curve is None else part.curve for part in batch.parts], dtype=float)
-        usual = np.array([not part.deviations and part.curve is not None for part in batch.parts], dtype=bool)
+        usual = np.array([not (part.deviations or part.poor_fit or part.curve is None) for part in batch.parts])
         return cls(batch.curve_points, values, usual) if unknown and usual.any() else None
 
     @cached_property
@@ -168,13 +168,14 @@ class Curves:
         return number(mean, 2, "+") if np.isfinite(mean) else ""
 
     def picture(self, parts: Sequence[PartTable]) -> Picture:
-        """Median, range of the parts that do not differ, and the curves of those that do."""
-        singles = {p.name: curve for p, curve in zip(parts, self.values, strict=True) if p.deviations and p.curve}
+        """Median and range of the usual parts, and the curves of the others."""
+        curves = zip(parts, self.values, self.usual, strict=True)
+        singles = {part.name: curve for part, curve, is_usual in curves if part.curve and not is_usual}
         chart = plots.batch.curves_figure(self.headers, self.values[self.usual], singles)
         return picture(chart, "curves", chart.heading.get_text())
 
     def sparkline(self, index: int, *, differs: bool) -> Markup:
-        """Deviation of a curve from the median over the points, with the range of the parts that do not differ."""
+        """Deviation of a curve from the median over the points, with the range of the usual parts."""
         line, usual = self.relative[index], self.relative[self.usual]
         if not np.isfinite(line).all():
             return Markup()

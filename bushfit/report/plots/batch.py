@@ -191,8 +191,8 @@ def curves_figure(headers: Sequence[str], usual: Array, singles: Mapping[str, Ar
 
     Args:
         headers: columns of the points, such as "measured stiffness axial 25 Hz 0.1 mm [N/mm]", (k,).
-        usual: stiffness of the parts that do not differ, in the unit of the headers, (n, k).
-        singles: stiffness of the parts that differ, by name, (k,) each; six are drawn.
+        usual: stiffness of the parts that are not drawn singly, in the unit of the headers, (n, k).
+        singles: stiffness of the parts drawn singly, by name, (k,) each; six are drawn.
 
     Returns:
         Figure with one panel.
@@ -216,5 +216,5 @@ def curves_figure(headers: Sequence[str], usual: Array, singles: Mapping[str, Ar
     axes.legend()
     names = f" Single curves: {', '.join(named)}." if named else ""
     return figure.explain(
-        f"Measured, without a model: median of the parts, and range of those that do not differ (grey).{names}"
+        f"Measured, without a model: median and range (grey) of the parts that are not drawn singly.{names}"
     )
