@@ -246,7 +246,8 @@ def expand_pattern(entry: Entry, base: Path, source: str) -> list[Entry]:
         source: manifest, for errors.
 
     Returns:
-        Entries in the order of the files' names; the entry itself if its campaign is a file.
+        Entries in the order of the files' names, those of folders that cannot be read last; the entry itself if its
+        campaign is a file.
 
     Raises:
         CampaignError: no file matches, or a pattern has a name.
@@ -254,6 +255,11 @@ def expand_pattern(entry: Entry, base: Path, source: str) -> list[Entry]:
     if not _PATTERN.search(entry.campaign) or os.path.exists(base / entry.campaign):  # noqa: PTH110
         return [entry]
     matches = sorted(glob.glob(entry.campaign, root_dir=base, recursive=True))  # noqa: PTH207 - Path.glob refuses ".."
+    parts = Path(entry.campaign).parts
+    for depth in range(1, len(parts)):  # a locked folder matches nothing: it becomes a row that fails
+        for folder in glob.glob(os.path.join(*parts[:depth]), root_dir=base):  # noqa: PTH118, PTH207
+            if os.path.isdir(base / folder) and not os.access(base / folder, os.R_OK | os.X_OK):  # noqa: PTH112
+                matches.append(os.path.join(folder, *parts[depth:]))  # noqa: PTH118
     if not matches or entry.name:
         problem = "a pattern cannot have a name" if matches else "the pattern matches no file"
         expected = "campaign files, counted from the folder of the manifest"

@@ -192,8 +192,12 @@ def model_of(campaign: Campaign) -> Model:
 def refuse_tests(paths: Sequence[Path]) -> None:
     """Raise a CampaignError where test files, a folder or a model were given in place of a campaign."""
     first = paths[0]
-    tests = [path for path in paths if path.is_dir() or (path.suffix.lower() in TEST_FILES and path.exists())]
-    if not tests and not (first.suffix.lower() == ".json" and first.exists()):
+    try:
+        tests = [path for path in paths if path.is_dir() or (path.suffix.lower() in TEST_FILES and path.exists())]
+        is_model = first.suffix.lower() == ".json" and first.exists()
+    except OSError:  # a locked folder, or a name that is too long: the reader reports it
+        return
+    if not (tests or is_model):
         return
     expected = "a .toml file that names the bushing and its tests"
     if tests:

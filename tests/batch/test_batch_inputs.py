@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import os
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +69,13 @@ def test_a_pattern_takes_every_match_and_names_by_folder_where_files_share_a_nam
     inside = read(shop, '[[bushings]]\ncampaign = "bushings/b[0-2]/*.toml"\n[[bushings]]\ncampaign = "x.toml"\n')
     assert [row.name for row in inside.rows] == ["b0", "b1", "b2", "x"]
     assert inside.title == "m"
+
+
+def test_a_locked_folder_is_a_row_of_its_own(shop: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (shop / "bushings/locked").mkdir()
+    monkeypatch.setattr(os, "access", lambda path, _: Path(path).name != "locked")
+    rows = read_manifest(str(shop / "bushings/*/bushing.toml"), RowSettings()).rows
+    assert [Path(row.campaign).parent.name for row in rows] == ["b0", "b1", "b2", "b3", "b4", "locked"]
 
 
 @pytest.mark.parametrize(

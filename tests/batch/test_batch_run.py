@@ -247,11 +247,18 @@ def test_inputs_are_read_guarded(typed: Callable[..., Any], shop: Path) -> None:
     with (shop / "huge.toml").open("wb") as stream:
         stream.truncate(6 << 30)
     lines = ["campaign,commands,model", "huge.toml,fit,"]
+    lines += [f"{'a' * 300}.toml,fit,"]
     lines += [f"bushings/b0/bushing.toml,predict,{model}" for model in ("pipe.json", "/dev/zero", "absent.json")]
     (shop / "m.csv").write_text("\n".join(lines))
     done = typed("batch", "m.csv", "-o", "all", "--no-plots")
     assert (done.returncode, "an internal error of bushfit" in done.stderr) == (1, False)
     errors = [part["error"] for part in rows(shop / "all")]
-    words = ("the file is too large", "this is not a file", "this is not a file", "there is no such file")
-    assert [word in error for word, error in zip(words, errors, strict=True)] == [True] * 4
+    words = (
+        "the file is too large",
+        "File name too long",
+        "this is not a file",
+        "this is not a file",
+        "there is no such file",
+    )
+    assert [word in error for word, error in zip(words, errors, strict=True)] == [True] * 5
     assert typed("batch", "m.csv", "-o", "two", "--scheduler", "").returncode == 2
