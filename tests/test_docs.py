@@ -152,7 +152,8 @@ def test_the_page_of_each_folder_has_its_files_in_their_own_words(root: Path) ->
 
 def test_what_the_page_on_the_code_names_is_there(root: Path) -> None:
     text = (root / "bushfit/manual/code.md").read_text(encoding="utf-8")
-    paths = re.findall(r"`([\w/]+(?:\.py|/))`", text)
+    (tree,) = blocks(root / "bushfit/manual/code.md", "text")
+    paths = re.findall(r"`([\w/]+(?:\.py|/))`", text) + re.findall(r"[\w/]+\.py", tree)
     assert [path for path in paths if not any((place / path).exists() for place in (root / "bushfit", root))] == []
     names = re.findall(r"`([a-z]\w*(?:\.\w+)+)`", re.sub(r"`[\w/]+\.(?:py|json)`", "", text))
     assert len(names) > 30
