@@ -149,19 +149,6 @@ def test_what_is_mistyped_in_a_campaign_is_refused(root: Path, right: str, wrong
     assert complaints("campaign", tomllib.loads(text.replace(right, wrong, 1)))
 
 
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("manifest", 'bushings = [{ campaign = "a.toml", comand = "fit" }]'),
-        ("manifest", 'bushings = [{ name = "a" }]'), ("limits", '[[stiffness]]\nmax = "1 kN/mm"'),
-        ("manifest", 'bushings = [{ campaign = "a.toml" }]\nat = [25]'), ("limits", 'verdicts = ["fine"]'),
-        ("limits", "[parameters.mu]\nmaximum = 2"),
-    ],
-)  # fmt: skip
-def test_what_is_mistyped_in_a_manifest_or_limits_is_refused(name: str, text: str) -> None:
-    assert complaints(name, tomllib.loads(text))
-
-
 def test_printed_and_written_are_the_same(root: Path, tmp_path: Path) -> None:
     printed = call(tmp_path, "schema", "diagnosis", "-q")
     assert (printed.returncode, printed.stderr) == (0, "")

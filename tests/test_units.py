@@ -99,11 +99,6 @@ def test_units_of_two_readings_are_refused(unit: str, expected: str, said: str) 
         units.si_factor(unit, expected)
 
 
-@pytest.mark.parametrize("unit", units._EVERYDAY)
-def test_everyday_units_are_what_pint_says(unit: str) -> None:
-    assert units._EVERYDAY[unit] == units._by_pint(unit)
-
-
 @pytest.mark.parametrize(
     ("value", "digits", "shown"),
     [
@@ -113,13 +108,6 @@ def test_everyday_units_are_what_pint_says(unit: str) -> None:
 )  # fmt: skip
 def test_numbers_that_people_read(value: float, digits: int, shown: str) -> None:
     assert units.number(value, digits) == shown
-
-
-@given(st.floats(-1e6, 1e6).filter(lambda x: abs(x) > 1e-3), st.integers(1, 9))
-def test_a_number_keeps_its_digits(value: float, digits: int) -> None:
-    text = units.number(value, digits)
-    assert "e" not in text
-    assert float(text) == float(f"{value:.{digits}g}")
 
 
 @pytest.mark.parametrize(

@@ -6,20 +6,15 @@ Most of what can be wrong with a campaign stands in cli/spoiled_campaigns.py, wi
 from __future__ import annotations
 
 import math
-import pickle
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
 
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.session import Visit, session
-from bushfit.errors import BushfitError, CampaignError, MeasurementError, UnitError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Bushing, Direction, Specimen, unit_strain
-from bushfit.reading.tablefile import folder_name
 
 BUSHING = """
 [bushing]
@@ -121,40 +116,6 @@ sweeps = [{ direction = "torsion", amplitudes = ["1 deg"], frequencies = ["5 Hz"
     assert simulate.effects == {"inertia": {"mass": 0.1}, "delay": {"tau": 5e-5}}
     assert (simulate.noise, simulate.gain_error, simulate.loops[0].cycles) == (0.005, 0.0, 3)
     assert simulate.sweeps[0].amplitudes == pytest.approx((math.radians(1),))
-
-
-@pytest.mark.parametrize(
-    ("kind", "text", "words"),
-    [
-        (MeasurementError, BUSHING + TESTS.replace("loop.csv", "x" * 5000), ["cannot be read", "too long"]),
-        (UnitError, BUSHING + TESTS + "noise = 0.5", ["sweeps #1.noise", "without a unit", "%"]),
-        (UnitError, BUSHING + TESTS.replace("\n\n", '\nrate = "1 deg/s"\n\n'), ["loops #1.rate", "a speed"]),
-        (CampaignError, SIMULATE + '[fit."inertia.mas"]\nvary = true', ["fit.inertia.mas", 'mean "inertia.mass"']),
-    ],
-)
-def test_what_is_wrong_has_one_clear_error_which_travels_between_processes(
-    kind: type[BushfitError], text: str, words: list[str], folder: Path
-) -> None:
-    with pytest.raises(BushfitError) as caught:
-        campaign_from(text, folder)
-    message = str(caught.value)
-    assert type(caught.value) is kind
-    assert str(folder) in message
-    assert all(word in message for word in words), message
-    assert str(pickle.loads(pickle.dumps(caught.value))) == message
-
-
-@given(st.text(max_size=300))
-@example("con")
-@example("Aux .txt")
-@example("../" * 50)
-def test_a_name_is_one_folder_on_every_system(name: str) -> None:
-    folder = folder_name(name)
-    assert (Path("/results") / folder).resolve().parent == Path("/results")
-    assert folder.strip(" .") == folder
-    assert 0 < len(folder.encode("utf-8", "surrogatepass")) < 250
-    assert not set(folder) & set('/\\:*?"<>|\n')
-    assert folder.partition(".")[0].upper() not in {"CON", "PRN", "AUX", "NUL", "COM1", "LPT9"}
 
 
 RUBBER = Bushing("CMP 15 961", 0.010, 0.018, 0.034)

@@ -109,19 +109,6 @@ def test_a_missed_limit_is_status_1_and_results_go_to_a_folder_of_the_campaign(
     assert (tmp_path / "results" / "CMP 15 961" / "static.json").exists()
 
 
-def test_the_installed_command(work: Path, tmp_path: Path) -> None:
-    """In a process of its own, with warnings as errors; JSON is the file."""
-    command = [sys.executable, "-W", "error", str(Path(sys.executable).with_name("bushfit"))]
-    folder = tmp_path / "x"
-    done = subprocess.run(
-        [*command, "fit", CAMPAIGN, "-o", str(folder), "--json", "--no-plots"],
-        cwd=work, capture_output=True, text=True, check=False, encoding="utf-8",
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert done.stdout == (folder / "model.json").read_text(encoding="utf-8")
-    assert "CMP 15 961: joint fit" in done.stderr
-
-
 @pytest.mark.parametrize(
     ("arguments", "slow"),
     [

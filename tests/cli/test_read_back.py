@@ -48,20 +48,16 @@ frequencies = ["15 Hz"]
 stepped = "amplitude"
 """
 RISING = json.dumps([f"{frequency} Hz" for frequency in range(10, 250, 8)])
-WEAK = "rig_compliance.compliance=3e-8 m/N"
 
 #: What is tested, by the shape of the campaign, and what is hidden in it.
 SHAPES: dict[str, tuple[str, ...]] = {
     "coloured loops": (MOUNT + COLOURED + LOOPS + SWEEPS["axial"],),
-    "one coloured loop": (MOUNT + COLOURED + LOOP.format("axial", "1 mm", "0.1 Hz"),),
     "one loop in torsion": (MOUNT + RIG + LOOP.format("torsion", "2 deg", "0.1 Hz"),),
     "amplitudes at one frequency": (MOUNT + RIG + ONE_FREQUENCY,),
     "coupons alone": ('name = "Sheet"\n' + SPECIMENS + RIG + COUPONS,),
     "coupons beside a bushing": (SPECIMENS + MOUNT + RIG + LOOPS + SWEEPS["axial"] + COUPONS,),
     "all directions": (MOUNT + RIG + LOOPS + "".join(SWEEPS.values()),),
-    "radial alone": (MOUNT + RIG + LOOP.format("radial", "0.3 mm", "0.1 Hz") + SWEEPS["radial"],),
     "a resonance": (MOUNT + RIG + LOOPS + SHAKEN.format(RISING),),
-    "twins": (MOUNT + RIG + LOOPS + SWEEPS["axial"] + SWEEPS["radial"], "--effect", WEAK),
     "described": (MOUNT + RIG + LOOPS + SWEEPS["axial"] + SWEEPS["radial"],),
 }
 #: Commands that write a model, and its name in their folder.

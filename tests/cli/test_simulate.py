@@ -119,32 +119,6 @@ def test_a_raw_record_becomes_a_sweep_that_fits(
         assert abs(off) * table_1[name] < 3.0 * entry["stderr"]
 
 
-def halves(root: Path, folder: Path, *names: str) -> list[Path]:
-    lines = (root / RECORD).read_text(encoding="utf-8").splitlines(keepends=True)
-    middle = len(lines) // 2
-    for name, part in zip(names, (lines[1:middle], lines[middle:]), strict=True):
-        (folder / name).write_text("".join([lines[0], *part]), encoding="utf-8")
-    return [folder / name for name in names]
-
-
-@pytest.mark.parametrize(
-    ("files", "said"),
-    [
-        (("first.csv", "second.csv"), "state it: --direction axial"),
-        (("axial.csv", "radial.csv"), "reduce each direction by itself"),
-    ],
-)
-def test_a_direction_is_never_guessed(
-    typed: Run, root: Path, tmp_path: Path, files: tuple[str, ...], said: str
-) -> None:
-    refused(typed("reduce", *halves(root, tmp_path, *files), "-o", "x", status=2), tmp_path / "x", said)
-    if files[0] == "first.csv":
-        typed("reduce", *files, "-o", "x", "--direction", "axial", "--no-plots")
-        table = pd.read_csv(tmp_path / "x/sweep.csv")
-        assert set(table["history"]) == {"first", "second"}, "several files make one sweep"
-        assert 14 <= len(table) <= 15, "one step may be cut in two"
-
-
 @pytest.mark.parametrize(
     ("options", "said"),
     [

@@ -115,13 +115,6 @@ def test_a_workbook_with_a_forgotten_cell_far_away(bombed: Path) -> None:
     )
 
 
-def test_300_mb_of_zeros_behind_a_table(bombed: Path) -> None:
-    with (bombed / "loop.csv").open("r+b") as stream:
-        stream.write(FILES["loop.csv"].encode() * 20)
-        stream.truncate(300_000_000)
-    refused(bounded(bombed, "fit", "campaign.toml", "-o", "x"), bombed / "x", "this is not text", "found: byte 0x00")
-
-
 @pytest.fixture
 def long_runs(bombed: Path) -> Path:
     """Two runs of 12,000 points: what grew with the square of them took 1.2 GB for each matrix."""
@@ -139,10 +132,3 @@ def test_a_fit_to_runs_of_12_000_points(long_runs: Path) -> None:
     done = bounded(long_runs, "fit-dynamic", "campaign.toml", "--static", "model.json", "-o", "x", "--no-plots")
     assert done.returncode == 0, done.stderr
     assert json.loads((long_runs / "x" / "dynamic.json").read_text())["fit"]["points"] == 2 * 12_000
-
-
-@pytest.mark.slow
-def test_a_diagnosis_of_runs_of_12_000_points(long_runs: Path) -> None:
-    done = bounded(long_runs, "diagnose", "campaign.toml", "-o", "x", "--no-plots", "-v", times=2)
-    assert done.returncode == 0, done.stderr
-    assert "24000 points are averaged to 200 narrow bands for the diagnosis" in done.stderr

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from shell import Run, refused, values
+from shell import Run, values
 
 from bushfit.campaign.campaign import load_campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
@@ -136,15 +136,6 @@ def test_a_visit_makes_a_campaign_that_fits(
     assert "…" not in done.stderr, "long names wrap"
 
 
-@pytest.mark.parametrize(("name", "said"), [("axial", ""), ("axial_18mm_1mm", "18 mm and 1 mm")])
-def test_what_no_name_says_is_one_question(typed: Run, visited: Path, tmp_path: Path, name: str, said: str) -> None:
-    (tmp_path / f"{name}.csv").write_bytes(next(visited.glob("Dyn_*.csv")).read_bytes())
-    done = typed("init", f"{name}.csv", *GEOMETRY, "-o", "x", status=2)
-    refused(done, tmp_path / "x", "nothing says at which amplitude this was tested", said)
-    assert "--at-amplitude" in done.stderr.partition("try: ")[2]
-    typed("init", f"{name}.csv", *GEOMETRY, "-o", "x", "--at-amplitude", "0.05 mm")
-
-
 @pytest.mark.parametrize(
     ("file", "said"),
     [
@@ -163,28 +154,6 @@ def test_what_has_to_be_reduced_is_left_out_with_the_way_on(
     name = file.rpartition("/")[2]
     assert f"{name}: {said}; bushfit reduce lab/{name}" in told
     assert "results/lab" in done.stderr
-
-
-def test_folders_and_workbooks_without_a_test_are_refused_and_a_test_with_a_fault_is_not_left_out(
-    typed: Run, visited: Path, tmp_path: Path
-) -> None:
-    (tmp_path / "lab").mkdir()
-    (tmp_path / "lab/photo.png").write_bytes(b"\x89PNG")
-    said = "no file of this folder contains a test"
-    refused(typed("init", "lab", *GEOMETRY, "-o", "x", status=2), tmp_path / "x", said, "photo.png: no table")
-    sheets = pd.read_excel(visited / "Buchse 7.xlsx", sheet_name=None, engine="openpyxl")
-    with pd.ExcelWriter(tmp_path / "notes.xlsx") as book:
-        for name in ("Info", "more"):
-            sheets["Info"].to_excel(book, sheet_name=name, index=False)
-    done = typed("init", "notes.xlsx", *GEOMETRY, "-o", "x", status=2)
-    refused(done, tmp_path / "x", "no sheet holds such a table")
-    with pd.ExcelWriter(tmp_path / "both.xlsx") as book:
-        sheets["axial"].to_excel(book, sheet_name="axial", index=False)
-        sheets["radial"].rename(columns={"Amplitude [mm]": "Amplitude"}).to_excel(
-            book, sheet_name="radial", index=False
-        )
-    done = typed("init", "both.xlsx", *GEOMETRY, "-o", "x", status=2)
-    refused(done, tmp_path / "x", 'sheet "radial"', "the amplitude has no unit")
 
 
 def coupon(model: Model, file: Path, strain: float) -> None:

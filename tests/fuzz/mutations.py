@@ -46,7 +46,7 @@ LINES: dict[str, list[tuple[str, ...]]] = {
     "compare": [("model.json", "model.json"), ("campaign.toml", "--families", "kraus")],
     "report": [("res",)],
     "batch": [("list.toml", "--limits", "limits.toml"), ("list.csv",), ("campaign.toml", "--limits", "limits.toml")],
-    "inspect": [("loop.csv",), ("sweep.csv",), ("shaker.csv",), (".",)],
+    "inspect": [("loop.csv",), ("sweep.csv",), ("shaker.csv",)],
     "init": [("loop.csv", "sweep.csv", "--direction", "axial", *SIZES), (".", *SIZES)],
     "reduce": [("loop.csv", "--direction", "axial"), ("shaker.csv", "--mass", "0.5 kg", "--direction", "axial")],
     "plan": [("campaign.toml", "--hours", "1"), ("model.json", "--hours", "1")],
@@ -204,7 +204,7 @@ def tried(command: str, seed: int, folder: Path) -> tuple[list[str], str]:
     except Exception as error:
         return words, f"{type(error).__name__}: {error}"
     said = done.stdout + done.stderr + "".join(file.read_text("utf-8") for file in folder.glob("x/batch.csv"))
-    if "a fault in bushfit" in said or "Traceback" in said:
+    if "internal error" in said or "Traceback" in said:
         return words, said[-500:]
     if (done.returncode == 2 and done.stderr.count("rror: ") < 1) or done.returncode not in (0, 1, 2):
         return words, f"status {done.returncode} without an error: {done.stderr}"
