@@ -2,7 +2,7 @@
 
 import hashlib
 import os
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -230,6 +230,7 @@ def reader_keywords(
     """
     listed_tests = set()
     places = [(os.path.normpath(campaign.parent / test.file), test.sheet, test.temperature) for test in tests]
+    counts = Counter(places)
     for test, place, name in zip(tests, places, _test_names(tests), strict=True):
         if (identity := (*place, test.direction, test.specimen_number, *test.rows.items())) in listed_tests:
             raise CampaignError(
@@ -240,7 +241,7 @@ def reader_keywords(
             "file": campaign.parent / test.file,
             "test": test,
             "name": name,
-            "shared": places.count(place) > 1,
+            "shared": counts[place] > 1,
         }
         with error_location(campaign, place=test.file):
             keywords["direction"] = body = place_tested(test.specimen, test.direction, specimens)
@@ -253,19 +254,20 @@ def reader_keywords(
 
 def _test_names(tests: Sequence[LoopFile | SweepFile]) -> list[str]:
     """Unique names of tests, in order."""
-    files, stems = Counter(test.file for test in tests), Counter(Path(test.file).stem for test in tests)
+    keys = ("direction", "specimen_number")
+    stems, values = Counter(Path(test.file).stem for test in tests), defaultdict[str, list[tuple[Any, ...]]](list)
+    for test in tests:
+        values[test.file].append(tuple(getattr(test, key) for key in keys))
+    differing = {
+        file: [key for key, column in zip(keys, zip(*rows, strict=True), strict=True) if len(set(column)) > 1]
+        for file, rows in values.items()
+    }
     names = []
     for test in tests:
         stem = Path(test.file).stem
         temperature = None if test.temperature is None else f"{test.temperature - CELSIUS:.4g} degC"
-        tests_of_file = (
-            [candidate for candidate in tests if candidate.file == test.file] if files[test.file] > 1 else []
-        )
-        keys = [
-            key
-            for key in ("direction", "specimen_number")
-            if len({getattr(candidate, key) for candidate in tests_of_file}) > 1
-        ]
-        parts = (stem, test.sheet, temperature, *(getattr(test, key) for key in keys), *test.rows.values())
-        names.append(" ".join(filter(None, parts)) if tests_of_file else test.file if stems[stem] > 1 else stem)
+        distinguishing = (getattr(test, key) for key in differing[test.file])
+        parts = (stem, test.sheet, temperature, *distinguishing, *test.rows.values())
+        is_shared = len(values[test.file]) > 1
+        names.append(" ".join(filter(None, parts)) if is_shared else test.file if stems[stem] > 1 else stem)
     return names

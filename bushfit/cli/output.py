@@ -94,7 +94,8 @@ class Output:
         """Console on standard error; silent with --quiet."""
         console = _Console(stderr=True, quiet=self.quiet, highlight=False, soft_wrap=True, emoji=False)
         if not console.is_terminal:
-            console.width = int(os.environ.get("COLUMNS", _WIDTH))
+            columns = os.environ.get("COLUMNS", "")
+            console.width = int(columns) if columns.isdecimal() else _WIDTH
         return console
 
     def folder(self, name: str, form: str = "{}") -> Path:

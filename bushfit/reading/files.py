@@ -183,6 +183,8 @@ def to_utf8(data: bytes, file: Path, stated_encoding: str | None = None) -> tupl
         parts = [part.encode("utf-8", "replace") for part in iter(lambda: text.read(CHUNK_BYTES), "")]
     except UnicodeDecodeError as error:
         raise _undecodable(data, file, raw.tell() - len(error.object) + error.start, encoding) from None
+    except UnicodeError:  # UTF-16 or UTF-32 without a byte order mark
+        raise _undecodable(data, file, 0, encoding) from None
     except LookupError:
         raise MeasurementError(
             "unknown encoding",

@@ -132,7 +132,7 @@ def test_a_visit_makes_a_campaign_that_fits(
     monkeypatch.setenv("COLUMNS", "50")
     done = typed("fit", "x/campaign.toml", "-o", "fit", "--no-plots", "--json")
     assert values(done) == pytest.approx(table_1, rel=0.04)
-    assert "and 1 more test, which is met better" in " ".join(done.stderr.split())
+    assert "and 1 more test has a smaller misfit" in " ".join(done.stderr.split())
     assert "…" not in done.stderr, "long names wrap"
 
 
