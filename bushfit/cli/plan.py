@@ -163,6 +163,9 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
         columns = ("of", "asked for", "before", "plan", "standard", "")
         title = "targets: half width of the 95 % interval at the widest point [%]"
         output.print_table(title, columns, [(*row, verdict) for row, verdict in zip(sizes, met, strict=True)])
+        for name, target in targets.items():
+            if target["why"]:
+                output.print(f"{name} is not met: {target['why']}")
     _print_effects(output, document)
     if rivals := document["rivals"]:
         chi_squares = ", ".join(f"{number(rivals[key], 3)} by the {key} tests" for key in ("planned", "standard"))
@@ -172,7 +175,8 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
         )
     if document["enough"]:
         output.print(document["enough"])
-    output.warn(document["warnings"])
+    reasons = [target["why"] for target in targets.values() if target["why"]]
+    output.warn([line for line in document["warnings"] if not any(reason in line for reason in reasons)])
 
 
 def _print_tests(output: Output, outcome: PlanOutput) -> None:
