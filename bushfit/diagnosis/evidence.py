@@ -63,7 +63,7 @@ class Evidence:
     @property
     def parameters(self) -> int:
         """Number of fitted parameters."""
-        return len(self.solution.coordinates.names)
+        return len(self.solution.names)
 
     @property
     def reduced(self) -> float:
@@ -72,24 +72,16 @@ class Evidence:
         return self.chi_square / max(counted - self.parameters, 1)
 
     @property
-    def penalty(self) -> float:
-        """Price of one parameter by the Bayesian information criterion: ln of the number of independent points."""
-        return float(np.log(sum(data_set.independent for data_set in self.data_sets)))
-
-    @property
     def bic(self) -> float:
-        """chi-square + parameters ln n; lower is better."""
-        return self.chi_square + self.parameters * self.penalty
+        """Bayesian information criterion: chi-square + parameters ln n, n independent points; lower is better."""
+        independent = sum(data_set.independent for data_set in self.data_sets)
+        return self.chi_square + self.parameters * float(np.log(independent))
 
     @cached_property
     def span(self) -> Array:
-        """Orthonormal basis of what the model's own parameters can absorb, (n, k)."""
+        """Orthonormal basis of the residuals that the parameters of the model can absorb, (n, k)."""
         basis, size, _ = np.linalg.svd(self.solution.jacobian.T, full_matrices=False)
         return basis[:, size > 1e-10 * size[0]]
-
-    def project_out(self, columns: Array) -> Array:
-        """Remove from columns, (c, n), the part that the parameters of the model can absorb."""
-        return columns - (columns @ self.span) @ self.span.T
 
     @cached_property
     def place(self) -> Mapping[MeasuredTest, slice]:

@@ -46,14 +46,14 @@ def faulty_places(evidence: Evidence) -> list[FaultyPlace]:
 def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPlace]:
     """Each level of a direction that has several, and each repeat of a level."""
     for sweep in sweeps:
-        levels_of_direction = [np.unique(other.held) for other in sweeps if other.direction == sweep.direction]
-        known = np.concatenate(levels_of_direction)
+        levels_of_direction = [np.unique(member.held) for member in sweeps if member.direction == sweep.direction]
+        levels = np.concatenate(levels_of_direction)
         for level in np.unique(sweep.held):
             mask = sweep.held == level
             label = sweep.line_words(int(np.argmax(mask)))
-            if known.size > 1:  # in this file or in others
+            if levels.size > 1:  # in this file or in others
                 place = _shifted(evidence, "level", label, [sweep], [mask], sloping=True)
-                yield replace(place, extreme=known.size > 2 and level in (known.min(), known.max()))
+                yield replace(place, extreme=levels.size > 2 and level in (levels.min(), levels.max()))
             numbers = np.unique(sweep.repeat[mask])
             for number in numbers if numbers.size > 2 else ():
                 repeat = mask & (sweep.repeat == number)

@@ -23,6 +23,7 @@ from bushfit.errors import FitError, ModelError
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.coordinates import Bounds, jacobian, residual
 from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, split_by_kind
+from bushfit.fitting.problem import FitResult
 from bushfit.progress import track
 from bushfit.reading.measurement import Stepped
 
@@ -144,10 +145,10 @@ def predicted_parts(before: Evidence, after: Evidence, bounds: Bounds) -> tuple[
     Returns:
         Predictions by the name of the part, and the parts that one model cannot predict.
     """
-    models = [_Fitted.from_evidence(evidence) for evidence in dict.fromkeys((before, after))]
+    models = [(evidence, _leave_out(evidence.solution)) for evidence in dict.fromkeys((before, after))]
     predictions, skipped = dict[str, Predicted](), list[Skipped]()
     for part in track("parts held out", list(parts(after.data_sets))):
-        attempts = [model.predicted(part, bounds) for model in models]
+        attempts = [_predict(*model, part, bounds) for model in models]
         pairs = [prediction for prediction in attempts if not isinstance(prediction, Skipped)]
         if len(pairs) < len(models):
             skipped.append(next(prediction for prediction in attempts if isinstance(prediction, Skipped)))
@@ -176,63 +177,45 @@ class Predicted(NamedTuple):
     pulls: Array
 
 
-@dataclass(frozen=True, eq=False)
-class _Fitted:
-    """A fitted model with its leave-out formulas.
+def _leave_out(solution: FitResult) -> LeaveOut:
+    """Leave-out formulas of a fit, for the parameters that are not at a bound."""
+    return LeaveOut.from_fit(solution.jacobian[solution.moving], solution.residual)
+
+
+def _predict(
+    evidence: Evidence, leave_out: LeaveOut, part: HoldOutPart, bounds: Bounds
+) -> tuple[Array, Array] | Skipped:
+    """Predict a part from the rest by one model, with a refit where one step is too long.
 
     Args:
-        evidence: the fit.
-        free: indices of the parameters that are not at a bound.
-        whole: leave-out formulas of the full fit.
-    """
+        evidence: fit to all tests.
+        leave_out: its leave-out formulas.
+        part: held out.
+        bounds: limits of parameters, for a fit to the rest.
 
-    evidence: Evidence
-    free: list[int]
-    whole: LeaveOut
-
-    @classmethod
-    def from_evidence(cls, evidence: Evidence) -> _Fitted:
-        solution = evidence.solution
-        free = solution.moving
-        return cls(evidence, free, LeaveOut.from_fit(solution.jacobian[free], solution.residual))
-
-    def predicted(self, part: HoldOutPart, bounds: Bounds) -> tuple[Array, Array] | Skipped:
-        """Predict a part from the rest.
-
-        Returns: residuals, plain and whitened by the error of the prediction, (2, n); and the derivative of half their
-            sum of
+    Returns:
+        Residuals, plain and whitened by the error of the prediction, (2, n); and the derivative of half their sum of
         squares by the noise of each row of all tests, (all rows,).
-        """
-        evidence, names = self.evidence, self.evidence.solution.coordinates.names
-        rows, clusters = part.rows(evidence.data_sets), _clusters(evidence.data_sets)
-        if left_open := [names[self.free[i]] for i in np.flatnonzero(self.whole.open(rows))]:
-            reason = f"the other tests do not determine {', '.join(left_open)}"
-            return Skipped(part.name, reason, tuple(dict.fromkeys(map(effect_name_of, left_open))))
-        if self.whole.step(rows) is not None:
-            return _with_pull(self.whole, rows, clusters, stepped=True)
-        refitted = _refitted(evidence, part, bounds)
-        if refitted is None or refitted.whole.open(rows).any():
-            return Skipped(part.name, "no fit to the other tests converges")
-        return _with_pull(refitted.whole, rows, clusters, stepped=False)
-
-
-def _with_pull(whole: LeaveOut, rows: Array, clusters: Array, *, stepped: bool) -> tuple[Array, Array]:
-    """The residuals of some rows as predicted, plain and whitened, and how noise moves their squares."""
-    residuals = np.array(whole.predicted(rows, clusters, stepped=stepped))
-    return residuals, whole.pulled(rows, residuals[0])
-
-
-def _refitted(evidence: Evidence, part: HoldOutPart, bounds: Bounds) -> _Fitted | None:
-    """Fit a model to the tests without a part; None if the fit does not converge."""
-    data_sets, names = evidence.data_sets, evidence.solution.coordinates.names
-    fixed = [name for name in evidence.model.parameters if name not in names]
-    try:
-        rest = fit(evidence.model, part.rest(data_sets), fixed, bounds).solution
-    except (FitError, ModelError):
-        return None
-    slopes = jacobian(rest.model, data_sets, names)
-    solution = replace(rest, residual=residual(rest.model, data_sets), jacobian=slopes)
-    return None if rest.stopped else _Fitted.from_evidence(Evidence(solution, data_sets))
+    """
+    solution, data_sets = evidence.solution, evidence.data_sets
+    rows, names = part.rows(data_sets), solution.coordinates.names
+    if left_open := [names[solution.moving[i]] for i in np.flatnonzero(leave_out.open(rows))]:
+        reason = f"the other tests do not determine {', '.join(left_open)}"
+        return Skipped(part.name, reason, tuple(dict.fromkeys(map(effect_name_of, left_open))))
+    is_step = leave_out.step(rows) is not None
+    if not is_step:
+        fixed = [name for name in evidence.model.parameters if name not in names]
+        failed = Skipped(part.name, "no fit to the other tests converges")
+        try:
+            rest = fit(evidence.model, part.rest(data_sets), fixed, bounds).solution
+        except (FitError, ModelError):
+            return failed
+        slopes = jacobian(rest.model, data_sets, names)
+        leave_out = _leave_out(replace(rest, residual=residual(rest.model, data_sets), jacobian=slopes))
+        if rest.stopped or leave_out.open(rows).any():
+            return failed
+    residuals = np.array(leave_out.predicted(rows, _clusters(data_sets), stepped=is_step))
+    return residuals, leave_out.pulled(rows, residuals[0])
 
 
 def _clusters(data_sets: Sequence[MeasuredTest]) -> Array:

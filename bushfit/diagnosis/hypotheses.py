@@ -195,9 +195,9 @@ class State:
         tests, solution = self.tests, self.bare.solution
         precision = np.array([self.precision.get(name, 0.0) for name in solution.coordinates.names])
         moves = np.isfinite(precision)
-        known = [np.full(len(p.columns), x**-2) for p, x in zip(self.places, self.amounts, strict=True)]
+        of_places = [np.full(len(p.columns), x**-2) for p, x in zip(self.places, self.amounts, strict=True)]
         rows = np.concatenate([solution.jacobian[moves], *(place.columns for place in self.places)])
-        precision = np.concatenate([precision[moves], *known])
+        precision = np.concatenate([precision[moves], *of_places])
         return LinearModel(self.bare.residual, rows, precision, tests.errors, compound=tests.compound)
 
     @cached_property

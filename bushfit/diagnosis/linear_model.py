@@ -155,46 +155,46 @@ class LinearModel:
         rows = np.concatenate([self.residual[None], self.jacobian, deviation, *(group.scaled for group in self.groups)])
         first = 1 + len(self.jacobian) + len(deviation)
         scatters = np.zeros(self.residual.size, dtype=bool)
-        along = np.zeros((len(rig.blocks), rig.roots[0].shape[-1], len(rows)))
+        projections = np.zeros((len(rig.blocks), rig.roots[0].shape[-1], len(rows)))
         for number, block in enumerate(rig.blocks):
             scatters[block.rows] |= block.scatters
-            along[number, : len(block.kinds)] = block.columns @ rows[:, block.rows].T
+            projections[number, : len(block.kinds)] = block.columns @ rows[:, block.rows].T
         parts = [_columns(rows, scatters), _columns(rows, ~scatters)]
         products = [part[:first] @ part.T for part in parts]
         block_products = [[_block_products(part, block_rows) for part in parts] for _, block_rows in self._blocks]
-        told = np.diag(products[0] + products[1])[1 : 1 + len(self.jacobian)]
+        by_noise = np.diag(products[0] + products[1])[1 : 1 + len(self.jacobian)]
         index = rig.combinations[1][self.nodes]
         used = np.unique(index)
         results = list[tuple[Array, _AtNodes]]()
-        for part in np.array_split(used, max(1, min(used.size, used.size * along.size // _AT_ONCE))):
+        for part in np.array_split(used, max(1, min(used.size, used.size * projections.size // _AT_ONCE))):
             scatter, roots = rig.combinations[0][part, 0], rig.roots[0][part]
             share = 1.0 / np.square(scatter)[:, None, None]
-            left = (roots @ along).reshape(len(part), -1, len(rows))
-            gram = share * products[0] + products[1] - left[..., :first].swapaxes(1, 2) @ left
+            error_products = (roots @ projections).reshape(len(part), -1, len(rows))
+            gram = share * products[0] + products[1] - error_products[..., :first].swapaxes(1, 2) @ error_products
             grams = []
             for (_, block_rows), both in zip(self._blocks, block_products, strict=True):
-                errors = np.moveaxis(left[..., block_rows], 1, -1)  # (combinations, blocks, width, errors)
+                errors = np.moveaxis(error_products[..., block_rows], 1, -1)  # (combinations, blocks, width, errors)
                 grams.append(share[..., None] * both[0] + both[1] - errors @ errors.swapaxes(-1, -2))
             log_det = rig.roots[1][part] + 2.0 * np.count_nonzero(scatters) * np.log(scatter)
             chosen = np.flatnonzero(np.isin(index, part))
-            at_nodes = self._projected(chosen, np.searchsorted(part, index[chosen]), gram, grams, log_det, told)
+            at_nodes = self._projected(chosen, np.searchsorted(part, index[chosen]), gram, grams, log_det, by_noise)
             results.append((chosen, at_nodes))
         order = np.argsort(np.concatenate([chosen for chosen, _ in results]))
-        base, misfit, moved = (
+        base, misfit, changes = (
             np.concatenate([getattr(result, name) for _, result in results])[order]
-            for name in ("base", "misfit", "moved")
+            for name in ("base", "misfit", "changes")
         )
         along_groups, grams = (
             [
                 np.concatenate(kind)[order]
                 for kind in zip(*(getattr(result, name) for _, result in results), strict=True)
             ]
-            for name in ("along", "grams")
+            for name in ("projections", "grams")
         )
-        return _AtNodes(base, misfit, moved, along_groups, grams)
+        return _AtNodes(base, misfit, changes, along_groups, grams)
 
     def _projected(
-        self, chosen: Array, index: Array, gram: Array, grams: Sequence[Array], log_det: Array, told: Array
+        self, chosen: Array, index: Array, gram: Array, grams: Sequence[Array], log_det: Array, by_noise: Array
     ) -> "_AtNodes":
         """Products beside the parameters and the compound's deviation, at some of the nodes.
 
@@ -204,51 +204,50 @@ class LinearModel:
             gram: products of residual, derivatives and the compound with all rows, at each combination.
             grams: products within the blocks of groups, at each combination.
             log_det: natural log of the determinant of the covariance of noise and rig, at each combination.
-            told: products of the derivatives with themselves by noise alone, (k,).
+            by_noise: products of the derivatives with themselves by noise alone, (k,).
         """
-        flat, known = slice(1, 1 + len(self.jacobian)), self.precision > 0.0
-        scale = np.sqrt(np.maximum(told + self.precision, np.finfo(float).tiny))
+        flat, has_prior = slice(1, 1 + len(self.jacobian)), self.precision > 0.0
+        scale = np.sqrt(np.maximum(by_noise + self.precision, np.finfo(float).tiny))
         information = gram[:, flat, flat] + np.diag(self.precision)
         root = np.linalg.cholesky(information / np.outer(scale, scale) + _ROUNDING * np.eye(scale.size))
         free = np.linalg.solve(root, gram[:, flat] / scale[:, None])
         log_det = log_det + 2.0 * np.sum(np.log(np.einsum("nkk->nk", root) * scale), axis=1)
-        log_det -= np.sum(np.log(self.precision[known]))
+        log_det -= np.sum(np.log(self.precision[has_prior]))
         residual = gram[:, 0] - np.einsum("nk,nkc->nc", free[..., 0], free)
         smooth = slice(flat.stop, gram.shape[1])
         deviation = gram[:, smooth] - free[..., smooth].swapaxes(1, 2) @ free
         values, vectors = np.linalg.eigh(deviation[..., smooth])
         values, deviation = np.maximum(values, 0.0)[index], (vectors.swapaxes(1, 2) @ deviation)[index]
         variance = np.square(self._deviation[chosen])[:, None]
-        taken = variance / (1.0 + variance * values)  # of the products along each eigenvector
-        residual = residual[index] - np.einsum("nq,nqc->nc", taken * deviation[..., 0], deviation)
+        shrinkage = variance / (1.0 + variance * values)  # of the products along each eigenvector
+        residual = residual[index] - np.einsum("nq,nqc->nc", shrinkage * deviation[..., 0], deviation)
         log_det = log_det[index] + np.sum(np.log1p(variance * values), axis=1)
-        moved = np.zeros(len(chosen))
+        changes = np.zeros(len(chosen))
         if self.compound:
-            amounts = np.einsum("nij,nj->ni", vectors[index], taken * deviation[..., 0])
-            moved = np.square(np.abs(amounts @ self.compound.unit)).max(axis=-1)
-        along, projected = [], []
+            amounts = np.einsum("nij,nj->ni", vectors[index], shrinkage * deviation[..., 0])
+            changes = np.square(np.abs(amounts @ self.compound.unit)).max(axis=-1)
+        projections, projected = [], []
         for (_, rows), products in zip(self._blocks, grams, strict=True):
             absorbed = np.moveaxis(free[..., rows], 1, -1)  # (combinations, blocks, width, k)
-            beside = np.moveaxis(deviation[..., rows], 1, -1)
+            smooth_rows = np.moveaxis(deviation[..., rows], 1, -1)
             products = products - absorbed @ absorbed.swapaxes(-1, -2)
-            projected.append(products[index] - (beside * taken[:, None, None]) @ beside.swapaxes(-1, -2))
-            along.append(residual[:, rows])
+            projected.append(products[index] - (smooth_rows * shrinkage[:, None, None]) @ smooth_rows.swapaxes(-1, -2))
+            projections.append(residual[:, rows])
         weight = np.array([self.rig.nodes[n].log_weight for n in self.nodes[chosen]])
-        return _AtNodes(weight - 0.5 * (residual[:, 0] + log_det), residual[:, 0], moved, along, projected)
+        return _AtNodes(weight - 0.5 * (residual[:, 0] + log_det), residual[:, 0], changes, projections, projected)
 
     @cached_property
     def _gains(self) -> list[tuple[Array, Array]]:
         """For each group the gain in log evidence, and the squared relative change, by node, block and size."""
         gains: list[list[tuple[Array, Array]]] = [[] for _ in self.groups]
         at_nodes = self._at_nodes
-        for (numbers, _), along, gram in zip(self._blocks, at_nodes.along, at_nodes.grams, strict=True):
+        for (numbers, _), projections, gram in zip(self._blocks, at_nodes.projections, at_nodes.grams, strict=True):
             units = [self.groups[number].unit if self.groups[number].together else np.eye(1) for number in numbers]
             senses = np.array([self.groups[number].sense for number in numbers])
-            for number, gain, moved in zip(numbers, *_block_gains(gram, along, units, senses), strict=True):
-                gains[number].append((gain, moved))
-        return [
-            (np.stack(gain, axis=1), np.stack(moved, axis=1)) for gain, moved in (zip(*g, strict=True) for g in gains)
-        ]
+            for number, gain, changes in zip(numbers, *_block_gains(gram, projections, units, senses), strict=True):
+                gains[number].append((gain, changes))
+        stacked = (zip(*blocks, strict=True) for blocks in gains)
+        return [(np.stack(gain, axis=1), np.stack(changes, axis=1)) for gain, changes in stacked]
 
     @cached_property
     def group_evidence(self) -> list[GroupEvidence]:
@@ -307,7 +306,7 @@ class LinearModel:
         share = np.exp(self._at_nodes.base[bent] - self.log_evidence_bent)
         sizes = self._deviation[bent]
         likeliest = max(np.unique(sizes), key=lambda size: share[sizes == size].sum())
-        return float(np.sqrt(share @ self._at_nodes.moved[bent])), float(likeliest)
+        return float(np.sqrt(share @ self._at_nodes.changes[bent])), float(likeliest)
 
     def likely(self, far: float) -> Array:
         """Nodes of the rig's errors at which a further group of columns may contribute.
@@ -324,8 +323,8 @@ class LinearModel:
         best = np.full(index.max() + 1, -np.inf)
         np.maximum.at(best, index, base)
         near = (base > base.max() - far) | (plain & (base > base[plain].max() - far))
-        beside = np.max([base, *(self._at_nodes.base + gains.max(axis=(1, 2)) for gains, _ in self._gains)], axis=0)
-        led = (best[index] > best.max() - far) | (beside > beside[plain].max() - far)
+        with_group = np.max([base, *(self._at_nodes.base + gains.max(axis=(1, 2)) for gains, _ in self._gains)], axis=0)
+        led = (best[index] > best.max() - far) | (with_group > with_group[plain].max() - far)
         return self.nodes[near | (plain & led)]
 
     def chance(self, *, bent: bool = False) -> float:
@@ -353,12 +352,14 @@ class LinearModel:
             if number in numbers
         )
         values, vectors = np.linalg.eigh(self._at_nodes.grams[kind][self._plain, place])
-        along = np.einsum("nij,ni->nj", vectors, self._at_nodes.along[kind][self._plain, place])[:, None]
+        projections = np.einsum("nij,ni->nj", vectors, self._at_nodes.projections[kind][self._plain, place])[:, None]
         v2 = np.square(SIZES)[:, None]
         grown = 1.0 + v2 * np.maximum(values, 0.0)[:, None]
-        gain = 0.5 * np.sum(v2 * along**2 / grown - np.log(grown), axis=-1) + self._at_nodes.base[self._plain, None]
+        gain = (
+            0.5 * np.sum(v2 * projections**2 / grown - np.log(grown), axis=-1) + self._at_nodes.base[self._plain, None]
+        )
         share = np.exp(gain - logsumexp(gain))
-        means = np.einsum("nij,nsj->nsi", vectors, -v2 * along / grown)
+        means = np.einsum("nij,nsj->nsi", vectors, -v2 * projections / grown)
         mean = np.einsum("ns,nsi->i", share, means)
         spread = np.einsum("nij,nj,nkj->ik", vectors, np.einsum("ns,nsj->nj", share, v2 / grown), vectors)
         return mean, spread + np.einsum("ns,nsi,nsj->ij", share, means - mean, means - mean)
@@ -371,15 +372,15 @@ class _AtNodes:
     Args:
         base: log evidence without a group, (nodes,).
         misfit: r^T P r, (nodes,).
-        moved: square of the largest relative change by the compound's deviation, (nodes,).
-        along: U^T P r of the blocks of each width, (nodes, blocks, width) each.
+        changes: square of the largest relative change by the compound's deviation, (nodes,).
+        projections: U^T P r of the blocks of each width, (nodes, blocks, width) each.
         grams: U^T P U of the blocks of each width, (nodes, blocks, width, width) each.
     """
 
     base: Array
     misfit: Array
-    moved: Array
-    along: list[Array]
+    changes: Array
+    projections: list[Array]
     grams: list[Array]
 
 
@@ -399,12 +400,12 @@ def _block_products(part: Array, block_rows: Array) -> Array:
     return products
 
 
-def _block_gains(gram: Array, along: Array, units: Sequence[Array], senses: Array) -> tuple[Array, Array]:
+def _block_gains(gram: Array, projections: Array, units: Sequence[Array], senses: Array) -> tuple[Array, Array]:
     """Gains in log evidence and squared relative changes by blocks of columns that move together.
 
     Args:
         gram: products within the blocks, (nodes, blocks, width, width).
-        along: products with the residual, (nodes, blocks, width).
+        projections: products with the residual, (nodes, blocks, width).
         units: share of |K| that a unit of each amount changes at some points, (width, p) for each block.
         senses: +1 for each block of one column that only a positive amount makes sense of, (blocks,).
 
@@ -413,18 +414,18 @@ def _block_gains(gram: Array, along: Array, units: Sequence[Array], senses: Arra
     """
     single = gram.shape[-1] == 1
     values, vectors = (gram[..., 0], np.ones_like(gram)) if single else np.linalg.eigh(gram)
-    along = np.einsum("nmij,nmi->nmj", vectors, along)[:, :, None]
+    projections = np.einsum("nmij,nmi->nmj", vectors, projections)[:, :, None]
     v2 = np.square(SIZES)[:, None]
     grown = 1.0 + v2 * np.maximum(values, 0.0)[:, :, None]
-    gain = 0.5 * np.sum(v2 * along**2 / grown - np.log(grown), axis=-1)
-    amounts = -(v2 * along / grown) @ vectors.swapaxes(-1, -2)
+    gain = 0.5 * np.sum(v2 * projections**2 / grown - np.log(grown), axis=-1)
+    amounts = -(v2 * projections / grown) @ vectors.swapaxes(-1, -2)
     if senses.any():
         standardised = senses[:, None] * (amounts * np.sqrt(grown) / np.sqrt(v2))[..., 0]
         gain = np.where(senses[:, None] != 0, gain + np.log(2.0) + log_ndtr(standardised), gain)
     if single:
-        moved = np.square(amounts[..., 0] * np.array([np.abs(unit).max() for unit in units])[:, None])
+        changes = np.square(amounts[..., 0] * np.array([np.abs(unit).max() for unit in units])[:, None])
     else:
-        moved = np.stack(
+        changes = np.stack(
             [np.square(np.abs(amounts[:, block] @ unit)).max(axis=-1) for block, unit in enumerate(units)], axis=1
         )
-    return gain.swapaxes(0, 1), moved.swapaxes(0, 1)
+    return gain.swapaxes(0, 1), changes.swapaxes(0, 1)

@@ -33,11 +33,6 @@ _HARMONICS = {
 }
 
 
-def largest_smooth_misfit(evidence: Evidence) -> float:
-    """Largest smooth misfit anywhere, relative to |K| or to half a loop's force range."""
-    return max(data_set.smooth_misfit(evidence.model) for data_set in evidence.data_sets)
-
-
 def locate(evidence: Evidence) -> tuple[Where, ...]:
     """Regions of smooth misfit, the worst first."""
     found = [*_sweep_regions(evidence), *_loop_regions(evidence)]

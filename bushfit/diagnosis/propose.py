@@ -99,7 +99,8 @@ def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
     """
     lengths = np.linalg.norm(columns, axis=1)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
-    projected = evidence.project_out(columns / lengths[:, None])
+    unit = columns / lengths[:, None]
+    projected = unit - (unit @ evidence.span) @ evidence.span.T
     squares, products = np.einsum("ij,ij->i", projected, projected), projected @ evidence.residual
     visible = squares > _LEFT**2
     inverse = visible / np.where(visible, squares, 1.0)

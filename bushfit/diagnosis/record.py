@@ -223,6 +223,21 @@ class Diagnosis:
         Returns:
             JSON-compatible data.
         """
+        (before, after), holdout, places = self.calibration, self.holdout, self.result.usable
+        gap: GapEntry = {
+            "calibration": {"before": before, "after": after},
+            "heldout": {"before": holdout.before, "after": holdout.after} if holdout.parts else None,
+            "parts": holdout.parts,
+            "skipped": holdout.skipped,
+        }
+        usable: UsableEntry | None = None
+        if places:
+            usable = {
+                "stiffness": max(place.stiffness for place in places),
+                "loss_factor": max(place.loss_factor for place in places),
+                "held_out": all(place.held_out for place in places),
+                "places": places,
+            }
         document: DiagnosisFile = {
             "schema": "bushfit/diagnosis/3",
             "verdict": self.verdict,
@@ -233,34 +248,12 @@ class Diagnosis:
             "where": [_region_entry(region) for region in self.where],
             "remainder": [_region_entry(region) for region in self.remainder],
             "description": self.description,
-            "gap": self._gap(),
-            "usable": self._usable(),
+            "gap": gap,
+            "usable": usable,
             "next_test": self.next_test,
             "warnings": warnings_of(self.result, notes=self.notes),
         }
         return to_json_data(document, DiagnosisFile)
-
-    def _gap(self) -> GapEntry:
-        before, after = self.calibration
-        holdout = self.holdout
-        return {
-            "calibration": {"before": before, "after": after},
-            "heldout": {"before": holdout.before, "after": holdout.after} if holdout.parts else None,
-            "parts": holdout.parts,
-            "skipped": holdout.skipped,
-        }
-
-    def _usable(self) -> UsableEntry | None:
-        """Expected error of the model to use, at the worst place and by place."""
-        places = self.result.usable
-        if not places:
-            return None
-        return {
-            "stiffness": max(place.stiffness for place in places),
-            "loss_factor": max(place.loss_factor for place in places),
-            "held_out": all(place.held_out for place in places),
-            "places": places,
-        }
 
     def _effect(self, named: Named) -> EffectEntry:
         effect, model = get_candidate(named.name), self.result.model

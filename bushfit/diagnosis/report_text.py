@@ -88,8 +88,8 @@ class DiagnosisWriter:
             model = model if name in names else model.without(name)
         after = fit(model, state.evidence.data_sets, request.fixed, request.bounds)
         base, plain = self._with_free_gains(request.base), self._with_free_gains(after)
-        beside = " with the other named effects" if len(names) > 1 else ""
-        why = f"lowers chi-square by {base.chi_square - plain.chi_square:.0f}{beside}; {self._probability(first)}"
+        company = " with the other named effects" if len(names) > 1 else ""
+        why = f"lowers chi-square by {base.chi_square - plain.chi_square:.0f}{company}; {self._probability(first)}"
         entries = [Named(name, why) for name in names]
         doubt = _doubt(base, plain, names, request.bounds) if self.finding.verdict == "named" else ""
         if self.finding.verdict == "named" and not doubt:

@@ -166,8 +166,10 @@ class Search:
         grown: dict[str, State] = {}
         free_columns = state.free_columns
         for columns in [None] if free_columns is None else [free_columns, None]:
-            left = [p for p in proposed if p.name not in grown or not grown[p.name].likeliest_deviation]
-            fits = refitted(state.evidence, left, start, request.fixed, request.bounds, columns) if left else {}
+            remaining = [p for p in proposed if p.name not in grown or not grown[p.name].likeliest_deviation]
+            fits = (
+                refitted(state.evidence, remaining, start, request.fixed, request.bounds, columns) if remaining else {}
+            )
             for name, evidence in fits.items():
                 candidate = self._register(self._with_effect(state, name, evidence, depth))
                 if name not in grown or candidate.log_posterior > grown[name].log_posterior:
@@ -227,8 +229,8 @@ class Search:
                     continue
                 evidence = fit(model, data_sets, request.fixed, {**within_reach(model, data_sets), **request.bounds})
                 shorter = State.of_tests(state.tests, request)
-                for order, kept in enumerate(effect for effect in state.effects if effect != name):
-                    shorter = self._with_effect(shorter, kept, evidence, order)
+                for order, effect_name in enumerate(effect for effect in state.effects if effect != name):
+                    shorter = self._with_effect(shorter, effect_name, evidence, order)
                 yield self._register(shorter)
 
     def _corrected_records(self) -> Iterator[State]:
@@ -248,7 +250,9 @@ def _record_change(base: Evidence, mended: Evidence) -> float:
     """Largest relative change of what a record says: of a stiffness, an amplitude, a frequency; other dimensions of
     the bushing, or another direction of a test, change all."""
     pairs = list(zip(base.data_sets, mended.data_sets, strict=True))
-    if base.model.bushing != mended.model.bushing or any(one.direction != other.direction for one, other in pairs):
+    if base.model.bushing != mended.model.bushing or any(
+        before.direction != after.direction for before, after in pairs
+    ):
         return 1.0
     recorded = [(getattr(before, name), getattr(after, name)) for before, after in pairs for name in _RECORDED]
     return max(float(np.max(np.abs(after / before - 1.0))) for before, after in recorded)

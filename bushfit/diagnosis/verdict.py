@@ -45,9 +45,9 @@ class Composition:
     def parts(self) -> frozenset[str]:
         """Names of its effects, kinds of places and other parts."""
         best = self.best
-        others = [f"place: {place.family}" for place in self.places] + ["levels"] * best.levels
-        others += ["unnamed"] * self.unnamed + ([str(best.claim.mistake.name)] if best.claim else [])
-        return frozenset((*self.names, *others))
+        marks = [f"place: {place.family}" for place in self.places] + ["levels"] * best.levels
+        marks += ["unnamed"] * self.unnamed + ([str(best.claim.mistake.name)] if best.claim else [])
+        return frozenset((*self.names, *marks))
 
     @property
     def may_mislead(self) -> bool:
@@ -104,8 +104,8 @@ def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
     certain = common | {"unnamed"} if unnamed > 0.5 else common
     alone = next((composition for composition in likely if composition.parts == certain), None)
     if alone:  # all that is probable has these parts; the tests show no other part, but that there is one
-        others = (composition for composition in likely if composition is not alone)
-        return replace(_single(alone, nothing, leads), reported=(alone, *others))
+        rivals = (composition for composition in likely if composition is not alone)
+        return replace(_single(alone, nothing, leads), reported=(alone, *rivals))
     reported = tuple(likely[:MOST_REPORTED])
     if common and all(part.startswith("place: ") for part in common):  # whatever else there is, this has to go first
         return Finding("unexplained", nothing, reported, leads)
@@ -209,11 +209,11 @@ def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
     whole = sum(merged.values())
     compositions = [
         Composition(
-            sum(merged[parts] for parts in alike) / whole,
-            best[alike[0]],
-            tuple(name for name in best[alike[0]].effects if name in alike[0].effects),
-            unnamed[alike[0]] > 0.5 * total[alike[0]],
+            sum(merged[parts] for parts in members) / whole,
+            best[members[0]],
+            tuple(name for name in best[members[0]].effects if name in members[0].effects),
+            unnamed[members[0]] > 0.5 * total[members[0]],
         )
-        for alike in kinds.values()
+        for members in kinds.values()
     ]
     return sorted(compositions, key=lambda composition: -composition.probability)

@@ -22,7 +22,6 @@ from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.commands.diagnose import diagnose as diagnose_campaign
 from bushfit.commands.plan import plan
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.locate import largest_smooth_misfit
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import effect_name_of
@@ -164,7 +163,7 @@ def _outcome(task: Task, truth: Sealed, diagnosis: Diagnosis, seconds: float) ->
 
 def _matters(before: Evidence, truth: Sealed) -> bool:
     """Whether a mistake shows at all, and leaves more than _MATTERS of |K| or of a parameter."""
-    gap = largest_smooth_misfit(before)
+    gap = max(test.smooth_misfit(before.model) for test in before.data_sets)
     off = max(abs(before.model.values[name] / value - 1.0) for name, value in truth.values.items())
     return gap > DiagnosisSettings().tolerance and max(gap, off) > _MATTERS
 
