@@ -67,7 +67,7 @@ def command(
     Writes sweep.csv, for [[sweeps]] of a campaign or `bushfit init`, and reduce.png.
     """
     from bushfit.reduction.steps import reduce
-    from bushfit.report.tables import reduced_table, resonance_table
+    from bushfit.report.reduced import reduced_table, resonance_table
 
     folder = output.free_folder(files[0].stem, output.formats.table("sweep"))
     table = _resonance_table(files[0], test_options, shaker)

@@ -12,29 +12,18 @@ from bushfit.effects.contract import Array
 from bushfit.errors import ModelError, printable
 from bushfit.fitting.master_curve import Shifted
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep
-from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Display, Place
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Display, Place
 from bushfit.model.arms import Arms, arm_rows
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
-from bushfit.prediction.stiffness import Band, PredictedResonance, Prediction
+from bushfit.prediction.stiffness import PredictedResonance, Prediction
 from bushfit.reading.measurement import loss_factor
-from bushfit.reduction.resonance import Resonance
-from bushfit.reduction.result import Reduction
 from bushfit.units import CELSIUS
 
 #: Headers of what was measured and of the model beside it, in the tables of loops and sweeps.
 _MEASURED = re.compile(
     r"outlier$|(strain amplitude|(model )?"
     r"(displacement|rotation|strain|force|moment|stress|stiffness|modulus|loss factor)) \["
-)
-#: Columns of all tables that hold texts; the others hold numbers.
-TEXTS = frozenset(
-    (
-        *("loop", "sweep", "test", "kind", "direction", "fitted", "stepped", "part", "outlier"),
-        *("effect", "level", "parameters", "why"),
-        *("name", "campaign", "folder", "status", "error", "limits", "out of limits", "on the edge", "verdict"),
-        *("named effects", "cannot be told from", "on a bound", "warnings", "campaign name", "subgroup", "differs in"),
-    )
 )
 #: Separator of the warnings of a bushing in the table of a batch.
 BETWEEN = " | "
@@ -65,12 +54,12 @@ def moved_of(place: Place) -> str:
     return f"{motion_name} [{place.display.displacement.name}]"
 
 
-def _amplitudes(place: Place, amplitude: Array) -> dict[str, Array]:
+def amplitude_column(place: Place, amplitude: Array) -> dict[str, Array]:
     """Column of amplitudes at a place, by its header; `amplitude` in SI."""
     return {columns_of(place)[0]: amplitude * place.display.displacement.factor}
 
 
-def _responses(place: Place, stiffness: Array, before: str = "") -> dict[str, Array]:
+def response_columns(place: Place, stiffness: Array, before: str = "") -> dict[str, Array]:
     """Columns of |K| and loss factor of complex stiffnesses [SI] at a place, whose headers begin with `before`."""
     magnitude = np.abs(stiffness) * place.display.stiffness.factor
     return {f"{before}{columns_of(place)[1]}": magnitude, f"{before}loss factor [-]": loss_factor(stiffness)}
@@ -90,21 +79,22 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     motion_name, _, resisted = words(prediction.direction)
     force = f"{resisted} [{stiffness}]"
-    names, scales = (force, "loss factor [-]", f"storage {force}", f"loss {force}"), (factor, 1.0, factor, factor)
-
-    def bands(reading: Prediction) -> list[tuple[str, Band, float]]:
-        quantities = reading.stiffness, reading.loss_factor, reading.storage_stiffness, reading.loss_stiffness
-        return list(zip(names, quantities, scales, strict=True))
-
+    quantities = {
+        force: ("stiffness", factor),
+        "loss factor [-]": ("loss_factor", 1.0),
+        f"storage {force}": ("storage_stiffness", factor),
+        f"loss {force}": ("loss_stiffness", factor),
+    }
     columns = {
         "frequency [Hz]": prediction.frequency,
         f"{motion_name} [{length}]": prediction.amplitude * length_factor,
     }
-    columns |= {name: band.value * scale for name, band, scale in bands(prediction)}
-    for name, band, scale in bands(prediction):
+    columns |= {name: getattr(prediction, key).value * scale for name, (key, scale) in quantities.items()}
+    for name, (key, scale) in quantities.items():
+        band = getattr(prediction, key)
         columns |= {f"{name}, low": band.low * scale, f"{name}, high": band.high * scale}
-    for name, band, scale in bands(prediction.if_rigs) if prediction.if_rigs else ():
-        columns[f"{name}, {IF_RIGS}"] = band.value * scale
+    if rig := prediction.if_rigs:
+        columns |= {f"{name}, {IF_RIGS}": getattr(rig, key).value * scale for name, (key, scale) in quantities.items()}
     if (measured := prediction.measured) is not None:
         columns |= {f"measured {force}": np.abs(measured) * factor, "measured loss factor [-]": loss_factor(measured)}
     return pd.DataFrame(columns)
@@ -146,8 +136,8 @@ def shaken_table(resonance: PredictedResonance) -> pd.DataFrame:
             "frequency [Hz]": resonance.frequency,
             "transmissibility [-]": np.abs(resonance.transmissibility),
             "phase [deg]": np.degrees(np.angle(resonance.transmissibility)),
-            **_amplitudes(resonance.place, resonance.amplitude),
-            **_responses(resonance.place, resonance.stiffness),
+            **amplitude_column(resonance.place, resonance.amplitude),
+            **response_columns(resonance.place, resonance.stiffness),
         }
     )
     if resonance.if_rigs:
@@ -237,10 +227,10 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
                     "direction": str(place),
                     **_condition_columns(data_set),
                     "frequency [Hz]": data_set.frequency,
-                    **_amplitudes(place, data_set.amplitude),
+                    **amplitude_column(place, data_set.amplitude),
                     "repeat": data_set.repeat,
-                    **_responses(place, data_set.measured),
-                    **_responses(place, modelled, "model "),
+                    **response_columns(place, data_set.measured),
+                    **response_columns(place, modelled, "model "),
                     "stiffness residual [noise]": gain,
                     "loss residual [noise]": phase,
                     "model over measured [-]": np.abs(modelled / data_set.measured),
@@ -296,68 +286,32 @@ def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
 
 
 def master_curve_table(shifted_sweeps: Sequence[Shifted]) -> pd.DataFrame:
-    """Points of sweeps at several temperatures, as measured and shifted to 23 degC, a row per point.
-
-    Args:
-        shifted_sweeps: sweeps shifted to 23 degC.
-
-    Returns:
-        A row per point.
-    """
+    """Points of sweeps at several temperatures, as measured and shifted to 23 degC, a row per point."""
     tables = []
     for shifted in shifted_sweeps:
         sweep, place = shifted.sweep, shifted.sweep.direction
-        tables.append(
-            pd.DataFrame(
-                {
-                    "sweep": sweep.name,
-                    "direction": str(place),
-                    "temperature [degC]": sweep.temperature - CELSIUS,
-                    "frequency [Hz]": sweep.frequency,
-                    **_amplitudes(place, sweep.amplitude),
-                    **_responses(place, sweep.measured),
-                    "reduced frequency [Hz]": shifted.reduced_frequency,
-                    **_responses(place, shifted.reduced_stiffness, "reduced "),
-                }
-            )
-        )
+        columns = {"sweep": sweep.name, "direction": str(place), "temperature [degC]": sweep.temperature - CELSIUS}
+        columns |= {"frequency [Hz]": sweep.frequency, **amplitude_column(place, sweep.amplitude)}
+        columns |= response_columns(place, sweep.measured) | {"reduced frequency [Hz]": shifted.reduced_frequency}
+        tables.append(pd.DataFrame(columns | response_columns(place, shifted.reduced_stiffness, "reduced ")))
     return pd.concat(tables, ignore_index=True)
 
 
 def shift_factors_table(shifted_sweeps: Sequence[Shifted]) -> pd.DataFrame:
-    """log10 of the shift factor of shifted sweep, by the fitted law and fitted alone, with 95 % intervals.
-
-    Args:
-        shifted_sweeps: sweeps shifted to 23 degC.
-
-    Returns:
-        A row per sweep.
-    """
-    both = {
-        "log10 a_T": [shifted.shift for shifted in shifted_sweeps],
-        "own log10 a_T": [shifted.own for shifted in shifted_sweeps],
-    }
+    """log10 of the shift factor of each sweep, by the fitted law and fitted alone, with 95 % intervals."""
     columns: dict[str, Any] = {
         "sweep": [shifted.sweep.name for shifted in shifted_sweeps],
         "direction": [str(shifted.sweep.direction) for shifted in shifted_sweeps],
         "temperature [degC]": [shifted.temperature - CELSIUS for shifted in shifted_sweeps],
     }
-    for name, pairs in both.items():
-        value, error = np.array(pairs).T / np.log(10.0)
-        ends = (("", value), (", low", value - Z95 * error), (", high", value + Z95 * error))
-        columns |= {f"{name} [-]{end}": column for end, column in ends}
+    for name, key in (("log10 a_T [-]", "shift"), ("own log10 a_T [-]", "own")):
+        value, error = np.array([getattr(shifted, key) for shifted in shifted_sweeps]).T / np.log(10.0)
+        columns |= {name: value, f"{name}, low": value - Z95 * error, f"{name}, high": value + Z95 * error}
     return pd.DataFrame(columns)
 
 
 def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """Every effect of the library: score, gain in chi-square, probability, parameters, and the reason of the result.
-
-    Args:
-        diagnosis: finished diagnosis.
-
-    Returns:
-        A row per effect.
-    """
+    """Every effect of the library: score, gain in chi-square, probability, parameters, and the reason of the result."""
     rows = [
         {
             "effect": judged.name,
@@ -371,69 +325,6 @@ def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
         for judged in diagnosis.candidates
     ]
     return pd.DataFrame(rows)
-
-
-#: Columns of a reduced sweep on the origin of each point, and the attributes of a step.
-_OF_STEPS = {
-    "frequency found [Hz]": "frequency",
-    "displacement distortion [-]": "displacement_distortion",
-    "force distortion [-]": "force_distortion",
-    "cycles used": "cycles",
-    "rows per cycle": "rows_per_cycle",
-    "start [s]": "start",
-    "end [s]": "end",
-    "history": "name",
-}
-
-
-def reduced_table(reduction: Reduction) -> pd.DataFrame:
-    """Raw histories reduced to a sweep: columns of a sweep file, then columns on the quality of each point.
-
-    Args:
-        reduction: reduced histories of one direction.
-
-    Returns:
-        A row per operating point, sorted by amplitude, repeat and frequency.
-    """
-    place, steps = reduction.direction, pd.DataFrame([vars(step) for step in reduction.steps])
-    (length, length_factor), _, (stiffness, _) = place.display
-    responses = _responses(place, steps["stiffness"].to_numpy())
-    magnitude, factors = responses.values()
-    frame = pd.DataFrame(
-        {
-            "frequency [Hz]": [float(f"{frequency:.5g}") for frequency in steps["nominal_frequency"]],
-            f"amplitude [{length}]": [float(f"{length_factor * level:.5g}") for level in steps["level"]],
-            f"amplitude reached [{length}]": steps["amplitude"] * length_factor,
-            "repeat": steps["repeat"],
-            **responses,
-            f"stiffness std error [{stiffness}]": steps["gain_error"] * magnitude,
-            "loss factor std error [-]": steps["phase_error"] * (1.0 + factors**2),
-            **{header: steps[key] for header, key in _OF_STEPS.items()},
-        }
-    )
-    order = [f"amplitude [{length}]", "repeat", "frequency [Hz]"]
-    return frame.sort_values(order, ignore_index=True, kind="stable")
-
-
-def resonance_table(resonance: Resonance) -> pd.DataFrame:
-    """A resonance test reduced to a sweep: columns of a sweep file, then columns on the origin of each point.
-
-    Args:
-        resonance: resonance test reduced to stiffness over frequency.
-
-    Returns:
-        A row per frequency.
-    """
-    return pd.DataFrame(
-        {
-            "frequency [Hz]": resonance.frequency,
-            **_amplitudes(Direction.AXIAL, resonance.amplitude),  # which translation it is makes no difference
-            **_responses(Direction.AXIAL, resonance.stiffness),
-            "relative error [-]": resonance.relative_error,
-            "transmissibility [-]": np.abs(resonance.transmissibility),
-            "rows averaged": resonance.rows,
-        }
-    )
 
 
 def shortened(name: str, letters: int) -> str:
@@ -467,10 +358,3 @@ def required(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
             hint = "write the results again, or remove the table: the page then omits it"
             raise ModelError("a column of a table is missing", expected=header, hint=hint)
     return rows
-
-
-def complete(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
-    """The rows of a table in which all these numbers are known; none of none, whatever columns it had before."""
-    if rows.empty:
-        return rows.reindex(columns=list(dict.fromkeys((*rows.columns, *headers))))
-    return rows.iloc[np.flatnonzero(np.isfinite(numbers(rows, *headers)).all(axis=0))]

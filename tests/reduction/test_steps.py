@@ -18,7 +18,7 @@ from bushfit.reading.measurement import Loop
 from bushfit.reduction.harmonics import spread_rows
 from bushfit.reduction.result import Reduction
 from bushfit.reduction.steps import reduce
-from bushfit.report.tables import reduced_table
+from bushfit.report.reduced import reduced_table
 
 FREQUENCIES = (5.0, 25.0, 100.0, 101.0, 155.0)
 #: The rig misses 0.1, 0.2 and 0.5 mm.

@@ -1,0 +1,71 @@
+"""Tables of the reduction of raw histories and of resonance tests: sweep files with the quality of each point."""
+
+import numpy as np
+import pandas as pd
+
+from bushfit.geometry import Direction
+from bushfit.reduction.resonance import Resonance
+from bushfit.reduction.result import Reduction
+from bushfit.report.tables import amplitude_column, response_columns
+
+#: Columns of a reduced sweep on the origin of each point, and the attributes of a step.
+_OF_STEPS = {
+    "frequency found [Hz]": "frequency",
+    "displacement distortion [-]": "displacement_distortion",
+    "force distortion [-]": "force_distortion",
+    "cycles used": "cycles",
+    "rows per cycle": "rows_per_cycle",
+    "start [s]": "start",
+    "end [s]": "end",
+    "history": "name",
+}
+
+
+def reduced_table(reduction: Reduction) -> pd.DataFrame:
+    """Raw histories reduced to a sweep: columns of a sweep file, then columns on the quality of each point.
+
+    Args:
+        reduction: reduced histories of one direction.
+
+    Returns:
+        A row per operating point, sorted by amplitude, repeat and frequency.
+    """
+    place, steps = reduction.direction, pd.DataFrame([vars(step) for step in reduction.steps])
+    (length, length_factor), _, (stiffness, _) = place.display
+    responses = response_columns(place, steps["stiffness"].to_numpy())
+    magnitude, factors = responses.values()
+    frame = pd.DataFrame(
+        {
+            "frequency [Hz]": [float(f"{frequency:.5g}") for frequency in steps["nominal_frequency"]],
+            f"amplitude [{length}]": [float(f"{length_factor * level:.5g}") for level in steps["level"]],
+            f"amplitude reached [{length}]": steps["amplitude"] * length_factor,
+            "repeat": steps["repeat"],
+            **responses,
+            f"stiffness std error [{stiffness}]": steps["gain_error"] * magnitude,
+            "loss factor std error [-]": steps["phase_error"] * (1.0 + factors**2),
+            **{header: steps[key] for header, key in _OF_STEPS.items()},
+        }
+    )
+    order = [f"amplitude [{length}]", "repeat", "frequency [Hz]"]
+    return frame.sort_values(order, ignore_index=True, kind="stable")
+
+
+def resonance_table(resonance: Resonance) -> pd.DataFrame:
+    """A resonance test reduced to a sweep: columns of a sweep file, then columns on the origin of each point.
+
+    Args:
+        resonance: resonance test reduced to stiffness over frequency.
+
+    Returns:
+        A row per frequency.
+    """
+    return pd.DataFrame(
+        {
+            "frequency [Hz]": resonance.frequency,
+            **amplitude_column(Direction.AXIAL, resonance.amplitude),  # which translation it is makes no difference
+            **response_columns(Direction.AXIAL, resonance.stiffness),
+            "relative error [-]": resonance.relative_error,
+            "transmissibility [-]": np.abs(resonance.transmissibility),
+            "rows averaged": resonance.rows,
+        }
+    )
