@@ -154,7 +154,7 @@ def test_look_alikes_are_told_with_their_odds(work: Path, bushfit: Run) -> None:
     assert len(lines) > 1
     for line in lines:
         assert f"  {line}\n" in run.stderr
-    assert f"<p>Probabilities: {'; '.join(lines)}" in page
+    assert "".join(f"<li>{line}</li>" for line in lines) in page
     assert f"<b>Next test:</b> {written['next_test']}." in page
 
 

@@ -93,10 +93,13 @@ def basis(record: ReportRecord, place: str) -> str:
     source = f"predicted from {' and '.join(fitted)} tests" if fitted else "calculated from given parameters"
     if not tests:
         return f"{source}; not tested"
-    worst = number(100 * max(tests, key=lambda test: test.reduced_chi_square).nrmse, 2)
-    if agrees_within_noise(record.result, record.result.place(place)):
-        return f"{source}; the measured sweep agrees within its noise ({worst} %)"
-    return f"{source}; the measured sweep differs by {worst} %"
+    errors = [100.0 * test.nrmse for test in tests]
+    size = " to ".join(dict.fromkeys(number(end, 2) for end in (min(errors), max(errors))))
+    agrees, single = agrees_within_noise(record.result, record.result.place(place)), len(tests) == 1
+    sweeps = "the measured sweep" if single else f"the {len(tests)} measured sweeps"
+    if agrees:
+        return f"{source}; {sweeps} {'agrees within its' if single else 'agree within their'} noise ({size} %)"
+    return f"{source}; {sweeps} differ{'s' * single} by {size} %"
 
 
 def value_rows(predictions: Sequence[Prediction]) -> Iterator[list[str]]:

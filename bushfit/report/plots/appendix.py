@@ -75,8 +75,9 @@ def complex_figure(result: Result, prediction: Prediction, table: pd.DataFrame |
     style.label_axes(storage, "frequency [Hz]", f"storage {stiffness_header}", fine.frequency)
     style.label_axes(loss, "frequency [Hz]", f"loss {stiffness_header}", fine.frequency)
     style.label_axes(cole_cole, f"storage [{stiffness_unit}]", f"loss [{stiffness_unit}]")
+    cole_cole.locator_params("x", nbins=3)
     style.name_levels(cole_cole, [format_range(unit, length * level) for level in levels], "amplitude")
-    return figure.explain("Lines: model, shaded: its 95 % band. Points: measured, mean of the repeats.")
+    return figure.explain("Lines: model, shaded: its 95 % band. Points: measured; repeats are averaged.")
 
 
 @style.in_own_style

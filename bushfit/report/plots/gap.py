@@ -84,7 +84,7 @@ def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any]
         note = f"Held-out data: {held_out['before']:.2f} × noise before, {held_out['after']:.2f} × noise after."
     return figure.explain(
         "Maps: measured minus model in percent of |K|, real part (storage) and imaginary part (loss). A cell is the "
-        f"mean of the repeats. Pale grey: within {_EDGES[0]:g} %. A bar in a cell: {_BARRED:g} % or more below the "
+        f"mean of its points. Pale grey: within {_EDGES[0]:g} %. A bar in a cell: {_BARRED:g} % or more below the "
         "model. White: not measured." * bool(maps),
         f"Loops: measured minus model in percent of half the force range, means over {SECTOR:g}° of the cycle."
         * bool(loops),
