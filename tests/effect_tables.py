@@ -31,7 +31,7 @@ def _tables() -> Iterator[str]:
         ((_link(e), e.level, type(e).__name__.lower(), e.sentence, f"`{e.equation}`", _parameters(e)) for e in library),
     )
     yield _table(
-        ("named and proposed", "its twins, which no test of this kind tells from it"),
+        ("named and proposed", "twins, which no test of the bushing distinguishes from it"),
         ((f"`{e.name}`", ", ".join(f"`{twin}` ({get_effect(twin).level})" for twin in e.twins)) for e in twinned),
     )
     yield _table(

@@ -36,7 +36,7 @@ _WORDS = {
     "column": "header of the column of the {role}",
     "unit": "unit of the {role}",
     "rate": 'rate of the motion, such as "10 mm/min", or its frequency, such as "0.1 Hz"',
-    "waveform": "course of the motion in time",
+    "waveform": "waveform of the motion",
     "amplitude": "they count",
     "at_amplitude": 'its amplitude, such as "0.1 mm"',
     "at_frequency": 'its frequency, such as "10 Hz"',

@@ -104,7 +104,7 @@ def export(order: Order) -> Exported:
     elements = [_element(stiffness_tables(prediction)) for prediction in predictions]
     shared = [line for prediction in predictions for line in band_losses(prediction)] + list(common_losses(order))
     if order.units:
-        shared.append(f"the units asked for, {order.units}: the file states its units, which Adams converts")
+        shared.append(f"the requested units, {order.units}: the file states its own units, which Adams converts")
     losses = {kind: [element.loss(kind) for element in elements] for kind in _KINDS}
     files = {
         f"bushing_{kind}.bus": encode_deck(_property_file(order, elements, kind, [*losses[kind], *shared]))

@@ -65,7 +65,7 @@ def estimate(
         The fit, with its outliers.
 
     Raises:
-        FitError: the robust fit does not settle, or as of the solver.
+        FitError: the robust fit does not converge, or as of the solver.
     """
     if not robust:
         found = solver(problem)
@@ -87,7 +87,7 @@ def estimate(
             outliers = outliers_at(model, retained, outlying)
             return replace(found, weighed=weighed, unsoftened=retained, outliers=outliers)
     raise FitError(
-        "the robust fit does not settle",
+        "the robust fit does not converge",
         found=f"{_MOST_ROUNDS} rounds of reweighting",
         hint="look at the rows that --loss linear warns of, and take them out of the file",
     )

@@ -91,7 +91,9 @@ def _check_covariance(table: CovarianceTable) -> CovarianceTable:
         widths = {len(row) for row in matrix}
         if len(matrix) != size or widths - {size}:
             found = f"{len(matrix)} rows of {' or '.join(sorted(map(str, widths))) or 'no'} numbers"
-            raise ValueError(ModelError("no covariance of its names", found=found, expected=f"{size} x {size}"))
+            raise ValueError(
+                ModelError("a covariance that does not match its names", found=found, expected=f"{size} x {size}")
+            )
     if any(table.matrix[i][i] < 0.0 for i in range(size)):
         raise ValueError(ModelError("a variance below zero", place="matrix", expected="squares on the diagonal"))
     if len(set(table.names)) < size:

@@ -160,7 +160,10 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
         return even, (f'"{column.header}" is rounded and repeats: its rows are spread evenly, at {rate:.6g} Hz',)
     hint = "if a column numbers the runs, bushfit init makes a loop of each"
     if "block" in table.headers:
-        hint = 'this file has several blocks: rows = { block = "1" } in the campaign takes the first; bushfit init all'
+        hint = (
+            'this file has several blocks: rows = { block = "1" } in the campaign selects the first; bushfit '
+            "init uses all"
+        )
     elif stuck.any() and np.all(np.diff(time) >= 0.0):
         hint = "export the file again with more digits of the time"
     if stuck.any():

@@ -83,7 +83,7 @@ class SideBySide:
         Raises:
             ModelError: another schema, a missing or wrong key, or results that do not belong together.
         """
-        require_schema(document, file, "a comparison", SCHEMA, hint="bushfit compare writes it anew")
+        require_schema(document, file, "a comparison", SCHEMA, hint="bushfit compare writes it again")
         checked = validate_tables(document, file, ComparisonFile, kind=ModelError)
         first, *other_labels = [entry["label"] for entry in checked["compared"]] or [""]
         families = checked["families"]

@@ -87,7 +87,7 @@ def report_record(files: Sequence[ResultFile], folder: Path | None = None) -> Re
     model, joint, diagnosis = documents[name], documents.get(JOINT), documents.get("diagnosis")
     result = from_document(model, paths.get(name))
     if diagnosis is not None:
-        hint = "bushfit diagnose writes it anew"
+        hint = "bushfit diagnose writes it again"
         require_schema(diagnosis, paths.get("diagnosis"), "a diagnosis", DIAGNOSIS, hint=hint)
         diagnosis = validate_tables(diagnosis, paths.get("diagnosis"), DiagnosisFile, kind=ModelError)
     campaign, provenance = model.get("campaign"), model.get("provenance", {})
