@@ -19,6 +19,9 @@ import pytest
 
 from bushfit.cli import cli, main
 
+#: Width of the terminal, whatever that of the tests is.
+WIDTH = "80"
+
 
 @dataclass(frozen=True)
 class Done:
@@ -36,7 +39,7 @@ def call(folder: Path, *arguments: object, program: click.Command = cli) -> Done
         contextlib.chdir(folder),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
-        mock.patch.dict(os.environ, {"COLUMNS": "80"}),  # whatever the terminal of the tests
+        mock.patch.dict(os.environ, {"COLUMNS": WIDTH}),
         mock.patch.object(sys, "argv", ["bushfit", *map(str, arguments)]),
         pytest.raises(SystemExit) as left,
     ):

@@ -50,6 +50,9 @@ IN_CAMPAIGN = [
 ]
 #: The same for keys that the plain campaign does not use.
 IN_MORE = [
+    ("repeats = 3", "repeats = 1000000", "simulate.repeats: this value is not understood", "less than or equal to 1000"),
+    ('frequency = "0.1 Hz"\n', 'frequency = "0.1 Hz"\ncycles = 1000000\n', "simulate.loops #1.cycles: this value", "to 1000"),
+    ("alpha = 0.24", "alpha = true", "simulate.parameters.alpha: this is no quantity", "found: true"),
     ('min = "0.5 MPa"', 'min = "5 MPa"', "more.toml, fit.mu: no value is within these limits", "min below max within 1000 to 1e+09 Pa, and value between them"),
     ("vary = true", 'vary = "yes"', "more.toml, fit.mu.vary: this value is not understood", "true or false"),
     ('step = "10 Hz"', 'step = "1e-9 Hz"', "more.toml, predict.frequencies: this is no range of frequencies", "0 < start <= stop, step > 0"),
