@@ -20,7 +20,7 @@ from scipy.special import bdtrc
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.linear_model import Group
 from bushfit.effects.contract import Array
-from bushfit.fitting.measured_loop import smooth_waves
+from bushfit.fitting.loop_harmonics import smooth_waves
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, group_repeats, split_by_kind
 from bushfit.gaussian_process import coordinates, in_lengths, patterns
 from bushfit.geometry import Place

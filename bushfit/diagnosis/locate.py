@@ -7,7 +7,7 @@ import numpy as np
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.record import Where
 from bushfit.effects.contract import Array
-from bushfit.fitting.measured_sweep import LineMisfit
+from bushfit.fitting.line_misfit import LineMisfit
 from bushfit.fitting.preparation import split_by_kind
 from bushfit.units import number
 

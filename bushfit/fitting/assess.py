@@ -137,9 +137,9 @@ def _changes_by_noise(
     """
     unit, sums = basis / np.linalg.norm(basis[0]), dict[Hashable, list[Array]]()
     for test, rows in zip(data_sets, rows_of(data_sets), strict=True):
-        here = influence[:, rows]
-        for variance, move in test.unsure(here).items():
-            products = [move @ here.T, move @ move.T, move @ unit[:, rows].T]
+        of_test = influence[:, rows]
+        for variance, move in test.unsure(of_test).items():
+            products = [move @ of_test.T, move @ move.T, move @ unit[:, rows].T]
             so_far = sums.get(variance, [0.0] * 3)
             sums[variance] = [one + previous for one, previous in zip(products, so_far, strict=True)]
     return {variance: (first, second - lost @ lost.T) for variance, (first, second, lost) in sums.items()}
@@ -336,6 +336,9 @@ def unfitted(model: Model, data_sets: Sequence[MeasuredTest], advice: str) -> li
         model: fitted model.
         data_sets: tests that were not fitted.
         advice: end of each sentence.
+
+    Returns:
+        Sentences; empty if the model predicts all these tests within their noise.
     """
     misses, sentences = dict[str, list[tuple[float, float, str]]](), []
     for test in data_sets:

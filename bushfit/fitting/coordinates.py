@@ -6,6 +6,7 @@ coordinate is of order one.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import methodcaller
 
 import numpy as np
 
@@ -61,17 +62,14 @@ def coordinate_bounds(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, 
     ends = []
     for name, parameter in zip(coordinates.names, coordinates.parameters, strict=True):
         limits = zip(bounds.get(name, (None, None)), parameter.bounds, strict=True)
-        ends.append(sorted(coordinates.forward(name, end if given is None else given) for given, end in limits))
+        ends.append(sorted(coordinates.forward(name, end if limit is None else limit) for limit, end in limits))
     low, high = np.array(ends).T
     return low, high
 
 
 def residual(model: Model, data_sets: Sequence[MeasuredTest]) -> Array:
     """Whitened residuals of all tests, (n,)."""
-    rows = []
-    for data_set in data_sets:
-        rows.append(data_set.residual(model))  # noqa: PERF401  # a comprehension is a frame of its own
-    return together(data_sets, np.concatenate(rows))
+    return together(data_sets, np.concatenate(list(map(methodcaller("residual", model), data_sets))))
 
 
 def jacobian(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> Array:
@@ -83,7 +81,7 @@ def jacobian(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[st
         names: k parameters.
     """
     slopes = Coordinates.of_parameters(model, names).slopes(model.values)
-    by_value = np.concatenate([data_set.jacobian(model, names) for data_set in data_sets], axis=-1)
+    by_value = np.concatenate(list(map(methodcaller("jacobian", model, names), data_sets)), axis=-1)
     return together(data_sets, by_value * slopes[:, None])
 
 

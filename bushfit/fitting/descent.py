@@ -85,6 +85,9 @@ class Descent:
             problem: parameters to fit, tests and bounds.
             tolerance: relative fall of chi-square at which the fit ends; None for models that are compared.
 
+        Returns:
+            The fit at the start values.
+
         Raises:
             FitError: fewer data than parameters, or no finite response.
             ModelError: no response.
@@ -123,9 +126,15 @@ class Descent:
         return self.finished(self.evaluations + 1)
 
     def finished(self, evaluations: int) -> "Descent":
-        """Take steps until the fit has converged or has evaluated the model so often.
+        """Take steps until the fit has converged or has used up its evaluations of the model.
 
         Each step leads to a lower chi-square with less damping, or leaves the fit where it was with more.
+
+        Args:
+            evaluations: of the model at most, counted from the start.
+
+        Returns:
+            The fit after these steps.
         """
         fit, tests, names = self, self.problem.tests, self.problem.names
         while not fit.converged and fit.evaluations < evaluations:

@@ -106,16 +106,26 @@ class FittedTests:
 
     def project(self, rows: Array) -> Array:
         """Components of residuals, (..., n) -> (..., d)."""
-        parts = [rows[..., block] if along is None else rows[..., block] @ along for _, block, along, _ in self._blocks]
+        parts = [
+            rows[..., block] if directions is None else rows[..., block] @ directions
+            for _, block, directions, _ in self._blocks
+        ]
         return np.concatenate(parts, axis=-1)
 
     def columns(self, shapes: Array) -> Array:
-        """Components of the residuals by relative changes of the stiffness, complex (c, p) -> (c, d)."""
+        """Components of the residuals by relative changes of the stiffness.
+
+        Args:
+            shapes: relative changes at the operating points, complex (c, p).
+
+        Returns:
+            (c, d).
+        """
         columns, first, changes = [], 0, shapes * self._stiffness
-        for test, _, along, components in self._blocks:
+        for test, _, directions, components in self._blocks:
             change = changes[:, first : first + test.frequency.size]
             first += test.frequency.size
-            if along is None:
+            if directions is None:
                 columns.append(test.residual_change(change, self.solution.model))
             else:
                 columns.append(np.concatenate((change.real, change.imag), axis=-1) @ components)
@@ -138,8 +148,10 @@ class FittedTests:
         size, vectors = np.linalg.eigh(information / np.outer(scale, scale))
         determined = size > ROUNDING * size.max(initial=0.0)
         mixed = (vectors[:, determined] / np.sqrt(size[determined])).T / scale
-        moved = block_diag(*(errors if along is None else errors @ along for (_, _, along, _), errors in pairs))
-        span = mixed @ np.concatenate((self.project(rows), moved))
+        rig_components = block_diag(
+            *(errors if directions is None else errors @ directions for (_, _, directions, _), errors in pairs)
+        )
+        span = mixed @ np.concatenate((self.project(rows), rig_components))
         slopes = [rows @ residual, *(errors @ residual[block] for (_, block, *_), errors in pairs)]
         absorbed = mixed @ np.concatenate(slopes)
         return span, self.project(residual) - absorbed @ span

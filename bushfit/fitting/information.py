@@ -140,9 +140,11 @@ def _candidates(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[tup
             yield f"a loop {words}", [changed.noise_free(model).with_noise(largest.relative_noise)]
     else:
         direction = data_sets[0].direction
-        most = max(float(data_set.amplitude.max()) for data_set in data_sets if data_set.direction == direction)
+        largest_amplitude = max(
+            float(data_set.amplitude.max()) for data_set in data_sets if data_set.direction == direction
+        )
         for times, words in ((1.0, ""), (3.0, "three times "), (10.0, "ten times ")):
-            motion = model, direction, _NEW_RATE, times * most, _FORCE_NOISE
+            motion = model, direction, _NEW_RATE, times * largest_amplitude, _FORCE_NOISE
             loop = new_loop(*motion, cycles=2.0, rows=400, from_rest=True)
             yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", [replace(loop, gain_error=ASSUMED[0])]
     reach = measured_range(model, data_sets)

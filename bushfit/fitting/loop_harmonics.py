@@ -25,6 +25,8 @@ MOST_ROWS = 4 * GRID
 _MOST_ROWS_CHECKED = 200_000
 #: Harmonics that are fitted at most; chosen: those of a triangle have then fallen to 3e-4 of the first.
 _MOST_HARMONICS = 60
+#: Harmonics of a loop that count as smooth misfit: beyond the fifth, physics makes next to nothing.
+SMOOTH_HARMONICS = 5
 #: Harmonics of one cycle that count as slow change from cycle to cycle, which is settling or drift and no noise.
 _SLOW_HARMONICS = 3
 #: Residual of a triangle over that of free harmonics up to which a motion counts as one.
@@ -249,3 +251,10 @@ def phase_bins(
     filled, place = np.unique(GRID * group[bins // GRID] + bins % GRID, return_inverse=True)
     rows, inside, total = (np.bincount(place, weights=part) for part in parts)
     return middle[filled // GRID] + (filled % GRID + inside / rows) / GRID, total / rows, rows
+
+
+def smooth_waves(phase: Array) -> Array:
+    """1, and the cosine and sine of each smooth harmonic, at phases in cycles, (n,) -> (11, n)."""
+    angle = 2.0 * np.pi * phase
+    waves = [wave(order * angle) for order in range(1, SMOOTH_HARMONICS + 1) for wave in (np.cos, np.sin)]
+    return np.array([np.ones_like(angle), *waves])

@@ -44,7 +44,15 @@ class Shifted:
 
 
 def master_curve(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[Shifted, ...]:
-    """The sweeps over frequency whose temperature is known, coldest first, by a model with an effect of temperature."""
+    """Shift sweeps at several temperatures to one, by a model with an effect of temperature.
+
+    Args:
+        result: the fitted model.
+        sweeps: sweeps; those over frequency whose temperature is known are shifted.
+
+    Returns:
+        The shifted sweeps, coldest first.
+    """
     model, curves = result.model, []
     for sweep in sweeps:
         if can_shift(sweep.sweep):

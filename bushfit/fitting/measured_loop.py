@@ -10,26 +10,18 @@ import numpy as np
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.fitting.common_error import CommonError, ErrorProducts
 from bushfit.fitting.drive import Drive
+from bushfit.fitting.loop_harmonics import SMOOTH_HARMONICS, smooth_waves
 from bushfit.fitting.measured_test import MeasuredBase
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import force_and_slopes, stiffness_and_slopes
 from bushfit.reading.measurement import Loop
 
-#: Harmonics of a loop that count as smooth misfit: beyond the fifth, physics makes next to nothing.
-_SMOOTH_HARMONICS = 5
 #: Harmonics that the model error of a loop has: alike up to the last smooth one, beyond they fall as 1/h.
 _ERROR_HARMONICS = 25
 #: Sizes of these over that of the whole force, (25,): their mean square is then that of the whole.
-_ERROR_SIZES = 1.0 / np.maximum(np.arange(1.0, _ERROR_HARMONICS + 1.0), _SMOOTH_HARMONICS)
+_ERROR_SIZES = 1.0 / np.maximum(np.arange(1.0, _ERROR_HARMONICS + 1.0), SMOOTH_HARMONICS)
 _ERROR_SIZES /= np.linalg.norm(_ERROR_SIZES)
-
-
-def smooth_waves(phase: Array) -> Array:
-    """1, and the cosine and sine of each smooth harmonic, at phases in cycles, (n,) -> (11, n)."""
-    angle = 2.0 * np.pi * phase
-    waves = [wave(order * angle) for order in range(1, _SMOOTH_HARMONICS + 1) for wave in (np.cos, np.sin)]
-    return np.array([np.ones_like(angle), *waves])
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +148,9 @@ class MeasuredLoop(MeasuredBase):
         Args:
             model: the model.
             values: parameter values in place of the model's own; leading axes are added to the result.
+
+        Returns:
+            Force, (..., n).
         """
         last = self._last.get("force")
         if last and last[0] is model and values is None:

@@ -10,65 +10,24 @@ import numpy as np
 from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.fitting.common_error import ErrorProducts
+from bushfit.fitting.line_misfit import LineMisfit
 from bushfit.fitting.measured_test import MeasuredBase, shown_amplitude
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.outliers import contradictions, outlying_points
-from bushfit.fitting.repeats import FLOOR, unit
+from bushfit.fitting.repeats import FLOOR
 from bushfit.fitting.whitening import Whitening
-from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import stiffness_and_slopes
-from bushfit.reading.measurement import Stepped, Sweep
+from bushfit.reading.measurement import Sweep
 from bushfit.units import number
 
-#: Degree, in the logarithm of what is stepped, of the Legendre polynomials that count as smooth misfit.
-_SMOOTH_DEGREE = 3
 #: Points that a sentence lists one by one; chosen: more make it long.
 _MOST_LISTED = 4
 #: Magnitudes per point up to which, and step from one to the next, relative, from which on they are rounded.
 _FEW_SIZES, _COARSE = 0.4, 0.01
 #: Digits of ln|K| that tell magnitudes apart.
 _DIGITS = 9
-
-
-@dataclass(frozen=True, eq=False)
-class LineMisfit:
-    """Mean misfit of one line of a sweep over its repeats: of all that its runs stepped through while they held one.
-
-    Args:
-        frequency: [Hz], (n,).
-        amplitude: zero-to-peak [m or rad], (n,).
-        misfit: measured over model less 1, complex, (n,).
-        noise: standard deviation of the gain and the phase of one of these means, (2,).
-    """
-
-    name: str
-    direction: Place
-    stepped: Stepped | None
-    frequency: Array
-    amplitude: Array
-    misfit: Array
-    noise: Array
-
-    @property
-    def step(self) -> Array:
-        """Values stepped along the line, (n,)."""
-        return self.amplitude if self.stepped == "amplitude" else self.frequency
-
-    @property
-    def words(self) -> str:
-        """Constant value of the line as text, "0.1 mm" or "10 Hz"; for other lines the name of the test."""
-        if self.stepped == "frequency":
-            return shown_amplitude(self.direction, float(self.amplitude[0]))
-        return f"{self.frequency[0]:.4g} Hz" if self.stepped else self.name
-
-    @cached_property
-    def smooth(self) -> Array:
-        """The part of the misfit that is a polynomial in the logarithm of the step, complex, (n,)."""
-        x = np.log(self.step)
-        basis = np.polynomial.legendre.legvander(unit(x), min(_SMOOTH_DEGREE, np.unique(x).size - 1))
-        return basis @ np.linalg.lstsq(basis.astype(complex), self.misfit, rcond=None)[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,8 +71,8 @@ class MeasuredSweep(MeasuredBase):
         if pairs := contradictions(self.measured, points):
             rows = [f"{one} and {second}" for _, *pair in pairs for one, second in [sorted(self.order[pair] + 1)]]
             more = f" and {len(rows) - _MOST_LISTED} more pairs" if len(rows) > _MOST_LISTED else ""
-            apart = f"repeats of the same points differ by up to {number(100.0 * pairs[0][0], 2)} %"
-            found.append(f"{file}: {apart}, rows {', '.join(rows[:_MOST_LISTED])}{more}")
+            difference = f"repeats of the same points differ by up to {number(100.0 * pairs[0][0], 2)} %"
+            found.append(f"{file}: {difference}, rows {', '.join(rows[:_MOST_LISTED])}{more}")
         if self.contradiction:
             found.append(self.contradiction)
         sizes = np.unique(np.log(np.abs(self.measured)).round(_DIGITS))

@@ -159,7 +159,14 @@ def likeliest_size(model: Model, data_sets: Sequence[MeasuredTest], names: Seque
     variance = np.concatenate([part.variance for part in parts])
 
     def cost(log_size: float) -> float:
-        """Minus twice the logarithm of the likelihood of a model error, by the logarithm of its size."""
+        """Minus twice the log likelihood of a model error.
+
+        Args:
+            log_size: logarithm of its relative size.
+
+        Returns:
+            Minus twice the log likelihood, up to a constant.
+        """
         square = float(np.exp(2.0 * log_size))
         grown = 1.0 + square * variance
         both = products - components * (square / grown) @ components.T

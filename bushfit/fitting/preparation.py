@@ -134,8 +134,8 @@ def _with_contradictions(found: Sequence[_Kind], conditions: Sequence[Array]) ->
     for separation, *pair in reversed(contradictions(np.concatenate([test.measured for test in found]), points)):
         first, later = np.sort(owner[pair])
         if first != later:  # a file that contradicts itself tells so
-            apart = f"their stiffness differs by {number(100.0 * separation, 2)} %"
-            marked[later] = replace(found[later], contradiction=f"it repeats {found[first].name}, and {apart}")
+            difference = f"their stiffness differs by {number(100.0 * separation, 2)} %"
+            marked[later] = replace(found[later], contradiction=f"it repeats {found[first].name}, and {difference}")
     return marked
 
 

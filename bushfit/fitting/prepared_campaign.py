@@ -160,13 +160,13 @@ class PreparedCampaign:
         Returns:
             Model with start values.
         """
-        bushing, given = self.campaign.bushing, self.given_values
-        fixed = {name: value for name, value in given.items() if not self.free((name,))}
+        bushing, given_values = self.campaign.bushing, self.given_values
+        fixed = {name: value for name, value in given_values.items() if not self.free((name,))}
         with error_location(self.campaign.path):
-            starts = [start_values(bushing, data_sets, {**known, **stage_fixed}) for known in (given, fixed)]
+            starts = [start_values(bushing, data_sets, {**values, **stage_fixed}) for values in (given_values, fixed)]
         models = [Model.with_defaults(bushing, effects, values) for values in starts]
-        best = 0 if fixed == given else int(np.argmin([_chi_square(model, data_sets) for model in models]))
-        named = {effect_name_of(name) for name in given}
+        best = 0 if fixed == given_values else int(np.argmin([_chi_square(model, data_sets) for model in models]))
+        named = {effect_name_of(name) for name in given_values}
         added = [name for name in effects if name not in BASE and name not in named]
         added = [name for name in added if get_effect(name).replaces not in effects]
         if not added:
@@ -206,8 +206,8 @@ class PreparedCampaign:
             chosen = []
             for tests in (self.loops, self.sweeps):
                 any_axial = any(test.direction is Direction.AXIAL for test in tests)
-                others = [d for d in Direction if d is not Direction.AXIAL] if any_axial else []
-                chosen += [test for test in tests if test.direction not in others]
+                left_out = [d for d in Direction if d is not Direction.AXIAL] if any_axial else []
+                chosen += [test for test in tests if test.direction not in left_out]
             return chosen
         with error_location(self.campaign.path):
             wanted = [get_place(str(place), self.campaign.specimens) for place in places]

@@ -43,7 +43,14 @@ class FitProblem:
     def with_fixed(
         cls, model: Model, tests: Sequence[MeasuredTest], fixed: Collection[str], bounds: Bounds
     ) -> FitProblem:
-        """The problem in which all parameters of the model are free except those that are fixed."""
+        """The problem in which all parameters of the model are free except those that are fixed.
+
+        Args:
+            model: model with the start values.
+            tests: tests with their noise.
+            fixed: names of the fixed parameters.
+            bounds: limits inside the parameters' own [SI].
+        """
         return cls(model, tests, [name for name in model.parameters if name not in fixed], bounds)
 
     @cached_property
@@ -101,6 +108,9 @@ class Process:
             model: fitted model.
             tests: tests.
             influence: of each whitened residual on the parameters, (k, n).
+
+        Returns:
+            Covariance in the coordinates of the influence, (k, k).
         """
         first, changes = 0, np.zeros((len(influence), len(self.shapes)))
         for test, rows in zip(tests, rows_of(tests), strict=True):
@@ -184,11 +194,19 @@ class FitResult:
         return float(np.sum(np.square(left_vectors[:, significant].T @ self.residual)))
 
     def moved_to(self, model: Model, tests: Sequence[MeasuredTest]) -> FitResult:
-        """The result at the values of another model, with the residuals of other tests."""
-        moved = replace(self.problem, tests=tests)
+        """Move the result to the values of another model, with the residuals of other tests.
+
+        Args:
+            model: model with the same parameters.
+            tests: tests.
+
+        Returns:
+            The result there, with the outliers and bounds of this one.
+        """
+        problem = replace(self.problem, tests=tests)
         return replace(
             self,
-            problem=moved,
+            problem=problem,
             model=model,
             residual=residual(model, tests),
             jacobian=jacobian(model, tests, self.names),

@@ -118,6 +118,13 @@ def fit_static(data: PreparedCampaign, springpot: Result | None = None) -> Resul
     m and alpha come from the result given, or else from the campaign's [fit] where both have values; failing that the
     springpot is left out, and a warning says what this does.
 
+    Args:
+        data: the campaign.
+        springpot: result with m and alpha.
+
+    Returns:
+        The fitted model with its uncertainty and quality.
+
     Raises:
         FitError: no loop, or data that cannot support the fit.
     """

@@ -59,13 +59,13 @@ class _Profile:
         """The fit of the others, with the parameter fixed at a coordinate."""
         if coordinate not in self.known:
             near = self.known[min(self.known, key=lambda known: abs(known - coordinate))].model
-            others = replace(
+            problem = replace(
                 self.best.problem,
                 model=near.with_values({self.name: self.value(coordinate)}),
                 names=[name for name in self.best.names if name != self.name],
             )
             # five to ten evaluations are the rule, and the tolerance is far below what the rise is compared with
-            self.known[coordinate] = solve(others, evaluations=100, tolerance=1e-7, strict=False)
+            self.known[coordinate] = solve(problem, evaluations=100, tolerance=1e-7, strict=False)
         return self.known[coordinate]
 
     def root_rise(self, coordinate: float) -> float:

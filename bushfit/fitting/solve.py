@@ -59,6 +59,12 @@ class _OutOfBoundsError(Exception):
 def solve_with_lmfit(problem: FitProblem) -> FitResult:
     """Minimise by lmfit's MINPACK, as in the paper's procedure of static and dynamic fits in turn.
 
+    Args:
+        problem: parameters to fit, tests and bounds.
+
+    Returns:
+        The minimum.
+
     Raises:
         FitError: as of `solve`, which goes on where a step leaves the bounds or MINPACK comes to no end.
 

@@ -126,7 +126,15 @@ class Whitening:
         return float(np.sum(np.log1p(self._point.variance * self._point.weight)))
 
     def scaled(self, deviation: Array, *, shared: bool = True) -> Array:
-        """Deviations over the random noise, complex (n,) -> (2, n), with `shared` less the block's likeliest error."""
+        """Deviations in units of the random noise.
+
+        Args:
+            deviation: complex (n,).
+            shared: True to take out the likeliest error of each block.
+
+        Returns:
+            Gain and phase of each point, (2, n).
+        """
         rows, block = np.concatenate((deviation.real, deviation.imag)), self._block
         if shared:
             mean = block.components(rows * block.unit) / block.weight

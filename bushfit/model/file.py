@@ -66,6 +66,9 @@ def from_document(document: object, file: Path | None = None) -> Result:
         document: parsed JSON.
         file: for error messages.
 
+    Returns:
+        The result, with its model checked.
+
     Raises:
         ModelError: another schema, a key that is missing or invalid, or values that are not a valid model.
     """

@@ -17,7 +17,7 @@ from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import STRAINING, Bushing, Direction, Place
-from bushfit.model.stack import adjusted_values, layered_stiffness, rubber_stiffness, stack_force
+from bushfit.model.stack import adjusted_values, branch_stiffness, layered_stiffness, rubber_stiffness, stack_force
 from bushfit.model.structure import Structure, seen_by
 from bushfit.units import display_unit
 
@@ -260,10 +260,14 @@ class Model:
             omega, amplitude = np.broadcast_arrays(omega, amplitude)
         points, setting = np.atleast_1d(omega), self.setting(direction, kind, under)
         values = self.values if values is None else values
+        amplitude = np.atleast_1d(amplitude)
         if layers := self.layers(setting):
-            stiffness = layered_stiffness(self, setting, values, layers, points, np.atleast_1d(amplitude))
+            stiffness = layered_stiffness(self, setting, values, layers, points, amplitude)
+        elif self.structure.modifiers:
+            stiffness = rubber_stiffness(self, setting, values, points, amplitude)
         else:
-            stiffness = rubber_stiffness(self, setting, values, points, np.atleast_1d(amplitude))
+            strain = amplitude * self.unit_strain(setting.direction)
+            stiffness = branch_stiffness(self, setting, values, points, strain, values)
         if stiffness.shape[-points.ndim :] != points.shape:
             stiffness = stiffness + np.zeros(points.shape)
         return stiffness if omega.ndim else stiffness[..., 0]

@@ -60,11 +60,12 @@ def stiffness_and_slopes(
             lambda values: model.stiffness(direction, frequency, amplitude, kind=kind, values=values, under=under),
         )
     test = 2.0 * np.pi * frequency, amplitude * model.unit_strain(direction)
-    slopes = np.zeros((len(names), frequency.size), dtype=complex)
+    modulus, slopes = np.zeros(frequency.size), np.zeros((len(names), frequency.size), dtype=complex)
     for branch in model.structure.branches:
+        modulus = modulus + branch.modulus(seen_by(branch, model.values), *test)
         _add_slopes(slopes, model, names, branch, branch.modulus, branch.modulus_sensitivities, test)
-    stiffness = model.stiffness(direction, frequency, amplitude, kind=kind, under=under)
-    return stiffness, model.stiffness_per_modulus(direction) * slopes
+    factor = model.stiffness_per_modulus(direction)
+    return factor * modulus, factor * slopes
 
 
 def force_and_slopes(

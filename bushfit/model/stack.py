@@ -40,7 +40,14 @@ def layered_stiffness(
     }
 
     def below(count: int) -> StiffnessBelow:
-        """Stiffness and steady-cycle force of the rubber and the innermost `count` groups of layers."""
+        """Response of the rubber and some layers.
+
+        Args:
+            count: number of groups of layers, from the rubber outward.
+
+        Returns:
+            Stiffness and steady-cycle force.
+        """
 
         def cycle(omega: Array, motion: Array, points: Any) -> Array:
             """Force [N or N m] over one steady cycle, (..., k, n).
@@ -65,7 +72,15 @@ def layered_stiffness(
 
 
 def rubber_stiffness(model: Model, setting: Setting, values: Values, omega: Array, amplitude: Array) -> Array:
-    """Stiffness of the rubber without layers, in the form of `layered_stiffness`."""
+    """Complex stiffness of the rubber without layers [N/m or N m/rad], (..., n).
+
+    Args:
+        model: the model.
+        setting: direction and circumstances of the test.
+        values: parameter values [SI] by qualified name.
+        omega: angular frequencies [rad/s], (n,).
+        amplitude: zero-to-peak displacements [m] or rotations [rad], (n,).
+    """
     strain = amplitude * model.unit_strain(setting.direction)
     base = adjusted_values(model, setting, values, omega, amplitude, strain)
     return branch_stiffness(model, setting, values, omega, strain, base)
@@ -88,7 +103,14 @@ def stack_force(model: Model, setting: Setting, values: Values, layers: Sequence
     structure, last_moduli = model.structure, dict[int, tuple[Any, Array]]()
 
     def rubber(displacement: History) -> Array:
-        """Force [N] or moment [N m] of the rubber alone over a history of displacement, (..., n)."""
+        """Force of the rubber alone.
+
+        Args:
+            displacement: history of displacement [m] or rotation [rad].
+
+        Returns:
+            Force [N] or moment [N m], (..., n).
+        """
         strain, base = displacement.scaled(per_displacement), values
         if structure.modifiers:
             omega = np.atleast_1d(displacement.omega)

@@ -1,0 +1,54 @@
+"""Mean misfit of one line of a sweep over its repeats."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.fitting.measured_test import shown_amplitude
+from bushfit.fitting.repeats import unit
+from bushfit.geometry import Place
+from bushfit.reading.measurement import Stepped
+
+#: Degree, in the logarithm of what is stepped, of the Legendre polynomials that count as smooth misfit.
+_SMOOTH_DEGREE = 3
+
+
+@dataclass(frozen=True, eq=False)
+class LineMisfit:
+    """Mean misfit of one line of a sweep over its repeats: of all that its runs stepped through while they held one.
+
+    Args:
+        frequency: [Hz], (n,).
+        amplitude: zero-to-peak [m or rad], (n,).
+        misfit: measured over model less 1, complex, (n,).
+        noise: standard deviation of the gain and the phase of one of these means, (2,).
+    """
+
+    name: str
+    direction: Place
+    stepped: Stepped | None
+    frequency: Array
+    amplitude: Array
+    misfit: Array
+    noise: Array
+
+    @property
+    def step(self) -> Array:
+        """Values stepped along the line, (n,)."""
+        return self.amplitude if self.stepped == "amplitude" else self.frequency
+
+    @property
+    def words(self) -> str:
+        """Constant value of the line as text, "0.1 mm" or "10 Hz"; for other lines the name of the test."""
+        if self.stepped == "frequency":
+            return shown_amplitude(self.direction, float(self.amplitude[0]))
+        return f"{self.frequency[0]:.4g} Hz" if self.stepped else self.name
+
+    @cached_property
+    def smooth(self) -> Array:
+        """The part of the misfit that is a polynomial in the logarithm of the step, complex, (n,)."""
+        x = np.log(self.step)
+        basis = np.polynomial.legendre.legvander(unit(x), min(_SMOOTH_DEGREE, np.unique(x).size - 1))
+        return basis @ np.linalg.lstsq(basis.astype(complex), self.misfit, rcond=None)[0]
