@@ -216,7 +216,15 @@ def table_losses(order: Order, form: Form) -> Iterator[str]:
     model = order.result.model.without(EffectLevel.INSTRUMENT)
     for prediction in exported_directions(order):
         tables, place = stiffness_tables(prediction), prediction.direction
-        yield from _amplitude_loss(tables)
+        if len(tables) > 1:
+            reference = middle(tables)
+            ratios = np.concatenate([np.abs(reference.stiffness / table.stiffness) for table in tables])
+            unit, factor = place.display.displacement
+            low, value, high = (number(table.amplitude * factor, 4) for table in (tables[0], reference, tables[-1]))
+            yield (
+                f"{place}: one amplitude per property: with {value} {unit}, the error of |K| is "
+                f"{percent_off(ratios)} at {low} to {high} {unit}"
+            )
         if tables[0].frequency.size > 1:
             worst = 0.0
             for table in tables:  # linear interpolation halfway between two frequencies
@@ -244,19 +252,6 @@ def common_losses(order: Order) -> Iterator[str]:
     yield f"no stiffness in {', '.join([*missing, 'rotations about x and y'])}"
     if specimens := [str(place) for place in order.places if place not in DOFS]:
         yield f"specimens: {', '.join(specimens)}"
-
-
-def _amplitude_loss(tables: Sequence[StiffnessTable]) -> Iterator[str]:
-    """Sentence on the error of one amplitude per property; none for a single amplitude."""
-    if len(tables) > 1:
-        reference = middle(tables)
-        ratios = np.concatenate([np.abs(reference.stiffness / table.stiffness) for table in tables])
-        unit, factor = reference.direction.display.displacement
-        low, value, high = (number(table.amplitude * factor, 4) for table in (tables[0], reference, tables[-1]))
-        yield (
-            f"{reference.direction}: one amplitude per property: with {value} {unit}, the error of |K| is "
-            f"{percent_off(ratios)} at {low} to {high} {unit}"
-        )
 
 
 def band_losses(prediction: Prediction) -> Iterator[str]:

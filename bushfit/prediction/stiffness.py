@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from bushfit.effects import Level
-from bushfit.effects.contract import Array, Circumstances, Setting
+from bushfit.effects.contract import Array, Circumstances
 from bushfit.errors import ModelError
 from bushfit.fitting.preparation import MeasuredSweep
 from bushfit.geometry import TRANSLATION, Place
@@ -138,12 +138,12 @@ def predict(
         axis.ravel() for axis in np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
     )
     points = direction, frequency, amplitude, temperature
-    models = [result.model] if rig else _car_models(result.model, result.unresolved)
-    predictions = [_predicted(result, model, *points) for model in models]
+    models = [result.model] if rig else car_models(result.model, result.unresolved)
+    predictions = [predict_with_model(result, model, *points) for model in models]
     bushings, rigs = predictions[0], predictions[-1] if len(predictions) > 1 else None
     explained = replace(result, model_error=None)
-    predictions += [_predicted(explained, model, *points) for model in _alternatives(result, rig=rig)]
-    measured = None if sweeps is None else _measured(direction, frequency, amplitude, sweeps)
+    predictions += [predict_with_model(explained, model, *points) for model in _alternatives(result, rig=rig)]
+    measured = None if sweeps is None else measured_stiffness(direction, frequency, amplitude, sweeps)
     bands: dict[str, Any] = {}
     for name in _BANDS:
         candidates = [getattr(prediction, name) for prediction in predictions]
@@ -160,9 +160,10 @@ def predict(
     return replace(bushings, **bands, if_rigs=rigs, measured=measured, warnings=tuple(warnings))
 
 
-def _car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
-    """Models that may hold in the car: without instrument effects, and with all of the unresolved ones (first) to none
-    of them (last)."""
+def car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
+    """Models that may hold in the car: without instrument effects, and with all (first) to none (last) of the
+    unresolved effects.
+    """
     bare = model.without(Level.INSTRUMENT)
     count = range(len(unresolved) + 1)
     return [bare.without(*names) for size in count for names in combinations(unresolved, size)]
@@ -173,29 +174,44 @@ def _alternatives(result: Result, *, rig: bool) -> Iterator[Model]:
     resolved = {*result.model.effects} - {*result.unresolved}
     for model in (alternative.model for alternative in result.alternatives):
         twins = [effect.name for effect in model.records if effect.twins and effect.name not in resolved]
-        yield from [model] if rig else _car_models(model, twins)
+        yield from [model] if rig else car_models(model, twins)
 
 
-def _predicted(
+def predict_with_model(
     result: Result, model: Model, direction: Place, frequency: Array, amplitude: Array, temperature: float | None
 ) -> Prediction:
-    """Prediction of one model at operating points, (n,), with the uncertainty of the fit."""
+    """Predict the stiffness with one model, with the uncertainty of the fit and the error of the model.
+
+    Args:
+        result: fitted result, whose covariance and model error apply.
+        model: possible model.
+        direction: direction or specimen.
+        frequency: [Hz], (n,).
+        amplitude: zero-to-peak [m, rad or 1], (n,).
+        temperature: [K]; None for the reference temperature.
+
+    Returns:
+        Prediction without warnings. An unnamed correction or a model error adds an error of the real and one of the
+        imaginary part; within the range of its nodes these include the errors of the parameters, which fade there.
+    """
     under = Circumstances(temperature)
     names = [name for name in result.covariance.names if name in model.values]
     covariance = result.covariance.restricted(names)
     stiffness, slopes = stiffness_and_slopes(model, direction, frequency, amplitude, names, under=under)
-    model_errors, scale = _model_errors(
-        result, model, model.setting(direction, under=under), frequency, amplitude, stiffness
-    )
-    count, slopes = len(names), np.concatenate((slopes, model_errors))
+    count, scale = len(names), np.ones(frequency.size)
+    if correction := model.unnamed or result.model_error:
+        setting = model.setting(direction, under=under)
+        share, error, weight = correction.evaluate(setting, 2.0 * np.pi * frequency, amplitude)
+        scale = np.sqrt(1.0 - np.square(weight))
+        relative_error = error / (1.0 + share) if model.unnamed else np.hypot(error, [share.real, share.imag])
+        slopes = np.concatenate((slopes, np.array([[1.0], [1.0j]]) * relative_error * stiffness))
 
     def band(value: Array, slope: Array) -> Band:
         half = np.hypot(scale * covariance.half_width(slope[:count]), Z95 * np.linalg.norm(slope[count:], axis=0))
         root = np.concatenate((scale * (covariance.root.T @ slope[:count]), slope[count:]))
         return Band(value, value - half, value + half, root)
 
-    relative = slopes / stiffness
-    loss_factor = stiffness.imag / stiffness.real
+    relative, loss_factor = slopes / stiffness, stiffness.imag / stiffness.real
     return Prediction(
         direction,
         frequency,
@@ -207,28 +223,18 @@ def _predicted(
     )
 
 
-def _model_errors(
-    result: Result, model: Model, setting: Setting, frequency: Array, amplitude: Array, stiffness: Array
-) -> tuple[Array, Array]:
-    """Errors of the stiffness by an unnamed correction, or by a model error that is reported but not corrected.
+def measured_stiffness(direction: Place, frequency: Array, amplitude: Array, sweeps: Sequence[MeasuredSweep]) -> Array:
+    """Mean of the measured stiffness at operating points.
+
+    Args:
+        direction: direction or specimen.
+        frequency: [Hz], (n,).
+        amplitude: zero-to-peak [m, rad or 1], (n,).
+        sweeps: measured sweeps; those of other directions are ignored.
 
     Returns:
-        Change of the stiffness by one standard deviation of the real and of the imaginary part, (2, n), or (0, n)
-        without such an error; and the factor on the errors of the parameters, (n,): 0 within the range of the
-        correction's nodes, where its errors include those of the parameters, and 1 far outside.
+        Complex stiffness [SI], (n,); nan without a measurement.
     """
-    correction = model.unnamed or result.model_error
-    if correction is None:
-        return np.zeros((0, frequency.size)), np.ones(frequency.size)
-    share, error, weight = correction.evaluate(setting, 2.0 * np.pi * frequency, amplitude)
-    parts, scale = np.array([[1.0], [1.0j]]), np.sqrt(1.0 - np.square(weight))
-    if model.unnamed:
-        return parts * error * stiffness / (1.0 + share), scale
-    return parts * np.hypot(error, [share.real, share.imag]) * stiffness, scale
-
-
-def _measured(direction: Place, frequency: Array, amplitude: Array, sweeps: Sequence[MeasuredSweep]) -> Array:
-    """Measured complex stiffness at operating points, (n,): mean of the repeats, nan without a measurement."""
     mine = [sweep.with_weight() for sweep in sweeps if sweep.direction == direction]
     f, x, stiffness = (
         np.concatenate([np.empty(0), *(getattr(sweep, name) for sweep in mine)])
@@ -301,7 +307,7 @@ def predict_resonance(
     """
     if place.motion is not TRANSLATION:
         raise ModelError("this cannot carry a mass", found=str(place), expected="a direction or mount with a stiffness")
-    bushings, *rig_models = _car_models(result.model, result.unresolved)
+    bushings, *rig_models = car_models(result.model, result.unresolved)
     under = Circumstances(temperature)
     if frequencies is None:
         small = bushings.stiffness(place, 1.0, _SMALL_STRAIN / bushings.unit_strain(place), under=under)
