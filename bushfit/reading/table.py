@@ -18,7 +18,17 @@ from bushfit.geometry import STRAINING, TRANSLATION, Motion
 from bushfit.reading.blocks import combined
 from bushfit.reading.cells import MOST_LEFT_OUT, Cells, Row
 from bushfit.reading.classification import classify
-from bushfit.reading.headers import OF_MOTION, PAIRS, Column, Vocabulary, is_angular, of_motion, split_convention
+from bushfit.reading.headers import (
+    LOOP_COLUMNS,
+    OF_MOTION,
+    PAIRS,
+    SWEEP_COLUMNS,
+    Column,
+    Vocabulary,
+    is_angular,
+    of_motion,
+    split_convention,
+)
 from bushfit.reading.labelled import Rows, find_labels, select_rows
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, Line, find_layout, is_comment
 from bushfit.reading.measurement import Floats
@@ -215,11 +225,11 @@ class Table(Cells):
 
     def columns_key(self, role: str, unit: str) -> str:
         """Return keys of a campaign for up to three free headers that fit the SI unit of a role, or one with "..."."""
-        taken = {column.index for column in self.roles.values()}
+        usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS}, {})
         free = [
             (header, split_convention(units.split_header(split_convention(header)[0])[1] or in_row)[0])
-            for index, (header, in_row) in enumerate(zip(self.headers, self.layout.units, strict=True))
-            if header and index not in taken
+            for header, in_row in zip(self.headers, self.layout.units, strict=True)
+            if header and (not (known := usual.heading(header)) or (role, known.role) == ("amplitude", "displacement"))
         ]
         fitting = [header for header, text in free if unit != "1" and units.is_compatible(text, unit)]
         return " or ".join(f'columns = {{ {role} = "{header}" }}' for header in fitting[:3] or ["..."])
