@@ -72,6 +72,11 @@ class Cells:
                 yield line, cells
 
     @cached_property
+    def first_row(self) -> Sequence[str | float]:
+        """Cells of the first row of data; those of an empty row if there is none."""
+        return next((cells for _, cells in self.rows()), [""] * len(self.headers))
+
+    @cached_property
     def first_rows(self) -> list[Sequence[str | float]]:
         """Cells of the first thousand rows of data; those of an empty row if there are none."""
         return [cells for _, cells in islice(self.rows(), _FIRST)] or [[""] * len(self.headers)]
@@ -188,7 +193,7 @@ class Cells:
 
     def holds_numbers(self, index: int) -> bool:
         """Return True if a column begins with a number."""
-        cell = self.first_rows[0][index]
+        cell = self.first_row[index]
         return not isinstance(cell, str) or is_like_number(cell)
 
     def error(
@@ -221,7 +226,9 @@ class Cells:
     @property
     def is_table(self) -> bool:
         """True if the file is understood as a table of numbers; the text of any other file is not shown in errors."""
-        return len(self.roles) > 1 or any(is_row(list(map(str, cells))) for cells in self.first_rows[:_MOST_LISTED])
+        return len(self.roles) > 1 or any(
+            is_row(list(map(str, cells))) for _, cells in islice(self.rows(), _MOST_LISTED)
+        )
 
     def place(self, line: int | None, column: Column | None) -> str | None:
         """Return the location in the file as "line 3, column "Time [s]""; None if all is unknown."""

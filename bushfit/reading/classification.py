@@ -113,7 +113,7 @@ def classify(
     if {"force_amplitude", "stiffness"} & set(roles) and "amplitude" not in roles:
         notes += _add_motion_as_amplitude(cells, roles, stated_units)
     times = {role: column for role, column in roles.items() if role == "time"}
-    clocks = {column.index for column in times.values() if clock(str(cells.first_rows[0][column.index])) is not None}
+    clocks = {column.index for column in times.values() if clock(str(cells.first_row[column.index])) is not None}
     return roles, tuple(notes), frozenset(clocks)
 
 
@@ -277,14 +277,14 @@ def _add_by_unit(
             if column.unit
             and any(units.is_compatible(column.unit, si) for si in expected)
             and (qualifier is None or words & (_QUALIFIERS[qualifier] | {qualifier}))
-            and is_like_number(str(cells.first_rows[0][column.index]))
+            and is_like_number(str(cells.first_row[column.index]))
         ]
         if len(fitting) == 1:
             roles[role] = replace(fitting[0], role=role)
             del free[fitting[0].index]
             notes.append(f'"{fitting[0].header}" is read as the {role.replace("_", " ")} by its unit')
     if "time" in names and "time" not in roles:
-        stamps = [column for column, _ in free.values() if clock(str(cells.first_rows[0][column.index])) is not None]
+        stamps = [column for column, _ in free.values() if clock(str(cells.first_row[column.index])) is not None]
         roles |= {"time": replace(stamps[0], role="time")} if len(stamps) == 1 else {}
     return notes
 

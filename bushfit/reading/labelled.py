@@ -80,7 +80,7 @@ def _text(cell: str | float) -> str:
 
 def _large_texts(cells: Cells) -> Mapping[int, ColumnTexts]:
     """Texts of the columns without a role in a large text whose rows all are data, by index; else empty."""
-    first, source = [_text(cell) for cell in cells.first_rows[0]], cells.source
+    first, source = [_text(cell) for cell in cells.first_row], cells.source
     if not isinstance(source, Text) or len(source.data) < _LARGE or cells.selected is not None:
         return {}
     if len(first) != len(cells.headers) or not cells.needed or cells.needed & cells.clocks:
@@ -94,9 +94,10 @@ def _large_texts(cells: Cells) -> Mapping[int, ColumnTexts]:
 
 def _may_separate(cells: Cells, index: int) -> bool:
     """Return True if a column without a role has few different texts, so that it may separate tests."""
+    if not cells.headers[index] or index in {column.index for column in cells.roles.values()}:
+        return False
     first = [_text(row[index]) for row in cells.first_rows]
-    is_free = bool(cells.headers[index]) and index not in {column.index for column in cells.roles.values()}
-    return is_free and any(first) and _FEWEST_ROWS * len({text for text in first if text}) <= len(first)
+    return any(first) and _FEWEST_ROWS * len({text for text in first if text}) <= len(first)
 
 
 def find_labels(cells: Cells) -> Mapping[str, tuple[int, Sequence[str]]]:

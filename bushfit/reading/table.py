@@ -351,7 +351,7 @@ class Table(Cells):
             arrays = {index: source.arrays[index] for index in indices}
         elif isinstance(source, Text):
             ways = weigh(islice(self.number_texts(), _FIRST), self.possible_numerals()).ways
-            first = [str(cell) for cell in self.first_rows[0]]
+            first = [str(cell) for cell in self.first_row]
             numerals = Numerals(ways[0].decimal)
             are_settled = len({way.decimal for way in ways}) == 1 and len(first) == len(self.headers)
             if are_settled and all(numerals.allows(first[index]) for index in indices):  # pandas takes TRUE for 1
