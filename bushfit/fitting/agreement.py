@@ -41,7 +41,7 @@ class _Run(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LeaveOut:
-    """A fit at its end, ready to be asked what it would be without some of its rows.
+    """A fit that predicts how its parameters and residuals would change without some of its rows.
 
     Args:
         basis: orthonormal basis of what the parameters can do to the whitened residuals, (n, m).
@@ -57,7 +57,8 @@ class LeaveOut:
 
     @classmethod
     def from_fit(cls, jacobian: Array, residual: Array) -> "LeaveOut":
-        """Build it from the derivatives of the whitened residuals by coordinate, (k, n), and the residuals, (n,).
+        """Prepare a fit, given by the derivatives of the whitened residuals by coordinate, (k, n), and the residuals,
+        (n,).
 
         What all rows together leave open moves no residual, and stays where it is.
         """
@@ -67,7 +68,7 @@ class LeaveOut:
         return cls(basis, directions[determined].T / size[determined], basis.T @ residual, residual)
 
     def open(self, rows: Array) -> Array:
-        """Mask of the parameters that the fit leaves open without these rows, (k,)."""
+        """Mask of the parameters that the remaining rows do not determine, (k,)."""
         size, vectors = np.linalg.eigh(self._rest(rows))
         without = np.square(self.back @ vectors) @ (1.0 / np.maximum(size, _LEAST_SEEN**2))
         return without > _MOST_GROWTH * np.sum(np.square(self.back), axis=1)
@@ -84,8 +85,7 @@ class LeaveOut:
         return None if np.abs(change).max(initial=0.0) > _LONGEST_STEP else change
 
     def predicted(self, rows: Array, clusters: Array, *, stepped: bool = True) -> tuple[Array, Array]:
-        """Residuals of these rows, (n,) each, after that step: in units of noise, and whitened by the error of the
-        prediction too.
+        """Residuals of some rows, predicted from the fit to the others.
 
         Args:
             rows: which the rest determines, (all rows,) bool.
@@ -113,8 +113,8 @@ class LeaveOut:
         return plain, plain - directions @ ((1.0 - 1.0 / np.hypot(1.0, scale)) * (directions.T @ plain))
 
     def pulled(self, rows: Array, predicted: Array) -> Array:
-        """Slopes of half the sum of squares of these rows, predicted from the rest, by the noise of each row, (all
-        rows,): directly, and through the parameters that the rest determines.
+        """Derivatives of half the sum of squares of predicted rows with respect to the noise of each row, (all rows,):
+        directly, and through the parameters that the other rows determine.
         """
         through = self.basis @ np.linalg.solve(self._rest(rows), self.basis[rows].T @ predicted)
         pull = -through
@@ -122,11 +122,11 @@ class LeaveOut:
         return pull
 
     def _rest(self, rows: Array) -> Array:
-        """Information of the other rows along the basis, (m, m)."""
+        """Fisher information of the other rows along the basis, (m, m)."""
         return np.eye(self.components.size) - self.basis[rows].T @ self.basis[rows]
 
     def _basis_step(self, rows: Array) -> Array:
-        """The step along the basis, (m,)."""
+        """Gauss-Newton step without these rows, along the basis, (m,)."""
         return -np.linalg.solve(self._rest(rows), self.components - self.basis[rows].T @ self.residual[rows])
 
 
@@ -234,7 +234,7 @@ def _by_place(parts: Sequence[tuple[str, Array, bool]]) -> tuple[Usable, ...]:
 
 
 def _absolute_difference(modelled: Array, measured: Array) -> Array:
-    """Relative difference of |K|, and difference of the loss factor, without sign, (2, n)."""
+    """Absolute relative difference of |K|, and absolute difference of the loss factor, (2, n)."""
     return np.abs([np.abs(modelled / measured) - 1.0, loss_factor(modelled) - loss_factor(measured)])
 
 

@@ -131,7 +131,8 @@ def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | Non
 def _changes_by_noise(
     data_sets: Sequence[MeasuredTest], influence: Array, basis: Array
 ) -> dict[Hashable, tuple[Array, Array]]:
-    """Change of a covariance by the standard error of each estimated variance, and what wrong weights add, (k, k) each.
+    """Changes of a covariance by each estimated variance of the noise: by its standard error, and by the wrong weights
+    that follow from it, (k, k) each.
 
     The influence of each residual on the parameters is (k, n), the basis of the stage's own equations (own, n).
     """
@@ -146,7 +147,7 @@ def _changes_by_noise(
 
 
 def _inverse(system: Array) -> Array:
-    """Inverse of a square matrix, what is open limited to _LARGEST_ERROR."""
+    """Inverse of a square matrix, with undetermined directions limited to _LARGEST_ERROR."""
     left_vectors, values, right_vectors = np.linalg.svd(system)
     return (right_vectors.T / np.maximum(values, 1.0 / _LARGEST_ERROR)) @ left_vectors.T
 
@@ -240,7 +241,7 @@ def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) ->
 
 
 def measured_range(model: Model, data_sets: Sequence[MeasuredTest]) -> Range:
-    """Frequencies [Hz], equivalent strains, directions and temperatures [K] that the data sets reach."""
+    """Range of frequencies [Hz], equivalent strains and temperatures [K] of tests, and their directions."""
     found = [str(data_set.direction) for data_set in data_sets]
     directions = tuple(dict.fromkeys([*(str(direction) for direction in Direction if direction in found), *found]))
     kelvin = [np.ravel(data_set.test.temperature) for data_set in data_sets if data_set.test.temperature is not None]
@@ -250,7 +251,8 @@ def measured_range(model: Model, data_sets: Sequence[MeasuredTest]) -> Range:
 
 
 def implausible(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> list[str]:
-    """Sentences on moduli that no rubber has, and on tests too far apart to be of one bushing: most often a unit.
+    """Warning about moduli that no rubber has, or tests too different to be of one bushing, usually because of a wrong
+    unit.
 
     Returns:
         At most one sentence.
@@ -268,7 +270,9 @@ def implausible(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> l
 
 
 def refuse_strain(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> None:
-    """Raise a FitError where a test strains its rubber by more than any bears: a unit, or a size, is wrong."""
+    """Raise a FitError if a test strains its rubber by more than any rubber bears, usually because of a wrong unit or
+    size.
+    """
     for data_set in data_sets:
         largest = float(np.max(data_set.amplitude))
         if (strain := largest * unit_strain(bushing, data_set.direction)) > _MOST_STRAIN:
@@ -283,7 +287,7 @@ def refuse_strain(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) ->
 
 
 def apart_in_temperature(model: Model, data_sets: Sequence[MeasuredTest]) -> list[str]:
-    """A sentence on tests whose temperatures, where they are known, lie too far apart for one model.
+    """Warning about tests whose temperatures are too different for one model.
 
     Returns:
         At most one sentence.
@@ -305,7 +309,7 @@ def apart_in_temperature(model: Model, data_sets: Sequence[MeasuredTest]) -> lis
 
 
 def mixed_conditions(data_sets: Sequence[MeasuredTest]) -> list[str]:
-    """Warn of tests of the bushing that were made on several specimens, or under several preloads, and fitted as one.
+    """Warnings about tests of one bushing made on several specimens or under several preloads.
 
     Args:
         data_sets: tests of a campaign.

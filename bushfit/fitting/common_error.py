@@ -20,7 +20,7 @@ _ROUNDING = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class CommonError:
-    """Independent amounts of an error that each move many residuals.
+    """An error of several independent amounts that each change many residuals.
 
     Args:
         columns: change of the residuals, in units of noise, by one standard deviation of each amount, (q, n).
@@ -41,7 +41,7 @@ class CommonError:
 
     @property
     def log_size(self) -> float:
-        """ln|S|."""
+        """Natural log of the determinant of the covariance S."""
         return float(np.sum(np.log1p(np.square(self.principal_errors[1]))))
 
     def whiten(self, rows: Array) -> Array:
@@ -51,7 +51,7 @@ class CommonError:
 
 
 class ErrorProducts(NamedTuple):
-    """Inner products of whitened rows, such as a residual and its derivatives, with an error of unknown size.
+    """Inner products of whitened rows, such as a residual and its derivatives, beside an error of unknown size.
 
     Args:
         products: of the rows in noise, (m, m).

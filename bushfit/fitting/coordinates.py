@@ -52,7 +52,7 @@ class Coordinates:
         }
 
     def slopes(self, values: Mapping[str, float]) -> Array:
-        """d value / d coordinate, (k,)."""
+        """Derivatives of parameter values by coordinate, (k,)."""
         pairs = zip(self.names, self.parameters, strict=True)
         return np.array([values[name] if parameter.log else parameter.typical for name, parameter in pairs])
 
@@ -86,5 +86,5 @@ def jacobian(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[st
 
 
 def together(data_sets: Sequence[MeasuredTest], rows: Array) -> Array:
-    """Residuals of all tests, each whitened by itself, (..., n), whitened by an error that the tests share as well."""
+    """Whiten residuals of all tests, (..., n), by an error that the tests share, if they share one."""
     return data_sets.error.whiten(rows) if isinstance(data_sets, Joined) else rows

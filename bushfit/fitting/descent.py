@@ -48,7 +48,7 @@ _LEAST_SENSITIVITY = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """A fit under way, which never climbs; its model is the best so far.
+    """A least-squares fit in progress; its model is the best so far.
 
     Args:
         problem: parameters to fit, tests and bounds.
@@ -223,7 +223,7 @@ class Descent:
         return step, float(-(2.0 * slope + curvature @ step) @ step)
 
     def _bend(self, step: Array, damping: float) -> Array:
-        """Correction that bends a damped step along the valley, (k,); 0 where the last step led another way."""
+        """Correction that bends a damped step along the valley, (k,); 0 if the last step led in another direction."""
         if self.last is None:
             return np.zeros_like(step)
         before, second = self.last
@@ -238,12 +238,12 @@ class Descent:
         return bend
 
     def _length(self, step: Array) -> float:
-        """Length of a step in units of noise, each parameter by itself."""
+        """Length of a step in units of noise, with each parameter alone."""
         return float(np.sqrt(np.diag(self._normal[0]) @ np.square(step)))
 
 
 def _solved(curvature: Array, pull: Array, free: Array) -> Array:
-    """The free parameters at which a curvature, (k, k), meets a pull, (k,), none along what rounding decides."""
+    """Step of the free parameters at which the curvature meets a pull; 0 in directions that rounding decides."""
     scale = np.sqrt(np.diag(curvature)[free])
     scaled = curvature[np.ix_(free, free)] / np.outer(scale, scale)
     return np.linalg.lstsq(scaled, pull[free] / scale, rcond=ROUNDING)[0] / scale

@@ -99,7 +99,7 @@ def with_effect(
 
 
 def fit_from(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds) -> Descent:
-    """A fit of every parameter of a model but the fixed ones, from its own values, before its first step.
+    """Prepare a fit of all parameters of a model except the fixed ones, from its own values.
 
     Args:
         model: model with the start values.
@@ -111,7 +111,7 @@ def fit_from(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[st
 
 
 def probes(data_sets: Sequence[MeasuredTest], model: Model, parameter: Parameter) -> Array:
-    """Values of a shape parameter that these tests could show, by what it is measured against.
+    """Start values of a shape parameter within the range that the tests can show.
 
     Args:
         data_sets: tests.

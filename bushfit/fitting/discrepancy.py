@@ -93,8 +93,9 @@ class FittedTests:
 
     @cached_property
     def _blocks(self) -> list[tuple[MeasuredTest, slice, Array | None, Array]]:
-        """Each test, its rows, and for a loop the orthonormal directions of its residuals, (n, 2), and the components
-        along them by 1 and i of a change of stiffness, (2, 2)."""
+        """Each test, its rows, and for a loop the orthonormal directions in which a change of stiffness moves its
+        residuals, (n, 2), with the components of 1 and i along them, (2, 2).
+        """
         units, blocks = np.array([[1.0], [1.0j]]), list[tuple[MeasuredTest, slice, Array | None, Array]]()
         for test, rows in zip(self.data_sets, rows_of(self.data_sets), strict=True):
             if test.kind == "loop":
@@ -137,8 +138,7 @@ class FittedTests:
 
     @cached_property
     def remainder(self) -> tuple[Array, Array]:
-        """Directions that parameters and rig errors absorb, (k, d), orthonormal but for the prior of the latter, and
-        the components of the residual that both leave, (d,)."""
+        """Directions that parameters and rig errors absorb, (k, d), and components of the remaining residual, (d,)."""
         rows, residual = self.solution.jacobian, self.solution.residual
         pairs = list(zip(self._blocks, self.rig_errors, strict=True))
         across = np.concatenate([rows[:, block] @ errors.T for (_, block, *_), errors in pairs], axis=1)
@@ -180,7 +180,7 @@ class Discrepancy:
     def over_tests(
         cls, tests: FittedTests, groups: Groups, lengths: tuple[float, float], maximum_nodes: int
     ) -> Discrepancy:
-        """The process over the points of some tests, with a number of nodes at most in each group.
+        """Build the process over the operating points of tests.
 
         Args:
             tests: fitted model and tests.
@@ -202,23 +202,23 @@ class Discrepancy:
 
     @cached_property
     def complex_shapes(self) -> Array:
-        """Patterns in phase, then in quadrature, complex (2 q, p)."""
+        """Patterns of the process in phase, then in quadrature, complex (2 q, p)."""
         return np.concatenate((self.shapes, 1j * self.shapes))
 
     @cached_property
     def likelihood(self) -> RestrictedLikelihood:
-        """Restricted likelihood of its size."""
+        """Restricted likelihood of the size of the process."""
         span, remainder = self.tests.remainder
         return RestrictedLikelihood.from_columns(self.tests.columns(self.complex_shapes), remainder, span)
 
     @cached_property
     def best(self) -> tuple[float, float]:
-        """The largest gain of the log likelihood, and the size that brings it."""
+        """Largest gain of the log likelihood, and the size at which it occurs."""
         gains = self.likelihood.gains(self.sizes)
         return float(gains.max()), float(self.sizes[gains.argmax()])
 
     def conditioned(self) -> tuple[Array, Array]:
-        """The process, of its best size, conditioned on the tests.
+        """Condition the process, at its best size, on the tests.
 
         Returns:
             Mean at the operating points, complex (p,), and standard deviation of its two parts with those of the
@@ -239,7 +239,7 @@ class Discrepancy:
 
 
 def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
-    """Processes conditioned on the tests, averaged by their likelihood: mean and standard deviation at nodes.
+    """Average of processes conditioned on the tests, weighted by their likelihood.
 
     Between the nodes, and in sharing directions, it is as the likeliest, over lengths of the mean logarithm. Its sizes
     are known by few degrees of freedom: standard deviations are those by which a normal interval is as wide as
@@ -269,7 +269,7 @@ def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
 
 
 def discrepancies(tests: FittedTests) -> list[Discrepancy]:
-    """Processes that all tests share, and one of each direction by itself, of all lengths."""
+    """Processes of all lengths, shared by all directions and separate for each direction."""
     names = tuple(dict.fromkeys(tests.directions.tolist()))
     shared = dict.fromkeys([(names,), tuple((name,) for name in names)])
     pairs = product(shared, product(OVER_FREQUENCY, OVER_STRAIN))

@@ -49,7 +49,7 @@ _ACCURACY = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """A loop made ready for the model.
+    """A measured loop, prepared as an input of the model: its motion without noise, and its force with weights.
 
     Args:
         frequency: [Hz], found from the displacement.
@@ -95,7 +95,7 @@ class Drive:
 
     @property
     def correlated(self) -> str:
-        """Over how many rows the noise of the force is correlated, as the end of a sentence; "" where it is not."""
+        """Text on the number of rows over which the noise of the force is correlated; "" if it is not."""
         if not self.row_noise.order:
             return ""
         time = self.row_noise.rows_as_one * float(np.median(np.diff(self.phase))) / self.frequency
@@ -103,7 +103,7 @@ class Drive:
         return f", correlated over about {number(rows, 2)} rows ({number(time, 2)} s)"
 
     def displacement(self, phase: Array) -> Array:
-        """The motion at any phase [cycles], noise removed [m or rad], (n,)."""
+        """Displacement without noise at any phase [cycles], [m or rad], (n,)."""
         return series(self.coefficients, phase)
 
     def first_harmonic(self) -> complex:
@@ -113,7 +113,8 @@ class Drive:
         return complex(force / self.coefficients[1])
 
     def history(self, settles: bool) -> History:
-        """One settled cycle, GRID samples long, or the whole record where it begins at rest, or the model `settles`.
+        """Displacement that drives the model: one settled cycle of GRID samples, or the whole record if it begins at
+        rest or the model `settles`.
 
         In a part after other cycles the model has settled.
         """
@@ -121,12 +122,12 @@ class Drive:
 
     @property
     def follows(self) -> bool:
-        """True if other rows of its record went before, which the rubber remembers."""
+        """True if earlier rows of the same record precede the loop, which the rubber remembers."""
         return self.loop.part is not None and self.loop.part.first_row > 0
 
     @property
     def _rounding(self) -> float:
-        """Cycles by which the record may miss a whole number of them: half a row."""
+        """Half a row in cycles: by so much the record may miss a whole number of cycles."""
         return 0.5 * self.cycles / self.loop.time.size
 
     @cached_property
@@ -227,7 +228,7 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
 
 
 def _check_loses_energy(drive: Drive) -> None:
-    """Refuse a force that lags behind the displacement, beyond noise and what the delay of a rig makes."""
+    """Raise a FitError if the force lags behind the displacement by more than noise and the delay of a rig explain."""
     stiffness = drive.first_harmonic()
     rows = drive.weight.sum() / drive.row_noise.rows_as_one
     chance = drive.noise * np.sqrt(2.0 / rows) / abs(drive.coefficients[1])
@@ -245,7 +246,7 @@ def _check_loses_energy(drive: Drive) -> None:
 
 
 def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
-    """The loop with the noise of its rows, or bins, estimated from whole cycles, but the first where it began at rest.
+    """Estimate the noise of the rows, or bins, of a loop from its whole cycles.
 
     Where that leaves no cycle, or no noise above that of any rig, rows count as independent.
     """
@@ -285,7 +286,7 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
 
 
 def _at_reversal(drive: Drive) -> Array:
-    """Rows within a step of the grid from a turning point, (n,): dry friction jumps there, and no grid tells when."""
+    """Mask of the rows within a grid step of a turning point, (n,), where dry friction jumps."""
     motion, position = drive.history(settles=False).value, drive.phase * GRID
     if drive.from_rest:
         turns = np.flatnonzero(reversals(motion))
@@ -300,7 +301,7 @@ def _at_reversal(drive: Drive) -> Array:
 def _rests(
     loop: Loop, found: LoopHarmonics, frequency: float, half_motion: float, half_force: float, noise: float
 ) -> tuple[bool, bool]:
-    """True if the record begins at rest at zero, and true if it begins at rest at its mean, about a preload.
+    """Find out if the record begins at rest at zero, and if it begins at rest about a preload.
 
     A settled loop may pass the origin too, where its load cell is off zero, but then it passes it every cycle: at rest
     the force at the start differs from that a cycle later by more than noise explains.
@@ -324,7 +325,7 @@ def _rests(
 
 
 def _preload(drive: Drive) -> Iterator[str]:
-    """A sentence on the means that a loop counts from, where they are no sensor's zero."""
+    """Note on mean values of a loop that are too large for a wrong zero of a sensor."""
     if drive.datum is None:
         return
     (motion, force, _), units = drive.loop.direction.motion.words, drive.loop.direction.display

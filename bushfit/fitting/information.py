@@ -51,7 +51,7 @@ class FisherInformation:
 
     @classmethod
     def from_tests(cls, model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> "FisherInformation":
-        """Information of data sets on the named parameters of a model at its values.
+        """Fisher information of tests on parameters of a model at its values.
 
         Args:
             model: model at whose values the information is taken.
@@ -62,7 +62,9 @@ class FisherInformation:
         return cls(tuple(names), slope @ slope.T)
 
     def directions(self) -> tuple[Array, Array]:
-        """Relative standard errors, (k,), of the eigenvectors of the information, and these, (k, k) by column."""
+        """Relative standard errors of the eigenvectors of the information, (k,), and these eigenvectors, (k, k) by
+        column.
+        """
         values, vectors = np.linalg.eigh(self.matrix)
         return 1.0 / np.sqrt(np.maximum(values, np.finfo(float).eps * values.max())), vectors
 
@@ -72,14 +74,14 @@ class FisherInformation:
         return np.linalg.norm(vectors * errors, axis=1)
 
     def error(self, weights: Mapping[str, float]) -> float:
-        """Standard error of a sum of relative changes, each with its weight."""
+        """Standard error of a weighted sum of relative changes."""
         errors, vectors = self.directions()
         row = np.array([weights.get(name, 0.0) for name in self.names])
         return float(np.linalg.norm(row @ vectors * errors))
 
 
 def relative_sizes(model: Model, names: Sequence[str]) -> Array:
-    """Change of each coordinate of a fit per relative change of its parameter, (k,)."""
+    """Change of each fit coordinate per relative change of its parameter, (k,)."""
     pairs = [(model.parameters[name], abs(model.values[name])) for name in names]
     return np.array(
         [1.0 if parameter.log else max(value / parameter.typical, _LEAST_SIZE) for parameter, value in pairs]
@@ -87,12 +89,12 @@ def relative_sizes(model: Model, names: Sequence[str]) -> Array:
 
 
 def percent(error: float) -> str:
-    """Relative standard error as text: "2.5 %"."""
+    """Relative standard error as text, such as "2.5 %"."""
     return f"{float(f'{100.0 * error:.2g}'):g} %" if error < _BEYOND else "beyond 1000 %"
 
 
 def further_test(model: Model, data_sets: Sequence[MeasuredTest], information: FisherInformation) -> list[str]:
-    """A sentence on the test that shrinks the worst standard error most, and to what; none where none helps.
+    """Sentence on the further test that reduces the largest standard error most; none if no test helps.
 
     Args:
         model: fitted model.
@@ -120,7 +122,7 @@ def further_test(model: Model, data_sets: Sequence[MeasuredTest], information: F
 
 
 def _candidates(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[tuple[str, list[MeasuredTest]]]:
-    """Tests that a laboratory could add: in words, and with the noise of the campaign or of most rigs.
+    """Possible further tests, in words and with the noise of the campaign or of most rigs.
 
     These are a repeat of every test, the loop of the largest strain at other amplitudes and rates, or slow loops if the
     campaign has none, and sweeps beyond and within the frequencies and amplitudes of the campaign.

@@ -38,7 +38,7 @@ class LevelErrors(NamedTuple):
 def level_errors(
     data_sets: Sequence[MeasuredTest], residual: Array, absorbed: Array, maximum: tuple[float, float]
 ) -> LevelErrors:
-    """Errors of the levels of sweeps by restricted maximum likelihood, between 0 and `maximum`.
+    """Estimate gain and phase errors that all repeats of a level share, by restricted maximum likelihood.
 
     Args:
         residual: whitened residuals at the end of a fit, (n,).
@@ -76,7 +76,7 @@ def level_errors(
     added, most_added = np.zeros(2), np.maximum(np.square(maximum) - counted, 0.0)
 
     def likelihood(added: Array) -> tuple[Array, Array, float]:
-        """Slope and curvature of the logarithm of the likelihood, and minus twice itself."""
+        """Derivatives of the log likelihood by the added variances."""
         covariance = np.eye(components.size) + np.tensordot(added, parts, 1)
         solved = np.linalg.solve(covariance, parts)
         white = np.linalg.solve(covariance, components)

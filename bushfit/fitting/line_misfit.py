@@ -17,7 +17,7 @@ _SMOOTH_DEGREE = 3
 
 @dataclass(frozen=True, eq=False)
 class LineMisfit:
-    """Mean misfit of one line of a sweep over its repeats: of all that its runs stepped through while they held one.
+    """Mean misfit of one line of a sweep, such as a level of amplitude, over its repeats.
 
     Args:
         frequency: [Hz], (n,).
@@ -48,7 +48,7 @@ class LineMisfit:
 
     @cached_property
     def smooth(self) -> Array:
-        """The part of the misfit that is a polynomial in the logarithm of the step, complex, (n,)."""
+        """Part of the misfit that is a polynomial in the logarithm of the step, complex (n,)."""
         x = np.log(self.step)
         basis = np.polynomial.legendre.legvander(unit(x), min(_SMOOTH_DEGREE, np.unique(x).size - 1))
         return basis @ np.linalg.lstsq(basis.astype(complex), self.misfit, rcond=None)[0]

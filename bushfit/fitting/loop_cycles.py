@@ -46,7 +46,7 @@ _OUTER = 0.9
 
 
 class SteadyCycles(NamedTuple):
-    """The steady cycles of a loop.
+    """Steady cycles of a loop.
 
     Args:
         loop: without what comes before and after them; the same one where nothing does.
@@ -62,7 +62,7 @@ class SteadyCycles(NamedTuple):
 
 
 def steady_cycles(loop: Loop) -> SteadyCycles:
-    """The steady cycles of a loop: of one with holes, those of the longest part without.
+    """Find the steady cycles of a loop; if rows are missing, those of its longest part without a hole.
 
     Returns:
         The steady part, its frequency and number of cycles, and a note.
@@ -97,7 +97,8 @@ def _thinned(loop: Loop) -> tuple[Array, Array]:
 
 
 def _crossings(motion: Array) -> tuple[Array, Array, Array]:
-    """A motion about its middle, (n,), and the last row before and the first after each crossing of it, (k,) each.
+    """Motion about its middle, (n,), and the last row before and the first row after each crossing of the middle, (k,)
+    each.
 
     Rows within a tenth of the range on either side, more than any noise, belong to the middle.
     """
@@ -108,7 +109,7 @@ def _crossings(motion: Array) -> tuple[Array, Array, Array]:
 
 
 def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | None]:
-    """A loop without what comes before and after its steady cycles, and a sentence on what was left out or None."""
+    """Loop without the rows before and after its steady cycles, and a note on the rows left out or None."""
     period = _period(time, motion)
     if period is None or time[-1] - time[0] <= period:
         return loop, None
@@ -150,7 +151,7 @@ def _cut(loop: Loop, first: float, last: float) -> Loop:
 
 
 def _period(time: Array, motion: Array) -> float | None:
-    """Usual time between crossings of the middle in one sense, in the later half of the record [s].
+    """Median time between crossings of the middle in one direction, in the later half of the record [s].
 
     Twice a stroke where there is one cycle. What holds a hole does not count; None where nothing is left.
     """
@@ -214,7 +215,7 @@ def _of_one_cycle(loop: Loop, clock: Array, x: Array, across: Array) -> tuple[fl
 
 
 def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> float | None:
-    """Period of a motion whose last rows meet its first, going the same way; None where they do not, or stand still.
+    """Period of a motion whose last rows continue its first rows; None if they do not.
 
     Both ends are drawn as straight lines. They tell how far beyond one cycle the record goes, or how short of it it
     stops; within their error it is just one cycle, of the period `whole` [s].
@@ -235,7 +236,7 @@ def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> fl
 
 
 def _refined(clock: Array, x: Array, frequency: float, rows_per_cycle: float) -> float:
-    """Frequency [Hz] of several cycles, by Gauss-Newton on the motion's harmonics and their frequency together."""
+    """Frequency [Hz] of several cycles, refined by Gauss-Newton on the harmonics of the motion."""
     chosen = spread_rows(x.size, _ROWS_TO_REFINE)
     time, motion = clock[chosen], x[chosen]
     order = resolved_order(rows_per_cycle * chosen.size / x.size, _MOST_HARMONICS)
@@ -266,7 +267,7 @@ def _repeats(clock: Array, x: Array, period: float) -> bool:
 
 
 def waveform(coefficients: Array) -> str:
-    """The name of a motion, in words, from its complex harmonics, mean first."""
+    """Name of a waveform from its complex harmonics, mean first."""
     share = abs(coefficients[3]) / abs(coefficients[1]) if coefficients.size > 3 else 0.0
     if abs(share - 1.0 / 9.0) < _LIKE:
         return "a triangle"
@@ -274,7 +275,7 @@ def waveform(coefficients: Array) -> str:
 
 
 def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
-    """A sentence where a loop's time was made from its motion, but not as its rows lie; else None.
+    """Note on a loop whose time was made from its motion and contradicts its rows; else None.
 
     Returns:
         The sentence, or None.

@@ -36,7 +36,7 @@ _CORNER = 0.5
 
 
 class OutlierRows(NamedTuple):
-    """Outliers of one column: their rows, (k,), and how far each lies off the harmonics, in units of noise, (k,)."""
+    """Outliers of one column: their rows, (k,), and their distances from the harmonics in units of noise, (k,)."""
 
     rows: Array
     off: Array
@@ -46,7 +46,7 @@ _NO_OUTLIERS = OutlierRows(np.empty(0, dtype=np.intp), np.empty(0))
 
 
 class LoopHarmonics(NamedTuple):
-    """Motion and noise of a loop as its rows show them.
+    """Harmonics, noise and outliers of a loop.
 
     Args:
         motion: complex harmonics of the displacement that rise above its noise, mean first.
@@ -67,7 +67,7 @@ class LoopHarmonics(NamedTuple):
 
 
 def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics:
-    """Significant harmonics of the displacement, mean and noise of the force, and outliers.
+    """Determine harmonics of displacement and force, the noise of the force, and outliers of both.
 
     The noise holds what does not repeat from cycle to cycle and what is too fast for the rubber, but not what changes
     slowly from one cycle to the next, which is settling or drift.
@@ -108,8 +108,8 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
 
 
 def _cleared(coefficients: Array, noise: float, phase: Array, displacement: Array, inliers: Array) -> Array:
-    """The harmonics of a motion without those that noise explains; those of a triangle where its rows, (n,), agree
-    with one as well, but for noise, as with its own. A triangle's harmonics fall so slowly that its corners need all.
+    """Harmonics of a motion that are larger than its noise; all harmonics of a triangle if the rows agree with a
+    triangle.
     """
     order, fundamental = np.arange(1, GRID // 2, 2), coefficients[1]
     turn, triangle = 1j * fundamental / abs(fundamental), np.zeros(GRID // 2, dtype=complex)
@@ -124,7 +124,7 @@ def _cleared(coefficients: Array, noise: float, phase: Array, displacement: Arra
 
 
 def less_slow(phase: Array, residual: Array) -> tuple[Array, int]:
-    """Residuals of the force less the slow part of each cycle's own, (n,), and how many unknowns that took.
+    """Remove from residuals of the force what changes slowly within each cycle.
 
     Returns:
         Residuals, (n,), and number of fitted unknowns.
@@ -142,7 +142,7 @@ def less_slow(phase: Array, residual: Array) -> tuple[Array, int]:
 
 
 def residual_limit(solution: Array, residual: Array, rows: int) -> float:
-    """Distance from its harmonics within which a row is no outlier, in units of the column of so many rows.
+    """Largest distance from the harmonics of a row that is no outlier, in units of the column.
 
     Noise takes part of it, and the corners of a triangle, which these harmonics, (2 order + 1,), round off, the rest.
 
@@ -156,7 +156,7 @@ def residual_limit(solution: Array, residual: Array, rows: int) -> float:
 
 
 def _fit_without_outliers(columns: Array, values: Array, solution: Array) -> tuple[Array, Array]:
-    """Harmonics of a column fitted without its outliers, and which rows are none, (n,).
+    """Fit harmonics to a column without its outliers; with a mask of the rows that are none, (n,).
 
     Squares let so many harmonics follow a cluster of outliers, as `solution` does. So rows are weighted down by their
     distance first; then outliers are found and left out in turn until both agree.
@@ -177,7 +177,7 @@ def _fit_without_outliers(columns: Array, values: Array, solution: Array) -> tup
 
 
 def _column_outliers(loop: Loop, frequency: float, column: Array, solution: Array, residual: Array) -> OutlierRows:
-    """Outliers among all rows of a column, whose harmonics and residual are of rows that stand for all."""
+    """Outliers among all rows of a column, from harmonics fitted to some of the rows."""
     grid = np.arange(GRID + 1) / GRID
     cycle = basis(grid, solution.size // 2) @ solution
     distance = column - np.interp((loop.time - loop.time[0]) * frequency % 1.0, grid, cycle)
@@ -187,25 +187,25 @@ def _column_outliers(loop: Loop, frequency: float, column: Array, solution: Arra
 
 
 def _inliers(columns: Array, values: Array, solution: Array, stuck: Array) -> Array:
-    """Rows that are neither stuck nor far off these harmonics, (n,)."""
+    """Mask of the rows that are neither stuck nor far from the harmonics, (n,)."""
     residual = values - columns @ solution
     return ~(stuck | are_outliers(residual, values, residual_limit(solution, residual, values.size)))
 
 
 def _noise(solution: Array, residual: Array) -> float:
-    """Noise of one row: the spread of the residuals, and no less than any rig has."""
+    """Noise of one row: the spread of the residuals, but at least that of the best rigs."""
     return max(_spread(residual), FLOOR * abs(as_complex(solution)[1]))
 
 
 def _spread(residual: Array) -> float:
-    """Standard deviation of residuals about zero, which outliers hardly move."""
+    """Robust standard deviation of residuals about zero."""
     return MEDIAN_TO_SIGMA * float(np.median(np.abs(residual)))
 
 
 def phase_bins(
     clock: Array, force: Array, frequency: float, cycles: float, *, each_cycle: bool
 ) -> tuple[Array, Array, Array]:
-    """Mean phase [cycles], mean force and number of rows of each bin that holds rows, (k,) each.
+    """Average the rows of a loop in bins of phase.
 
     A bin is a GRID-th of a cycle. The first few cycles have bins of their own, and later ones share bins in ever larger
     groups, unless `each_cycle` has its own. The clock [s], (n,), rises from the first row.
@@ -254,7 +254,7 @@ def phase_bins(
 
 
 def smooth_waves(phase: Array) -> Array:
-    """1, and the cosine and sine of each smooth harmonic, at phases in cycles, (n,) -> (11, n)."""
+    """Constant, and cosine and sine of the first five harmonics, at phases [cycles], (n,) -> (11, n)."""
     angle = 2.0 * np.pi * phase
     waves = [wave(order * angle) for order in range(1, SMOOTH_HARMONICS + 1) for wave in (np.cos, np.sin)]
     return np.array([np.ones_like(angle), *waves])

@@ -23,7 +23,7 @@ SHIFT = "temperature.shift"
 
 @dataclass(frozen=True, eq=False)
 class Shifted:
-    """A sweep beside its master curve.
+    """A sweep shifted to the reference temperature.
 
     Args:
         sweep: as it was fitted.
@@ -73,7 +73,7 @@ def can_shift(sweep: Sweep) -> bool:
 
 
 def law(result: Result, temperature: Array) -> tuple[Array, Array]:
-    """ln a_T of a fitted law at temperatures [K], and its standard errors; nan where these are not known.
+    """Fitted shift factors ln a_T at temperatures [K], with standard errors; nan if these are unknown.
 
     Returns:
         ln a_T and its standard error, (n,) each.

@@ -238,7 +238,7 @@ def _exceeds_noise(found: FitResult, rig: RigSettings) -> bool:
 
 
 def _is_smooth(found: FitResult, rig: RigSettings) -> bool:
-    """True if the tests are likelier with something smooth beside noise and a rig of the class, prior odds counted."""
+    """True if a smooth discrepancy is more probable than noise and errors of a rig of the class alone."""
     thinned = _thinned(found.minimised)
     solution = found.moved_to(found.model, thinned)
     tests = FittedTests(solution, [_errors_of_class(test, rig) for test in thinned])
@@ -253,8 +253,9 @@ def _is_smooth(found: FitResult, rig: RigSettings) -> bool:
 
 
 def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
-    """Whitened residuals of a test by the errors of a rig of the class beside what counts already: the gain of a loop,
-    and gain and phase of each level, (w, n)."""
+    """Whitened residuals by the errors of a rig of the class that the noise does not include: the gain of a loop, and
+    gain and phase of each level, (w, n).
+    """
     if isinstance(test, MeasuredLoop):
         gain = test.gain_error * test.unit_gain[None]
         return gain[:0] if test.gain_weighs else gain
@@ -264,10 +265,10 @@ def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
 
 
 def _in_noise(solution: FitResult, tests: Sequence[MeasuredTest]) -> FittedTests:
-    """A fitted model with other weights of the tests, beside no errors of the rig."""
+    """Fitted model with other weights of the tests, without errors of the rig."""
     return FittedTests(solution.moved_to(solution.model, tests), [np.empty((0, test.size)) for test in tests])
 
 
 def _thinned(tests: Sequence[MeasuredTest]) -> list[MeasuredTest]:
-    """The tests with evenly chosen points of dense sweeps: enough for what is smooth."""
+    """Tests with evenly chosen points of dense sweeps, enough for smooth discrepancies."""
     return [test if isinstance(test, MeasuredLoop) else test.thinned(_ENOUGH) for test in tests]

@@ -161,8 +161,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
 
 
 def _slope(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
-    """Exponent with which the scatter of lines goes with what is stepped, and a middle step; None where
-    repeats show no growth.
+    """Exponent of the growth of the scatter along what is stepped, and a middle step; None if repeats show no growth.
 
     Notes:
         Squares of the deviations over their line's mean are regressed on ln(step); the test is that of Koenker (1981),
@@ -196,7 +195,7 @@ def _slope(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
 
 
 def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -> tuple[dict[LineKey, Array], int]:
-    """Variance of gain and phase of each line, (2,), one for all where they agree, and its degrees of freedom.
+    """Variance of gain and phase of each line, (2,), pooled over lines that agree, and its degrees of freedom.
 
     Of few degrees of freedom gain and phase have one, unless they deny it.
     """
@@ -222,7 +221,7 @@ def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -
 
 
 def _shared(lines: Sequence[LineNoise], rig: RigSettings) -> Array:
-    """Standard deviation of what a run shares in gain and phase, (2,), outlying pairs of repeats left out.
+    """Standard deviation of the errors that a run shares, in gain and phase, (2,), without outlying pairs of repeats.
 
     Few repeats often show none by chance: what they lack to _ENOUGH degrees of freedom, the rig's class makes up.
     """

@@ -41,7 +41,7 @@ _LEAST_DISTANCE = 1e-3
 
 
 def outlier_limit(rows: int, parts: int, freedom: float) -> float:
-    """Distance from the truth, in units of noise, that noise alone reaches in one of a hundred tests of so many rows.
+    """Distance in units of noise that noise alone exceeds in one of a hundred tests.
 
     A row has so many `parts`: 1 for a force, 2 for a complex stiffness. Infinite freedom is a noise that is known.
 
@@ -54,7 +54,7 @@ def outlier_limit(rows: int, parts: int, freedom: float) -> float:
 
 
 def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
-    """Mask of rows that lie farther than a limit off a curve, by `residual`, and off neighbours, or are stuck, (n,).
+    """Mask of rows that are far from a curve and from their neighbours, or stuck, (n,).
 
     A short run of such rows has to lie as far off the rows before and after the run.
 
@@ -83,7 +83,7 @@ def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
 
 
 def are_stuck(recorded: Array) -> Array:
-    """Mask of rows that repeat the one before over and over, where the channel has noise that forbids it, (n,).
+    """Mask of rows in which a channel that has noise repeats one value, (n,).
 
     Returns:
         Mask, (n,).
@@ -104,7 +104,7 @@ def are_stuck(recorded: Array) -> Array:
 
 
 def gross_rows(values: Array) -> Array:
-    """Rows of a periodic motion that lie far off the median of those around them, before its period is known, (k,).
+    """Rows of a periodic motion, of unknown period, that are far from the median of their neighbours, (k,).
 
     None where these are many, even with a median over few rows: then the motion turns within so few rows.
 
@@ -130,7 +130,8 @@ def _run_lengths(mask: Array) -> Array:
 def outlying_points(
     deviation: Array, distance_of: Callable[..., Array], starts: Array, points: Array, freedom: float
 ) -> Array:
-    """Points that lie farther off the model than noise reaches, and as far off their neighbours, by number, (k,).
+    """Points of a sweep that are farther from the model than noise explains, and as far from their neighbours, by
+    number, (k,).
 
     A point that was repeated must stand out from its repeats as well: what all of them do is no fault of one row.
     Where two repeats or more agree against it that is enough, so that neither outliers side by side nor a misfit of
@@ -168,8 +169,11 @@ def outlying_points(
 
 
 def contradictions(stiffness: Array, place: Array) -> list[tuple[float, int, int]]:
-    """The two points of each place, (n,), that lie farthest apart in |K| or in phase, the worst first: how far, as a
-    share of |K|, from _UNLIKE on, and their numbers. Points of one `place` repeat each other.
+    """For each operating point, the two repeats that differ most, if they differ by _UNLIKE or more; the worst first.
+
+    Args:
+        stiffness: of the points, complex (n,).
+        place: number of the operating point of each point, (n,).
 
     Returns:
         For each contradiction the distance relative to |K| and two point numbers.
@@ -186,7 +190,7 @@ def contradictions(stiffness: Array, place: Array) -> list[tuple[float, int, int
 
 
 def misfit_scale(distance: Array, parts: int) -> float:
-    """Median distance from the model over that which noise alone makes, for points of so many parts; 1 or more."""
+    """Median distance from the model over that of noise alone; at least 1."""
     if not distance.size:
         return 1.0
     return max(1.0, float(np.median(distance) / np.sqrt(chdtri(parts, 0.5))))
@@ -205,7 +209,7 @@ def _from_neighbours(values: Array, starts: Array, window: int) -> Array:
 
 
 def _from_repeats(values: Array, place: Array) -> tuple[Array, Array]:
-    """How many other repeats each point has, (n,), and its distance from their median, 0 without any, complex (n,).
+    """Number of other repeats of each point, (n,), and its distance from their median, complex (n,); 0 without repeats.
 
     Points of one `place`, (n,), are repeats.
     """
@@ -224,7 +228,7 @@ def _from_repeats(values: Array, place: Array) -> tuple[Array, Array]:
 
 
 def least_absolute(basis: Array, values: Array, smallest: float) -> Array:
-    """Coefficients of a curve, (n, k), with the least sum of distances to points, (n, m) -> (k, m).
+    """Fit a curve with the least sum of absolute distances, (n, k), (n, m) -> (k, m).
 
     It hardly follows outliers. Distances of less than the relative one of the median and `smallest` count alike.
 

@@ -74,19 +74,19 @@ def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[Me
 
 
 def with_gains(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> list[MeasuredTest]:
-    """Tests whose loops' gain errors are part of their noise, or not."""
+    """Tests with the gain errors of loops included in their noise, or not."""
     return [replace(test, gain_weighs=weigh) if isinstance(test, MeasuredLoop) else test for test in data_sets]
 
 
 def repeats_of(loops: Sequence[MeasuredLoop]) -> Array:
-    """Mask of the loops that repeat one another, themselves among them, (n, n)."""
+    """Mask of the pairs of loops that repeat one another, (n, n)."""
     conditions = np.log([(loop.drive.amplitude, loop.drive.frequency) for loop in loops]).reshape(-1, 2)
     place = np.array([str(loop.direction) for loop in loops])
     return np.all(np.abs(conditions[:, None] - conditions) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
 
 
 def group_repeats(loops: Sequence[MeasuredLoop]) -> list[list[MeasuredLoop]]:
-    """Loops in groups that repeat one another; each is in one, that of the first that it repeats."""
+    """Group loops that repeat one another."""
     if not loops:
         return []
     first = np.argmax(repeats_of(loops), axis=1)
@@ -161,7 +161,7 @@ def split_by_kind(data_sets: Iterable[MeasuredTest]) -> tuple[list[MeasuredLoop]
 
 
 def rows_of(data_sets: Iterable[MeasuredTest]) -> list[slice]:
-    """Slices of the residuals of each test among those of all."""
+    """Slice of the residuals of each test among those of all tests."""
     ends = accumulate((test.size for test in data_sets), initial=0)
     return [slice(*pair) for pair in pairwise(ends)]
 
@@ -187,7 +187,7 @@ def log_slopes(model: Model, data_set: MeasuredTest, names: Sequence[str]) -> Ar
 
 
 def sources(data_sets: Iterable[MeasuredTest]) -> tuple[Source, ...]:
-    """The files that tests came from, each once: a record may hold several loops."""
+    """Files of tests, each once, because a record may contain several loops."""
     found = list[Source]()
     for test in data_sets:
         if test.source is not None and test.source not in found:
@@ -206,7 +206,7 @@ def new_loop(
     rows: int,
     from_rest: bool = False,
 ) -> MeasuredLoop:
-    """A sinusoidal loop of so many rows in all.
+    """Build a sinusoidal loop of a test that was not made.
 
     Args:
         frequency: [Hz].
@@ -241,7 +241,7 @@ def new_sweep(
     scatter: tuple[float, float],
     shared: tuple[float, float],
 ) -> MeasuredSweep:
-    """A sweep at operating points [Hz, m or rad], (n,) each, a run for each amplitude.
+    """Build a sweep that was not made, with one run for each amplitude.
 
     Args:
         scatter, shared: standard deviations of gain and phase, from point to point and of a run.

@@ -38,7 +38,7 @@ _Kind = TypeVar("_Kind", MeasuredLoop, MeasuredSweep, MeasuredLoop | MeasuredSwe
 
 @dataclass(frozen=True, eq=False)
 class PreparedCampaign:
-    """A campaign made ready to fit: one data set per loop and per sweep, and the limits that [fit] gives parameters."""
+    """A campaign ready to fit: its loops and sweeps with their noise, and the bounds of [fit]."""
 
     campaign: Campaign
     loops: tuple[MeasuredLoop, ...]
@@ -47,7 +47,7 @@ class PreparedCampaign:
 
     @classmethod
     def from_campaign(cls, campaign: Campaign) -> "PreparedCampaign":
-        """The data sets of a campaign as its [fit] asks for them.
+        """Prepare the tests of a campaign as its [fit] requests.
 
         Returns:
             The campaign with its measured tests.
@@ -69,7 +69,7 @@ class PreparedCampaign:
         return data.in_session()
 
     def in_session(self) -> "PreparedCampaign":
-        """Data whose points know what they were measured under."""
+        """Add to each test the circumstances in which it was measured, such as the temperature and earlier tests."""
         under = iter(measured_session(self.campaign.bushing, [data_set.test for data_set in self.data_sets]))
         loops = tuple(replace(loop, under=next(under).select(0)) for loop in self.loops)
         return replace(self, loops=loops, sweeps=tuple(replace(sweep, under=next(under)) for sweep in self.sweeps))
@@ -81,13 +81,13 @@ class PreparedCampaign:
 
     @property
     def notes(self) -> list[str]:
-        """Warnings on the tests themselves, whatever is fitted to them."""
+        """Warnings about the tests themselves."""
         of_tests = [f"{test.name}: {note}" for test in self.data_sets for note in test.notes]
         return [*of_tests, *mixed_conditions(self.data_sets)]
 
     @property
     def assumed(self) -> list[str]:
-        """Warning on an assumed class of the rig, where nothing was repeated and not all of the class is stated."""
+        """Warning if the class of the rig is assumed: nothing was repeated, and the class is not fully stated."""
         if None not in self.campaign.rig.stiffness_errors or all(
             sweep.noise.origin != "assumed" for sweep in self.sweeps
         ):
@@ -127,7 +127,7 @@ class PreparedCampaign:
         return replace(self, sweeps=tuple(sweeps))
 
     def with_sweeps(self, sweeps: Sequence[Sweep]) -> "PreparedCampaign":
-        """Data with its sweeps read anew, row by row: noise is estimated again, rows left out stay so."""
+        """Replace the sweeps by others with the same rows; their noise is estimated again."""
         fit, new = self.campaign.fit, []
         for old, data_set in zip(self.sweeps, prepare_sweeps(sweeps, fit.residuals, self.campaign.rig), strict=True):
             rows = old.order[old.weights == 0.0]

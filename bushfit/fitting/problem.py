@@ -60,7 +60,7 @@ class FitProblem:
 
     @cached_property
     def limits(self) -> tuple[Array, Array]:
-        """Lower and upper bound of each coordinate, (k,) each."""
+        """Lower and upper bounds of the coordinates, (k,) each."""
         low, high = coordinate_bounds(self.coordinates, self.bounds)
         inside = _INSIDE * (high - low)
         return low + inside, high - inside
@@ -183,7 +183,7 @@ class FitResult:
 
     @property
     def flat(self) -> bool:
-        """True if the next step would lower chi-square, in units of the misfit's variance, by less than chance does."""
+        """True if the next step would lower chi-square by less than chance does."""
         return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
 
     def gain(self, fixed: Collection[str]) -> float:

@@ -225,7 +225,7 @@ def _without_springpot(data: PreparedCampaign, static: FitResult) -> str:
 def _problem(
     data: PreparedCampaign, tests: Sequence[MeasuredTest], effects: Sequence[str], fixed: Mapping[str, float]
 ) -> FitProblem:
-    """The fit of what the campaign leaves free of a model, from start values of the campaign or of the tests."""
+    """Fit of the free parameters of a model, from start values of the campaign or of the tests."""
     model = data.starting_model(effects, tests, fixed)
     names = [name for name in data.free(tuple(model.parameters)) if name not in fixed]
     return FitProblem(model, tests, names, data.bounds)
@@ -234,7 +234,7 @@ def _problem(
 def _fit_step(
     data: PreparedCampaign, tests: Sequence[MeasuredTest], effects: Sequence[str], fixed: Mapping[str, float]
 ) -> FitResult:
-    """One fit of the paper's procedure, some values fixed, which lmfit makes."""
+    """Fit one step of the paper's procedure with lmfit."""
     return estimate(_problem(data, tests, effects, fixed), robust=data.robust, solver=solve_with_lmfit)
 
 

@@ -44,7 +44,7 @@ Interval = tuple[float | None, float | None]
 
 @dataclass(frozen=True, eq=False)
 class _Profile:
-    """The rise of chi-square by the coordinate of one parameter, the others fitted from the nearest `known` fit."""
+    """Profile of chi-square over one parameter, with the other parameters fitted."""
 
     name: str
     best: FitResult
@@ -69,11 +69,11 @@ class _Profile:
         return self.known[coordinate]
 
     def root_rise(self, coordinate: float) -> float:
-        """Root of the rise over the least chi-square."""
+        """Square root of the rise of chi-square above its minimum."""
         return float(np.sqrt(max(self.fitted(coordinate).chi_square - self.best.chi_square, 0.0)))
 
     def end(self, start: float, bound: float, step: float, allowed: float) -> float | None:
-        """Value at which the root of the rise, in steps from the best one to the bound, is as allowed, if anywhere."""
+        """Value at which the square root of the rise reaches the allowed one; None if it does not."""
         from scipy.optimize import brentq
 
         steps = start + np.copysign(step, bound - start) * np.arange(_MOST_STEPS + 1)

@@ -40,7 +40,7 @@ _OUTLIER = 6.0
 
 @dataclass(frozen=True)
 class LineNoise:
-    """Noise of one line of a sweep as its repeats show it.
+    """Noise of one line of a sweep, estimated from its repeats.
 
     Args:
         scatter: deviations of gain and phase from point to point, (k, 2).
@@ -68,8 +68,7 @@ class LineNoise:
 
 
 def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed: Collection[float] = ()) -> LineNoise:
-    """Estimate the noise of one line of a sweep without disturbed steps: by pairs of repeats, or about a smooth curve
-    where there is no pair.
+    """Estimate the noise of one line of a sweep from pairs of repeats, or from its scatter about a smooth curve.
 
     Args:
         sweep: measured sweep.
@@ -106,13 +105,12 @@ def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed:
 
 
 def free_of(steps: int) -> float:
-    """Degrees of freedom behind the squares of so many steps from one value to the next, which share the values."""
+    """Degrees of freedom of the mean square of successive differences."""
     return 2.0 * steps**2 / (3.0 * steps - 1.0)
 
 
 def _usual(difference: Array, log_step: Array) -> Array:
-    """Mask of steps at which two repeats were both measured and differ as they do elsewhere, (n,): single outliers are
-    faults.
+    """Mask of steps at which two repeats differ as they do at other steps, (n,).
 
     Elsewhere is all along the run, and nearby where differences grow along it: by Theil's (1950) median slope.
     """
@@ -130,7 +128,7 @@ def _usual(difference: Array, log_step: Array) -> Array:
 
 
 def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
-    """Noise of a line without repeats: its scatter about a smooth curve; of one or two points this is assumed."""
+    """Noise of a line without repeats: its scatter about a smooth curve; assumed if the line has one or two points."""
     degree = min(_SMOOTH_DEGREE, steps.size - 2)
     if degree < 1:
         return LineNoise(np.full((1, 2), ASSUMED[0]), 1, np.empty((0, 2)))
@@ -152,8 +150,7 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
 
 
 def disturbed(lines: Iterable[LineNoise]) -> list[float]:
-    """Steps at which lines without repeats scatter far more than elsewhere, such as frequencies near that of the mains:
-    there it is no noise of the rig.
+    """Steps at which lines without repeats scatter far more than elsewhere, such as frequencies near that of the mains.
 
     Returns:
         Frequencies [Hz] or amplitudes [m or rad].
@@ -170,14 +167,12 @@ def disturbed(lines: Iterable[LineNoise]) -> list[float]:
 
 
 def unit(values: Array) -> Array:
-    """Values spread from -1 to 1, (n,); all -1 where they are one."""
+    """Scale values to -1 ... 1, (n,); all -1 if they are equal."""
     return 2.0 * (values - values.min()) / max(float(np.ptp(values)), np.finfo(float).tiny) - 1.0
 
 
 def _freed(basis: Array, values: Array) -> Array:
-    """Residuals of values about a curve, (n, k), (n, m) -> (n - k, m), in orthonormal coordinates: they scatter
-    independently. No matrix of n by n is made.
-    """
+    """Independent residuals of values about a curve, (n, k), (n, m) -> (n - k, m), in orthonormal coordinates."""
     (reflections, factors), _ = qr(basis, mode="raw")
     turned, *_ = lapack.dormqr("L", "T", reflections, factors, values, lwork=values.shape[1])
     return np.asarray(turned[basis.shape[1] :])
@@ -189,7 +184,7 @@ def _parts(values: Array) -> Array:
 
 
 def at_nominal(sweep: Sweep) -> Array:
-    """ln K of each point as it would be at the amplitude of its level, complex (n,).
+    """Logarithm of the stiffness of each point, corrected to the nominal amplitude of its level, complex (n,).
 
     From the amplitude that was reached it is carried there along a smooth surface over ln f and ln X, which tells how K
     goes with amplitude; without two levels or more there is none.

@@ -12,7 +12,7 @@ _MOST_CLASSES = 3.0
 
 
 def of_class(rig: RigSettings, unstated: tuple[float, float] = ASSUMED) -> tuple[float, float]:
-    """Gain and phase error [rad] that a rig's class states, else the one given."""
+    """Gain and phase error [rad] of the class of a rig, as stated or by default."""
     gain, phase = (default if one is None else one for one, default in zip(rig.stiffness_errors, unstated, strict=True))
     return gain, phase
 
@@ -24,12 +24,12 @@ def largest_error(rig: RigSettings) -> tuple[float, float]:
 
 
 def words_of(error: tuple[float, float]) -> str:
-    """A gain and a phase error [rad] in words."""
+    """Gain and phase error [rad] as text."""
     return f"{100.0 * error[0]:.2g} % gain and {np.degrees(error[1]):.2g} deg phase"
 
 
 def class_words(rig: RigSettings) -> str:
-    """A rig's class as it counts, in words: gain and phase error, and which of them is assumed."""
+    """Class of a rig as text: gain and phase error, and which of them is assumed."""
     unstated = [name for name, error in zip(("gain", "phase"), rig.stiffness_errors, strict=True) if error is None]
     whose = f"{' and '.join(unstated)} assumed" if unstated else "as [rig] states"
     return f"{words_of(of_class(rig))}, {whose}"

@@ -50,7 +50,7 @@ def outliers_at(
 def estimate(
     problem: FitProblem, *, robust: bool = False, solver: Callable[[FitProblem], FitResult] = solve
 ) -> FitResult:
-    """Fit by least squares, or robustly: soft_l1, the outliers of sweeps left out.
+    """Fit by least squares, or robustly by the loss soft_l1 without the outliers of sweeps.
 
     soft_l1 minimises the sum of 2 C^2 (sqrt(1 + (z/C)^2) - 1) over the distances z of the points in units of noise.
     The covariance is that of least squares with all weights at (E psi')^2/E psi^2 of normal noise, psi the loss's
@@ -95,7 +95,7 @@ def estimate(
 
 @lru_cache(maxsize=4)
 def _efficiency(parts: int) -> float:
-    """(E psi')^2/E psi^2 of soft_l1 under normal noise of so many parts a point."""
+    """Efficiency (E psi')^2/E psi^2 of soft_l1 under normal noise, for points of one or two components."""
     z = np.linspace(0.0, 12.0, 4001)[1:]
     density = z ** (parts - 1) * np.exp(-(z**2) / 2.0)
     density /= density.sum()

@@ -41,7 +41,7 @@ _FIRST_EVEN = 4
 
 @dataclass(frozen=True, eq=False)
 class RowNoise:
-    """Noise of unit variance a row, each row's dependent on those before it; by default they are independent.
+    """Correlated noise of the rows of a loop, of unit variance, as an autoregressive model.
 
     Args:
         filter: prediction-error filter b, (p + 1,): sum of b_k times the k-th row before is white of unit variance.
@@ -68,12 +68,11 @@ class RowNoise:
 
     @property
     def rows_as_one(self) -> float:
-        """Number of rows that tell as much as one independent row about what is slow, at least 1."""
+        """Number of correlated rows with the information of one independent row on slow changes, at least 1."""
         return max(1.0 / float(np.sum(self.filter)) ** 2, 1.0)
 
     def counting(self, weight: Array) -> Array:
-        """Mask of the whitened rows that count, (n,): those that have weight, as have all from which their noise is
-        known.
+        """Mask of the whitened rows that have weight and whose preceding rows have weight, (n,).
 
         Returns:
             Mask, (n,).
@@ -120,7 +119,7 @@ class RowNoise:
         return list(np.tensordot(self.error.T, np.array(moves), axes=1))
 
     def _coloured(self, rows: Array, delay: int) -> Array:
-        """Independent numbers as the noise, over b_0, that they stand for, so many rows late, (..., n)."""
+        """Correlated noise, over b_0, from independent numbers, delayed by some rows, (..., n)."""
         late = np.zeros((rows.shape[-1], rows[..., 0].size))  # a banded system: no module of filters is loaded
         late[delay:] = rows.reshape(late.shape[::-1])[:, : len(late) - delay].T
         band = np.repeat((self.filter / self.filter[0])[:, None], len(late), axis=1)
@@ -134,13 +133,13 @@ class _Model(NamedTuple):
     correlations: Array
 
     def spectrum(self, waves: Array) -> Array:
-        """Power at frequencies whose waves, (lags, m), have a row per lag, (m,)."""
+        """Power spectrum at frequencies given by their waves, (lags, m) -> (m,)."""
         variance = self.polynomial @ self.correlations
         return variance / np.abs(self.polynomial @ waves[: self.polynomial.size]) ** 2
 
 
 def row_noise(residual: Array, settled: Array, cycles: int) -> tuple[RowNoise, float]:
-    """The noise of a loop's rows, and the standard deviation of one row [N or N m].
+    """Estimate the noise of the rows of a loop.
 
     Args:
         residual: force less its harmonics; of a lone cycle less its mean, its first three and all odd ones, (n,).
@@ -178,7 +177,7 @@ def _periodogram(rows: Array) -> Array:
 
 
 def _fitted(power: Array, waves: Array, used: Array) -> _Model:
-    """The autoregressive model, of the order that Schwarz's criterion prefers, of a periodogram where it is used."""
+    """Fit an autoregressive model to a periodogram, with the order of Schwarz's criterion."""
     ends = np.ones(power.size)
     ends[[0, -1]] = 0.5
     cosines, used_numbers = waves.real * (ends / ends.sum()), np.flatnonzero(used)
@@ -205,7 +204,7 @@ def _fitted(power: Array, waves: Array, used: Array) -> _Model:
 
 
 def _noise_of(model: _Model, power: Array, waves: Array) -> RowNoise:
-    """The noise of a model, its errors and its share from the power, (m,), and waves it was fitted to, (lags, m)."""
+    """Noise of a fitted model, with its errors, from the power, (m,), and waves of the fit, (lags, m)."""
     polynomial, correlations = model
     order, lags = polynomial.size - 1, waves[1 : polynomial.size]
     slopes = np.vstack((np.ones(waves.shape[1]), -2.0 * (lags / (polynomial @ waves[: order + 1])).real))

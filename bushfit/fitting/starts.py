@@ -38,7 +38,7 @@ _ALPHA_RANGE = (0.1, 0.6)
 def start_values(
     bushing: Bushing | None, data_sets: Sequence[MeasuredTest], fixed: Mapping[str, float]
 ) -> dict[str, float]:
-    """Values of mu, m, alpha, sigma_fmax, eps_half to start from; fixed values are kept and allowed for.
+    """Determine start values of mu, m, alpha, sigma_fmax and eps_half from tests.
 
     What lies beyond the bounds of its parameter is moved to them.
 

@@ -27,7 +27,7 @@ from bushfit.fitting.noise import SweepNoise
 
 @dataclass(frozen=True, eq=False)
 class SharedError:
-    """An error that the deviations of each group share, groups side by side; what else they have is white.
+    """An error that all deviations of a group share, beside independent noise.
 
     Args:
         starts: index of the first deviation of each group, (g,).
@@ -67,7 +67,7 @@ class SharedError:
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """Covariance of a sweep's deviations, gain and phase apart, block by block.
+    """Covariance of the deviations of a sweep, block by block.
 
     Args:
         starts: index of the first point of each block, (blocks,).
@@ -144,7 +144,7 @@ class Whitening:
         return rows.reshape(2, -1) / self.random
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
-        """Reactions of an estimator to each variance of the noise, (k, 2 n) each, as `MeasuredTest.unsure`.
+        """Reaction of an estimator to each estimated variance of the noise, (k, 2 n) each.
 
         Returns:
             Reactions by variance, (k, 2 n) each.
