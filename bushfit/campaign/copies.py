@@ -31,8 +31,11 @@ def group_copies(tests: Sequence[_Test]) -> list[list[_Test]]:
     """
     groups: defaultdict[object, list[_Test]] = defaultdict(list)
     for number, test in enumerate(tests):
-        is_short = isinstance(test, Sweep) and test.frequency.size < _FEWEST_POINTS
-        groups[test.direction, number if is_short else _numbers(test)].append(test)
+        if isinstance(test, Loop):
+            numbers: bytes | int = np.stack((test.time, test.displacement, test.force)).tobytes()
+        else:
+            numbers = _digits(test) if test.frequency.size >= _FEWEST_POINTS else number
+        groups[test.direction, numbers].append(test)
     return list(groups.values())
 
 
@@ -62,44 +65,31 @@ def without_copied_repeats(sweep: Sweep) -> Sweep:
         The remaining rows, with a note that names the copied repeats; the sweep itself without copies.
     """
     runs: set[bytes] = set()
-    is_copy = np.zeros(sweep.frequency.size, dtype=bool)
-    repeats: list[int] = []
-    for repeat in np.unique(sweep.repeat).tolist():
-        for level in np.unique(sweep.held[sweep.repeat == repeat]).tolist():
-            rows = (sweep.repeat == repeat) & (sweep.held == level)
-            numbers = _digits(sweep, rows)
-            if numbers in runs:
-                is_copy |= rows
-                repeats.append(repeat)
-            runs.add(numbers)
+    is_copy, repeats = np.zeros(sweep.frequency.size, dtype=bool), dict[int, None]()
+    for repeat, level in sorted(set(zip(sweep.repeat.tolist(), sweep.held.tolist(), strict=True))):
+        rows = (sweep.repeat == repeat) & (sweep.held == level)
+        numbers = _digits(sweep, rows)
+        if numbers in runs:
+            is_copy |= rows
+            repeats[repeat] = None
+        runs.add(numbers)
     points = int(np.count_nonzero(is_copy))
     if sweep.stepped is None or points < _FEWEST_POINTS:
         return sweep
-    remaining = ~is_copy
     names = ("frequency", "amplitude", "stiffness", "repeat", "reached", "relative_error", "temperature")
     columns = {name: getattr(sweep, name) for name in names}
-    columns = {name: values[remaining] for name, values in columns.items() if isinstance(values, np.ndarray)}
-    listed = _listed([f"{repeat}" for repeat in dict.fromkeys(repeats)])
-    one = len(set(repeats)) == 1
+    columns = {name: values[~is_copy] for name, values in columns.items() if isinstance(values, np.ndarray)}
     note = (
-        f"{points} points of repeat{'' if one else 's'} {listed} are those of an earlier repeat in all digits: counted "
-        "once, and data rows are numbered without them"
+        f"{points} points of repeat{'s' * (len(repeats) > 1)} {_listed([*map(str, repeats)])} are those of an earlier "
+        "repeat in all digits: counted once, and data rows are numbered without them"
     )
     return _with_note(replace(sweep, **columns), note)
 
 
-def _numbers(test: Loop | Sweep) -> bytes:
-    """All numbers that were measured in a test."""
-    if isinstance(test, Loop):
-        return np.stack((test.time, test.displacement, test.force)).tobytes()
-    return _digits(test, np.ones(test.frequency.size, dtype=bool))
-
-
-def _digits(sweep: Sweep, rows: NDArray[np.bool_]) -> bytes:
+def _digits(sweep: Sweep, rows: NDArray[np.bool_] | slice = slice(None)) -> bytes:
     """Frequencies, amplitudes and stiffness of some rows of a sweep, rounded, in an order of their own."""
     stiffness = sweep.stiffness[rows]
-    amplitude = sweep.amplitude_reached[rows]
-    numbers = np.stack([sweep.frequency[rows], amplitude, stiffness.real, stiffness.imag])
+    numbers = np.stack([sweep.frequency[rows], sweep.amplitude_reached[rows], stiffness.real, stiffness.imag])
     scale = 10.0 ** (_DIGITS - 1 - np.floor(np.log10(np.maximum(np.abs(numbers), 1e-300))))
     numbers = np.round(numbers * scale) / scale
     return numbers[:, np.lexsort(numbers[::-1])].tobytes()

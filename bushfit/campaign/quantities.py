@@ -2,12 +2,13 @@
 
 import base64
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import BeforeValidator
 
 from bushfit.effects import get_parameter, is_parameter, parameter_names
 from bushfit.errors import CampaignError, UnitError, error_location
@@ -21,6 +22,8 @@ _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
 Polymer = Literal["natural", "SBR", "EPDM", "NBR", "CR", "IIR"]
 #: Hardness between which Gent's relation is used [Shore A]: outside of it a durometer hardly tells rubbers apart.
 _HARDNESS = (20.0, 90.0)
+#: Unit of the filler.
+_PHR = r"phr(?:\s+(?:of\s+)?carbon[\s-]black)?"
 #: Carbon black at most [phr]: more is not mixed into rubber that is to move.
 _MOST_FILLER = 120.0
 #: A logo at most [bytes]: it stands in every model file of its campaign.
@@ -61,26 +64,23 @@ def parameter_values(raw: dict[str, Any]) -> dict[str, float]:
 
 
 def effect_values(raw: dict[str, Any]) -> dict[str, Any]:
-    """Values by effect and parameter, in SI."""
-
-    def values(effect: str, table: dict[str, Any]) -> dict[str, float]:
-        return {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
-
-    return _each_table(raw, values)
+    """Values by effect and parameter, in SI; what is no table is left to pydantic."""
+    return {
+        effect: {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
+        if isinstance(table, dict)
+        else table
+        for effect, table in raw.items()
+    }
 
 
 def with_sizes(raw: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
-    """Tables by parameter with the values of some keys in SI; what is no table is left alone."""
-
-    def sized_table(name: str, table: dict[str, Any]) -> dict[str, Any]:
-        return table | {key: parameter_value(f"{name}.{key}", name, table[key]) for key in keys if key in table}
-
-    return _each_table(raw, sized_table)
-
-
-def _each_table(raw: dict[str, Any], convert: Callable[[str, dict[str, Any]], Any]) -> dict[str, Any]:
-    """Tables by name, each converted; what is no table is left to pydantic."""
-    return {name: convert(name, table) if isinstance(table, dict) else table for name, table in raw.items()}
+    """Tables by parameter with the values of some keys in SI; what is no table is left to pydantic."""
+    return {
+        name: table | {key: parameter_value(f"{name}.{key}", name, table[key]) for key in keys if key in table}
+        if isinstance(table, dict)
+        else table
+        for name, table in raw.items()
+    }
 
 
 def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
@@ -114,39 +114,27 @@ def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
     return settings
 
 
-def hardness(raw: object) -> float:
-    """The number of a text such as "61 Shore A".
+def _plain_number(quantity: str, unit: str, example: str, largest: float, smallest: float = 0.0) -> BeforeValidator:
+    """Validator of a text with a unit that pint does not know; the JSON Schema has the example.
 
-    Raises:
-        UnitError: no such text.
-        CampaignError: a hardness for which Gent's relation does not hold.
+    Args:
+        quantity: for errors, such as "a hardness".
+        unit: regular expression of the unit.
+        example: text with the unit.
+        largest, smallest: limits of the number.
     """
-    found = _number(raw, r"sh(?:ore)?\.?\s*a", "a hardness", '"61 Shore A"')
-    if not _HARDNESS[0] <= found <= _HARDNESS[1]:
-        expected = f"{_HARDNESS[0]:g} to {_HARDNESS[1]:g} Shore A"
-        raise CampaignError("no modulus follows from this hardness", found=str(raw), expected=expected)
-    return found
+    pattern = re.compile(rf"\s*(\d{{1,4}}(?:\.\d{{1,6}})?)\s*(?:{unit})\s*", re.ASCII | re.IGNORECASE)
 
+    def convert(raw: object, _: object) -> float:
+        match = pattern.fullmatch(raw) if isinstance(raw, str) else None
+        if not match:
+            raise UnitError(f"this is not {quantity}", found=str(raw), expected=f'"{example}"')
+        if not smallest <= float(match[1]) <= largest:
+            limits = f"{smallest:g} to {largest:g} {example.partition(' ')[2]}"
+            raise CampaignError(f"{quantity} for which no estimate is known", found=str(raw), expected=limits)
+        return float(match[1])
 
-def filler(raw: object) -> float:
-    """The carbon black per hundred parts of rubber of a text such as "27 phr", or "27 phr carbon black".
-
-    Raises:
-        UnitError: no such text.
-        CampaignError: more filler than there is in bushings.
-    """
-    found = _number(raw, r"phr(?:\s+(?:of\s+)?carbon[\s-]black)?", "a filler", '"27 phr", of carbon black')
-    if found > _MOST_FILLER:
-        raise CampaignError("impossible filler", found=str(raw), expected=f"0 to {_MOST_FILLER:g} phr of carbon black")
-    return found
-
-
-def _number(raw: object, unit: str, quantity: str, expected: str) -> float:
-    """The number before a unit that pint does not know."""
-    match = re.fullmatch(rf"\s*(\d{{1,4}}(?:\.\d{{1,6}})?)\s*(?:{unit})\s*", str(raw), re.ASCII | re.IGNORECASE)
-    if not (isinstance(raw, str) and match):
-        raise UnitError(f"this is not {quantity}", found=str(raw), expected=expected)
-    return float(match[1])
+    return converter(convert, text(f'such as "{example}"'))
 
 
 @dataclass(frozen=True)
@@ -159,8 +147,8 @@ class Compound:
         rubber: the polymer.
     """
 
-    hardness: Annotated[float, converter(lambda raw, _: hardness(raw), text('such as "61 Shore A"'))]
-    filler: Annotated[float, converter(lambda raw, _: filler(raw), text('such as "27 phr"'))]
+    hardness: Annotated[float, _plain_number("a hardness", r"sh(?:ore)?\.?\s*a", "61 Shore A", *_HARDNESS[::-1])]
+    filler: Annotated[float, _plain_number("a filler", _PHR, "27 phr", _MOST_FILLER)]
     rubber: Polymer = "natural"
 
 

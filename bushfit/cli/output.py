@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -46,6 +47,8 @@ _PATIENCE = 2.0
 _WIDTH = 100
 #: Largest number of warnings that are printed without -v.
 _MOST_WARNINGS = 3
+#: Signs in which warnings differ that say the same of several places or tests.
+_NUMBERS = re.compile(r"[-+\d.]+")
 #: Characters between two columns of a table.
 _GAP = 3
 
@@ -133,7 +136,7 @@ class Output:
         self._warnings.update(dict.fromkeys(warnings))
 
     def print_warnings(self) -> None:
-        """Print the most important of the warnings that were kept, one for each meaning for the use; with -v all."""
+        """Print the most important of the warnings that were kept, each for one place or test only; with -v all."""
         if not self._warnings:
             return
         from bushfit.prediction.caveats import by_importance, use_of
@@ -141,8 +144,10 @@ class Output:
         warnings = by_importance(self._warnings)
         if not self.verbose:
             warnings = [line for line in warnings if not any(line in verdict for verdict in self._headlines)]
-        distinct = {use_of(warning): warning for warning in reversed(warnings)}
-        printed = warnings if self.verbose else [*distinct.values()][::-1][:_MOST_WARNINGS]
+        distinct: dict[str, str] = {}
+        for line in warnings:
+            distinct.setdefault(_NUMBERS.sub("", line.partition(": ")[2] or line), line)
+        printed = warnings if self.verbose else [*distinct.values()][:_MOST_WARNINGS]
         for warning in printed:
             self.console.print(f"[yellow]warning:[/yellow] {escape(warning)}")
             if (use := use_of(warning)) != use_of(""):  # which is said of warnings of no known kind

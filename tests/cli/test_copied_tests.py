@@ -56,7 +56,7 @@ def test_inspect_names_files_with_the_same_data(bushfit: Run, own: Path) -> None
     copy = (own / LOOP).with_name("again.csv")
     copy.write_bytes((own / LOOP).read_bytes())
     done = bushfit("inspect", own / LOOP, copy, own / SWEEP, "--no-plots")
-    lines = [line for line in " ".join(done.stderr.split()).split("odd: ") if "the same data" in line]
+    lines = [line for line in " ".join(done.stderr.split()).split("unusual: ") if "the same data" in line]
     assert [line.split(":")[0] for line in lines] == ["loop_axial_1.csv", "again.csv"]
     assert "again.csv: a campaign counts them once" in lines[0]
     assert "loop_axial_1.csv: a campaign counts them once" in lines[1]
