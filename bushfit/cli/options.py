@@ -223,6 +223,7 @@ def format_options(*kinds: Written) -> list[Parameter]:
             type=click.Choice(get_args(Form)),
             default="csv",
             envvar="BUSHFIT_TABLE_FORMAT",
+            show_envvar=True,
         ),
         "pictures": option(
             "--plot-format",
@@ -232,6 +233,7 @@ def format_options(*kinds: Written) -> list[Parameter]:
             multiple=True,
             default=["png"],
             envvar="BUSHFIT_PLOT_FORMAT",
+            show_envvar=True,
         ),
         "pages": flag("--no-report", "Do not write the HTML page."),
     }
