@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import re
 import sys
@@ -207,6 +208,7 @@ class Output:
             inputs: files that the command has read and must not replace.
         """
         self.print_warnings()
+        gc.freeze()  # figures make many objects: the search for unused ones need not pass through all others each time
         written = write_results(folder, files, self.formats, overwrite=self.force, inputs=inputs)
         if document is not None:
             self.print_json(document)

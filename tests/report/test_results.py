@@ -7,11 +7,9 @@ import io
 import os
 import signal
 import stat
-import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args
 from xml.etree import ElementTree
@@ -106,30 +104,6 @@ def test_a_figure_that_fails_loses_no_other_file(tmp_path: Path) -> None:
     with pytest.raises(RuntimeError):
         write_results(tmp_path, files)
     assert set(contents(tmp_path)) == {"y.json", "z.csv"}
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A disk of 64 KiB."""
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mounting = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(folder)]
-    try:
-        done = subprocess.run(mounting, capture_output=True, text=True, check=False)
-    except FileNotFoundError as error:
-        pytest.skip(f"no disk can be mounted here: {error}")
-    if done.returncode:
-        pytest.skip(f"no disk may be mounted here: {done.stderr.strip()}")
-    yield folder
-    subprocess.run(["umount", str(folder)], check=True)
-
-
-def test_a_full_disk_keeps_the_old_file(small_disk: Path) -> None:
-    write(small_disk / "x", OLD)
-    with pytest.raises(OutputError, match="No space left"):
-        write(small_disk / "x", {"a.csv": bytes(90_000)}, force=True)
-    assert contents(small_disk / "x") == OLD
-    assert not list((small_disk / "x").glob("*.part"))
 
 
 def test_a_folder_that_allows_no_writing() -> None:

@@ -77,6 +77,7 @@ _WIDER_FONTS = {"Noto Sans CJK SC", "Noto Sans CJK JP", "WenQuanYi Zen Hei", "Mi
 _SETTINGS: dict[Any, Any] = {
     key: value for key, value in rcParamsDefault.items() if key.partition(".")[0] not in ("backend", "interactive")
 } | {
+    "font.family": ["DejaVu Sans"],  # one font to look for, not the fourteen of sans-serif
     "axes.grid": True,
     "axes.axisbelow": True,
     "axes.labelsize": TEXT,

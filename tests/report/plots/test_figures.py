@@ -43,7 +43,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
 from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.reduction.steps import Reduction, Step, reduce
+from bushfit.reduction.steps import reduce
 from bushfit.report.plots.appendix import complex_figure, ellipses_figure
 from bushfit.report.plots.inspection import inspection_figure, reduction_figure
 from bushfit.report.plots.master_curve import arms_figure
@@ -318,19 +318,3 @@ def test_many_loops(paper_model: Model, looped: Looped, count: int) -> None:
     assert ("Only 8 loops of a direction are drawn" in note(figure)) is (count > 8)
     for after in (paper_model, paper_model.with_values({"mu": 1.2 * paper_model.values["mu"]})):
         checked(gap(paper_model, after, data_sets))
-
-
-@pytest.mark.parametrize(("levels", "histories"), [(8, 40), pytest.param(60, 2, marks=pytest.mark.slow)])
-def test_reduction_of_many_levels(levels: int, histories: int) -> None:
-    time = np.linspace(0.0, 2.0 * levels, 4000)
-    motion = 1e-3 * np.sin(20.0 * time)
-    records = [Loop(f"{LONG_NAME}{k}", Direction.AXIAL, time, motion, 1e6 * motion) for k in range(histories)]
-    steps = tuple(
-        Step(record.name, 2.0 * k, 2.0 * k + 1.0, 10, 12, 50.0, f, a, 1e6 + 1e5j, 3e-3, 3e-3, 0.01, 0.02, f, a)
-        for record in records
-        for k, a in enumerate(np.geomspace(1e-5, 1e-3, levels))
-        for f in (5.0, 50.0)
-    )
-    figure = checked(reduction_figure(Reduction(Direction.AXIAL, steps, ()), records, "raw.csv"))
-    (box,) = (axes for axes in figure.axes if axes.get_legend())
-    assert len(legend(box)) == min(levels, 8) + (levels > 8)

@@ -164,20 +164,3 @@ def test_triangles_have_a_name_and_the_value_that_the_panel_does_not_show() -> N
     assert {text.get_text() for text in axes.texts} == {"b5: 4010", "b7: 30", "b9: 20"}
     boxes = [text.get_window_extent() for text in axes.texts]
     assert not any(one.overlaps(other) for one, other in combinations(boxes, 2)), "names must not cover each other"
-
-
-def test_a_panel_shows_no_less_than_what_is_known() -> None:
-    rounding = 1e-8 * np.arange(6.0)
-    values, half = 0.010974926 + rounding, 2e-4
-    ends = np.stack((values - half, values + half))
-    names = [f"b{n}" for n in range(6)]
-    figure = batch_figure([Panel("a [-]", values, intervals=ends), Panel("b [-]", values)], "x", names)
-    to_image(figure)
-    known, unknown = figure.axes[:2]
-    assert np.ptp(known.get_ylim()) > 2.0 * half
-    bars = [line for found in known.collections for line in found.get_segments()]
-    np.testing.assert_allclose(np.array(bars)[:, :, 1].T, ends)
-    assert unknown.collections[:] == []
-    for axes in (known, unknown):
-        assert all(len(label.get_text()) < 10 for label in axes.get_yticklabels())
-    assert "95 % intervals" in note(figure)
