@@ -99,10 +99,7 @@ def run_batch(
             before_writing(result)
             if plan.junit:
                 write_files(plan.junit.parent, {plan.junit.name: junit_report(result)})
-            for name, content in files.items():
-                staged = output / store.STAGE / name
-                staged.write_bytes(content)
-                staged.replace(output / name)
+            write_files(output, files)
             return result
     except OSError as error:
         raise unwritable(output, error) from error

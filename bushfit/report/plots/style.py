@@ -47,6 +47,8 @@ NAMES: dict[str, Any] = {"fontsize": TEXT, "color": INK}
 WORDS: dict[str, Any] = {"fontsize": SMALL, "color": INK}
 #: Resolution of a picture [dots per inch]: sharp in a report, and small enough to be mailed.
 _DPI = 150
+#: Effort of compressing a PNG: more takes longer and saves little.
+_COMPRESSION = 3
 #: Metadata that would hold date and version, by format.
 _UNSAID = {"png": ["Software"], "svg": ["Creator", "Date"], "pdf": ["Creator", "Producer", "CreationDate"]}
 #: Most lines that a legend names: more do not fit beside a panel.
@@ -339,5 +341,6 @@ def to_image(figure: Figure, form: str = "png", *, outlines: bool = True) -> byt
     figure.set_dpi(_DPI)  # SVG and PDF leave that of their units behind
     with _own_settings(**{"svg.fonttype": "path" if outlines else "none"}):
         canvas = get_registered_canvas_class(form)(figure)
-        getattr(canvas, f"print_{form}")(buffer, metadata=dict.fromkeys(_UNSAID[form]))
+        options = {"pil_kwargs": {"compress_level": _COMPRESSION}} if form == "png" else {}
+        getattr(canvas, f"print_{form}")(buffer, metadata=dict.fromkeys(_UNSAID[form]), **options)
     return buffer.getvalue()

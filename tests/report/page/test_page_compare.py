@@ -138,6 +138,7 @@ def test_report_makes_it_again_and_elsewhere_with_whole_links(batch: Path, tmp_p
     assert done.returncode == 0, done.stderr
     links = re.findall(r'href="([^"]*)"', (tmp_path / "x/index.html").read_text(encoding="utf-8"))
     assert sorted(set(links)) == [f"{batch.resolve().as_uri()}/bushings/c{n}/report.html" for n in range(3)]
+    assert call(tmp_path, "report", batch, "--force").returncode == 0
 
 
 @SLOW

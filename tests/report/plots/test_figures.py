@@ -197,19 +197,6 @@ def test_what_may_be_the_rigs_has_a_double_line_that_the_legend_names(paper_mode
     assert "Double lines: the model if the unresolved effect belongs to the rig" in note(figure)
 
 
-def test_units_follow_direction_and_size(
-    paper_model: Model, other_models: dict[str, Model], swept: Swept, looped: Looped
-) -> None:
-    torsion = swept(paper_model, Direction.TORSION, amplitudes=TORSION)
-    figure = prediction(fitted(paper_model), Direction.TORSION, torsion, amplitudes=TORSION)
-    assert {"torsion stiffness |K| [N m/rad]", "amplitude [deg]"} <= {*labels(figure)}
-    assert legend(figure.axes[1]) == ["0.5 deg", "1 deg", "2 deg"]
-    stiff = prediction(fitted(other_models["stiff and thin"]), Direction.RADIAL)
-    assert "radial stiffness |K| [kN/mm]" in labels(stiff)
-    over_rotation = labels(loops(paper_model, looped(paper_model, 0.1, direction=Direction.TORSION)))
-    assert over_rotation[:2] == ["rotation [deg]", "torsion moment [N m]"]
-
-
 def test_storage_loss_and_ellipses(paper_model: Model, swept: Swept) -> None:
     result = fitted(paper_model)
     grid = predict(result, Direction.AXIAL, FREQUENCIES, AMPLITUDES)
