@@ -52,9 +52,9 @@ _BY_UNIT: tuple[tuple[str, tuple[str, ...], str | None], ...] = (
     ("storage_stiffness", ("N/m", "N*m/rad", "Pa"), "real"),
     ("loss_stiffness", ("N/m", "N*m/rad", "Pa"), "imaginary"),
     ("stiffness", ("N/m", "N*m/rad"), None),
+    ("force_amplitude", ("N", "N*m"), "amplitude"),
     ("frequency", ("Hz",), None),
     ("amplitude", ("m", "rad", "1"), "amplitude"),
-    ("force_amplitude", ("N", "N*m"), "amplitude"),
     ("phase", ("rad",), None),
 )
 
@@ -262,7 +262,7 @@ def _add_by_unit(
             if motion is STRAINING and any(len(strain) > 4 and plain(strain) in plain(name) for strain in strains):
                 words |= {"amplitude"}  # a compound, such as Scherdeformation
             free[index] = column, words
-    notes = []
+    notes, amplitude = [], _QUALIFIERS["amplitude"]
     for role, expected, qualifier in _BY_UNIT:
         if role in roles or role not in names or (role == "phase" and _LOSSES & set(roles)):
             continue
@@ -276,7 +276,9 @@ def _add_by_unit(
             for column, words in free.values()
             if column.unit
             and any(units.is_compatible(column.unit, si) for si in expected)
-            and (qualifier is None or words & (_QUALIFIERS[qualifier] | {qualifier}))
+            and (
+                bool(words & _QUALIFIERS[qualifier]) if qualifier else not (words & amplitude and role in LOOP_COLUMNS)
+            )
             and is_like_number(str(cells.first_row[column.index]))
         ]
         if len(fitting) == 1:
