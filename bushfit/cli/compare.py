@@ -130,8 +130,8 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
         output.print(sentence)
     for label, entry in zip(compared.labels, compared.entries, strict=True):
         output.print(f"{label}: {entry.name} ({entry.source})")
-    shown = compared.comparisons if output.verbose or not compared.families else ()
-    for label, comparison in zip(labels, shown, strict=False):
+    detailed = compared.comparisons if output.verbose or not compared.families else ()
+    for label, comparison in zip(labels, detailed, strict=False):
         title = f"parameters of {label} against {first}; p: probability of such a difference by chance (Holm)"
         columns = ("parameter", first, label, "difference", "95 % interval", "p", "unit")
         output.print_table(title, columns, map(parameter_cells, comparison.parameters))

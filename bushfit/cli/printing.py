@@ -48,6 +48,8 @@ def print_result(output: Output, title: str, result: Result) -> None:
 
 def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Usable]) -> None:
     """Print the misfit of each test, with -v of each of its runs, and the expected error of the model."""
+    from bushfit.report.tables import DISPLAYS
+
     tests = [test for test in misfits if output.verbose or test.held is None]
     worst = sorted(tests, key=lambda test: -test.reduced_chi_square)[: len(tests) if output.verbose else _MOST_TESTS]
     if len(tests) > 1:
@@ -57,7 +59,9 @@ def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Usab
         )
         columns, rows = ("test", "direction", "points", "NRMSE", "chi2", "mean", ""), []
         for test in (test for test in tests if test in worst):
-            name = test.test if test.held is None else f"  {_run_label(test)}"
+            name, (unit, factor) = test.test, DISPLAYS.get(test.unit or "", (test.unit or "", 1.0))
+            if test.held is not None:  # a run, by its amplitude or frequency
+                name = f"  {format_range(unit, factor * (test.value or 0.0))}"
             gain = f"{round(100 * test.gain, 2) + 0.0:+.2f}"  # no -0
             figures = (number(100 * test.nrmse, 2), number(test.reduced_chi_square, 2), gain)
             rows.append((name, test.place, str(test.points), *figures, "" if test.fitted else "not fitted"))
@@ -68,14 +72,6 @@ def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Usab
         how = "each predicted without its own run" if place.held_out else "as fitted"
         error = f"{number(100 * place.stiffness, 2)} % in stiffness and {number(place.loss_factor, 2)} in loss factor"
         output.print(f"{place.place}: expected error {error} (95 % of {place.points} points, {how})")
-
-
-def _run_label(test: Misfit) -> str:
-    """Amplitude or frequency of a run, in the unit of tables."""
-    from bushfit.report.tables import DISPLAYS
-
-    unit, factor = DISPLAYS.get(test.unit or "", (test.unit or "", 1.0))
-    return format_range(unit, factor * (test.value or 0.0))
 
 
 def print_origin(output: Output, result: Result) -> None:

@@ -228,11 +228,11 @@ def _compared(
         "command": command,
         "versions": {"bushfit": __version__, **versions()},
     }
-    shown = SideBySide.from_document(document)
+    side_by_side = SideBySide.from_document(document)
     names = ("parameters", *(["families"] if families else []), "differences")
     files = [json_file("compare", document)]
-    files += [table_file(name, partial(lambda name: shown.tables()[name], name)) for name in names]
-    files.append(figure_file("compare", lambda: plots.comparison.comparison_figure(shown)))
+    files += [table_file(name, partial(lambda name: side_by_side.tables()[name], name)) for name in names]
+    files.append(figure_file("compare", lambda: plots.comparison.comparison_figure(side_by_side)))
     files.append(page_file("compare", comparison_page, files))
     return ComparisonOutput(entries, comparisons, families, labels, advice, words, notes, warnings, document, files)
 

@@ -128,7 +128,7 @@ def predict(
 
     Args:
         model: result, or output with a result.
-        campaign: campaign whose sweeps are shown beside, and whose grid is the default.
+        campaign: campaign whose sweeps are drawn_sweeps beside, and whose grid is the default.
         directions: directions or specimens; default axial and radial, and all specimens.
         frequencies: [Hz].
         amplitudes: zero-to-peak displacements [m].
@@ -166,7 +166,7 @@ def predict(
     default = (*(_DIRECTIONS if result.model.bushing or not specimens else ()), *specimens.values())
     places = [get_place(name, specimens.values()) for name in settings.directions or ()] or list(default)
     measured = _predictable_sweeps(result, campaign) if campaign else []
-    shown = [
+    drawn_sweeps = [
         sweep
         for sweep in measured
         if not knows_temperature
@@ -178,7 +178,7 @@ def predict(
             result,
             place,
             *requested_grid(default_grid(result, place, sweeps), settings, place),
-            sweeps=shown if campaign else None,
+            sweeps=drawn_sweeps if campaign else None,
             temperature=temperature,
         )
         for place in places
@@ -201,7 +201,7 @@ def predict(
             )
     notes = (*notes, *(f"{sweep.name}: {note}" for sweep in measured for note in sweep.notes))
     output = PredictionOutput(result, predictions, measured, notes, resonances, maxwell)
-    return replace(output, files=_files(output, shown, wide=wide))
+    return replace(output, files=_files(output, drawn_sweeps, wide=wide))
 
 
 def grid_of(directions: Sequence[str] | None, *axes: Numbers | None) -> PredictSettings:
@@ -236,14 +236,14 @@ def split_by_fit(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[list[
     return fitted, [sweep for sweep in sweeps if sweep not in fitted]
 
 
-def _files(output: PredictionOutput, shown: Sequence[MeasuredSweep], *, wide: bool) -> list[ResultFile]:
-    """Tables and figures of a prediction; `shown` are the sweeps in its figures."""
+def _files(output: PredictionOutput, drawn_sweeps: Sequence[MeasuredSweep], *, wide: bool) -> list[ResultFile]:
+    """Tables and figures of a prediction; `drawn_sweeps` are those in its figures."""
     result, places = output.result, [prediction.direction for prediction in output.predictions]
     names = place_names(places)
 
     def draw(prediction: Prediction) -> Figure:
         place = prediction.direction
-        measured = [sweep for sweep in shown if sweep.direction == place]
+        measured = [sweep for sweep in drawn_sweeps if sweep.direction == place]
         table = tables.sweeps_table(result.model, measured) if measured else None
         title = result.name if isinstance(place, Direction) else str(place)
         note = plots.style.first_sentences(warnings_of(result, [], (*prediction.warnings, *output.notes)))

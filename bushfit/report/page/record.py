@@ -118,7 +118,7 @@ def _tests(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
                 tested[name] = rows[gap["kind"] == kind]
     for name, header in (("sweeps", "stepped"), ("loops", "frequency [Hz]")):
         if name in tested:
-            required(tested[name], "direction", header, "outlier")
+            required(tested[name], "direction", header, "frequency [Hz]", "outlier")
     return tested
 
 
