@@ -94,10 +94,10 @@ def command(
     folder, target = output.folder(name), "campaign.toml"
     if output.output and output.output.suffix == ".toml":
         folder, target = output.output.parent, output.output.name
-    size = partial(_bushing, name)
+    size = partial(make_bushing, name)
     bushing = questions.complete(sizes, size) if any(sizes.values()) else None
     check_free(folder, [target], overwrite=output.force)
-    inspections, left_out = _inspect_files(files, test_options, questions, is_sized=bushing is not None)
+    inspections, left_out = inspect_files(files, test_options, questions, is_sized=bushing is not None)
     inspections = with_specimens_named(inspections)
     if bushing is None and not all(isinstance(inspection.direction, Specimen) for inspection in inspections):
         bushing = questions.complete(sizes, size)
@@ -109,9 +109,12 @@ def command(
     else:
         written = {target: campaign_text(name, table, inspections, folder)}
     if bushing:
-        _print_bushing(output, bushing[0])
+        body = bushing[0]
+        inner, outer, long = (1e3 * size for size in (2 * body.inner_radius, 2 * body.outer_radius, body.length))
+        across = f"from {inner:.6g} to {outer:.6g} mm in diameter, {(outer - inner) / 2:.6g} mm thick"
+        output.print(f"{body.name}: rubber {across}, {long:.6g} mm long")
     for inspection in inspections:
-        _print_inspection(output, inspection)
+        print_summary(output, inspection)
     for sentence, count in Counter(inspection.assumed for inspection in inspections).items():
         if sentence:
             output.print(f"{count} test{'s' * (count > 1)}: {sentence}")
@@ -126,51 +129,54 @@ def command(
     output.print(f"next: bushfit {'batch' if len(written) > 1 else 'run'} {quote_path(folder / target)}")
 
 
-def _radius(side: str, sizes: Mapping[str, str | None]) -> str:
-    """Radius as the campaign states it, from the option of the radius or of the diameter."""
-    radius, diameter = sizes[f"{side}_radius"], sizes[f"{side}_diameter"]
-    options = f"--{side}-radius", f"--{side}-diameter"
-    if radius is not None and diameter is not None:
-        raise click.UsageError(f"'{options[0]}' and '{options[1]}' state the same size; give one of them.")
-    if radius is not None:
-        return radius
-    if diameter is None:
-        hint = f'state it: {options[1]} "20 mm", or {options[0]} "10 mm"'
-        raise CampaignError(f"the {side} size of the rubber is not stated", hint=hint)
-    with error_location(place=options[1]):
-        return f"{1e3 * parse_quantity(diameter, 'm') / 2.0:.12g} mm"
+def make_bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[str, str]]:
+    """Make the bushing of the new campaign.
 
+    Args:
+        name: of the bushing.
+        sizes: texts of the options for radii, diameters and the length, by key.
 
-def _bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[str, str]]:
-    """Bushing of the new campaign, and the keys of its [bushing] table.
+    Returns:
+        The bushing, and the keys of its [bushing] table.
 
-    Errors name the options, diameters where these were given and halved.
+    Raises:
+        UsageError: radius and diameter of one side.
+        CampaignError, UnitError, ModelError: a size that is missing or impossible. Errors name the options, diameters
+            where these were given and halved.
     """
     from bushfit.campaign.schema import BushingSettings
     from bushfit.validation import validate_tables
 
-    table = {f"{side}_radius": _radius(side, sizes) for side in _SIDES}
+    table, halved = dict[str, str](), list[str]()
+    for side in _SIDES:
+        radius, diameter = sizes[f"{side}_radius"], sizes[f"{side}_diameter"]
+        options = f"--{side}-radius", f"--{side}-diameter"
+        if radius is not None and diameter is not None:
+            raise click.UsageError(f"'{options[0]}' and '{options[1]}' state the same size; give one of them.")
+        if radius is None and diameter is None:
+            hint = f'state it: {options[1]} "20 mm", or {options[0]} "10 mm"'
+            raise CampaignError(f"the {side} size of the rubber is not stated", hint=hint)
+        if diameter is not None:
+            halved.append(f"{side}_radius")
+            with error_location(place=options[1]):
+                radius = f"{1e3 * parse_quantity(diameter, 'm') / 2.0:.12g} mm"
+        table[f"{side}_radius"] = radius or ""
     if (length := sizes["length"]) is None:
         raise CampaignError("the length of the rubber is not stated", hint='state it: --length "34 mm"')
     table["length"] = length
-    halved = [f"{side}_radius" for side in _SIDES if sizes[f"{side}_diameter"]]
     try:
         bushing = validate_tables({"name": name, **table}, None, BushingSettings).to_bushing()
-        if bushing.correction is not None:
-            table["shape"] = "calibrated"
-        return bushing, table
     except BushfitError as error:
-        error.file = None
-        if error.place:
-            keys = error.place.split(", ")
-            names = [key.replace("radius", "diameter") if key in halved else key for key in keys]
-            error.place = ", ".join(map(option_of, names))
-            if set(keys) & set(halved):
-                error.hint = "a diameter is halved; check that inner and outer are not swapped"
+        error.file, keys = None, (error.place or "").split(", ")
+        names = [key.replace("radius", "diameter") if key in halved else key for key in keys]
+        error.place = ", ".join(map(option_of, names)) if error.place else None
+        if set(keys) & set(halved):
+            error.hint = "a diameter given counts by its half; check that inner and outer are not swapped"
         raise
+    return bushing, table | ({"shape": "calibrated"} if bushing.correction is not None else {})
 
 
-def _inspect_files(
+def inspect_files(
     files: Sequence[Path], test_options: Mapping[str, Any], questions: Questions, *, is_sized: bool
 ) -> tuple[list[Inspection], list[str]]:
     """Inspect the loops and sweeps among files, each of a known direction or specimen.
@@ -194,7 +200,7 @@ def _inspect_files(
     inspections: list[Inspection] = []
     sentences = list(left_out)
     for source in sources if questions.enabled else track("tests looked at", sources):
-        look = partial(_inspect_source, source, is_sized=is_sized, is_asking=questions.enabled)
+        look = partial(inspect_source, source, is_sized=is_sized, is_asking=questions.enabled)
         try:
             inspection = questions.complete(source.test_options, look)
         except click.UsageError as error:
@@ -218,7 +224,7 @@ def _inspect_files(
     return inspections, sentences
 
 
-def _inspect_source(
+def inspect_source(
     source: TestSource, test_options: Mapping[str, Any], *, is_sized: bool, is_asking: bool
 ) -> Inspection:
     """Inspect a test; raise an error for a missing option, at a terminal also for an optional one."""
@@ -249,13 +255,7 @@ def _inspect_source(
     return inspection
 
 
-def _print_bushing(output: Output, bushing: Bushing) -> None:
-    inner, outer, long = (1e3 * size for size in (2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length))
-    across = f"from {inner:.6g} to {outer:.6g} mm in diameter, {(outer - inner) / 2:.6g} mm thick"
-    output.print(f"{bushing.name}: rubber {across}, {long:.6g} mm long")
-
-
-def _print_inspection(output: Output, inspection: Inspection) -> None:
+def print_summary(output: Output, inspection: Inspection) -> None:
     """Print one line on a file, then anything unusual in it."""
     wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
     facts = [f"{key}: {value}" for key, value in inspection.facts.items() if key in wanted or key.startswith("from ")]
@@ -305,16 +305,25 @@ class Questions:
                 if not self.enabled:
                     raise
                 bare_error = type(error)(**{**vars(error), "hint": None})
-                wanted = _wanted_options(error)
+                wanted = wanted_options(error)
                 new = [key for key in wanted if key not in answers and not options.get(key[0])]
-                wrong = [key for key, answer in answers.items() if key in wanted or _mentions(bare_error, key, answer)]
+                wrong = [key for key, answer in answers.items() if key in wanted or is_about(bare_error, key, answer)]
                 if not (new or wrong):
                     raise
                 for key in [] if new else [*answers][[*answers].index(wrong[0]) :]:  # and the answers after it
                     del answers[key], self._answers[key]
-                answers |= self._ask((new or wrong)[0], bare_error)
+                answers |= self.ask((new or wrong)[0], bare_error)
 
-    def _ask(self, key: _Key, error: BushfitError) -> dict[_Key, Any]:
+    def ask(self, key: _Key, error: BushfitError) -> dict[_Key, Any]:
+        """Ask for the option that an error names.
+
+        Args:
+            key: of the option.
+            error: printed above the question.
+
+        Returns:
+            The answer by its key: a rate in Hz is a frequency.
+        """
         name, role = key
         answer = self._answers.get(key)
         if key not in _ONCE or answer is None:
@@ -327,14 +336,14 @@ class Questions:
         return {key: answer}
 
 
-def _wanted_options(error: BushfitError) -> list[_Key]:
+def wanted_options(error: BushfitError) -> list[_Key]:
     """Options that the hint of an error names; a column last, since files without one are more frequent."""
     options = [(kind or option.replace("-", "_"), role) for kind, role, option in _NAMED.findall(error.hint or "")]
     known_options = [(name, role) for name, role in options if role or name in STATED or name in _WORDS]
     return sorted(known_options, key=lambda key: key[0] == "column")
 
 
-def _mentions(error: BushfitError, key: _Key, answer: Any) -> bool:
+def is_about(error: BushfitError, key: _Key, answer: Any) -> bool:
     """Return True if an error is about an answer."""
-    place, quoted = option_of(key[0]) in (error.place or ""), f'"{answer}"' in error.problem
-    return place or quoted or (error.found or "").strip('"') == str(answer)
+    is_placed, is_quoted = option_of(key[0]) in (error.place or ""), f'"{answer}"' in error.problem
+    return is_placed or is_quoted or (error.found or "").strip('"') == str(answer)
