@@ -140,6 +140,15 @@ class Tests:
         return compound(self.base)
 
     @cached_property
+    def _places_in_fits(self) -> dict[str, FaultyPlace]:
+        return {place.name: place for place in faulty_places(self.base)}
+
+    def in_fits(self, place: FaultyPlace) -> FaultyPlace:
+        """A faulty place in residuals as they are fitted."""
+        fitted = self._places_in_fits[place.name]
+        return fitted if len(fitted.columns) == len(place.columns) else fitted.point_by_point()
+
+    @cached_property
     def explanations(self) -> list[Explanation]:
         """Explanations that do not depend on the model: faulty places and smooth curves."""
         return [*faulty_places(self.bare), *unnamed(self.bare)]
@@ -212,11 +221,20 @@ class State:
         linear = self.linear
         return linear.deviation[1] if linear.log_evidence_bent > linear.log_evidence else 0.0
 
-    @property
-    def free_columns(self) -> Array | None:
-        """Columns beside which effects are refitted, at one standard deviation; None if the compound obeys the laws."""
-        deviation = self.tests.compound_in_fits if self.likeliest_deviation else None
-        return self.likeliest_deviation * deviation.whole if deviation else None
+    def free_columns(self, deviation: float) -> Array | None:
+        """Residuals beside which effects are refitted, at one standard deviation: those of the faulty places, without
+        which an effect would have to follow them, and of the compound.
+
+        Args:
+            deviation: size of the compound's deviation, relative to |K|.
+
+        Returns:
+            Columns (c, n); None without a place and a deviation.
+        """
+        columns = [x * self.tests.in_fits(place).columns for place, x in zip(self.places, self.amounts, strict=True)]
+        compound = self.tests.compound_in_fits if deviation else None
+        columns += [deviation * compound.whole] if compound else []
+        return np.concatenate(columns) if columns else None
 
     @cached_property
     def proposals(self) -> list[Proposal]:

@@ -243,7 +243,8 @@ def nearest_power_law(
     Returns:
         The power law; None if the tests show none.
     """
-    bare, begun = scattering_alone(fitted), fitted.model.with_values(start)
+    bare, model = scattering_alone(fitted), fitted.model
+    begun = model.with_values({name: value for name, value in start.items() if name in model.values})
     rows, smooth_curves = bare.solution.jacobian, [curve.group for curve in unnamed(bare) if curve.group]
     plain = LinearModel(bare.residual, rows, np.zeros(len(rows)), rig_errors(bare, rig), smooth_curves)
     plain = replace(plain, chosen_nodes=plain.likely(_NEAR))

@@ -164,8 +164,8 @@ class Search:
         proposed = [proposal for proposal in state.proposals if proposal.name in names]
         start = request.start if not state.effects and state.evidence.reduced > _BENT else {}
         grown: dict[str, State] = {}
-        free_columns = state.free_columns
-        for columns in [None] if free_columns is None else [free_columns, None]:
+        for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
+            columns = state.free_columns(deviation)
             remaining = [p for p in proposed if p.name not in grown or not grown[p.name].likeliest_deviation]
             fits = (
                 refitted(state.evidence, remaining, start, request.fixed, request.bounds, columns) if remaining else {}

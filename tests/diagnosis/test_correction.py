@@ -91,6 +91,13 @@ def test_the_parameters_beside_it_are_no_longer_bent(
     assert described.after.chi_square < 1.15 * evidence.residual.size
 
 
+def test_a_gap_beside_a_replaced_branch_is_described(measured: Measured, fitted: Fitted) -> None:
+    """Starting values that were read off for the branch are none of the model's."""
+    evidence = fitted(with_relaxation(measured()), "distributed_sliders")
+    start = {**evidence.model.values, "sigma_fmax": 1e4, "eps_half": 1e-2}
+    assert describe(evidence, RigSettings(), start, (), {}) is not None
+
+
 def test_errors_of_levels_are_not_described(measured: Measured, fitted: Fitted) -> None:
     """The middle level 8 % off in both directions: nothing predicts it from the others."""
     campaign = replace(measured(), loops=())
