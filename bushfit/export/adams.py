@@ -82,11 +82,11 @@ class _Element(NamedTuple):
             by_angle = np.full(table.frequency.size, storage * (1.0 + 1j * np.tan(damping)))
             written.append(by_angle if kind == "ride" else viscous)
             exact.append(table.stiffness)
-        one, other = np.concatenate(written), np.concatenate(exact)
-        loss = number(float(np.max(np.abs(loss_factor(one) - loss_factor(other)))), 2)
+        element, model = np.concatenate(written), np.concatenate(exact)
+        loss = number(float(np.max(np.abs(loss_factor(element) - loss_factor(model)))), 2)
         return (
             f"{self.reference.direction}, {kind}: frequency, one damping, of {number(self.frequency, 4)} Hz: over "
-            f"the grid |K| is {percent_off(np.abs(one / other))} off, the loss factor up to {loss}"
+            f"the grid |K| is {percent_off(np.abs(element / model))} off, the loss factor up to {loss}"
         )
 
 

@@ -243,33 +243,27 @@ def add_variables(variables: ET.Element, model: TimeModel, displays: Mapping[str
         displays: display units by SI unit.
     """
 
-    def add(name: str, reference: int, attributes: Mapping[str, str], unit: str, real: Mapping[str, str]) -> None:
-        names = {"name": _xml_text(name), "valueReference": str(reference)}
-        variable = ET.SubElement(variables, "ScalarVariable", {**names, **attributes})
-        ET.SubElement(variable, "Real", {**({} if unit == "1" or not unit else {"unit": unit}), **real})
-
-    count = _OFFSET + len(model.values)
+    count, rows = _OFFSET + len(model.values), list[tuple[str, int, dict[str, str], str, dict[str, str]]]()
     for index, place in enumerate(model.places):
         displacement, force, _ = place.motion.words
-        units = place.motion.displacement_unit, place.motion.force_unit
-        shown, reacted = ({"displayUnit": displays[unit].name} if unit in displays else {} for unit in units)
-        moved = {"causality": "input", "variability": "continuous"}
-        add(f"{displacement}.{place}", count + index, moved, units[0], {**shown, "start": "0"})
-        resisting = {"causality": "output", "variability": "continuous", "initial": "calculated"}
-        add(f"{force}.{place}", count + len(model.places) + index, resisting, units[1], reacted)
+        length, newton = place.motion.displacement_unit, place.motion.force_unit
+        display = {"displayUnit": displays[length].name} if length in displays else {}
+        attributes = {"causality": "input", "variability": "continuous"}
+        rows.append((f"{displacement}.{place}", count + index, attributes, length, {**display, "start": "0"}))
+        display = {"displayUnit": displays[newton].name} if newton in displays else {}
+        attributes = {"causality": "output", "variability": "continuous", "initial": "calculated"}
+        rows.append((f"{force}.{place}", count + len(model.places) + index, attributes, newton, display))
     for reference, value in enumerate(model.values, start=_OFFSET):
         attributes = {"description": _xml_text(value.meaning), "causality": "local", "variability": "constant"}
-        limits = {}
+        real = {"start": repr(value.value)}
         if value.settable:
             attributes |= {"causality": "parameter", "variability": "tunable"}
-            limits = {"min": repr(value.bounds[0]), "max": repr(value.bounds[1])}
-        add(
-            value.name,
-            reference,
-            {**attributes, "initial": "exact"},
-            value.unit,
-            {**limits, "start": repr(value.value)},
-        )
+            real = {"min": repr(value.bounds[0]), "max": repr(value.bounds[1]), **real}
+        rows.append((value.name, reference, {**attributes, "initial": "exact"}, value.unit, real))
+    for name, reference, attributes, unit, real in rows:
+        names = {"name": _xml_text(name), "valueReference": str(reference)}
+        variable = ET.SubElement(variables, "ScalarVariable", {**names, **attributes})
+        ET.SubElement(variable, "Real", {**({} if unit in ("", "1") else {"unit": unit}), **real})
 
 
 def _xml_text(text: str) -> str:

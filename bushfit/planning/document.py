@@ -123,6 +123,9 @@ def plan_document(plan: Plan, check: Check | None = None) -> PlanFile:
     Args:
         plan: the plan.
         check: simulations of the plan, if they were asked for.
+
+    Returns:
+        Keys and values of the file, in SI.
     """
     request, planned, standard = plan.request, plan.planned, plan.standard
     programmes = (plan.before, planned, standard)
@@ -145,11 +148,13 @@ def plan_document(plan: Plan, check: Check | None = None) -> PlanFile:
         for points, *errors in zip(request.points, *by_programme, strict=True):
             by_place[str(points.place)] = _reached(np.sqrt(np.mean(np.square(error))) for error in errors)
     visible: dict[str, Shown] = {}
-    for one, other in zip(planned.detectable, standard.detectable, strict=True):
-        amounts = [item.amount if np.isfinite(item.amount) else None for item in (one, other)]
-        visible[one.effect] = {
-            "parameter": one.parameter, "unit": one.unit, "planned": amounts[0], "standard": amounts[1],
-        }  # fmt: skip
+    for amount, standard_amount in zip(planned.detectable, standard.detectable, strict=True):
+        visible[amount.effect] = {
+            "parameter": amount.parameter,
+            "unit": amount.unit,
+            "planned": amount.amount if np.isfinite(amount.amount) else None,
+            "standard": standard_amount.amount if np.isfinite(standard_amount.amount) else None,
+        }
     tests: list[PlannedRun] = []
     for test, minutes in zip(planned.tests, planned.minutes.tolist(), strict=True):
         (amplitudes, frequencies), is_loop = motions(test), isinstance(test, SimulatedLoop)

@@ -153,7 +153,15 @@ class CandidateGrid:
 
     @classmethod
     def from_tests(cls, knowledge: Knowledge, tests: tuple[Test, ...]) -> CandidateGrid:
-        """Compute the data sets of candidate tests."""
+        """Compute the data sets of candidate tests.
+
+        Args:
+            knowledge: model whose stiffness the tests would measure, and noise of the rig.
+            tests: runs of the rig.
+
+        Returns:
+            Grid with a data set for each distinct loop and for the sweeps of each direction.
+        """
         model, noise = knowledge.model, knowledge.noise
         per_row = noise.force * float(np.sqrt(_ROWS * noise.rows_as_one / ROWS_PER_CYCLE))
         data_sets: list[MeasuredTest] = []

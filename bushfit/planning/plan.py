@@ -127,8 +127,7 @@ def describe_purpose(search: PlanSearch, test: int) -> str:
     if request.aim == "rivals":
         chi_square, closer = problem.nearest_rivals(counts), problem.nearest_rivals(reduced)
         if closer * _NOTABLE_RATIO <= chi_square:
-            apart = f"expected chi-square {number(closer, 2)} without it, {number(chi_square, 2)} with it"
-            return f"rivals {apart}"
+            return f"rivals expected chi-square {number(closer, 2)} without it, {number(chi_square, 2)} with it"
     elif problem.goals:
         widened = [
             goal for goal in problem.goals if goal.half_width(wider) >= _NOTABLE_RATIO * goal.half_width(covariance)

@@ -113,10 +113,13 @@ class PlanSearch:
         return np.bincount(np.array(runs, dtype=int), minlength=len(self.problem.tests))
 
     def reaches_aim(self, *, soundly: bool = False) -> bool:
-        """True if the tests separate the rivals with a margin of two, or meet the targets that can be met.
+        """Check that the tests separate the rivals with a margin of two, or meet the targets that can be met.
 
         Args:
             soundly: whether effects have to show as in the standard programme, and repeats to determine the scatter.
+
+        Returns:
+            True if the tests reach the aim.
         """
         problem, counts = self.problem, self.counts
         if problem.request.aim == "rivals":

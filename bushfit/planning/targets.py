@@ -32,7 +32,7 @@ class WantedPoints:
         loss_factor: loss factor at each point, (n,).
         slopes: change of ln|K| and of the phase by relative change of each parameter, (2, n, k).
         model_error: standard error by the model's own error: of |K|, relative, and of the loss factor, (2, n).
-        undecided: half width of the 95 % interval that undecided readings of the tests add, likewise, (2, n).
+        undecided: half width of the 95 % interval that the undecided explanations of the tests add to both, (2, n).
     """
 
     points: Points
@@ -43,7 +43,15 @@ class WantedPoints:
 
     @classmethod
     def from_knowledge(cls, knowledge: Knowledge, points: Points) -> WantedPoints:
-        """Compute sensitivities and errors at wanted points from the knowledge before the tests."""
+        """Compute sensitivities and errors at wanted points.
+
+        Args:
+            knowledge: before the tests.
+            points: operating points of one direction.
+
+        Returns:
+            Sensitivity at the points in their order.
+        """
         place, frequency, amplitude = points.place, points.frequency, points.amplitude
         sweep = new_sweep(knowledge.model, place, frequency, amplitude, (1.0, 1.0), (0.0, 0.0))
         slopes = np.stack(np.split(relative_slopes(knowledge, [sweep]).T, 2))
@@ -86,6 +94,9 @@ class Goal:
             target: a parameter, or the stiffness or loss factor of a direction.
             names: of the k parameters.
             wanted: points of the direction; None of a parameter.
+
+        Returns:
+            Goal at all points of the direction.
         """
         if wanted is None:
             row = np.array([[float(name == target.quantity) for name in names]])

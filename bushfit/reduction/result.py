@@ -166,6 +166,9 @@ def preload_warnings(steps: Sequence[Step], direction: Place) -> list[str]:
     Args:
         steps: of one direction.
         direction: of the steps.
+
+    Returns:
+        At most one sentence.
     """
     (motion, force, _), units = direction.motion.words, direction.display
     means = []

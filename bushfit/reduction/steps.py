@@ -91,7 +91,15 @@ def steady_sines(history: Loop) -> list[tuple[float, float, int]]:
 
 
 def find_steps(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStretch]]:
-    """Find the steps of a history with at least `fewest` cycles, and the stretches without one."""
+    """Find the steps of a history.
+
+    Args:
+        history: time, displacement and force, without outliers.
+        fewest: steady cycles that make a point.
+
+    Returns:
+        Operating points, and the stretches that give none.
+    """
     found: list[tuple[float, float, Step]] = []
     skipped: list[SkippedStretch] = []
     cycles = Cycles.count(history.time, history.displacement)
@@ -125,7 +133,13 @@ def join_broken_steps(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
     """Join the parts of broken steps: the longest part remains.
 
     An outlier or a creeping amplitude breaks a step: its sine goes on in phase after a cycle or two. The frequencies of
-    the parts may differ by more if one of them is brief. The steps come with start and end of their cycles [s].
+    the parts may differ by more if one of them is brief.
+
+    Args:
+        found: beginning and end of the cycles [s] of each step, and the step, in order.
+
+    Returns:
+        Steps in order.
     """
     joined: list[Step] = []
     last_end = -np.inf
@@ -212,9 +226,9 @@ def group_steps(steps: Sequence[Step], levels: Sequence[float], direction: Place
     groups = _clusters(np.log(frequency), _SAME_FREQUENCY)
     nominal = np.array([np.median(frequency[groups == group]) for group in groups])
     if levels:
-        stated, (unit, factor) = np.array(levels, dtype=float), direction.display.displacement
-        level = stated[np.argmin(np.abs(np.log(amplitude[:, None] / stated)), axis=1)]
-        far = np.flatnonzero(np.abs(amplitude[:, None] / stated - 1.0).min(axis=1) > _LEVEL_REACH)
+        nominal_levels, (unit, factor) = np.array(levels, dtype=float), direction.display.displacement
+        level = nominal_levels[np.argmin(np.abs(np.log(amplitude[:, None] / nominal_levels)), axis=1)]
+        far = np.flatnonzero(np.abs(amplitude[:, None] / nominal_levels - 1.0).min(axis=1) > _LEVEL_REACH)
         if far.size:
             step = steps[far[0]]
             raise MeasurementError(

@@ -25,11 +25,12 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.planning.candidates import candidates, run_minutes
 from bushfit.planning.compound import guess_parameters
-from bushfit.planning.contract import Aim, Knowledge, Noise, Plan, PlanRequest, Points, Programme, Test, motions
+from bushfit.planning.contract import Aim, Knowledge, Noise, Plan, PlanRequest, Points, Programme, Target, Test, motions
 from bushfit.planning.criterion import Budget, Criterion, DriftEffect, best_runs, order_runs
 from bushfit.planning.information import CandidateGrid, ModelInformation, relative_slopes, rival_chi_squares
 from bushfit.planning.knowledge import from_result, noise_of
 from bushfit.planning.plan import plan
+from bushfit.planning.problem import PlanningProblem
 
 AXIAL, RADIAL = Direction.AXIAL, Direction.RADIAL
 BAND = (5.0, 20.0, 60.0, 150.0)
@@ -223,6 +224,11 @@ def test_a_plan_is_better_than_the_standard_programme_and_errors_before_are_thos
     slopes = np.array([(wanted_of(name, 1.0 + 1e-4) - wanted_of(name, 1.0 - 1e-4)) / 2e-4 for name in known.names])
     expected = np.sqrt(np.einsum("kcn,kl,lcn->cn", slopes, np.linalg.inv(known.precision), slopes))
     np.testing.assert_allclose([planned.before.stiffness, planned.before.loss], expected, rtol=1e-3)
+    request = replace(planned.request, targets=(Target("loss_factor", 0.05, RADIAL),))
+    (goal,) = PlanningProblem.from_request(known, request).goals
+    relative = 1.96 * expected[1] / wanted_of("mu", 1.0)[1]
+    radial = slice(POINTS[0].frequency.size, None)
+    assert goal.half_width(np.linalg.inv(known.precision)) == pytest.approx(relative[radial].max(), rel=2e-3)
 
 
 @pytest.mark.parametrize(
@@ -283,3 +289,6 @@ def test_a_rig_without_limits_and_an_error_of_the_model_are_told(root: Path) -> 
     points = found.plan.request.points
     errors = found.plan.planned.stiffness
     assert errors.size == sum(part.frequency.size for part in points)
+    first = errors[: points[0].frequency.size]
+    row = found.document["stiffness"][str(points[0].place)]
+    assert row["planned"] == pytest.approx(np.sqrt(np.mean(first**2)))
