@@ -10,7 +10,7 @@ import pytest
 from fmpy.validation import validate_fmu
 from fmus import LEVELS, Running, off, order_of, wandering, written
 
-from bushfit.effects import LIBRARY, Branch, Layer, Level, qualified_name
+from bushfit.effects import LIBRARY, Branch, Layer, Level, get_parameter, qualified_name
 from bushfit.effects.contract import Array, Circumstances
 from bushfit.export.in_time import FIELDS
 from bushfit.geometry import Bushing, Direction
@@ -135,6 +135,8 @@ def test_the_description_is_valid(paper: Running) -> None:
     assert paper.inputs == ["displacement.axial", "displacement.radial", "rotation.torsion"]
     assert paper.outputs == ["force.axial", "force.radial", "moment.torsion"]
     assert {"mu", "m", "sigma_fmax", "eps_half"} <= {n for n, v in variables.items() if v.causality == "parameter"}
+    low, high = get_parameter("mu").bounds
+    assert float(variables["mu"].min) <= low < float(variables["mu"].max) == high
     assert (variables["alpha"].variability, float(variables["alpha"].start)) == ("constant", 0.24)
 
 

@@ -19,6 +19,7 @@ from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
 from bushfit.prediction.comparison import Comparison, ParameterContrast, compare, holm, with_holm
+from bushfit.prediction.stiffness import Band
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
@@ -186,3 +187,10 @@ def test_holm_is_holm() -> None:
     assert holm(p) == pytest.approx([0.03, 0.06, 0.06, 0.02])
     assert (np.array(holm(p)) >= false_discovery_control(p)).all()
     assert holm([]) == []
+
+
+def test_uneven_bands_are_subtracted_end_from_opposite_end() -> None:
+    one, two = (Band(*map(np.array, ends)) for ends in ((2.0, 1.9, 2.3), (1.0, 0.7, 1.1)))
+    difference = one.minus(two)
+    ends = difference.value, difference.low, difference.high
+    assert ends == pytest.approx((1.0, 1.0 - np.hypot(0.1, 0.1), 1.0 + np.hypot(0.3, 0.3)))

@@ -15,6 +15,7 @@ from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop
+from bushfit.reduction.cycles import mean_from_steady
 from bushfit.reduction.harmonics import spread_rows
 from bushfit.reduction.result import Reduction
 from bushfit.reduction.steps import reduce
@@ -259,3 +260,12 @@ def test_rows_that_stand_for_all_keep_no_time_with_cycles() -> None:
     chosen = spread_rows(1_000_000, 1000)
     assert (chosen.size, bool(np.all(np.diff(chosen) > 0)), bool(chosen[-1] < 1_000_000)) == (1000, True, True)
     assert np.abs(np.exp(2j * np.pi * chosen / 1000.0).mean()) < 0.1
+
+
+def test_cycles_that_are_not_steady_are_cut_at_either_end() -> None:
+    motion = 1e-3 * (1.0 + 1e-4 * np.random.default_rng(0).standard_normal(20)).astype(complex)
+    stiffness, start, end = np.full(20, 1e5 + 0j), motion.copy(), motion.copy()
+    start[:3] *= [0.5, 0.8, 0.95]
+    end[-2:] *= [0.9, 0.7]
+    assert mean_from_steady(start, stiffness, 3).start == 3
+    assert mean_from_steady(end, stiffness, 3).stop == 18
