@@ -5,7 +5,7 @@ import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import islice
 from pathlib import Path
 
@@ -173,36 +173,27 @@ class Table(Cells):
         column = self.roles[role]
         if column.index in self.clocks:
             return column
-        place = self.place(self.layout.header_line, column)
+        place, example = self.place(self.layout.header_line, column), units.example_unit(expected)
+        unclear = partial(UnitError, file=self.file, place=place, found=f'"{column.header}"')
         if math.isnan(column.logarithm):
-            unit = column.unit or units.example_unit(expected)
-            raise UnitError(
+            unit = column.unit or example
+            raise unclear(
                 f"the base of the logarithm of the {label} is not known",
-                file=self.file,
-                place=place,
-                found=f'"{column.header}"',
                 expected="log10 or ln in the header",
                 hint=f'units = {{ {role} = "log10({unit})" }} in the campaign, or units = {{ {role} = "ln({unit})" }}',
             )
-        if column.unit is None and (expected != "1" or role in OF_MOTION or column.logarithm):
-            example = units.example_unit(expected)
-            if column.logarithm:
-                raise UnitError(
-                    f"the logarithms of the {label} have no unit",
-                    file=self.file,
-                    place=place,
-                    found=f'"{column.header}"',
-                    expected="the reference, such as dB re 1 N/mm, or the unit, such as log10(N/mm)",
-                    hint=f'units = {{ {role} = "{example}" }} in the campaign if the logarithm of 1 {example} is 0',
-                )
+        if column.unit is None and column.logarithm:
+            raise unclear(
+                f"the logarithms of the {label} have no unit",
+                expected="the reference, such as dB re 1 N/mm, or the unit, such as log10(N/mm)",
+                hint=f'units = {{ {role} = "{example}" }} in the campaign if the logarithm of 1 {example} is 0',
+            )
+        if column.unit is None and (expected != "1" or role in OF_MOTION):
             angular = expected == "Hz" and is_angular(column.header, "1/s")
             second = "rad/s" if angular else "rad" if expected == "rad" and role == "phase" else ""
             alternative = f', or units = {{ {role} = "{second}" }}' if second else ""
-            raise UnitError(
+            raise unclear(
                 f"the {label} has no unit",
-                file=self.file,
-                place=place,
-                found=f'"{column.header}"',
                 expected=f"{units.describe_unit(expected)}{', or an angular frequency, such as rad/s' * angular}",
                 hint=f'write "{column.header} [{"rad/s" if angular else example}]" in the header, '
                 f'or units = {{ {role} = "{example}" }} in the campaign{alternative}',
