@@ -53,14 +53,6 @@ def test_a_quote_left_open_in_a_remark_takes_no_rows(first: str, last: str, tmp_
     assert np.array_equal(loop.force, loop_from(LOOP, tmp_path).force)
 
 
-def test_names_and_units_from_the_campaign(tmp_path: Path) -> None:
-    text = LOOP.replace("force [N]", "Kräft").replace("displacement [mm]", "Weg [mm]")
-    columns = {"force": "KrÃ¤ft", "displacement": "weg"}
-    stated = {"columns": columns, "units": {"force": "kN"}, "encoding": "latin-1"}
-    loop = loop_from(text, tmp_path, force_sign=1, **stated)
-    assert loop.force.max() == pytest.approx(99.96e3, rel=1e-3)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("lead", ["# rig 3\n\n", '\ufeffOperator "A"\nPrüfstand 3\n'])
 def test_a_large_file_reads_like_a_small_one(lead: str, tmp_path: Path) -> None:
