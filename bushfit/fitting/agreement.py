@@ -193,7 +193,10 @@ def usable(solution: FitResult, unfitted: Sequence[MeasuredTest] = ()) -> tuple[
             counted = run.points & (test.weights > 0.0 if isinstance(test, MeasuredSweep) else True)
             difference = _absolute_difference(predicted[counted], test.measured[counted])
             parts.append((str(test.direction), difference, step is not None))
-    return _by_place([*parts, *_as_modelled(model, unfitted, predicted=True)])
+    for test in unfitted:
+        difference = _absolute_difference(test.noise_free(model).measured, test.measured)
+        parts.append((str(test.direction), difference, True))
+    return _by_place(parts)
 
 
 def met_within(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest]) -> tuple[Usable, ...]:
@@ -207,13 +210,11 @@ def met_within(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[
     Returns:
         95 % quantile of the error of stiffness and loss factor, for each direction or specimen.
     """
-    return _by_place([*_as_modelled(model, fitted, predicted=False), *_as_modelled(model, unfitted, predicted=True)])
-
-
-def _as_modelled(model: Model, data_sets: Sequence[MeasuredTest], *, predicted: bool) -> list[tuple[str, Array, bool]]:
-    """Direction of each test, its differences from the model, (2, n), and the flag, for `_by_place`."""
-    pairs = [(test, _absolute_difference(test.noise_free(model).measured, test.measured)) for test in data_sets]
-    return [(str(test.direction), difference, predicted) for test, difference in pairs]
+    parts = list[tuple[str, Array, bool]]()
+    for number, test in enumerate([*fitted, *unfitted]):
+        difference = _absolute_difference(test.noise_free(model).measured, test.measured)
+        parts.append((str(test.direction), difference, number >= len(fitted)))
+    return _by_place(parts)
 
 
 def _by_place(parts: Sequence[tuple[str, Array, bool]]) -> tuple[Usable, ...]:

@@ -163,7 +163,14 @@ def row_noise(residual: Array, settled: Array, cycles: int) -> tuple[RowNoise, f
     steepest = model.spectrum(waves[:, first : first + 1]) * np.square(first / np.maximum(number, 1))
     if slow.any() and np.mean(whole[slow] / steepest[slow]) < _MOST_SLOW:
         used, power, model = between, whole, _fitted(whole, waves, between)
-    return _noise_of(model, power[used], waves[:, used]), float(np.sqrt(model.correlations[0]))
+    polynomial, correlations = model
+    order, waves = polynomial.size - 1, waves[: polynomial.size, used]
+    slopes = np.vstack((np.ones(waves.shape[1]), -2.0 * (waves[1:] / (polynomial @ waves)).real))
+    starts = np.linalg.inv(np.linalg.cholesky(toeplitz(correlations[:order] / correlations[0])))
+    innovation = polynomial @ correlations / correlations[0]
+    error = np.linalg.cholesky(np.linalg.inv(slopes @ slopes.T))
+    share = min(float(np.mean(power[used] / model.spectrum(waves))), 1.0) if order else 1.0
+    return RowNoise(polynomial / np.sqrt(innovation), starts, error, share), float(np.sqrt(correlations[0]))
 
 
 def of_a_lone_cycle(number: Array) -> Array:
@@ -201,15 +208,3 @@ def _fitted(power: Array, waves: Array, used: Array) -> _Model:
         if len(prices) > _IN_VAIN and min(prices[-_IN_VAIN:]) > min(prices):
             break
     return models[int(np.argmin(prices))]
-
-
-def _noise_of(model: _Model, power: Array, waves: Array) -> RowNoise:
-    """Noise of a fitted model, with its errors, from the power, (m,), and waves of the fit, (lags, m)."""
-    polynomial, correlations = model
-    order, lags = polynomial.size - 1, waves[1 : polynomial.size]
-    slopes = np.vstack((np.ones(waves.shape[1]), -2.0 * (lags / (polynomial @ waves[: order + 1])).real))
-    starts = np.linalg.inv(np.linalg.cholesky(toeplitz(correlations[:order] / correlations[0])))
-    innovation = polynomial @ correlations / correlations[0]
-    error = np.linalg.cholesky(np.linalg.inv(slopes @ slopes.T))
-    share = min(float(np.mean(power / model.spectrum(waves))), 1.0) if order else 1.0
-    return RowNoise(polynomial / np.sqrt(innovation), starts, error, share)
