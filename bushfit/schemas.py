@@ -109,7 +109,9 @@ def _explained(table_schema: dict[str, Any], kind: type) -> dict[str, Any]:
     properties: dict[str, Any] = table_schema["properties"]
     descriptions = _beside_keys(kind) if is_typeddict(kind) else {}
     for base in reversed(kind.__mro__):
-        descriptions |= _arguments(inspect.cleandoc(base.__doc__ or ""))
+        found = _ARGS.search(re.sub(r"\bNone\b", "null", inspect.cleandoc(base.__doc__ or "")))
+        for names, words in _ARG.findall(found[1]) if found else ():
+            descriptions |= dict.fromkeys(names.split(", "), " ".join(words.split()))
     for key in properties.keys() & descriptions.keys():
         properties[key] = {**properties[key], "description": descriptions[key]}
     for field, keys in (inline_fields(kind) if is_dataclass(kind) else {}).items():
@@ -122,13 +124,6 @@ def _explained(table_schema: dict[str, Any], kind: type) -> dict[str, Any]:
             table_schema["additionalProperties"] = inner
     words = inspect.cleandoc(kind.__doc__ or "").partition("\n\nArgs:")[0]
     return {**table_schema, "description": " ".join(words.split())}
-
-
-def _arguments(docstring: str) -> dict[str, str]:
-    """Description of each argument in a docstring, in the words of JSON."""
-    found = _ARGS.search(re.sub(r"\bNone\b", "null", docstring))
-    entries = _ARG.findall(found[1]) if found else []
-    return {name: " ".join(words.split()) for names, words in entries for name in names.split(", ")}
 
 
 def _beside_keys(kind: type) -> dict[str, str]:

@@ -126,6 +126,11 @@ def _plain_number(quantity: str, unit: str, example: str, largest: float, smalle
     pattern = re.compile(rf"\s*(\d{{1,4}}(?:\.\d{{1,6}})?)\s*(?:{unit})\s*", re.ASCII | re.IGNORECASE)
 
     def convert(raw: object, _: object) -> float:
+        """Number of the text.
+
+        Returns:
+            The number, in the unit of the text.
+        """
         match = pattern.fullmatch(raw) if isinstance(raw, str) else None
         if not match:
             raise UnitError(f"this is not {quantity}", found=str(raw), expected=f'"{example}"')

@@ -270,19 +270,15 @@ def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> li
     """Directions and specimens to compare, each as every result has it; the compound if none is common to all."""
     if names:
         return [[result.place(name) for result in results] for name in names]
-    fitted_places = [_fitted_places(result) for result in results]
-    common = [name for name in fitted_places[0] if all(name in names for names in fitted_places)]
+    known = []
+    for result in results:
+        directions = [Direction.AXIAL, Direction.RADIAL] if result.model.bushing else []
+        default = [*map(str, directions), *(specimen.name for specimen in result.specimens)]
+        known.append(list(result.measured.directions if result.measured else ()) or default)
+    common = [name for name in known[0] if all(name in places for places in known)]
     places = [[result.place(name) for result in results] for name in common]
     matching = [bodies for bodies in places if all(body.motion is bodies[0].motion for body in bodies)]
     return matching or [[_COMPOUND] * len(results)]
-
-
-def _fitted_places(result: Result) -> list[str]:
-    """Directions and specimens that a result was fitted to; all that it has if it does not state them."""
-    if result.measured and result.measured.directions:
-        return list(result.measured.directions)
-    directions = [Direction.AXIAL, Direction.RADIAL] if result.model.bushing else []
-    return [*map(str, directions), *(specimen.name for specimen in result.specimens)]
 
 
 def _fit_families(

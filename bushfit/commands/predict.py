@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
@@ -249,13 +249,6 @@ def _files(output: PredictionOutput, drawn_sweeps: Sequence[MeasuredSweep], *, w
         note = plots.style.first_sentences(warnings_of(result, [], (*prediction.warnings, *output.notes)))
         return plots.prediction.prediction_figure(result, prediction, table, title, note)
 
-    def further(suffix: str, make: Callable[[Any], pd.DataFrame], parts: Sequence[Any]) -> Iterator[ResultFile]:
-        for name, part in zip(names, parts, strict=False):
-            stem = f"{name}_{suffix}"
-            while stem in names:  # of a specimen
-                stem += "_"
-            yield table_file(stem, partial(make, part))
-
     def measured_table() -> pd.DataFrame:
         fitted, not_fitted = split_by_fit(result, output.measured)
         rows = tables.sweeps_table(result.model, [*fitted, *not_fitted])
@@ -266,9 +259,17 @@ def _files(output: PredictionOutput, drawn_sweeps: Sequence[MeasuredSweep], *, w
     for name, prediction in zip(names, output.predictions, strict=True):
         files.append(table_file(name, partial(prediction_table, prediction)))
         files.append(figure_file(name, partial(draw, prediction)))
-    files += further("wide", tables.wide_table, output.predictions if wide else ())
     files += arms_files(result, output.arms, places)
-    files += further("resonance", tables.shaken_table, output.resonances)
+    suffixes: list[tuple[str, Callable[[Any], pd.DataFrame], Sequence[Any]]] = [
+        ("wide", tables.wide_table, output.predictions if wide else ()),
+        ("resonance", tables.shaken_table, output.resonances),
+    ]
+    for suffix, make, parts in suffixes:
+        for name, part in zip(names, parts, strict=False):
+            stem = f"{name}_{suffix}"
+            while stem in names:  # of a specimen
+                stem += "_"
+            files.append(table_file(stem, partial(make, part)))
     return [*files, *([table_file("measured", measured_table)] if output.measured else [])]
 
 
