@@ -59,9 +59,13 @@ def refitted(
         start_values = {name: value for name, value in start.items() if name in proposal.model.values}
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
             fits[proposal.name] = fit_from(proposal.model.with_values(start_values), tests, fixed, limits)
-    list(track("effects refitted", _finished(fits), len(fits)))
+    list(track("effects refitted", _descend(fits), len(fits)))
     best = min((fit.chi_square for fit in fits.values()), default=0.0)
-    near = {name: fit for name, fit in fits.items() if _ended(fit) or fit.chi_square <= best + _FAR}
+    near = {
+        name: fit
+        for name, fit in fits.items()
+        if fit.converged or fit.evaluations >= EVALUATIONS or fit.chi_square <= best + _FAR
+    }
     if columns is None:
         return {name: Evidence(fit.solution, evidence.data_sets) for name, fit in near.items()}
     return {
@@ -70,25 +74,20 @@ def refitted(
     }
 
 
-def _finished(fits: dict[str, Descent]) -> Iterator[str]:
-    """Steps fits side by side until each has ended or fallen behind, and gives its name then."""
+def _descend(fits: dict[str, Descent]) -> Iterator[str]:
+    """Step fits side by side until each has ended or fallen behind, and give its name then."""
     running = list(fits)
     while running:
         for name in running:
             fits[name] = fits[name].stepped()
-        best = min(fit.chi_square for fit in fits.values())
-        yield from (name for name in running if not _goes_on(fits[name], best))
-        running = [name for name in running if _goes_on(fits[name], best)]
-
-
-def _ended(fit: Descent) -> bool:
-    return fit.converged or fit.evaluations >= EVALUATIONS
-
-
-def _goes_on(fit: Descent, best: float) -> bool:
-    if _ended(fit):
-        return False
-    return fit.evaluations < _FIRST or fit.chi_square - _MOST_FALL * fit.expected_fall < best + _FAR
+        limit = min(fit.chi_square for fit in fits.values()) + _FAR
+        for name in list(running):
+            fit = fits[name]
+            ended = fit.converged or fit.evaluations >= EVALUATIONS
+            behind = fit.evaluations >= _FIRST and fit.chi_square - _MOST_FALL * fit.expected_fall >= limit
+            if ended or behind:
+                running.remove(name)
+                yield name
 
 
 def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:

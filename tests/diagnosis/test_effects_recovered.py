@@ -104,7 +104,7 @@ def test_what_the_data_push_below_zero_rests_on_its_bound(measured: Measured) ->
         campaign = changed(campaign, number, np.exp(-2j * np.pi * sweep.frequency * 1e-4))
     result = fit_joint(PreparedCampaign.from_campaign(campaign), effects=(*BASE, "viscous"), directions=BOTH)
     assert result.model.values["viscous.eta"] == pytest.approx(0.0, abs=1e-6)
-    assert any("viscous.eta ended at the edge" in line for line in result.warnings)
+    assert any("viscous.eta ended at a limit" in line for line in result.warnings)
 
 
 TRUTHS: dict[str, dict[str, float]] = {
