@@ -79,6 +79,7 @@ def index_page(files: Sequence[ResultFile], folder: Path, base: str = "") -> str
     rows = []
     for index in chosen:
         part = parts[index]
+        mean = 100.0 * float(np.expm1(np.log1p(curves.relative[index]).mean())) if curves else np.nan
         numbers = ", ".join(str(warnings.index(line) + 1) for line in part.warnings)
         remarks = [part.error, part.poor_fit and "poor fit", part.differs and f"differs: {part.differs}"]
         remarks += [*([] if part.poor_fit else part.doubtful.values()), numbers and f"warnings {numbers}"]
@@ -91,7 +92,7 @@ def index_page(files: Sequence[ResultFile], folder: Path, base: str = "") -> str
                 "link": links[index],
                 "texts": [part.result or ""] * bool(batch.limits) + [part.labels.get(name, "") for name in labels],
                 "curve": curves.sparkline(index, differs=bool(part.deviations)) if curves else "",
-                "deviation": curves.mean_deviation(index) if curves else "",
+                "deviation": number(mean, 2, "+") if np.isfinite(mean) else "",
                 "cells": list(zip(values, tones, strict=True)),
                 "remarks": "; ".join(filter(None, remarks)),
             }
@@ -161,11 +162,6 @@ class Curves:
     def scale(self) -> float:
         """Half the height of a small picture, relative: 1.5 times the largest deviation of a usual part."""
         return max(_LEAST_SCALE, 1.5 * float(np.abs(self.relative[self.usual]).max()))
-
-    def mean_deviation(self, index: int) -> str:
-        """Mean deviation of a curve from the median in per cent, as text; empty without a curve."""
-        mean = 100.0 * float(np.expm1(np.log1p(self.relative[index]).mean()))
-        return number(mean, 2, "+") if np.isfinite(mean) else ""
 
     def picture(self, parts: Sequence[PartTable]) -> Picture:
         """Median and range of the usual parts, and the curves of the others."""

@@ -229,7 +229,8 @@ def logarithmic(axes: Axes, values: Array, axis_name: Literal["x", "y"] = "x") -
     """
     axis = {"x": axes.xaxis, "y": axes.yaxis}[axis_name]
     axes.set(**{f"{axis_name}scale": "log"})
-    axis.set_major_locator(LogLocator(subs=(1, 3) if values.max() < _LOG_RATIO**2 * values.min() else (1,)))
+    subs = (1, 3) if values.max() < 10.0 * _LOG_RATIO * values.min() else (1,)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=_MOST_TICKS - 1))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
 
