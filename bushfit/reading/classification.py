@@ -253,9 +253,11 @@ def _add_by_unit(
     )
     free: dict[int, tuple[Column, set[str]]] = {}
     for index, header in enumerate(cells.headers):
-        name, unit, convention = split_unit(header)
+        if not header or usual.heading(header) is not None:
+            continue
+        name, unit, convention = split_unit(header)  # after the check, because unknown words import pint
         words = {plain(word) for word in name.replace("_", " ").replace("/", " ").split()}
-        if header and usual.heading(header) is None and not words & _QUALIFIERS["not_measured"]:
+        if not words & _QUALIFIERS["not_measured"]:
             in_row, of_row, _ = parse_unit(cells.layout.units[index])
             column = Column("", header, index, in_row or unit, 1.0, convention or of_row)
             words |= {"amplitude"} if column.convention else set()
