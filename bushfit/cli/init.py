@@ -171,7 +171,7 @@ def make_bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, d
         names = [key.replace("radius", "diameter") if key in halved else key for key in keys]
         error.place = ", ".join(map(option_of, names)) if error.place else None
         if set(keys) & set(halved):
-            error.hint = "a diameter given counts by its half; check that inner and outer are not swapped"
+            error.hint = "a diameter is halved; check that inner and outer are not swapped"
         raise
     return bushing, table | ({"shape": "calibrated"} if bushing.correction is not None else {})
 
