@@ -104,7 +104,6 @@ def test_what_only_the_user_knows_is_asked_for_and_written(typed: Run, tests: li
     ("name", "header", "says", "other"),
     [
         ("sweep_axial.csv", "stiffness [N/mm]", "axial", "radial"),
-        ("x.csv", "Radial stiffness [N/mm]", "radial", "axial"),
         ("rad_7.csv", "Axial stiffness [N/mm]", "radial", "axial"),
         ("x.xlsx", "stiffness [N/mm]", "radial", "axial"),
         ("turned.csv", "stiffness [N m/deg]", "torsion", "radial"),
@@ -136,17 +135,6 @@ def test_a_file_that_names_a_direction_is_no_block_in_shear(typed: Run, tests: l
     typed("init", tests[1], "mount.csv", *GEOMETRY, *block, "-o", "x")
     campaign = load_campaign(tmp_path / "x/campaign.toml")
     assert [str(sweep.direction) for sweep in campaign.sweeps] == ["axial", "mount"]
-
-
-def test_a_force_that_counts_the_other_way_is_turned_and_said(typed: Run, tests: list[Path], tmp_path: Path) -> None:
-    table = pd.read_csv(tests[0])
-    table["force [N]"] *= -1.0
-    table.to_csv(tests[0], index=False)
-    done = typed("init", tests[0], *GEOMETRY, "-o", "x")
-    assert "the force has the opposite sign" in done.stderr
-    assert "force_sign = -1" in (tmp_path / "x/campaign.toml").read_text(encoding="utf-8")
-    (loop,) = load_campaign(tmp_path / "x/campaign.toml").loops
-    assert loop.force[loop.displacement.argmax()] > 0.0
 
 
 @pytest.mark.parametrize(
