@@ -67,6 +67,19 @@ def test_the_place_that_went_wrong_is_the_likeliest(
     assert found.name == words
 
 
+def test_a_level_may_be_off_by_a_slope_over_the_logarithm_of_frequency(bare: Evidence) -> None:
+    """From -1 to 1 times the shift, and nothing at other levels."""
+    gain, _, slope, _ = next(place for place in faulty_places(bare) if place.family == "level").columns
+    sweep = split_by_kind(bare.data_sets)[1][0]
+    rows = bare.place[sweep].start + np.arange(sweep.frequency.size)
+    touched = gain[rows] != 0.0
+    expected = np.interp(np.log(sweep.frequency), np.log([sweep.frequency.min(), sweep.frequency.max()]), [-1.0, 1.0])
+    assert np.count_nonzero(slope) == np.count_nonzero(gain)
+    ratio = slope[rows][touched] / gain[rows][touched]
+    assert np.ptp(ratio) == pytest.approx(2.0)
+    assert np.ptp(ratio - expected[touched]) < 1e-9
+
+
 @pytest.mark.parametrize(
     ("part", "gone"),
     [(no_loops, {"loop"}), (no_repeats, {"repeat"}), (no_sweeps, {"level", "repeat", "frequency", "loop"})],
