@@ -170,3 +170,10 @@ def test_one_outlier_of_a_short_sweep_without_repeats_is_found_at_any_row(
         found.append([entry.row - 1 for entry in robust(with_factor(campaign, [row], factor)).outliers])
     assert all(rows in ([row], []) for row, rows in zip(tried, found, strict=True))
     assert found.count([]) <= missed
+
+
+def test_outliers_side_by_side_do_not_hide_each_other_from_their_repeats(rig: Rig) -> None:
+    for seed in range(3):
+        rows = 20 + seed + np.arange(3)
+        found = robust(with_factor(rig(seed), rows, 1.1)).outliers
+        assert [entry.row - 1 for entry in found] == rows.tolist()
