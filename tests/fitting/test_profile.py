@@ -205,3 +205,13 @@ def test_no_test_is_proposed_that_would_tear_the_rubber(
     lines = warnings(rig(1, model, loops=(loop(largest, 0.1),), sweeps=(sweep(0.3 * largest, largest),)))
     assert any("of eps_half: " in line for line in lines)
     assert any("times the largest amplitude" in line for line in lines) is proposed
+
+
+def test_directions_that_share_no_parameter_have_sentences_of_their_own(rig: Rig) -> None:
+    result = fit_joint(PreparedCampaign.from_campaign(rig(1, **ROUGH, sweeps=(sweep(1e-4, 5e-4),))))
+    friction, springpot = [line for line in result.warnings if "standard errors:" in line]
+    assert "sigma_fmax and eps_half are determined only as a ratio" in friction
+    assert "m and alpha cannot be determined separately" in springpot
+    stderr, value = result.covariance.stderr("sigma_fmax"), result.model.values["sigma_fmax"]
+    assert stderr is not None
+    assert f"sigma_fmax {100 * stderr / value:.2g} %" in friction
