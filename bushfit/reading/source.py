@@ -33,7 +33,7 @@ _GROUP_BY_BLANK = re.compile(rb"\d \d{3}(?!\d)")
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """Delimited text in UTF-8, with the encoding that the file had."""
+    """Delimited text in UTF-8, with the encoding that the file had, and what was found in it or parsed already."""
 
     data: bytes
     encoding: str | None
@@ -59,7 +59,10 @@ class Text:
 
     def has(self, sign: str, layout: Layout) -> bool:
         """Return True if the text below the header contains a character."""
-        return self.data.find(sign.encode(), self.offset(layout.lines_before_data)) >= 0
+        start = self.offset(layout.lines_before_data)
+        if (start, sign) not in self._parsed:
+            self._parsed[start, sign] = self.data.find(sign.encode(), start) >= 0
+        return bool(self._parsed[start, sign])
 
     def may_have_comma(self, layout: Layout) -> bool:
         """Return True if cells below the header can contain a comma."""
