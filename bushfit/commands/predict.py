@@ -201,7 +201,7 @@ def predict(
             )
     notes = (*notes, *(f"{sweep.name}: {note}" for sweep in measured for note in sweep.notes))
     output = PredictionOutput(result, predictions, measured, notes, resonances, maxwell)
-    return replace(output, files=_files(output, drawn_sweeps, wide=wide))
+    return replace(output, files=_files(output, drawn_sweeps, temperature, wide=wide))
 
 
 def grid_of(directions: Sequence[str] | None, *axes: Numbers | None) -> PredictSettings:
@@ -236,8 +236,10 @@ def split_by_fit(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[list[
     return fitted, [sweep for sweep in sweeps if sweep not in fitted]
 
 
-def _files(output: PredictionOutput, drawn_sweeps: Sequence[MeasuredSweep], *, wide: bool) -> list[ResultFile]:
-    """Tables and figures of a prediction; `drawn_sweeps` are those in its figures."""
+def _files(
+    output: PredictionOutput, drawn_sweeps: Sequence[MeasuredSweep], temperature: float | None, *, wide: bool
+) -> list[ResultFile]:
+    """Tables and figures of a prediction at a temperature [K]; `drawn_sweeps` are those in its figures."""
     result, places = output.result, [prediction.direction for prediction in output.predictions]
     names = place_names(places)
 
@@ -247,7 +249,7 @@ def _files(output: PredictionOutput, drawn_sweeps: Sequence[MeasuredSweep], *, w
         table = tables.sweeps_table(result.model, measured) if measured else None
         title = result.name if isinstance(place, Direction) else str(place)
         note = plots.style.first_sentences(warnings_of(result, [], (*prediction.warnings, *output.notes)))
-        return plots.prediction.prediction_figure(result, prediction, table, title, note)
+        return plots.prediction.prediction_figure(result, prediction, table, title, note, temperature)
 
     def measured_table() -> pd.DataFrame:
         fitted, not_fitted = split_by_fit(result, output.measured)

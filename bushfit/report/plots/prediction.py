@@ -31,7 +31,12 @@ _SAME = 0.01
 
 @style.in_own_style
 def prediction_figure(
-    result: Result, prediction: Prediction, table: pd.DataFrame | None, title: str, note: str = ""
+    result: Result,
+    prediction: Prediction,
+    table: pd.DataFrame | None,
+    title: str,
+    note: str = "",
+    temperature: float | None = None,
 ) -> style.Chart:
     """Stiffness magnitude and loss factor over frequency per amplitude, and over amplitude per frequency.
 
@@ -44,12 +49,13 @@ def prediction_figure(
         table: sweeps to lay over, as `tables.sweeps_table` makes it; None without.
         title: of the figure.
         note: sentences below the figure.
+        temperature: of the prediction [K]; None for the reference temperature.
 
     Returns:
         Figure with one or two rows of panels, and one per group of free sweeps.
     """
-    place, fine = prediction.direction, refined(result, prediction)
-    rig = refined(result, prediction, rig=True) if rig_effects(result) else None
+    place, fine = prediction.direction, refined(result, prediction, temperature)
+    rig = refined(result, prediction, temperature, rig=True) if rig_effects(result) else None
     of_place = None if table is None else table[table["direction"] == str(place)]
     groups = [] if of_place is None or of_place.empty else sweep_groups(of_place, result)
     free = [group.thinned() for group in groups if group.palette == "loop" and np.isnan(group.curves[0].level)]
@@ -82,19 +88,22 @@ def prediction_figure(
     return figure.explain(*sentences, note=note)
 
 
-def refined(result: Result, prediction: Prediction, *, rig: bool = False) -> Prediction:
+def refined(
+    result: Result, prediction: Prediction, temperature: float | None = None, *, rig: bool = False
+) -> Prediction:
     """The prediction on its own grid refined for smooth lines.
 
     Args:
         result: fitted or given model.
         prediction: prediction of one place on its grid.
+        temperature: of the prediction [K]; None for the reference temperature.
         rig: True to include the effects of the rig, as in the tests.
     """
     grid = [
         values if values.size < 2 else np.union1d(values, np.geomspace(values[0], values[-1], _FINE))
         for values in map(np.unique, (prediction.frequency, prediction.amplitude))
     ]
-    return predict(result, prediction.direction, *grid, rig=rig)
+    return predict(result, prediction.direction, *grid, rig=rig, temperature=temperature)
 
 
 def draw_prediction(

@@ -47,6 +47,7 @@ from bushfit.reduction.steps import reduce
 from bushfit.report.plots.appendix import complex_figure, ellipses_figure
 from bushfit.report.plots.inspection import inspection_figure, reduction_figure
 from bushfit.report.plots.master_curve import arms_figure
+from bushfit.report.plots.prediction import prediction_figure
 from bushfit.report.plots.style import to_image
 from bushfit.report.tables import sweeps_table
 
@@ -162,6 +163,14 @@ def test_prediction_over_frequency_and_amplitude_and_means_of_repeats(paper_mode
     mean = 1e-3 * np.abs(both[0].measured[here]).mean()
     assert drawn.get_ydata()[FREQUENCIES == 55.0][0] == pytest.approx(mean, rel=1e-12)
     assert "Points" not in note(prediction(result, Direction.TORSION, *both, amplitudes=TORSION))
+
+
+def test_a_prediction_is_drawn_at_its_temperature(paper_model: Model) -> None:
+    warm, kelvin = paper_model.with_effect("temperature", {"temperature.shift": 0.05}), 323.15
+    grid = predict(Result(warm), Direction.AXIAL, FREQUENCIES, AMPLITUDES, temperature=kelvin)
+    figure = prediction_figure(Result(warm), grid, None, "warm", temperature=kelvin)
+    line = lines(figure.axes[0])[0]
+    assert line.get_ydata()[[0, -1]] == pytest.approx(1e-3 * grid.stiffness.value[[0, FREQUENCIES.size - 1]], rel=1e-9)
 
 
 def test_points_lie_on_lines_with_the_rig_and_the_bushing_stands_apart(paper_model: Model, swept: Swept) -> None:
