@@ -149,7 +149,7 @@ def _label_columns(
     Args:
         labels: of the blocks.
         titles: of the blocks, which may name a direction.
-        parts: names of the parts of which the blocks are, if nothing else tells them apart.
+        parts: names of the parts in the blocks, if nothing else distinguishes the blocks.
         roles: that have a column already.
 
     Returns:
@@ -158,11 +158,11 @@ def _label_columns(
     columns: dict[str, list[str]] = {}
     for role, expected in (("amplitude", "m"), ("amplitude", "rad"), ("amplitude", "1"), ("frequency", "Hz")):
         quantities = [label.of_dimension(expected) for label in labels]
-        if role not in roles and all(len(stated) == 1 for stated in quantities):
-            kinds = {(stated[0].unit, stated[0].convention) for stated in quantities}
+        if role not in roles and all(len(matches) == 1 for matches in quantities):
+            kinds = {(matches[0].unit, matches[0].convention) for matches in quantities}
             if len(kinds) == 1:
                 unit, convention = kinds.pop()
-                texts = [stated[0].text.split()[0] for stated in quantities]
+                texts = [matches[0].text.split()[0] for matches in quantities]
                 columns[f"{role}{COUNTED[convention]} [{unit}]"] = texts
     if "temperature" not in roles and all(label.temperature for label in labels):
         degrees = [str(label.temperature).partition(" ") for label in labels]

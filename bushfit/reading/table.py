@@ -220,7 +220,8 @@ class Table(Cells):
         free = [
             (header, split_convention(units.split_header(split_convention(header)[0])[1] or in_row)[0])
             for header, in_row in zip(self.headers, self.layout.units, strict=True)
-            if header and (not (known := usual.heading(header)) or (role, known.role) == ("amplitude", "displacement"))
+            if header
+            and (not (heading := usual.heading(header)) or (role, heading.role) == ("amplitude", "displacement"))
         ]
         fitting = [header for header, text in free if unit != "1" and units.is_compatible(text, unit)]
         return " or ".join(f'columns = {{ {role} = "{header}" }}' for header in fitting[:3] or ["..."])
