@@ -18,7 +18,7 @@ from scipy.linalg import block_diag
 from scipy.special import bdtrc
 
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.linear_model import Group
+from bushfit.diagnosis.groups import Group
 from bushfit.effects.contract import Array
 from bushfit.fitting.loop_harmonics import smooth_waves
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, group_repeats, split_by_kind

@@ -8,7 +8,7 @@ import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import FaultyPlace
-from bushfit.diagnosis.linear_model import Group
+from bushfit.diagnosis.groups import Group
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
 

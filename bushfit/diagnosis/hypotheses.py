@@ -13,7 +13,8 @@ from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPlace, Meeting, compound, unnamed
 from bushfit.diagnosis.faulty_places import faulty_places
-from bushfit.diagnosis.linear_model import Group, GroupEvidence, LinearModel
+from bushfit.diagnosis.groups import Group, GroupEvidence
+from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import LEVELS
 from bushfit.diagnosis.propose import Proposal, proposals
 from bushfit.diagnosis.rig_errors import RigErrors, rig_errors, scattering_alone

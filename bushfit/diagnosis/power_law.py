@@ -22,7 +22,8 @@ from scipy.special import logsumexp
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import unnamed
-from bushfit.diagnosis.linear_model import Group, LinearModel
+from bushfit.diagnosis.groups import Group
+from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import TELLS
 from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
 from bushfit.effects.contract import Array

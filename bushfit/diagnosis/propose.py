@@ -14,7 +14,7 @@ import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation
-from bushfit.diagnosis.linear_model import Group
+from bushfit.diagnosis.groups import Group
 from bushfit.effects import Branch, Effect, effects_for_places, qualified_name, twins_of
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from scipy.special import logsumexp
 from scipy.stats import kstest, multivariate_normal, norm
 
-from bushfit.diagnosis.linear_model import Group, LinearModel
+from bushfit.diagnosis.groups import Group
+from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import SIZES
 from bushfit.diagnosis.rig_errors import Block, Node, RigErrors
 from bushfit.effects.contract import Array
