@@ -127,7 +127,11 @@ class Formats:
         return f"{name}.{ending(self.table_form)}"
 
     def names(self, file: ResultFile) -> list[str]:
-        """Names of the files that a result file becomes: one for each picture format; none if its kind is left out."""
+        """Names of the files that a result file becomes: one for each picture format; none if its kind is left out.
+
+        Returns:
+            File names with endings.
+        """
         return {
             "json": [f"{file.name}.json"],
             "raw": [file.name],
@@ -138,6 +142,9 @@ class Formats:
 
     def encode(self, file: ResultFile) -> dict[str, bytes]:
         """Bytes of the files that a result file becomes, by their names; empty if the kind is left out.
+
+        Returns:
+            Content by file name.
 
         Raises:
             OutputError: a table that is too large for its format.

@@ -60,7 +60,13 @@ def amplitude_column(place: Place, amplitude: Array) -> dict[str, Array]:
 
 
 def response_columns(place: Place, stiffness: Array, before: str = "") -> dict[str, Array]:
-    """Columns of |K| and loss factor of complex stiffnesses [SI] at a place, whose headers begin with `before`."""
+    """Columns of |K| and loss factor of complex stiffnesses [SI] at a place, whose headers begin with `before`.
+
+    Args:
+        place: direction or specimen.
+        stiffness: complex stiffnesses [SI], (n,).
+        before: beginning of both headers.
+    """
     magnitude = np.abs(stiffness) * place.display.stiffness.factor
     return {f"{before}{columns_of(place)[1]}": magnitude, f"{before}loss factor [-]": loss_factor(stiffness)}
 
@@ -286,7 +292,11 @@ def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
 
 
 def master_curve_table(shifted_sweeps: Sequence[Shifted]) -> pd.DataFrame:
-    """Points of sweeps at several temperatures, as measured and shifted to 23 degC, a row per point."""
+    """Points of sweeps at several temperatures, as measured and shifted to 23 degC, a row per point.
+
+    Returns:
+        Measured and reduced frequency, stiffness and loss factor of each point.
+    """
     tables = []
     for shifted in shifted_sweeps:
         sweep, place = shifted.sweep, shifted.sweep.direction
@@ -298,7 +308,11 @@ def master_curve_table(shifted_sweeps: Sequence[Shifted]) -> pd.DataFrame:
 
 
 def shift_factors_table(shifted_sweeps: Sequence[Shifted]) -> pd.DataFrame:
-    """log10 of the shift factor of each sweep, by the fitted law and fitted alone, with 95 % intervals."""
+    """log10 of the shift factor of each sweep, by the fitted law and fitted alone, with 95 % intervals.
+
+    Returns:
+        A row per sweep.
+    """
     columns: dict[str, Any] = {
         "sweep": [shifted.sweep.name for shifted in shifted_sweeps],
         "direction": [str(shifted.sweep.direction) for shifted in shifted_sweeps],
@@ -311,7 +325,11 @@ def shift_factors_table(shifted_sweeps: Sequence[Shifted]) -> pd.DataFrame:
 
 
 def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """Every effect of the library: score, gain in chi-square, probability, parameters, and the reason of the result."""
+    """Every effect of the library: score, gain in chi-square, probability, parameters, and the reason of the result.
+
+    Returns:
+        A row per effect.
+    """
     rows = [
         {
             "effect": judged.name,

@@ -50,10 +50,14 @@ def comparison_context(files: Sequence[ResultFile]) -> dict[str, Any]:
     """
     comparison = SideBySide.from_document(contents(files, "json")["compare"])
     document, names, places = comparison.document, comparison.names, comparison.places
-    compared, (reference, *others) = document["compared"], names.values()
+    compared, (reference, *other_names) = document["compared"], names.values()
     tables = [next(iter(comparison.differences_at(place).values())) for place in places]
     stiffness = [ContrastHeaders.from_table(table).stiffness for table in tables]
-    title = f"{others[0]} compared with {reference}" if len(others) == 1 else f"{len(others)} results and {reference}"
+    title = (
+        f"{other_names[0]} compared with {reference}"
+        if len(other_names) == 1
+        else f"{len(other_names)} results and {reference}"
+    )
     if families := bool(document["families"]):
         bushing = compared[0]["bushing"]
         title = f"Model families of {bushing.name if bushing else compared[0]['source']}"
@@ -64,8 +68,8 @@ def comparison_context(files: Sequence[ResultFile]) -> dict[str, Any]:
             strain = format_range("%", *(100.0 * end for end in measured.strain))
             tests = f"{format_range('Hz', *measured.frequency)}, strain {strain}, {', '.join(measured.directions)}"
         body = tube_description(Bushing(*astuple(entry["bushing"]))) if entry["bushing"] else "rubber compound"
-        stated = dict(conditions(source.conditions for source in entry["inputs"]))
-        entries.append({"of": entry, "body": body, "tests": tests, "conditions": stated})
+        test_conditions = dict(conditions(source.conditions for source in entry["inputs"]))
+        entries.append({"of": entry, "body": body, "tests": tests, "conditions": test_conditions})
     labels: dict[tuple[str, str], list[str]] = {}
     for entry in compared:
         inputs = [(str(source.file), source.sha256) for source in entry["inputs"]]
@@ -87,14 +91,14 @@ def comparison_context(files: Sequence[ResultFile]) -> dict[str, Any]:
         "sizes": [row for place in places for row in difference_sizes(comparison, place)],
         "family_heads": FAMILY_HEADS,
         "family_rows": [*comparison.family_cells()],
-        "judged": families and len(others) + document["words"][0].startswith("use "),
+        "judged": families and len(other_names) + document["words"][0].startswith("use "),
         "most": MOST,
         "cells": parameter_cells,
         "chance": chance,
         "pictures": pictures,
         "tabled": [*value_rows(comparison)][: 2 * _ROWS],
         "warnings": [(line, use_of(line)) for line in by_importance(document["warnings"])],
-        "files": [(f"{', '.join(of)}: {file}", sha256) for (file, sha256), of in labels.items()],
+        "files": [(f"{', '.join(letters)}: {file}", sha256) for (file, sha256), letters in labels.items()],
     }
 
 

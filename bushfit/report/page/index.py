@@ -56,6 +56,9 @@ def index_page(files: Sequence[ResultFile], folder: Path, base: str = "") -> str
         files: the document of the batch.
         folder: results of the batch; parts link to their reports in it, or to their folders.
         base: start of the links.
+
+    Returns:
+        The page.
     """
     batch = validate_tables(contents(files, "json")["batch"], None, BatchFile, kind=ModelError)
     parts, curves = batch.parts, Curves.from_batch(batch)
@@ -171,7 +174,11 @@ class Curves:
         return picture(chart, "curves", chart.heading.get_text())
 
     def sparkline(self, index: int, *, differs: bool) -> Markup:
-        """Deviation of a curve from the median over the points, with the range of the usual parts."""
+        """Deviation of a curve from the median over the points, with the range of the usual parts.
+
+        Returns:
+            A small SVG; empty for a part without a curve.
+        """
         line, usual = self.relative[index], self.relative[self.usual]
         if not np.isfinite(line).all():
             return Markup()

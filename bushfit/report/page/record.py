@@ -76,6 +76,9 @@ def report_record(files: Sequence[ResultFile], folder: Path | None = None) -> Re
             gives its grid) and figures.
         folder: where the documents were read, for error messages.
 
+    Returns:
+        Records for `report_context`.
+
     Raises:
         ModelError: no model among the documents, or a document or table that is not as bushfit writes it.
     """
@@ -149,6 +152,9 @@ def has_model(folder: Path) -> bool:
 
 def read_results(folder: Path) -> list[ResultFile]:
     """Documents and tables of a folder of results.
+
+    Returns:
+        Result files with the documents and tables, not with figures.
 
     Raises:
         ModelError: no folder, no results in it, or a file that is not as bushfit writes it.

@@ -136,11 +136,11 @@ def draw_figures(record: ReportRecord) -> tuple[list[Picture], list[Picture], bo
     result, diagnosis = record.result, record.diagnosis
     sweeps, loops, gap = (record.tables.get(name) for name in ("sweeps", "loops", "gap"))
     places = [*record.predictions.items()][:_MOST_PLACES]
-    beside = sweeps_beside(sweeps, result)
+    drawn_sweeps = sweeps_beside(sweeps, result)
     page, appendix = _Figures(), _Figures()
     for name, prediction in places:
         title = f"{prediction.direction}: prediction and measurement"
-        page[name, title] = partial(plots.prediction.prediction_figure, result, prediction, beside, "")
+        page[name, title] = partial(plots.prediction.prediction_figure, result, prediction, drawn_sweeps, "")
     if gap is not None and diagnosis is not None:
         page["gap", "Measured minus model"] = partial(plots.gap.gap_figure, gap, result, diagnosis, "")
     if loops is not None:
@@ -158,9 +158,9 @@ def draw_figures(record: ReportRecord) -> tuple[list[Picture], list[Picture], bo
     for (name, title), make in (page | appendix).items():
         chart = record.charts[name].content if name in record.charts else make()
         if chart is not None and room > 0:
-            shown = picture(chart, f"f{len(pictures)}-", title)
-            room -= len(shown.svg)
-            pictures += [shown] * (room > 0)
+            drawing = picture(chart, f"f{len(pictures)}-", title)
+            room -= len(drawing.svg)
+            pictures += [drawing] * (room > 0)
     left_out = len(pictures) < len(page) or len(record.predictions) > _MOST_PLACES
     return pictures[: len(page)], pictures[len(page) :], left_out
 
@@ -220,13 +220,17 @@ def conditions(test_conditions: Iterable[Mapping[str, str | float]]) -> Iterator
 
 
 def test_rows(record: ReportRecord) -> list[dict[str, str | int]]:
-    """Texts of the table of tests: range, conditions and misfit of the model of the first twelve tests."""
+    """Texts of the table of tests: range, conditions and misfit of the model of the first twelve tests.
+
+    Returns:
+        Texts of each row by the names of the template.
+    """
     misfits = {misfit.test: misfit for misfit in record.result.tests if misfit.held is None}
     rows = list[dict[str, str | int]]()
     for test in record.tests[:MOST]:
         unit, factor = DISPLAYS[test.unit]
-        stated = {key: value for key in _BESIDE_TEST if (value := test.conditions.get(key)) is not None}
-        texts = {key: value if isinstance(value, str) else number(value, 3) for key, value in stated.items()}
+        test_conditions = {key: value for key in _BESIDE_TEST if (value := test.conditions.get(key)) is not None}
+        texts = {key: value if isinstance(value, str) else number(value, 3) for key, value in test_conditions.items()}
         row: dict[str, str | int] = {
             "test": test.test,
             "kind": "hysteresis loop" if test.kind == "loop" else test.kind,

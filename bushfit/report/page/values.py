@@ -74,7 +74,13 @@ def headline(record: ReportRecord, prediction: Prediction) -> dict[str, str]:
 
 
 def band_at(band: Band, index: int, scale: float = 1.0) -> list[float]:
-    """Value, low and high of a band at one operating point, times a factor."""
+    """Value, low and high of a band at one operating point, times a factor.
+
+    Args:
+        band: band of a prediction.
+        index: operating point.
+        scale: factor from SI to the unit shown.
+    """
     return [scale * float(end[index]) for end in (band.value, band.low, band.high)]
 
 
@@ -85,7 +91,11 @@ def interval(values: Sequence[float], digits: int = 4) -> str:
 
 
 def basis(record: ReportRecord, place: str) -> str:
-    """Sentence on the tests that the prediction of a place rests on."""
+    """Sentence on the tests that the prediction of a place rests on.
+
+    Returns:
+        The sentence, without a full stop.
+    """
     fitted = record.result.measured.directions if record.result.measured else ()
     if place in fitted:
         return "fitted to tests in this direction"

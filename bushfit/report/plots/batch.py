@@ -58,7 +58,11 @@ class Panel:
     intervals: Array | None = None
 
     def reach(self) -> tuple[float, float]:
-        """Lowest and highest value to show: all values but those far out, the limits, and a usual 95 % interval."""
+        """Lowest and highest value to show: all values but those far out, the limits, and a usual 95 % interval.
+
+        Returns:
+            Lower and upper end, in the unit of the panel.
+        """
         values = self.values[np.isfinite(self.values)]
         middle, sigma = scatter(values)
         near = values[np.abs(values - middle) <= _FURTHEST * sigma] if sigma > 0.0 else values
@@ -154,17 +158,17 @@ def _name_outliers(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     """
     low, high = panel.reach()
     middle = float(np.nanmedian(panel.values))
-    beyond = set(np.flatnonzero((panel.values < low) | (panel.values > high)).tolist())
-    chosen = sorted(beyond.union(panel.missed), key=lambda k: (k not in panel.missed, -abs(panel.values[k] - middle)))
+    outside = set(np.flatnonzero((panel.values < low) | (panel.values > high)).tolist())
+    chosen = sorted(outside.union(panel.missed), key=lambda k: (k not in panel.missed, -abs(panel.values[k] - middle)))
     occupied: list[tuple[float, float, int, bool]] = []
     for k in chosen[:_MOST_NAMED]:
         value = float(np.clip(panel.values[k], low, high))
-        text = shortened(names[k], _MOST_LETTERS) + (f": {number(panel.values[k], 3)}" if k in beyond else "")
+        text = shortened(names[k], _MOST_LETTERS) + (f": {number(panel.values[k], 3)}" if k in outside else "")
         half, above, line = 0.5 * _LETTER * len(text), value < (low + high) / 2.0, 1
         center = min(max((k + 0.5) / panel.values.size, half), 1.0 - half)
         while any(
-            abs(center - other) < half + room and other_line == line and side == above
-            for other, room, other_line, side in occupied
+            abs(center - other_center) < half + room and other_line == line and side == above
+            for other_center, room, other_line, side in occupied
         ):
             line += 1
         occupied.append((center, half, line, above))

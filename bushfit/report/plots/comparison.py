@@ -28,19 +28,22 @@ def comparison_figure(comparison: SideBySide) -> style.Chart:
     Returns:
         Figure with four panels per place.
     """
-    first, *others = comparison.names
-    figure = style.Chart(f"{', '.join(others)} against {first}", 2 * len(comparison.places) * style.ROW)
+    first, *other_labels = comparison.names
+    figure = style.Chart(f"{', '.join(other_labels)} against {first}", 2 * len(comparison.places) * style.ROW)
     grid = figure.subplots(2 * len(comparison.places), 2, squeeze=False)
     looks = dict(zip(comparison.names, style.styles(len(comparison.names), "loop"), strict=True))
     for row, place in enumerate(comparison.places):
         tables = comparison.differences_at(place)
-        heads = ContrastHeaders.from_table(tables[others[0]])
-        frequency, amplitude = numbers(tables[others[0]], "frequency [Hz]", heads.amplitude)
+        heads = ContrastHeaders.from_table(tables[other_labels[0]])
+        frequency, amplitude = numbers(tables[other_labels[0]], "frequency [Hz]", heads.amplitude)
         over_frequency = bool(np.ptp(frequency))
         x_header, fixed_header = ("frequency [Hz]", heads.amplitude)[:: 1 if over_frequency else -1]
         levels = np.unique(np.unique(amplitude if over_frequency else frequency)[[0, -1]])
-        values = [(first, tables[others[0]], "reference "), *((label, tables[label], "other ") for label in others)]
-        differences = [(label, tables[label], "") for label in others]
+        values = [
+            (first, tables[other_labels[0]], "reference "),
+            *((label, tables[label], "other ") for label in other_labels),
+        ]
+        differences = [(label, tables[label], "") for label in other_labels]
         name, unit = split_header(heads.stiffness)
         largest = max(float(np.nanmax(table[f"{side}{heads.stiffness}"], initial=0.0)) for _, table, side in values)
         display, factor = display_unit(unit or "", 1.0, largest)
@@ -63,7 +66,7 @@ def comparison_figure(comparison: SideBySide) -> style.Chart:
                     line.set(marker=look.marker, markevery=max(value.size // _MARKS, 1), **style.POINT)
                     # bands of several results lie on each other
                     axes.fill_between(x[level == drawn_level], low, high, color=look.color, alpha=0.18, lw=0)
-            style.label_axes(axes, x_header, y_label, numbers(tables[others[0]], x_header)[0])
+            style.label_axes(axes, x_header, y_label, numbers(tables[other_labels[0]], x_header)[0])
             if least_span:
                 axes.axhline(0.0, color=looks[first].color, lw=_STROKE)
                 style.widen_span(axes, least_span)

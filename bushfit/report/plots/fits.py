@@ -139,12 +139,12 @@ def draw_points(
     values = scale * rows[header].to_numpy()[np.argsort(index, kind="stable")]
     counts = np.bincount(index)
     starts = np.cumsum(counts) - counts
-    kept = slice(None, None, _thinning(x.size, curves))
+    thinned = slice(None, None, _thinning(x.size, curves))
     if x.size < len(rows):
         low, high = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
-        axes.vlines(x[kept], low[kept], high[kept], color=look.color, lw=0.7, alpha=0.7)
+        axes.vlines(x[thinned], low[thinned], high[thinned], color=look.color, lw=0.7, alpha=0.7)
     points = style.POINT if x.size <= _MANY_POINTS else style.DOT | {"alpha": 0.5}
-    axes.plot(x[kept], (np.add.reduceat(values, starts) / counts)[kept], look.marker, color=look.color, **points)
+    axes.plot(x[thinned], (np.add.reduceat(values, starts) / counts)[thinned], look.marker, color=look.color, **points)
 
 
 def _thinning(count: int, curves: int) -> int:
@@ -262,6 +262,9 @@ def loop_labels(place: Place, loops: dict[str, pd.DataFrame]) -> list[str]:
     Args:
         place: direction or specimen of the loops.
         loops: rows of each loop by the name of its test.
+
+    Returns:
+        Labels in the order of the loops.
     """
     labels = []
     for loop in loops.values():

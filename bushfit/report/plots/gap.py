@@ -98,6 +98,9 @@ def column_titles(table: pd.DataFrame, diagnosis: Mapping[str, Any]) -> dict[str
     Args:
         table: as `tables.gap_table` makes it.
         diagnosis: the document of diagnosis.json.
+
+    Returns:
+        Titles by `before` and, where anything differs, `after`.
     """
     changed = any(
         not np.allclose(table[name], table[str(name).replace("before", "after")], equal_nan=True)
@@ -133,6 +136,9 @@ def color_scale(sweeps: pd.DataFrame, sides: Sequence[str]) -> tuple[Array, Scal
     Args:
         sweeps: sweeps of the table of the gap.
         sides: columns of the figure.
+
+    Returns:
+        Edges [%], rising, and the colours between and beyond them.
     """
     values = np.abs(sweeps[[f"{part} {side} [%]" for part in ("storage", "loss") for side in sides]].to_numpy())
     needed = int(np.searchsorted(_EDGES, np.nanquantile(values, 1.0 - _BEYOND))) + 1

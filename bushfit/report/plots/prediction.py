@@ -133,18 +133,18 @@ def draw_prediction(
     x_header, fixed_header = header_of(place, axis), header_of(place, fixed)
     points = points_near(table, fixed_header, scales[fixed] * levels)
     measured = np.array([len(rows) > 0 for rows in points])
-    shown = np.flatnonzero(measured) if measured.sum() > 1 else np.arange(levels.size)
-    shown = shown[spread(shown.size, _MOST_LEVELS[axis])]
+    chosen = np.flatnonzero(measured) if measured.sum() > 1 else np.arange(levels.size)
+    chosen = chosen[spread(chosen.size, _MOST_LEVELS[axis])]
     to_table = place.display.stiffness.factor
     factor, labels = stiffness_scale(place, to_table * float(prediction.stiffness.value.max()))
-    x, looks = scales[axis] * getattr(prediction, axis), style.styles(shown.size, fixed)
+    x, looks = scales[axis] * getattr(prediction, axis), style.styles(chosen.size, fixed)
     kinds = (
         ("stiffness", columns_of(place)[1], factor, factor * to_table),
         ("loss_factor", "loss factor [-]", 1.0, 1.0),
     )
     for axes, label, (name, header, from_table, from_si) in zip(pair, labels, kinds, strict=True):
         band = getattr(prediction, name)
-        for look, index in zip(looks, shown, strict=True):
+        for look, index in zip(looks, chosen, strict=True):
             mask, rows = getattr(prediction, fixed) == levels[index], drawn_points(points[index])
             value, low, high = (from_si * end[mask] for end in (band.value, band.low, band.high))
             marker = "_" if value.size == 1 else ""  # a single point is a stroke
@@ -157,11 +157,11 @@ def draw_prediction(
             if len(rows) and rig is not None:
                 axes.plot(x[mask], from_si * getattr(rig, name).value[mask], color=look.color, lw=_THIN)
             if len(rows):
-                draw_points(axes, rows, x_header, header, from_table, look, shown.size)
+                draw_points(axes, rows, x_header, header, from_table, look, chosen.size)
         style.label_axes(axes, x_header, label, x)
         style.widen_span(axes, 0.04 * from_si * band.high.max() if name == "stiffness" else 0.01)  # flat looks flat
     extra_lines: dict[str, Line2D | tuple[Line2D, ...]] = {}
-    if (with_rig := bool(measured[shown].any() and rig)) or prediction.if_rigs:
+    if (with_rig := bool(measured[chosen].any() and rig)) or prediction.if_rigs:
         extra_lines["bushing"] = Line2D([], [], color=style.INK, lw=_LINE)
     if with_rig:
         extra_lines["with the rig"] = Line2D([], [], color=style.INK, lw=_THIN, marker="o", **style.POINT)
@@ -169,9 +169,9 @@ def draw_prediction(
         double = ((style.INK, _DOUBLE), ("white", _CORE))
         extra_lines[IF_RIGS] = tuple(Line2D([], [], color=color, lw=width) for color, width in double)
     unit, to_people = display_unit(*(("Hz", 1.0) if fixed == "frequency" else place.display.displacement), levels.min())
-    names = [format_range(unit, to_people * level) for level in levels[shown]]
-    style.name_levels(pair[-1], names, fixed, measured[shown].tolist(), extra_lines)
-    return bool(measured[shown].any())
+    names = [format_range(unit, to_people * level) for level in levels[chosen]]
+    style.name_levels(pair[-1], names, fixed, measured[chosen].tolist(), extra_lines)
+    return bool(measured[chosen].any())
 
 
 def points_near(table: pd.DataFrame | None, header: str, levels: Array) -> list[pd.DataFrame]:

@@ -250,7 +250,12 @@ def noise_band(axes: Axes) -> None:
 
 
 def mark_outliers(axes: Axes, x: Array, y: Array) -> None:
-    """Draw crosses at outliers, (n,) each in the units of the panel, at its edge if they are beyond it."""
+    """Draw crosses at outliers, (n,) each in the units of the panel, at its edge if they are beyond it.
+
+    Args:
+        axes: panel.
+        x, y: outliers in the units of the panel, (n,) each.
+    """
     low, high = axes.get_ylim()
     if x.size:
         axes.plot(x, np.clip(y, low, high), "x", color=RED, ms=4.5, mew=1.2, zorder=5, clip_on=False)
