@@ -51,19 +51,19 @@ SeedRunner = Callable[[Sequence[int], Callable[[int], RelativeErrors]], Iterable
 
 
 def settings_of(tests: Sequence[Test], noise: Noise, seed: int = 0) -> SimulateSettings:
-    """Settings of the virtual rig for planned tests, with as many repeats of a sweep as the plan has runs.
+    """Convert planned tests to the settings of `bushfit simulate`; repeated sweeps become one sweep with repeats.
 
     Args:
         tests: runs of the plan.
-        noise: of the rig.
-        seed: of the random numbers.
+        noise: measurement errors of the rig.
+        seed: seed of the random numbers.
 
     Returns:
-        Settings of [simulate].
+        Settings of the table [simulate].
 
     Notes:
         The rows of a loop are correlated like the output of a first-order filter, AR(1) with coefficient r: n rows
-        have the information of n (1 - r)/(1 + r) independent ones.
+        have the information of n (1 - r)/(1 + r) independent rows.
     """
     counts = Counter(tests)
     return SimulateSettings(
@@ -84,8 +84,8 @@ def campaign_toml(plan: Plan, seed: int = 0) -> str:
     """Write the planned tests as a campaign file for `bushfit simulate`.
 
     Args:
-        plan: tests and model.
-        seed: of the random numbers.
+        plan: planned tests, and the model that the simulation uses.
+        seed: seed of the random numbers.
 
     Returns:
         Text of the TOML file.
@@ -116,7 +116,7 @@ def campaign_toml(plan: Plan, seed: int = 0) -> str:
 
 
 def _line(key: str, value: Any, test: Test | None = None) -> str:
-    """Line of one key and its value, with a unit if the key needs one."""
+    """Write one TOML line, with a unit if the key needs one; `test` gives the unit of the amplitude."""
     if key not in _UNITS:
         share = isinstance(value, float)
         return f"{key} = {toml_value(f'{_number(100.0 * value)} %') if share else toml_value(value)}"
@@ -129,20 +129,20 @@ def _line(key: str, value: Any, test: Test | None = None) -> str:
 
 
 def _number(value: float) -> str:
-    """Number with twelve digits, without the rounding errors of units."""
+    """Format a number with twelve digits, which hides the rounding errors of unit conversions."""
     return f"{value:.12g}"
 
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """Predicted and simulated standard errors of relative changes of k parameters.
+    """Comparison of the standard errors that a plan predicts with the scatter of fits to simulated campaigns.
 
     Args:
-        names: of the parameters.
-        predicted: standard errors by the plan, (k,).
-        deviations: fitted less true values of each campaign, relative, (campaigns, k).
+        names: names of the k parameters.
+        predicted: relative standard error of each parameter from the plan, (k,).
+        deviations: relative deviation of the fitted from the true parameters in each campaign, (campaigns, k).
         failed: number of campaigns that could not be fitted.
-        seed: of the first campaign; the others count on.
+        seed: seed of the first campaign; each further campaign has the next integer.
     """
 
     names: tuple[str, ...]
@@ -153,27 +153,30 @@ class Check:
 
     @property
     def observed(self) -> Array:
-        """Root mean square deviation of the fitted from the true values, (k,)."""
+        """Root mean square relative deviation of the fitted from the true parameters, (k,)."""
         return np.sqrt(np.mean(np.square(self.deviations), axis=0))
 
     @property
     def interval(self) -> tuple[Array, Array]:
-        """95 % interval of each observed standard error, (k,) each: n observed^2 / chi-square of n, n campaigns."""
+        """Lower and upper ends of the 95 % interval of each observed standard error, (k,) each.
+
+        Notes: observed * sqrt(n / chi-square quantile with n degrees of freedom), for n campaigns.
+        """
         n = len(self.deviations)
         low, high = (self.observed * np.sqrt(n / chdtri(n, p)) for p in (0.025, 0.975))
         return low, high
 
 
 def check(plan: Plan, count: int, seed: int, run_all: SeedRunner) -> Check:
-    """Simulate and fit a plan several times.
+    """Simulate a plan several times and fit each simulated campaign, to check the predicted standard errors.
 
-    A plan that continues a campaign is simulated with the tests of the campaign, because they are fitted together.
+    A plan that continues a campaign is simulated with the tests of the campaign, because all tests are fitted together.
 
     Args:
-        plan: to be simulated.
-        count: number of campaigns.
-        seed: of the first campaign; the others count on.
-        run_all: calls a function for all seeds, such as `batch.executor.run_rows` on all cores.
+        plan: plan to simulate.
+        count: number of simulated campaigns.
+        seed: seed of the first campaign; each further campaign has the next integer.
+        run_all: function that calls a function for all seeds, such as `batch.executor.run_rows` on all cores.
 
     Returns:
         Predicted and observed standard errors.
@@ -198,14 +201,14 @@ def fit_campaign(
     """Simulate one campaign and fit it.
 
     Args:
-        clean: tests without noise.
-        settings: of the virtual rig.
-        rig: class of the rig, which the fit receives.
-        names: of the k parameters.
-        seed: of the random numbers.
+        clean: simulated tests without noise.
+        settings: settings of the virtual rig, with its noise.
+        rig: settings [rig] that the fit receives, with the class of the rig.
+        names: names of the k parameters to compare.
+        seed: seed of the random numbers.
 
     Returns:
-        Relative errors of the fitted parameters, (k,); None if no fit was possible.
+        Relative deviations of the fitted from the true parameters, (k,); None if no fit was possible.
     """
     truth = clean.truth
     coordinates, sizes = Coordinates.of_parameters(truth, names), relative_sizes(truth, names)

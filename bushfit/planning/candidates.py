@@ -44,14 +44,14 @@ def run_minutes(test: Test, rig: RigSettings) -> float:
 
 
 def standard_tests(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
-    """Runs of the standard programme: the paper's axial and radial tests, or its axial tests of specimens.
+    """List the runs of the standard programme: the tests of the paper, scaled to the bushing or specimens.
 
     Args:
         knowledge: model of the bushing or specimens.
-        request: limits of the rig and directions.
+        request: limits of the rig, and the specimens if there is no bushing.
 
     Returns:
-        Each run once: loops of a bushing in the axial direction only, and sweeps in both.
+        Each run once: axial loops and sweeps and radial sweeps of a bushing, or loops and sweeps of each specimen.
     """
     if knowledge.model.bushing is None:
         return [test for place in request.places for test in paper_tests(knowledge, request.rig, place)]
@@ -60,7 +60,7 @@ def standard_tests(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
 
 
 def paper_tests(knowledge: Knowledge, rig: RigSettings, place: Place) -> list[Test]:
-    """The paper's loops and axial sweeps in a direction, with a run for each amplitude.
+    """List the paper's loops and axial sweeps in a direction, with one run for each amplitude.
 
     Args:
         knowledge: model of the bushing or specimens.
@@ -68,7 +68,7 @@ def paper_tests(knowledge: Knowledge, rig: RigSettings, place: Place) -> list[Te
         place: direction or specimen.
 
     Returns:
-        Loops, then sweeps, within the limits, at the amplitudes that cause the strains of the paper's bushing.
+        Loops, then sweeps, within the limits of the rig. The amplitudes cause the same strains as in the paper.
     """
     strained = Direction.AXIAL if place is Direction.RADIAL else place  # the paper's radial displacements are axial
     scale = _PAPER_STRAIN / knowledge.model.unit_strain(strained)
@@ -81,17 +81,17 @@ def paper_tests(knowledge: Knowledge, rig: RigSettings, place: Place) -> list[Te
 
 
 def candidates(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
-    """Candidate tests: those of the standard programme, and sweeps and loops of few points over a wider range.
+    """List the candidate tests: the standard programme, and sweeps and loops of few points over a wider range.
 
-    Frequencies reach twice those of the standard programme if [rig] states that the rig can. Frequencies near the top
-    show masses, delays and resonances in fewer points than a whole sweep.
+    If [rig] states a sufficient max_frequency, frequencies reach twice those of the standard programme: a few points
+    near the highest frequency reveal masses, delays and resonances.
 
     Args:
-        knowledge: model that gives forces and strains.
-        request: limits of the rig, directions and wanted points.
+        knowledge: model that predicts forces and strains.
+        request: limits of the rig, directions and wanted operating points.
 
     Returns:
-        Distinct runs.
+        Candidate runs, each once.
 
     Raises:
         ModelError: no test is within the limits of the rig.
@@ -128,7 +128,7 @@ def candidates(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
 
 
 def _possible_tests(knowledge: Knowledge, rig: RigSettings, tests: Sequence[Test]) -> list[Test]:
-    """Tests without steps beyond the limits of rig or rubber; sweeps of fewer than two steps are left out."""
+    """Remove loops and sweep steps beyond the limits of the rig or the rubber, then sweeps of fewer than two steps."""
     possible: list[Test] = []
     for test in tests:
         (frequency, amplitude), place = operating_points(test), test.direction
@@ -145,15 +145,15 @@ def _possible_tests(knowledge: Knowledge, rig: RigSettings, tests: Sequence[Test
 
 
 def _set_point(value: float) -> float:
-    """Value with two digits, as a set point is typed."""
+    """Round a value to two significant digits."""
     return float(f"{value:.2g}")
 
 
 def unlimited_rig_warning(knowledge: Knowledge, rig: RigSettings, tests: Sequence[Test]) -> str | None:
-    """Sentence on the velocity, acceleration and force of a plan if [rig] states no limits.
+    """Write a warning with the velocity, acceleration and force that a plan reaches if [rig] states no limits.
 
     Args:
-        knowledge: model that gives the forces.
+        knowledge: model that predicts the forces.
         rig: limits of the rig.
         tests: runs of the plan.
 

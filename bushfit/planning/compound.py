@@ -34,19 +34,20 @@ _NETWORK = 3.5
 _LEAST_SHARE = 0.02
 #: Standard deviation of a stated hardness [Shore A]: compounds are sold within 5 degrees, which is taken for 95 %.
 _HARDNESS_ERROR = 2.5
-#: Of ln G where the hardness is known; chosen: relations between hardness and modulus differ by some 20 %, and rubber
-#: in a mould is not rubber in a sheet.
+#: Standard deviation of ln G at a known hardness; chosen: relations between hardness and modulus differ by some 20 %,
+#: and rubber in a mould is not rubber in a sheet.
 _MODULUS_ERROR = 0.2
-#: Of ln q, ln alpha, ln r and ln eps_half in natural rubber: factors of 2.4, 1.7, 2.7 and 2.2 hold 95 %.
+#: Standard deviations of ln q, ln alpha, ln r and ln eps_half in natural rubber: 95 % of rubbers are within factors of
+#: 2.4, 1.7, 2.7 and 2.2.
 _SHAPE_ERRORS = np.array([0.45, 0.27, 0.5, 0.4])
-#: The same in other rubbers, none of which the numbers come from; an EPDM that was measured has alpha below 0.1.
+#: The same in other rubbers, larger because the numbers come from natural rubber; a measured EPDM has alpha below 0.1.
 _OTHER_ERRORS = np.array([0.7, 0.5, 0.7, 0.5])
-#: Of the power of the network's stiffness: blacks differ in it.
+#: Standard deviation of the power `_NETWORK`: carbon blacks differ in it.
 _NETWORK_ERROR = 1.0
 
 
 def gent_modulus(shore: float) -> float:
-    """Shear modulus [Pa] of a hardness in Shore A: a third of Young's modulus by Gent (1958)."""
+    """Shear modulus [Pa] of a rubber from its Shore A hardness: a third of Young's modulus by Gent (1958)."""
     return 1e6 * 0.0981 * (56.0 + 7.66 * shore) / (0.137505 * (254.0 - 2.54 * shore)) / 3.0
 
 
@@ -54,11 +55,11 @@ def guess_parameters(bushing: Bushing, compound: Compound) -> Knowledge:
     """Guess the parameters of a rubber that was not tested, with their uncertainty, from hardness and filler.
 
     Args:
-        bushing: geometry.
+        bushing: geometry of the bushing.
         compound: hardness [Shore A], carbon black [phr] and polymer.
 
     Returns:
-        Knowledge of the five parameters.
+        Knowledge with the estimates of the five parameters (mu, m, alpha, sigma_fmax, eps_half) and their covariance.
 
     Notes:
         The laws of the guess:
@@ -79,10 +80,10 @@ def guess_parameters(bushing: Bushing, compound: Compound) -> Knowledge:
         here, or with 7.62336, which gives 0.5 % less; E. Guth, J. Applied Physics 16 (1945) 20-25; G. Heinrich,
         M. Klueppel, Advances in Polymer Science 160 (2002) 1-44, for phi^3.5; Garcia Tarrago et al. 2007, Table 1.
 
-        ln G, ln q, ln alpha, ln r and ln eps_half are guessed independently, each with a standard deviation above.
-        These are chosen: one published and one measured compound lie inside (tests/planning), and two compounds prove
-        little. Where stiffness follows a power of frequency over four decades, as
-        that of the measured one does, mu falls to nothing in a fit, and no guess of a spring holds it.
+        The errors of ln G, ln q, ln alpha, ln r and ln eps_half are independent; their standard deviations are the
+        constants of this module. They are chosen: one published and one measured compound lie inside (tests/planning),
+        and two compounds prove little. If the stiffness follows a power of frequency over four decades, as for the
+        measured compound, a fit gives mu near zero, far from this estimate of mu.
     """
     filler = np.array([compound.filler, _PAPER_FILLER]) / _BLACK_DENSITY  # of the compound and of the paper's
     polymer = 100.0 / np.array([_DENSITY[compound.rubber], _DENSITY["natural"]])

@@ -27,7 +27,7 @@ Test = SimulatedLoop | SimulatedSweep
 
 
 def operating_points(test: Test) -> tuple[Array, Array]:
-    """Frequency [Hz] and amplitude, zero-to-peak [m or rad, or strain], of each point of a run, (n,) each."""
+    """Frequency [Hz] and zero-to-peak amplitude [m, rad or strain] of each of the n points of a test, (n,) each."""
     if isinstance(test, SimulatedLoop):
         frequency, amplitude = np.array(test.parts).T
         return frequency, amplitude
@@ -36,7 +36,7 @@ def operating_points(test: Test) -> tuple[Array, Array]:
 
 
 def motions(test: Test) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Amplitudes [m or rad, or strain] and frequencies [Hz] of a test."""
+    """Distinct zero-to-peak amplitudes [m, rad or strain] and frequencies [Hz] of a test, in that order."""
     if isinstance(test, SimulatedLoop):
         return (test.amplitude,), (test.frequency,)
     return test.amplitudes, test.frequencies
@@ -44,17 +44,19 @@ def motions(test: Test) -> tuple[tuple[float, ...], tuple[float, ...]]:
 
 @dataclass(frozen=True)
 class Noise:
-    """How well the rig measures, standard deviations; gain and phase [rad] are those of ln K.
+    """Standard deviations of the rig's measurement errors.
+
+    Gain and phase errors [1 and rad] are the real and imaginary part of the error of ln K.
 
     Args:
-        scatter: of a sweep's point, (gain, phase).
-        shared: of all points of one run, (gain, phase).
-        level: of all runs of one test, and the gain of a loop's record, (gain, phase): the class of the rig. In a fit
-            [rig] states it, so that loops and repeated sweeps count it as noise.
-        force: of a row of a loop, over half the force range; there are 1000 rows a cycle, as `simulate` has them.
-            Chosen: that of most force sensors.
-        rows_as_one: so many rows of a loop tell as much as an independent one. Chosen: an amplifier that passes sixteen
-            harmonics of the cycle, as loops are smoothed; rows taken as independent promise more than most rigs keep.
+        scatter: independent error of each point of a sweep, (gain, phase).
+        shared: error shared by all points of one run, (gain, phase).
+        level: error shared by all runs of one test, (gain, phase): the class of the rig. A loop has its gain only. A
+            fit takes this error from [rig] and treats it as noise of loops and repeated sweeps.
+        force: error of one recorded row of a loop over half the force range, at 1000 rows a cycle as in `simulate`.
+            The default is chosen: that of most force sensors.
+        rows_as_one: number of correlated rows of a loop with the information of one independent row. The default is
+            chosen: an amplifier that passes sixteen harmonics of the cycle.
     """
 
     scatter: tuple[float, float] = (ASSUMED[0], ASSUMED[0])
@@ -66,20 +68,20 @@ class Noise:
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """Knowledge before the tests.
+    """Knowledge of the model and its parameters before the planned tests: the prior of the plan.
 
     Args:
-        model: the likeliest values.
-        names: of its k parameters that the tests are to determine.
-        covariance: of their relative changes and those of the bounded parameters, (k + b, k + b).
-        noise: of the rig.
+        model: model with its likeliest parameter values.
+        names: names of the k parameters that the tests shall determine.
+        covariance: covariance of the relative changes of the k parameters and of the b bounded ones, (k + b, k + b).
         source: origin of the knowledge, as a phrase.
+        noise: measurement errors of the rig.
         rivals: knowledge for each model that may be the right one, this model first; empty if there is no doubt.
-        probability: of this model among its rivals.
-        strain: largest equivalent strain amplitude measured so far; None where nothing was.
-        specimens: bodies of the compound that can be tested in place of the bushing.
-        tests: of the campaign so far.
-        bounded: its b parameters at rest on a bound, off which noise takes a fit half of the times; in typical sizes.
+        probability: probability of this model among its rivals.
+        strain: largest equivalent strain amplitude measured so far [1]; None if there are no tests.
+        specimens: specimens of the compound that can be tested in place of the bushing.
+        tests: tests of the campaign so far.
+        bounded: names of the b parameters that the fit has at a bound; their changes are in units of typical values.
         warnings: of the fit.
         result: the fit itself; None of a guess.
     """
@@ -105,9 +107,10 @@ class Knowledge:
 
     @property
     def precision(self) -> Array:
-        """Information of the knowledge, with a prior of each parameter within a factor of 20, (k + b, k + b).
+        """Information matrix of the prior: inverse of `covariance` plus a weak prior (a factor of 20), (k + b, k + b).
 
-        Notes: what tests leave open has errors of a thousand times its size, which rounds all else away.
+        Notes: parameters that the tests do not determine have errors of a thousand times their value; without the weak
+        prior, rounding errors would swamp all other parameters.
         """
         size = np.sqrt(np.diag(self.covariance))
         values, vectors = np.linalg.eigh(self.covariance / np.outer(size, size))
@@ -117,11 +120,12 @@ class Knowledge:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Operating points of one direction whose stiffness is wanted.
+    """Operating points of one direction at which the plan shall predict the stiffness.
 
     Args:
-        frequency: [Hz], (n,).
-        amplitude: zero-to-peak [m or rad, or strain], (n,).
+        place: direction of the bushing, or specimen.
+        frequency: frequency of each point [Hz], (n,).
+        amplitude: zero-to-peak amplitude of each point [m, rad or strain], (n,).
     """
 
     place: Place
@@ -131,12 +135,13 @@ class Points:
 
 @dataclass(frozen=True)
 class Target:
-    """An interval that is to be reached.
+    """Accuracy that a plan shall reach: largest allowed 95 % interval of a parameter or of a prediction.
 
     Args:
-        quantity: a parameter by its name, or "stiffness" or "loss_factor".
-        half: of its 95 % interval at most, over its value; of a predicted one at every point that is wanted.
-        place: of a predicted one; None of a parameter.
+        quantity: name of a parameter, or "stiffness" or "loss_factor".
+        half: largest allowed half width of the 95 % interval, relative to the value. A prediction has to reach it at
+            every operating point of the request.
+        place: direction or specimen of the prediction; None for a parameter.
     """
 
     quantity: str
@@ -156,9 +161,9 @@ class PlanRequest:
         hours: largest duration on the rig [h].
         rig: limits of the rig, and its time for a point and for a set-up.
         places: directions or specimens that the rig can test.
-        points: points at which the stiffness is wanted; the plan reports its errors there whatever the aim.
-        parameters: names whose errors count, of aim "parameters".
-        targets: of aim "targets": no further test is planned once they are met.
+        points: operating points at which the plan reports the errors of the stiffness, whatever the aim.
+        parameters: names of the parameters whose errors aim "parameters" minimises.
+        targets: targets of aim "targets", which plans no further test once the targets are met.
     """
 
     aim: Aim
@@ -176,9 +181,9 @@ class DetectableAmount:
 
     Args:
         effect: name of an effect that the model lacks.
-        parameter: name of the parameter that the amount is of.
+        parameter: qualified name of the effect's parameter that measures the amount.
         unit: SI unit of the amount.
-        amount: in that unit.
+        amount: smallest detectable amount, in `unit`; infinite if no amount is detected.
     """
 
     effect: str
@@ -189,20 +194,20 @@ class DetectableAmount:
 
 @dataclass(frozen=True, eq=False)
 class Programme:
-    """Tests in their order, with their expected results beside the knowledge before them.
+    """Sequence of tests with their durations and the accuracy expected from them and the knowledge before them.
 
     Args:
         tests: runs of the rig, in the order in which they are made.
-        minutes: that each test takes, with the change of direction before it, (tests,).
+        minutes: duration of each test with the change of direction before it [min], (tests,).
         errors: standard error of each parameter's relative change, (k,).
-        alone: the errors by these tests alone, (k,).
-        stiffness: standard error of |K| at the points wanted, relative, all points of all directions, (n,).
-        loss: the same of the loss factor, in loss factor, (n,).
+        alone: standard error of each parameter's relative change from these tests without the prior, (k,).
+        stiffness: relative standard error of |K| at the wanted operating points of all directions, (n,).
+        loss: standard error of the loss factor at these points, absolute, (n,).
         rival_chi_square: expected chi-square between the two nearest rivals that can be separated, after the best
             refit of either; None without rivals.
-        halves: half of the 95 % interval of each target over its value, the widest of all points.
+        halves: half width of the 95 % interval of each target, relative to the value, at its worst point.
         detectable: smallest detectable amount of each effect that the standard programme can show.
-        drift: largest shift of a parameter, over its standard error, by a drift of the gain of 1 % over the session.
+        drift: largest shift of a parameter by a gain drift of 1 % over the session, in standard errors.
     """
 
     tests: tuple[Test, ...]
@@ -224,17 +229,17 @@ class Programme:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Tests chosen for an aim, and the standard programme of as many hours beside them.
+    """Result of planning: tests chosen for an aim, compared with the standard programme of as many hours.
 
     Args:
-        before: a programme without tests.
-        planned: the tests chosen.
-        standard: the paper's tests, as often as the same hours allow.
-        knowledge: before the tests.
-        request: aim of the plan.
-        purposes: sentence on the loss without a test and all its repeats, by test.
-        missed: reason why the planned tests miss each target; None where they meet it.
-        enough: reason why hours stay free; None if they are used.
+        knowledge: knowledge before the tests.
+        request: aim of the plan, with the hours and limits of the rig.
+        before: programme without tests, for comparison.
+        planned: programme of the chosen tests.
+        standard: programme of the paper's tests, repeated as often as the same hours allow.
+        purposes: sentence on the loss of accuracy without a test and all its repeats, by test.
+        missed: reason why the planned tests miss each target; None for a target that they meet.
+        enough: reason why hours remain free; None if the hours are used.
         notes: warnings and limits of the plan.
     """
 

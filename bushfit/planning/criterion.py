@@ -21,14 +21,18 @@ _SHIFT_WEIGHT = 100.0
 
 @dataclass(frozen=True, eq=False)
 class Criterion:
-    """Criterion of a choice of tests; the smaller, the better.
+    """Objective function that a plan minimises over the number of runs of each candidate test.
+
+    The objective is the logarithm of a weighted parameter variance, or of the entropy of the rival models, plus a
+    penalty for each missing effect that the tests would detect too weakly.
 
     Args:
-        models: information on the likeliest model, whose further columns are effects that it lacks; then on its rivals.
-        weight: weight of the parameters' covariance in the variance to minimise, (k, k); None to separate rivals.
-        probabilities: present probabilities of the rivals, (rivals,).
-        minimum_noncentrality: smallest wanted noncentrality of each effect, (e,); 0 where none is wanted.
-        penalty: weight of the logarithm of each shortfall beside the logarithm of the variance.
+        models: information of the tests on the likeliest model, whose further columns are effects that the model lacks;
+            then on each rival model.
+        weight: weight of the parameter covariance in the variance to minimise, (k, k); None to separate rival models.
+        probabilities: present probabilities of the rival models, (rivals,).
+        minimum_noncentrality: smallest wanted noncentrality (expected chi-square) of each effect, (e,); 0 for none.
+        penalty: weight of the logarithm of each shortfall in noncentrality.
     """
 
     models: Sequence[ModelInformation]
@@ -38,21 +42,21 @@ class Criterion:
     penalty: float
 
     def value(self, counts: Array) -> float:
-        """Criterion of a number of runs of each test, (tests,)."""
+        """Value of the objective for the number of runs of each test in `counts`, (tests,)."""
         return float(self.values([model.total(counts) for model in self.models])[0])
 
     def values_with_one_more(self, counts: Array) -> Array:
-        """Criterion with one more run of each test in turn, (tests,)."""
+        """Values of the objective with one run of each test in turn added to `counts`, (tests,)."""
         return self.values([model.with_one_more(counts) for model in self.models])
 
     def values(self, informations: Sequence[Information]) -> Array:
-        """Compute the criterion of several choices.
+        """Compute the objective for several choices of tests.
 
         Args:
-            informations: information of the choices on each model, (choices, ...).
+            informations: information on each model, in the order of `models`, with a first axis over the choices.
 
         Returns:
-            Criterion, (choices,).
+            Value of the objective for each choice, (choices,).
         """
         if self.weight is None:
             entropy = entropy_left(self.probabilities, rival_chi_squares(informations[1:]))
@@ -69,12 +73,13 @@ class Budget:
     """Durations and limits of the candidate tests.
 
     Args:
-        minutes: duration of one run of each test, (tests,).
-        place: number of the direction of each test, (tests,).
-        line: number of the quantity that each test holds constant, (tests,); one test of a line is chosen.
-        maximum_runs: largest number of runs of each test, (tests,); 0 where it may not be chosen.
-        setup_minutes: time to mount the bushing, once for each direction that is tested.
-        maximum_minutes: largest duration in all.
+        minutes: duration of one run of each test [min], (tests,).
+        place: index of the direction or specimen of each test, (tests,).
+        line: index of the line of each test, (tests,). A line is the set of tests of one direction with the same
+            constant amplitude or frequency; a plan chooses at most one test of a line.
+        maximum_runs: largest number of runs of each test, (tests,); 0 for a test that may not be chosen.
+        setup_minutes: time to mount the bushing [min], spent once for each direction or specimen.
+        maximum_minutes: largest total duration [min].
     """
 
     minutes: Array
@@ -85,21 +90,21 @@ class Budget:
     maximum_minutes: float
 
     def spent(self, counts: Array) -> float:
-        """Minutes of a number of runs of each test, (tests,)."""
+        """Total duration [min], with set-ups, of the number of runs of each test in `counts`, (tests,)."""
         return float(self.minutes @ counts) + self.setup_minutes * np.unique(self.place[counts > 0]).size
 
     def minutes_of_one_more(self, counts: Array) -> Array:
-        """Minutes that one more run of each test adds, (tests,); infinite where it may not be chosen."""
+        """Minutes that one more run of each test adds to `counts`, (tests,); infinite if the run is not allowed."""
         more = self.minutes + self.setup_minutes * ~np.isin(self.place, self.place[counts > 0])
         barred = np.isin(self.line, self.line[counts > 0]) & (counts == 0) | (counts >= self.maximum_runs)
         return np.where(barred | (self.spent(counts) + more > self.maximum_minutes), np.inf, more)
 
 
 def best_runs(criterion: Criterion, budget: Budget, start: Array, minimum_runs: Array) -> Array:
-    """Search for the number of runs of each test that makes the criterion small.
+    """Search for the number of runs of each test that minimises the criterion within the budget.
 
     Args:
-        criterion: to be made small.
+        criterion: objective to minimise.
         budget: durations and limits of the tests.
         start: number of runs of each test to start from, (tests,).
         minimum_runs: smallest number of runs of each test, (tests,).
@@ -108,8 +113,8 @@ def best_runs(criterion: Criterion, budget: Budget, start: Array, minimum_runs: 
         Number of runs of each test within the budget, (tests,).
 
     Notes:
-        Greedy by the decrease of the criterion per minute; then exchanges (Fedorov 1972): one run of a test, or all of
-        them, are replaced by the best runs in the same time, as long as that helps.
+        Greedy search by the decrease of the criterion per minute; then exchanges (Fedorov 1972): one run of a test, or
+        all its runs, are replaced by the best runs of the same duration, until no exchange lowers the criterion.
     """
     counts = add_runs(criterion, budget, start)
     best = criterion.value(counts)
@@ -132,16 +137,16 @@ def best_runs(criterion: Criterion, budget: Budget, start: Array, minimum_runs: 
 def add_runs(
     criterion: Criterion, budget: Budget, counts: Array, enough: Callable[[Array], bool] = lambda _: False
 ) -> Array:
-    """Add runs one after the other, the best per minute first.
+    """Add runs one by one, each time the run with the largest decrease of the criterion per minute.
 
     Args:
-        criterion: to be made small.
+        criterion: objective to minimise.
         budget: durations and limits of the tests.
         counts: number of runs of each test to start from, (tests,).
-        enough: returns true for a number of runs of each test after which no more are added.
+        enough: function of the number of runs of each test that returns true to stop adding runs.
 
     Returns:
-        Number of runs of each test, (tests,).
+        Number of runs of each test with the added runs, (tests,).
     """
     counts, value = counts.copy(), criterion.value(counts)
     while not enough(counts) and np.isfinite(minutes := budget.minutes_of_one_more(counts)).any():
@@ -157,16 +162,18 @@ def add_runs(
 
 @dataclass(frozen=True, eq=False)
 class DriftEffect:
-    """Effect of a drift of the gain over the session on a number of runs of each test.
+    """Effect that a linear drift of the sensor gain over the test session has on the data and on the fit.
+
+    The effect depends on the order of the runs. A unit drift changes the gain by 100 % over the session.
 
     Args:
-        gain_information: square of the change of one run by a unit of gain, in units of noise, (tests,).
-        level_share: part of it that may be an error of the level, (tests,).
+        gain_information: squared change of one run's data by a unit of gain, in units of noise, (tests,).
+        level_share: part of `gain_information` that an error shared by all runs of the test explains, (tests,).
         shift_root: shift of the parameters by a unit of gain, in standard errors, (tests, k).
 
     Notes:
-        With S1 and S2 the sums of t and t^2 over the runs of each test, where t is the turn of a run from -1/2 to 1/2
-        over the session, the noncentrality of a unit drift after a refit of the parameters is
+        With S1 and S2 the sums of t and t^2 over the runs of each test, where t is the position of a run from -1/2 to
+        1/2 in the session, the noncentrality of a unit drift after a refit of the parameters is
         sum(gain_information S2 - level_share S1^2) - |sum(S1 shift_root)|^2.
     """
 
@@ -175,30 +182,35 @@ class DriftEffect:
     shift_root: Array
 
     def turn_sums(self, runs: Sequence[int] | Array) -> tuple[Array, Array, Array]:
-        """Turn of each run, (runs,), and the sums of the turns and of their squares over each test, (tests,) each."""
+        """Position of each run in the session, -1/2 to 1/2, (runs,), its sum and its sum of squares by test, (tests,).
+
+        Args:
+            runs: index of the test of each run, in the order of the session.
+        """
         tests = np.array(runs, dtype=int)
         turn = np.arange(tests.size) / max(tests.size - 1, 1) - 0.5
         first, second = (np.bincount(tests, turn**power, self.gain_information.size) for power in (1, 2))
         return turn, first, second
 
     def noncentrality(self, runs: Sequence[int] | Array) -> float:
-        """Noncentrality of a unit drift over runs in their order, given by the numbers of their tests."""
+        """Noncentrality (expected chi-square) of a unit drift; `runs` are test indices in the order of the session."""
         _, first, second = self.turn_sums(runs)
         shift = first @ self.shift_root
         return float(self.gain_information @ second - self.level_share @ first**2 - shift @ shift)
 
     def shift(self, runs: Sequence[int] | Array) -> Array:
-        """Shift of the parameters by a unit drift over runs in their order, (k,)."""
+        """Shift of the parameters by a unit drift, in standard errors, (k,); `runs` are test indices in order."""
         return self.turn_sums(runs)[1] @ self.shift_root
 
     def exchange_gains(self, runs: Array) -> Array:
-        """Compute the growth of the noncentrality if two runs change places.
+        """Compute how much the drift becomes more visible if two runs swap their positions in the session.
 
         Args:
-            runs: numbers of the tests in their order, (runs,).
+            runs: test indices in the order of the session, (runs,).
 
         Returns:
-            Growth for each pair of runs, (runs, runs); the shift of the parameters counts with _SHIFT_WEIGHT.
+            Growth of the noncentrality minus _SHIFT_WEIGHT times the growth of the squared parameter shift, for each
+            pair of runs, (runs, runs).
         """
         turn, first, _ = self.turn_sums(runs)
         step, squared = turn - turn[:, None], turn**2 - turn[:, None] ** 2  # of the run in the row
@@ -211,19 +223,21 @@ class DriftEffect:
 
 
 def order_runs(counts: Array, places: Array, drift: DriftEffect) -> list[int]:
-    """Order the runs direction by direction; each begins and ends with the same test if one is repeated.
+    """Order the runs of a session so that a drift of the gain is visible and hardly shifts the parameters.
+
+    Runs are grouped by direction; each direction begins and ends with the same test if a test is repeated.
 
     Args:
         counts: number of runs of each test, (tests,).
-        places: number of the direction of each test, in the order in which they are mounted, (tests,).
+        places: index of the direction of each test, in the order in which the directions are mounted, (tests,).
         drift: effect of a drift on these runs.
 
     Returns:
-        Numbers of the tests in the order of the runs.
+        Test indices in the order of the runs.
 
     Notes:
-        The inner runs are mirrored about the middle. Then the two runs of one direction whose exchange makes the drift
-        most visible change places, as long as any exchange does.
+        The inner runs are mirrored about the middle. Then pairs of runs of one direction are swapped, the pair with
+        the largest gain in visibility first, until no swap helps.
     """
     order, ends = list[int](), list[int]()
     for place in np.unique(places[counts > 0]):

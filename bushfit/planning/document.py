@@ -14,7 +14,7 @@ from bushfit.planning.problem import RIVALS_APART
 
 
 class PlannedRun(TypedDict):
-    """One run of the rig, in the order of the plan."""
+    """Entry of plan.json for one run of the rig."""
 
     place: Annotated[str, Field(description="Direction, or name of the specimen.")]
     kind: Annotated[Literal["loop", "sweep"], Field(description="Kind of test.")]
@@ -30,7 +30,7 @@ class PlannedRun(TypedDict):
 
 
 class Reached(TypedDict):
-    """A standard error before further tests, with the planned tests, and with the standard programme."""
+    """Standard error before further tests, with the planned tests, and with the standard programme."""
 
     before: Annotated[float, Field(description="Without further tests.")]
     planned: Annotated[float, Field(description="With the tests of the plan.")]
@@ -38,7 +38,7 @@ class Reached(TypedDict):
 
 
 class TargetEntry(Reached):
-    """Half of a 95 % interval over its value, the widest of all points at which predictions are wanted."""
+    """Half width of the 95 % interval of a target, relative to its value, at the worst operating point."""
 
     asked: Annotated[float, Field(description="Largest half width that was asked for.")]
     met: Annotated[bool, Field(description="Whether the planned tests reach the target.")]
@@ -55,7 +55,7 @@ class Shown(TypedDict):
 
 
 class Rivalry(TypedDict):
-    """Models that explain the tests equally well."""
+    """Expected separation of the models that explain the tests so far equally well."""
 
     effects: Annotated[list[str], Field(description="Effect that each of the models adds.")]
     planned: Annotated[
@@ -70,7 +70,7 @@ class Rivalry(TypedDict):
 
 
 class Checked(TypedDict):
-    """Simulations of the plan, each fitted."""
+    """Predicted standard errors compared with fits to simulations of the plan."""
 
     campaigns: Annotated[int, Field(description="Number of simulated campaigns.")]
     failed: Annotated[int, Field(description="Number of campaigns that could not be fitted.")]
@@ -118,14 +118,14 @@ class PlanFile(TypedDict):
 
 
 def plan_document(plan: Plan, check: Check | None = None) -> PlanFile:
-    """Content of plan.json.
+    """Convert a plan to the content of plan.json.
 
     Args:
         plan: the plan.
-        check: simulations of the plan, if they were asked for.
+        check: result of the simulations of the plan; None if the plan was not simulated.
 
     Returns:
-        Keys and values of the file, in SI.
+        Keys and values of the file, in SI units.
     """
     request, planned, standard = plan.request, plan.planned, plan.standard
     programmes = (plan.before, planned, standard)
@@ -199,7 +199,7 @@ def _reached(errors: Iterable[float]) -> Reached:
 
 
 def _checked(check: Check) -> Checked:
-    """Simulations as plan.json has them."""
+    """Convert the result of the simulations to the entry "check" of plan.json."""
     low, high = check.interval
     return {
         "campaigns": len(check.deviations) + check.failed,

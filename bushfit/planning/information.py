@@ -1,9 +1,10 @@
 """Information of tests on the parameters of a model: inner products of whitened columns, which add up over tests.
 
 Notes:
-    The stiffness is computed once at all operating points of a direction. Each run then takes its points, whitened as
-    in a fit, where errors that all points of a run share are noise. Errors that all runs of a line share are not noise
-    of a run: their unit columns remain until the runs of a line are added up.
+    A column holds the derivatives of the residuals by a parameter, or their change by an effect; whitened means divided
+    by the noise. The stiffness is computed once at all operating points of a direction. Each run then takes its points,
+    whitened as in a fit, which treats errors shared by all points of a run as noise. Errors shared by all runs of a
+    test remain as columns of unit gain and unit phase until the runs of the test are added up.
 """
 
 from __future__ import annotations
@@ -31,11 +32,14 @@ ROWS_PER_CYCLE = 1000
 
 
 class Information(NamedTuple):
-    """Inner products of k parameter columns and e further columns, for one choice of tests or several.
+    """Fisher information of one or several choices of tests: inner products of whitened columns.
+
+    The columns are the derivatives of the residuals by k parameters, and e further columns: changes of the residuals by
+    a missing effect or by a rival model.
 
     Args:
-        products: of the parameters with the parameters and the further columns, (choices, k, k + e).
-        squares: of each further column, (choices, e).
+        products: inner products of the parameter columns with all columns, (choices, k, k + e).
+        squares: inner product of each further column with itself, (choices, e).
     """
 
     products: Array
@@ -47,7 +51,7 @@ class Information(NamedTuple):
         return self.products[..., : self.products.shape[-2]]
 
     def noncentralities(self) -> Array:
-        """Expected chi-square by one unit of each further column after a refit of the parameters, (choices, e)."""
+        """Expected increase of chi-square by each effect or rival, after a refit of the parameters, (choices, e)."""
         cross = self.products[..., self.products.shape[-2] :]
         fitted = np.linalg.solve(self.parameters, cross)
         return np.maximum(self.squares - np.sum(cross * fitted, axis=-2), 0.0)
@@ -55,15 +59,15 @@ class Information(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ModelInformation:
-    """Information of one run of each candidate test on the k parameters of one model, and on e further columns.
+    """Fisher information of one run of each candidate test on the k parameters of one model and on e further columns.
 
     Args:
-        products: of the line's gain and phase errors, which come first, and the parameters with all columns,
-            (tests, 2 + k, 2 + k + e).
-        squares: of each further column, (tests, e).
-        level: standard deviations of the gain and phase [rad] errors that all runs of a test share, (tests, 2).
-        prior: information on relative changes of the parameters before the tests, (k, k).
-        bounded: number of parameters at a bound, which are the last ones.
+        products: inner products of the first 2 + k columns with all columns, (tests, 2 + k, 2 + k + e). The columns
+            are unit gain error, unit phase error, k parameters, and e effects or rivals.
+        squares: inner product of each further column with itself, (tests, e).
+        level: standard deviations of the gain [1] and phase [rad] errors that all runs of a test share, (tests, 2).
+        prior: information matrix of the parameters' relative changes before the tests, (k, k).
+        bounded: number of parameters at a bound; these are the last of the k parameters.
     """
 
     products: Array
@@ -73,37 +77,40 @@ class ModelInformation:
     bounded: int = 0
 
     def of_runs(self, counts: Array) -> Information:
-        """Information of a number of runs of each test, (tests,), test by test, with unknown errors of each line."""
+        """Information of each test separately, (tests, ...), with `counts` runs of each, (tests,); without the prior.
+
+        The gain and phase errors that all runs of a test share are eliminated.
+        """
         products, decrease = eliminate_line_errors(self.products * counts[:, None, None], self.level)
         return Information(products, self.squares * counts[:, None] - decrease)
 
     def total(self, counts: Array) -> Information:
-        """Information of a number of runs of each test, (tests,), and of the prior, (1, ...)."""
+        """Information of all tests together and of the prior, (1, ...), with `counts` runs of each test, (tests,)."""
         tests = self.of_runs(counts)
         products, k = tests.products.sum(axis=0, keepdims=True), len(self.prior)
         products[..., :k] += self.prior
         return Information(products, tests.squares.sum(axis=0, keepdims=True))
 
     def with_one_more(self, counts: Array) -> Information:
-        """Information with one more run of each test in turn, (tests, ...)."""
+        """Total information with one run of each test in turn added to `counts`, (tests, ...)."""
         total, now, more = self.total(counts), self.of_runs(counts), self.of_runs(counts + 1)
         return Information(
             *(all_tests + (after - before) for all_tests, before, after in zip(total, now, more, strict=True))
         )
 
     def error_covariance(self, information: Information) -> Array:
-        """Compute the expected squares and products of the errors of the parameters.
+        """Compute the covariance of the parameters' errors, with the effect of bounds.
 
         Args:
-            information: of the tests and the prior.
+            information: information of the tests and the prior.
 
         Returns:
-            Covariance of relative changes, (..., k, k).
+            Covariance of the parameters' relative changes, (..., k, k).
 
         Notes:
-            If the true value of a parameter is at its bound, noise would take half of the fits beyond the bound. In
-            these the parameter stays there, and the others are fitted with it fixed, so half of its contribution to
-            their squares is absent.
+            If the true value of a parameter is at its bound, noise pushes half of the fits against the bound. In these
+            fits the parameter stays at the bound and the others are fitted with it fixed, so half of its contribution
+            to their covariance is absent.
         """
         free = np.linalg.inv(information.parameters)
         first = free.shape[-1] - self.bounded
@@ -112,18 +119,19 @@ class ModelInformation:
 
 
 def eliminate_line_errors(products: Array, level: Array) -> tuple[Array, Array]:
-    """Remove the columns of the gain and phase errors of each line, which are unknown within their class.
+    """Eliminate the gain and phase errors that all runs of a test share from the inner products of the columns.
 
     Args:
-        products: of these two columns and k parameters with all columns, (tests, 2 + k, 2 + k + e).
-        level: standard deviations of the gain and phase [rad] errors, (tests, 2).
+        products: inner products as in `ModelInformation.products`, summed over the runs of each test,
+            (tests, 2 + k, 2 + k + e).
+        level: standard deviations of the gain [1] and phase [rad] errors, (tests, 2).
 
     Returns:
-        Products of the parameters with the other columns, (tests, k, k + e), and the decrease of the square of each
-        further column, (tests, e).
+        Inner products of the parameters with all remaining columns, (tests, k, k + e), and the decrease of the square
+        of each further column, (tests, e).
 
     Notes:
-        With the line's columns U, of standard deviations T, a product a^T b becomes
+        With U the gain and phase columns and T their standard deviations, a product a^T b becomes
         a^T b - a^T U T (1 + T U^T U T)^-1 T U^T b.
     """
     k = products.shape[-2] - 2
@@ -135,15 +143,15 @@ def eliminate_line_errors(products: Array, level: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class CandidateGrid:
-    """Candidate tests, and the data sets whose residuals they share.
+    """Candidate tests with simulated data sets that several tests share, so that each point is computed once.
 
     Args:
         knowledge: model whose stiffness the tests would measure, and noise of the rig.
-        tests: runs of the rig.
-        data_sets: one cycle of each loop, in units of its noise, then one sweep of all points of a direction, in ln K.
-            The rubber has borne the largest strain so far.
-        rows: numbers of each test's residuals among those of all data sets: (rows,) of a loop, and (2, points) of a
-            sweep, gain and phase.
+        tests: candidate runs of the rig.
+        data_sets: one cycle of each distinct loop, in units of its noise, then one sweep with all points of each
+            direction, in ln K. All assume the largest strain that the rubber has borne so far.
+        rows: indices of each test's residuals among the residuals of all data sets: (rows,) for a loop; (2, points) for
+            a sweep, gain and phase.
     """
 
     knowledge: Knowledge
@@ -153,11 +161,11 @@ class CandidateGrid:
 
     @classmethod
     def from_tests(cls, knowledge: Knowledge, tests: tuple[Test, ...]) -> CandidateGrid:
-        """Compute the data sets of candidate tests.
+        """Simulate the data sets of candidate tests.
 
         Args:
             knowledge: model whose stiffness the tests would measure, and noise of the rig.
-            tests: runs of the rig.
+            tests: candidate runs of the rig.
 
         Returns:
             Grid with a data set for each distinct loop and for the sweeps of each direction.
@@ -193,11 +201,11 @@ class CandidateGrid:
         """Compute the information of one run of each test.
 
         Args:
-            knowledge: model, its parameters, and the prior.
-            further: further columns over the residuals of all data sets, (e, n).
+            knowledge: model, names of its parameters, and prior covariance.
+            further: changes of all n residuals by e effects or rival models, (e, n).
 
         Returns:
-            Information on the parameters and the further columns.
+            Information of each test on the parameters and the further columns.
         """
         slopes = relative_slopes(knowledge, self.data_sets)
         columns, k = np.concatenate((slopes, further)), len(slopes)
@@ -222,14 +230,14 @@ class CandidateGrid:
         return ModelInformation(np.array(products), np.array(squares), np.array(level), prior, bounded)
 
     def effect_columns(self) -> tuple[list[Effect], Array]:
-        """Sensitivity to the effects that the model lacks and these tests might show.
+        """Compute the changes of the residuals by the effects that the model lacks and these tests might detect.
 
-        Left out are effects that depend on the order of the tests or on their temperature, and effects that replace a
-        branch, which have no small amount.
+        Excluded are effects that depend on the order of the tests or on their temperature, and effects that replace a
+        branch of the model, which have no small amount.
 
         Returns:
-            Effect of each column, once for each of its shapes, and whitened changes of the residuals by its typical
-            amount, (e, n).
+            Effect of each column, repeated for each of its shapes, and the changes of the n whitened residuals by a
+            typical amount of the effect, (e, n).
         """
         model, places = self.knowledge.model, dict.fromkeys(str(test.direction) for test in self.tests)
         effects, columns = list[Effect](), [np.empty((0, sum(data_set.size for data_set in self.data_sets)))]
@@ -244,11 +252,11 @@ def relative_slopes(knowledge: Knowledge, data_sets: Sequence[MeasuredTest]) -> 
     """Differentiate whitened residuals by the relative change of each parameter.
 
     Args:
-        knowledge: model, its k free parameters and its b parameters at a bound.
-        data_sets: with n residuals together.
+        knowledge: model, and the names of its k free parameters and its b parameters at a bound.
+        data_sets: tests with n residuals together.
 
     Returns:
-        Derivatives, (k + b, n); those by a bounded parameter are per typical size.
+        Derivatives, (k + b, n); the last b are by the change of a bounded parameter in units of its typical value.
     """
     model, bounded = knowledge.model, Coordinates.of_parameters(knowledge.model, knowledge.bounded)
     typical = np.array([parameter.typical for parameter in bounded.parameters]) / bounded.slopes(model.values)
@@ -257,10 +265,13 @@ def relative_slopes(knowledge: Knowledge, data_sets: Sequence[MeasuredTest]) -> 
 
 
 def rival_chi_squares(rivals: Sequence[Information]) -> Array:
-    """Expected chi-square between any two rivals after the best refit of either, (tests, rivals, rivals).
+    """Compute the expected chi-square between any two rival models after the best refit of either.
 
     Args:
-        rivals: information on each rival, whose further columns are the differences of the other rivals in order.
+        rivals: information on each rival, whose further columns are the differences from the other rivals in order.
+
+    Returns:
+        Expected chi-square for each choice of tests, (choices, rivals, rivals).
     """
     rows = [np.insert(rival.noncentralities(), index, 0.0, axis=1) for index, rival in enumerate(rivals)]
     one_way = np.stack(rows, axis=1)

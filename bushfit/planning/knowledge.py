@@ -26,15 +26,17 @@ from bushfit.planning.information import ROWS_PER_CYCLE, relative_slopes
 
 
 def from_result(result: Result, noise: Noise | None = None, source: str = "") -> Knowledge:
-    """Make knowledge from a fitted model; values of a model that was not fitted are within a factor of 2.7.
+    """Convert a model with its covariance to knowledge for a plan.
+
+    Values of a model that was not fitted are assumed to be known within a factor of 2.7.
 
     Args:
-        result: model and covariance.
-        noise: of the rig; None for an assumed rig.
-        source: origin of the knowledge, as a phrase; empty for a standard one.
+        result: model and covariance of its parameters.
+        noise: measurement errors of the rig; None for a typical rig.
+        source: origin of the knowledge, as a phrase; empty for a standard phrase.
 
     Returns:
-        Knowledge of the parameters that have a standard error, or of all if the model was not fitted.
+        Knowledge of the parameters that have a standard error, or of all parameters if the model was not fitted.
     """
     model, fitted = result.model, result.covariance
     names = tuple(name for name in fitted.names if fitted.stderr(name)) or tuple(model.parameters)
@@ -57,23 +59,23 @@ def from_result(result: Result, noise: Noise | None = None, source: str = "") ->
 
 
 def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -> Knowledge:
-    """Knowledge from the tests of a campaign, fitted together, and with each rival effect added in turn.
+    """Fit the tests of a campaign to obtain the knowledge for a plan, once more with each rival effect added.
 
-    The errors of the class of the rig are noise, whether [rig] states them or not, as in the planned tests. If there
-    are rivals, the model also has the effects that a diagnosis named for certain, and the first effect of each other
-    set that the diagnosis cannot separate.
+    The fits treat the errors of the class of the rig as noise, whether [rig] states them or not, as in the planned
+    tests. With rivals, the model also has the effects that a diagnosis found for certain, and the first effect of each
+    other set that the diagnosis cannot separate.
 
     Args:
         data: tests of the campaign.
-        rivals: names of effects; empty for those that a diagnosis of these tests cannot separate, None for no
-            rivals.
+        rivals: names of the rival effects; empty for the effects that a diagnosis of these tests cannot separate, None
+            for no rivals.
 
     Returns:
         Knowledge of the likeliest model, with its rivals.
 
     Raises:
-        FitError: data that cannot support the fit.
-        ModelError: effects that these tests could not show, or a diagnosis without rivals.
+        FitError: the data cannot support the fit.
+        ModelError: these tests could not show a given effect, or the diagnosis finds no rivals.
     """
     _check_rivals(rivals or (), LIBRARY)
     diagnosis = None if rivals is None else diagnose(data)
@@ -121,7 +123,7 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
 
 
 def _check_rivals(names: Iterable[str], possible: Container[str]) -> None:
-    """Raise a ModelError for names that are no effect, or that these tests could not show."""
+    """Raise a ModelError if a name is not among the possible effects."""
     if unknown := [name for name in names if name not in possible]:
         raise ModelError(
             "this is no rival in these tests",
@@ -133,9 +135,10 @@ def _check_rivals(names: Iterable[str], possible: Container[str]) -> None:
 
 
 def _with_bounded(knowledge: Knowledge, bounded: tuple[str, ...], data_sets: Sequence[MeasuredTest]) -> Knowledge:
-    """Knowledge that treats parameters at a bound as free, except those that the tests do not show.
+    """Extend knowledge by the parameters at a bound, with the covariance that they would have if they were free.
 
-    The excess of noise over the assumed noise follows from the errors of the other parameters.
+    Parameters without effect on these tests are omitted. The excess of the noise over the assumed noise follows from
+    the errors of the other parameters.
     """
     k = len(knowledge.names)
     slopes = relative_slopes(replace(knowledge, bounded=bounded), data_sets)
@@ -156,19 +159,21 @@ def _with_bounded(knowledge: Knowledge, bounded: tuple[str, ...], data_sets: Seq
 
 
 def _add_effects(plain: Evidence, names: Sequence[str], fixed: Sequence[str], bounds: Bounds) -> dict[str, Evidence]:
-    """The fit with each of these effects added in turn, by name; without those that the tests could not show."""
+    """Fit the model with each effect added in turn, by name of the effect; effects without influence are omitted."""
     proposed = [proposal for proposal in proposals(plain, (), fixed) if proposal.name in names]
     return refitted(plain, proposed, {}, fixed, bounds)
 
 
 def look_alikes(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
-    """Sets of effects that a diagnosis cannot separate, without mistakes and faults, which no test separates.
+    """List the sets of effects that a diagnosis cannot separate and that a further test may separate.
+
+    Mistakes in the campaign and faults of the rig are excluded, because no planned test separates them.
 
     Args:
-        diagnosis: of a campaign.
+        diagnosis: diagnosis of a campaign.
 
     Returns:
-        Names of the effects of each set, without those that all explanations of the set share.
+        Names of the effects of each set, without the effects that all explanations of the set share.
     """
     sets, all_named = [], [effect.name for effect in diagnosis.effects]
     for effect in diagnosis.effects:
@@ -181,13 +186,13 @@ def look_alikes(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
 
 
 def noise_of(data: PreparedCampaign) -> Noise:
-    """Estimate the noise of the rig of a campaign.
+    """Estimate the measurement errors of the rig from the tests of a campaign.
 
     Args:
         data: tests of the campaign.
 
     Returns:
-        Noise as the tests show it; assumed where they do not.
+        Estimated standard deviations; typical values for errors that the tests do not determine.
     """
     loops, sweeps = split_by_kind(data.data_sets)
     estimate = replace(Noise(), level=of_class(data.campaign.rig))
@@ -207,12 +212,12 @@ def noise_of(data: PreparedCampaign) -> Noise:
 
 
 def rig_of(rig: RigSettings, noise: Noise) -> RigSettings:
-    """Settings of the rig with its class as a plan assumes it."""
+    """Return the settings [rig] with the class of the rig (gain and phase errors) that a plan assumes."""
     return replace(rig, gain_error=noise.level[0], phase_error=noise.level[1], displacement_error=None)
 
 
 def _tests(data: PreparedCampaign) -> Iterator[Test]:
-    """Runs of a campaign as a plan has them, without free oscillations."""
+    """Convert the loops and sweeps of a campaign to runs of a plan; free oscillations are omitted."""
     for loop in data.loops:
         yield SimulatedLoop(
             loop.direction, loop.drive.amplitude, loop.drive.frequency, max(round(loop.drive.cycles), 1)

@@ -27,14 +27,14 @@ _LONGEST_MINUTES = 60.0 * 2000.0
 def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
     """Choose tests for an aim within the hours and the limits of the rig.
 
-    Rivals are separated, and targets met, in as few hours as possible.
+    The plan separates rivals, or meets targets, in as few hours as possible.
 
     Args:
-        knowledge: before the tests.
-        request: aim, hours and rig.
+        knowledge: knowledge before the tests.
+        request: aim, hours and limits of the rig.
 
     Returns:
-        The tests in their order with their expected results.
+        The tests in their order with their expected results, compared with the standard programme.
 
     Raises:
         ModelError: no test is possible, none fits into the hours, or there are no rivals to be separated.
@@ -80,14 +80,14 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
 
 
 def explain_miss(search: PlanSearch, goal: Goal) -> str | None:
-    """Sentence on the reason why the tests miss a target, and on the hours that would meet it; None if they meet it.
+    """Write a sentence on the reason why the chosen tests miss a target, and on the hours that would meet the target.
 
     Args:
-        search: with the tests that it chose.
-        goal: of the target.
+        search: completed search with the chosen tests.
+        goal: target with its operating points.
 
     Returns:
-        The sentence, or None.
+        The sentence; None if the tests meet the target.
     """
     problem, counts = search.problem, search.counts
     limit, covariance = problem.limit_covariance, problem.error_covariance
@@ -112,11 +112,11 @@ def explain_miss(search: PlanSearch, goal: Goal) -> str | None:
 
 
 def describe_purpose(search: PlanSearch, test: int) -> str:
-    """Sentence on the largest loss without a test and all its repeats.
+    """Write a sentence on the purpose of a test: the largest loss of accuracy without the test and all its repeats.
 
     Args:
-        search: with the tests that it chose.
-        test: number of the test.
+        search: completed search with the chosen tests.
+        test: index of the test.
 
     Returns:
         The sentence.
@@ -148,12 +148,12 @@ def describe_purpose(search: PlanSearch, test: int) -> str:
 
 
 def explain_free_hours(search: PlanSearch, planned: Programme, missed: Sequence[str | None]) -> str | None:
-    """Sentence on the reason why hours of the rig stay free.
+    """Write a sentence on the reason why the plan leaves hours of the rig free.
 
     Args:
-        search: with the tests that it chose.
-        planned: their programme.
-        missed: reason why each target is missed, or None.
+        search: completed search with the chosen tests.
+        planned: programme of the chosen tests.
+        missed: reason why each target is missed; None for a target that is met.
 
     Returns:
         The sentence; None if the hours are used.
@@ -176,12 +176,12 @@ def explain_free_hours(search: PlanSearch, planned: Programme, missed: Sequence[
 
 
 def plan_warnings(search: PlanSearch, planned: Programme, missed: Sequence[str | None]) -> Iterator[str]:
-    """Warnings and limits of a plan, the important ones first.
+    """Generate the warnings of a plan, the most important first.
 
     Args:
-        search: with the tests that it chose.
-        planned: their programme.
-        missed: reason why each target is missed, or None.
+        search: completed search with the chosen tests.
+        planned: programme of the chosen tests.
+        missed: reason why each target is missed; None for a target that is met.
 
     Returns:
         Iterator over sentences.

@@ -31,17 +31,19 @@ RIVALS_APART = (_NINE_OF_TEN + float(np.sqrt(_NINE_OF_TEN**2 + TELLS))) ** 2
 
 @dataclass(frozen=True, eq=False)
 class PlanningProblem:
-    """Candidate tests with their duration and information; k includes the parameters at a bound.
+    """Data of the search for tests: candidate tests with their durations and information, and the aim.
+
+    The k parameters include the parameters at a bound.
 
     Args:
-        knowledge: before the tests.
+        knowledge: knowledge before the tests.
         request: aim of the plan and limits of the rig.
-        tests: candidate tests first, then tests that only the standard programme has.
-        effects: effect of each further column of the first model.
-        models: information on the likeliest model and the effects that it lacks, then on each rival and its differences
-            from the other rivals.
-        wanted: points at which the stiffness is wanted, by direction in the order of the request.
-        goals: one of each target.
+        tests: candidate tests, then tests that only the standard programme has.
+        effects: effect of each further column of `models[0]`.
+        models: information of the tests on the likeliest model and the effects that it lacks, then on each rival model
+            and its differences from the other rivals.
+        wanted: sensitivity of the stiffness at the wanted operating points of each direction of the request.
+        goals: derivatives and fixed errors of each target of the request.
         budget: durations of the tests, without a limit of hours.
     """
 
@@ -59,7 +61,7 @@ class PlanningProblem:
         """Compute the information of all candidate tests.
 
         Args:
-            knowledge: before the tests.
+            knowledge: knowledge before the tests.
             request: aim of the plan and limits of the rig.
 
         Returns:
@@ -85,7 +87,7 @@ class PlanningProblem:
         return cls(knowledge, request, tests, effects, models, list(wanted.values()), goals, budget)
 
     def error_covariance(self, counts: Array) -> Array:
-        """Covariance of the parameters with a number of runs of each test, (k, k)."""
+        """Covariance of the parameters, (k, k), with the number of runs of each test in `counts`, (tests,)."""
         return np.asarray(self.models[0].error_covariance(self.models[0].total(counts))[0])
 
     @cached_property
@@ -95,7 +97,7 @@ class PlanningProblem:
 
     @cached_property
     def weight(self) -> Array | None:
-        """Weight of the parameters' covariance in the criterion, (k, k); None if rivals are to be separated."""
+        """Weight of the parameter covariance in the criterion, (k, k); None if the aim is to separate rivals."""
         if self.request.aim == "rivals":
             return None
         if self.request.aim == "targets":
@@ -107,12 +109,15 @@ class PlanningProblem:
         return np.diag(np.isin(names, self.request.parameters).astype(float))
 
     def rival_distances(self, counts: Array) -> Array:
-        """Expected chi-square between any two rivals with a number of runs of each test, (rivals, rivals)."""
+        """Expected chi-square between any two rivals, (rivals, rivals), with `counts` runs of each test, (tests,)."""
         return np.asarray(rival_chi_squares([model.total(counts) for model in self.models[1:]])[0])
 
     @cached_property
     def separable_rivals(self) -> Array:
-        """Pairs of rivals that all tests together would separate, or all pairs if there are none, (rivals, rivals)."""
+        """True for pairs of rivals that all tests together separate, (rivals, rivals); all pairs if none is separable.
+
+        Only the upper triangle is used.
+        """
         rivals = len(self.knowledge.rivals)
         pairs = np.triu(np.ones((rivals, rivals), dtype=bool), 1)
         if not rivals:
@@ -121,12 +126,12 @@ class PlanningProblem:
         return separable if separable.any() else pairs
 
     def nearest_rivals(self, counts: Array) -> float:
-        """Smallest expected chi-square between rivals that can be separated, for a number of runs of each test."""
+        """Smallest expected chi-square between separable rivals, with `counts` runs of each test, (tests,)."""
         return float(self.rival_distances(counts)[self.separable_rivals].min())
 
 
 def _budget(request: PlanRequest, tests: tuple[Test, ...]) -> Budget:
-    """Durations of the tests, without a limit of hours; tests outside of the wanted directions have no runs."""
+    """Durations of the tests without a limit of hours; tests in directions that the request excludes get no runs."""
     places = list(dict.fromkeys([*request.places, *(test.direction for test in tests)]))
     lines = [
         (test.direction, test.amplitude, test.frequency)

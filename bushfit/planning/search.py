@@ -30,11 +30,13 @@ _SCATTER_FREEDOM = 10
 
 @dataclass(frozen=True, eq=False)
 class PlanSearch:
-    """Search for the best candidate tests within some hours; counts are numbers of runs of each test, (tests,).
+    """Search for the best numbers of runs of the candidate tests within given hours.
+
+    In all methods, `counts` is the number of runs of each candidate test, (tests,).
 
     Args:
-        problem: candidate tests with their information.
-        hours: of the rig.
+        problem: candidate tests with their durations and information.
+        hours: available time on the rig [h].
     """
 
     problem: PlanningProblem
@@ -42,14 +44,14 @@ class PlanSearch:
 
     @cached_property
     def budget(self) -> Budget:
-        """Durations of the tests within the hours."""
+        """Durations and limits of the tests, with the hours as largest total duration."""
         return replace(self.problem.budget, maximum_minutes=60.0 * self.hours)
 
     @cached_property
     def counts(self) -> Array:
-        """Number of runs of each test, (tests,); zero for all if no test fits into the hours.
+        """Best number of runs of each test, (tests,); all zero if no test fits into the hours.
 
-        If possible, all effects show as well as in the standard programme.
+        If possible, the tests detect every effect as well as the standard programme does.
         """
         required = self.required_runs
         counts = best_runs(replace(self.strict, penalty=_PENALTY), self.budget, required, required)
@@ -62,14 +64,14 @@ class PlanSearch:
 
     @cached_property
     def strict(self) -> Criterion:
-        """Criterion with much weight on effects that show less than in the standard programme."""
+        """Criterion with a large penalty for effects that the tests detect less well than the standard programme."""
         problem = self.problem
         probabilities = np.array([rival.probability for rival in problem.knowledge.rivals])
         return Criterion(problem.models, problem.weight, probabilities, self.minimum_noncentrality, _STRICT_PENALTY)
 
     @cached_property
     def standard_runs(self) -> list[int]:
-        """Numbers of the tests of the standard programme, repeated within the hours and ordered by direction."""
+        """Test indices of the standard programme, repeated to fill the hours and ordered by direction."""
         problem = self.problem
         tests = [problem.tests.index(test) for test in standard_tests(problem.knowledge, problem.request)]
         runs = list[int]()
@@ -82,7 +84,7 @@ class PlanSearch:
 
     @cached_property
     def minimum_noncentrality(self) -> Array:
-        """Noncentrality of each effect that the standard programme can show, 0 of others, (e,)."""
+        """Noncentrality of each effect in the standard programme, 0 for effects that it cannot detect, (e,)."""
         reached = self.problem.models[0].total(self.count(self.standard_runs)).noncentralities()[0]
         amounts = [effect.amount for effect in self.problem.effects]
         # the largest amount that a bushing or a rig can have, in typical amounts
@@ -91,10 +93,10 @@ class PlanSearch:
 
     @cached_property
     def required_runs(self) -> Array:
-        """One run in each direction whose stiffness is a target and that was not tested, (tests,).
+        """Smallest number of runs of each test, (tests,): one run in each untested direction that has a target.
 
-        Tests in other directions do not determine the error of the stiffness formula. Zero if the runs do not fit into
-        the hours.
+        Tests in other directions do not determine the error of the stiffness formula. All zero if the runs do not fit
+        into the hours.
         """
         problem = self.problem
         required = np.zeros(len(problem.tests), dtype=int)
@@ -109,14 +111,15 @@ class PlanSearch:
         return required if self.budget.spent(required) <= self.budget.maximum_minutes else 0 * required
 
     def count(self, runs: Sequence[int]) -> Array:
-        """Number of runs of each test, (tests,), among runs given by the numbers of their tests."""
+        """Count the runs of each test, (tests,), in a sequence of test indices."""
         return np.bincount(np.array(runs, dtype=int), minlength=len(self.problem.tests))
 
     def reaches_aim(self, *, soundly: bool = False) -> bool:
-        """Check that the tests separate the rivals with a margin of two, or meet the targets that can be met.
+        """Check that the chosen tests separate the rivals with a margin of two, or meet the targets that can be met.
 
         Args:
-            soundly: whether effects have to show as in the standard programme, and repeats to determine the scatter.
+            soundly: true to require also that the tests detect all effects as well as the standard programme, and that
+                repeats determine the scatter of sweeps.
 
         Returns:
             True if the tests reach the aim.
@@ -132,14 +135,14 @@ class PlanSearch:
         return not soundly or (not self.less_visible_effects(counts) and self.determines_scatter(counts))
 
     def untested(self, goal: Goal, counts: Array) -> str | None:
-        """Sentence on the error that a goal's interval lacks because its direction is not tested.
+        """Write a warning if a target's direction is untested, so that its interval omits the error of the formula.
 
         Args:
-            goal: of a target.
-            counts: number of runs of each test, (tests,), beside the tests so far.
+            goal: target with its operating points.
+            counts: number of runs of each test, (tests,), in addition to the tests so far.
 
         Returns:
-            The sentence; None if the interval lacks no error.
+            The sentence; None if the direction is tested or the target is a parameter.
         """
         place, knowledge = goal.target.place, self.problem.knowledge
         measured = knowledge.result.measured if knowledge.result else None
@@ -152,15 +155,15 @@ class PlanSearch:
         return next(unfitted(Result(knowledge.model, knowledge.names, measured=fitted), place), None)
 
     def less_visible_effects(self, counts: Array) -> list[str]:
-        """Effects that these runs show less well than the standard programme."""
+        """Names of the effects that these runs detect less well than the standard programme."""
         reached = self.problem.models[0].total(counts).noncentralities()[0]
         short = np.sqrt(reached) < 0.995 * np.sqrt(self.minimum_noncentrality)  # numerical accuracy
         return list(dict.fromkeys(self.problem.effects[index].name for index in np.flatnonzero(short)))
 
     def with_repeats(self, counts: Array) -> Array:
-        """Replace the least useful runs until a drift shows as in the standard programme in each direction.
+        """Add repeats so that each direction reveals a drift of the gain as well as the standard programme does.
 
-        A test of each direction with more than two tests is repeated.
+        In each direction with more than two tests, one test is repeated; the least useful runs make room.
 
         Args:
             counts: number of runs of each test, (tests,).
@@ -180,14 +183,13 @@ class PlanSearch:
         return counts
 
     def with_scatter(self, counts: Array) -> Array:
-        """Repeat sweeps until a fit can separate their scatter from the differences of repeats.
+        """Add repeats of sweeps until a fit can separate the scatter of points from the differences between runs.
 
         Args:
             counts: number of runs of each test, (tests,).
 
         Returns:
-            Number of runs of each test, (tests,), at a cost of at most a twentieth of the error unless there are
-            targets.
+            Number of runs of each test, (tests,). Unless there are targets, the errors grow by at most a twentieth.
         """
         largest = np.inf if self.problem.goals else self.strict.value(counts) + 0.1  # a twentieth of the error
         while not self.determines_scatter(counts):
@@ -204,16 +206,16 @@ class PlanSearch:
         return counts
 
     def repeated(self, counts: Array, tests: Iterable[int]) -> Iterator[Array]:
-        """Repeat each of some tests in turn, where that fits into the hours.
+        """Generate the variants of a choice in which one of the given tests has one more run.
 
-        Tests that are made once are dropped, the least useful first, until the repeat fits.
+        Tests with a single run are dropped, the least useful first, until the repeat fits into the hours.
 
         Args:
             counts: number of runs of each test, (tests,).
-            tests: numbers of the tests.
+            tests: indices of the tests to repeat.
 
         Returns:
-            Iterator over numbers of runs of each test, (tests,).
+            Iterator over the numbers of runs of each test, (tests,), one for each repeat that fits.
         """
         one = np.eye(len(self.problem.tests), dtype=int)
         for test in tests:
@@ -227,13 +229,13 @@ class PlanSearch:
                 yield runs
 
     def scatter_freedom(self, counts: Array) -> list[int]:
-        """Degrees of freedom of the scatter of sweeps by repeats, with the tests so far.
+        """Count the degrees of freedom with which repeats, and the tests so far, determine the scatter of sweeps.
 
         Args:
             counts: number of runs of each test, (tests,).
 
         Returns:
-            Degrees of freedom for the bushing and for each specimen up to the wanted number, the fewest first.
+            Degrees of freedom for the bushing and for each specimen, in ascending order, capped at the wanted number.
         """
         runs = Counter(self.problem.knowledge.tests)
         runs.update({test: int(n) for test, n in zip(self.problem.tests, counts, strict=True) if n})
@@ -245,17 +247,17 @@ class PlanSearch:
         return sorted(min(n, _SCATTER_FREEDOM) for n in freedom.values())
 
     def determines_scatter(self, counts: Array) -> bool:
-        """True if repeats determine the scatter of sweeps, of the bushing and of each specimen."""
+        """True if repeats determine the scatter of sweeps well enough, for the bushing and for each specimen."""
         return self.scatter_freedom(counts) >= [_SCATTER_FREEDOM]
 
     def drift_effect(self, counts: Array) -> DriftEffect:
-        """Compute the effect of a drift of the gain.
+        """Compute the effect of a drift of the gain on the given runs and on the fit.
 
         Args:
             counts: number of runs of each test, (tests,).
 
         Returns:
-            Effect of a unit drift on these runs.
+            Effect of a unit drift, for any order of these runs.
         """
         model = self.problem.models[0]
         errors_and_parameters = model.products[..., : model.products.shape[-2]]
@@ -267,13 +269,13 @@ class PlanSearch:
         return DriftEffect(gain, level * gain**2 / (1.0 + counts * level * gain), remaining[..., -1] @ root)
 
     def programme(self, runs: Sequence[int]) -> Programme:
-        """Compute the expected results of runs in their order.
+        """Compute the expected results of a sequence of runs.
 
         Args:
-            runs: numbers of the tests.
+            runs: test indices in the order of the runs.
 
         Returns:
-            The tests with their durations, errors, detectable amounts and the shift by a drift.
+            The tests with their durations, standard errors, detectable amounts and parameter shift by a drift.
         """
         problem, counts, places = self.problem, self.count(runs), self.budget.place[list(runs)]
         model, k, drift = problem.models[0], len(problem.knowledge.names), self.drift_effect(counts)
@@ -303,14 +305,14 @@ class PlanSearch:
         )
 
     def detectable_amounts(self, reached: Array, drift: float) -> Iterator[DetectableAmount]:
-        """Smallest detectable amount of each effect that the standard programme shows, in its most visible shape.
+        """Compute the smallest detectable amount of each effect that the standard programme can detect.
 
         Args:
-            reached: noncentrality of each effect column, (e,).
+            reached: noncentrality of a typical amount of each effect shape, (e,).
             drift: noncentrality of a unit drift of the gain.
 
         Returns:
-            Iterator over the amounts, that of the drift last; infinite where no amount is detected.
+            Iterator over the amounts, each for the effect's most visible shape, and last the drift of the gain.
         """
         effects, visible = self.problem.effects, self.minimum_noncentrality
         with np.errstate(divide="ignore"):
@@ -325,11 +327,11 @@ class PlanSearch:
 
 
 def covariance_root(information: Array) -> Array:
-    """Root R of the covariance R R^T that belongs to an information matrix, (k, k)."""
+    """Square root R, (k, k), of the covariance R R^T that is the inverse of an information matrix, (k, k)."""
     return np.linalg.inv(np.linalg.cholesky(information)).T
 
 
 def scatter_differences(test: Test) -> int:
-    """Degrees of freedom of the scatter that a repeat of a test adds."""
+    """Degrees of freedom of the scatter that one repeat of a test adds; 0 for loops and short sweeps."""
     steps = len(test.steps) if isinstance(test, SimulatedSweep) else 0
     return steps - 1 if steps >= FEWEST_STEPS else 0

@@ -30,9 +30,10 @@ class WantedPoints:
     Args:
         points: operating points.
         loss_factor: loss factor at each point, (n,).
-        slopes: change of ln|K| and of the phase by relative change of each parameter, (2, n, k).
-        model_error: standard error by the model's own error: of |K|, relative, and of the loss factor, (2, n).
-        undecided: half width of the 95 % interval that the undecided explanations of the tests add to both, (2, n).
+        slopes: derivatives of ln|K| and of the phase [rad] by the relative change of each parameter, (2, n, k).
+        model_error: standard error due to the model error, of |K| (relative) and of the loss factor (absolute), (2, n).
+        undecided: half width that explanations which the tests cannot distinguish add to the 95 % intervals of |K|
+            (relative) and of the loss factor (absolute), (2, n).
     """
 
     points: Points
@@ -43,14 +44,14 @@ class WantedPoints:
 
     @classmethod
     def from_knowledge(cls, knowledge: Knowledge, points: Points) -> WantedPoints:
-        """Compute sensitivities and errors at wanted points.
+        """Compute the sensitivities and errors at operating points.
 
         Args:
-            knowledge: before the tests.
+            knowledge: knowledge before the tests.
             points: operating points of one direction.
 
         Returns:
-            Sensitivity at the points in their order.
+            Sensitivities and errors, in the order of the points.
         """
         place, frequency, amplitude = points.place, points.frequency, points.amplitude
         sweep = new_sweep(knowledge.model, place, frequency, amplitude, (1.0, 1.0), (0.0, 0.0))
@@ -70,14 +71,16 @@ class WantedPoints:
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """A target as a function of the parameters' covariance, at n points; k includes the parameters at a bound.
+    """Target with the data that give its interval for any covariance of the parameters.
+
+    The target has n operating points (one for a parameter); the k parameters include the parameters at a bound.
 
     Args:
         target: quantity and wanted half width.
-        rows: relative change of the quantity at each point by relative change of the parameters, (n, k).
-        model_error: relative standard error by the error of the model, which no test lowers, (n,).
-        undecided: relative half width that undecided readings of the tests add, (n,).
-        points: operating points of a predicted quantity; None of a parameter.
+        rows: derivative of the relative change of the quantity by the relative change of each parameter, (n, k).
+        model_error: relative standard error due to the model error, which no test lowers, (n,).
+        undecided: relative half width due to explanations that the tests cannot distinguish, (n,).
+        points: operating points of a predicted quantity; None for a parameter.
     """
 
     target: Target
@@ -88,15 +91,15 @@ class Goal:
 
     @classmethod
     def from_target(cls, target: Target, names: Sequence[str], wanted: WantedPoints | None) -> Goal:
-        """Make the goal of a target.
+        """Compute the derivatives and fixed errors of a target.
 
         Args:
             target: a parameter, or the stiffness or loss factor of a direction.
-            names: of the k parameters.
-            wanted: points of the direction; None of a parameter.
+            names: names of the k parameters.
+            wanted: sensitivities at the operating points of the direction; None for a parameter.
 
         Returns:
-            Goal at all points of the direction.
+            Goal at all operating points of the direction.
         """
         if wanted is None:
             row = np.array([[float(name == target.quantity) for name in names]])
@@ -108,39 +111,45 @@ class Goal:
         return cls(target, rows, wanted.model_error[1] / loss, wanted.undecided[1] / loss, wanted.points)
 
     def variances(self, error_covariance: Array) -> Array:
-        """Relative variance of the quantity by the parameters' errors, (n,), from their covariance, (k, k)."""
+        """Relative variance of the quantity at each point, (n,), from the covariance of the parameters, (k, k)."""
         return np.asarray(np.einsum("nk,kl,nl->n", self.rows, error_covariance, self.rows))
 
     def half_widths(self, error_covariance: Array) -> Array:
-        """Half of the 95 % interval over the value at each point, (n,), from the parameters' covariance, (k, k)."""
+        """Relative half width of the 95 % interval at each point, (n,), from the covariance of the parameters, (k, k).
+
+        The interval includes the model error and the undecided explanations.
+        """
         return self.undecided + Z95 * np.sqrt(self.variances(error_covariance) + self.model_error**2)
 
     def half_width(self, error_covariance: Array) -> float:
-        """Half of the widest 95 % interval over its value, from the parameters' covariance, (k, k)."""
+        """Largest relative half width of the 95 % interval, from the covariance of the parameters, (k, k)."""
         return float(self.half_widths(error_covariance).max())
 
     def met(self, error_covariance: Array) -> bool:
-        """True if the interval is as narrow as the target."""
+        """True if the intervals are as narrow as the target for this covariance of the parameters, (k, k)."""
         return self.half_width(error_covariance) <= self.target.half * (1.0 + 1e-9)
 
     def reached(self, error_covariance: Array, limit: Array) -> bool:
         """True if the target is met, or nearly as well as unlimited tests would.
 
         Args:
-            error_covariance: of the parameters, (k, k).
-            limit: covariance with unlimited tests, (k, k).
+            error_covariance: covariance of the parameters with the tests in question, (k, k).
+            limit: covariance of the parameters with unlimited tests, (k, k).
         """
         nearly = self.half_width(error_covariance) <= _NEARLY * self.half_width(limit)
         return self.met(error_covariance) or (not self.met(limit) and nearly)
 
     def weight(self, limit: Array) -> Array:
-        """Weight of the parameters' covariance in the mean variance over the allowed variance.
+        """Compute the weight of the parameter covariance in the search criterion for this target.
+
+        The criterion is the variance of the quantity over the variance that the target allows, averaged over points.
 
         Args:
-            limit: covariance with unlimited tests, (k, k). If these miss the target, nearly their variance is allowed.
+            limit: covariance with unlimited tests, (k, k). If unlimited tests miss the target, the allowed variance is
+                set slightly above the variance that unlimited tests reach.
 
         Returns:
-            Weight, (k, k).
+            Weight matrix W, (k, k): trace(W covariance) is the mean ratio of variances.
         """
         if self.met(limit):
             allowed = np.square(np.maximum(self.target.half - self.undecided, 0.0) / Z95) - self.model_error**2
@@ -150,14 +159,14 @@ class Goal:
         return np.asarray((self.rows / allowed[:, None]).T @ self.rows / len(self.rows))
 
     def explain_limit(self, knowledge: Knowledge, limit: Array) -> str:
-        """Sentence on the largest error that remains with unlimited tests at the widest point.
+        """Write a sentence on the largest error that remains with unlimited tests, at the point of the widest interval.
 
         Args:
-            knowledge: before the tests.
-            limit: covariance with unlimited tests, (k, k).
+            knowledge: knowledge before the tests.
+            limit: covariance of the parameters with unlimited tests, (k, k).
 
         Returns:
-            Such as "+/-1.2 % at 5 Hz and 0.1 mm is the model's own error: ...".
+            Sentence such as "+/-1.2 % at 5 Hz and 0.1 mm is the model error: ...".
         """
         worst, variance = int(np.argmax(self.half_widths(limit))), self.variances(limit)
         contributions = np.abs(self.rows[worst]) * np.sqrt(np.diag(limit))
@@ -186,5 +195,5 @@ class Goal:
 
 
 def percent(half: float, digits: int = 2) -> str:
-    """Format half an interval over its value, such as "+/-1.5 %"."""
+    """Format a relative half width as a percentage: 0.015 becomes "+/-1.5 %"."""
     return f"+/-{number(100.0 * half, digits)} %"
