@@ -312,7 +312,7 @@ def parse_unit(text: str) -> tuple[str, AmplitudeConvention | None, float]:
     return *split_convention(text), base
 
 
-@lru_cache(maxsize=4096)
+@lru_cache(maxsize=1 << 15)  # the vocabularies have five thousand names
 def plain(name: str) -> str:
     """Spelling of a name for comparison: letters, digits and ' | * alone, without case, accents or umlauts."""
     letters = re.sub(r"[^\w'|*]|_", "", _folded(name.translate(_SPELLINGS)).replace("ß", "ss"))
