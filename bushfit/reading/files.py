@@ -11,11 +11,11 @@ from pathlib import Path
 from bushfit.errors import BushfitError, MeasurementError, did_you_mean
 from bushfit.reading.headers import WORDS
 
-#: Bytes of the largest file that is read: three times a loop of 10 million rows.
+#: Size of the largest file that is read [bytes]: three times that of a loop of 10 million rows.
 _LARGEST_BYTES = 1 << 30
 #: Bytes at the start of a file within which its header lies; chosen: far more than preambles have.
 HEAD_BYTES = 1 << 18
-#: Bytes that are checked at a time; chosen: few enough to be held beside the file, enough to be fast.
+#: Bytes that are checked at a time; chosen: few enough to fit in memory next to the file, enough to be fast.
 CHUNK_BYTES = 1 << 22
 #: Byte order marks with Python's name of the encoding. The mark of UTF-32 begins with that of UTF-16.
 _MARKS = (
@@ -26,13 +26,13 @@ _MARKS = (
 )
 #: Quoted cell of a header with a line end, such as "Force(line end)[N]".
 _QUOTED_LINE_END = re.compile(rb'(?:^|(?<=[,;\t\r\n]))"[^"\r\n,;\t]+(?:\r?\n[^"\r\n,;\t]+){1,2}"(?=[,;\t\r\n])')
-#: Share of zeros among every other byte from which a text is taken for UTF-16; ASCII has nearly all of them zero.
+#: Smallest share of zeros among the even or odd bytes of UTF-16; for ASCII characters nearly all of them are zero.
 _LEAST_ZERO_SHARE = 0.3
-#: Runs of bytes beyond ASCII that are compared; chosen: many times those of a header.
+#: Largest number of runs of non-ASCII bytes that are compared; chosen: many times those of a header.
 _MOST_RUNS = 1 << 16
-#: Encodings that are detected by known words alone: Japanese, Korean, Central European, Cyrillic.
+#: Encodings that are detected only by known column names: Japanese, Korean, Central European, Cyrillic.
 _RARE = ("cp932", "cp949", "cp1250", "cp1251")
-#: Names of columns with letters beyond ASCII; chosen: of two characters or more, which are no chance.
+#: Known column names with non-ASCII letters; chosen: two characters or more, which do not occur by chance.
 _KNOWN_WORDS = frozenset(
     word.lower()
     for table in WORDS.values()
@@ -40,7 +40,7 @@ _KNOWN_WORDS = frozenset(
     for word in words
     if len(word) > 1 and not word.isascii()
 )
-#: A run of bytes beyond ASCII.
+#: Run of non-ASCII bytes.
 _HIGH_RUN = re.compile(rb"[\x80-\xff]+")
 #: Two bytes of GB2312: its punctuation and its 3755 commonest characters. Western accents make few such pairs.
 _COMMON_CHINESE = re.compile(rb"(?:[\xa1-\xa3\xb0-\xd7][\xa1-\xfe])+")
@@ -49,19 +49,19 @@ _COMMON_CHINESE = re.compile(rb"(?:[\xa1-\xa3\xb0-\xd7][\xa1-\xfe])+")
 def view_bytes(
     file: Path, kind: type[BushfitError], *, largest: int = _LARGEST_BYTES, hint: str = "thin it out"
 ) -> bytes:
-    """Read the bytes of a file.
+    """Read the whole content of a file, with a clear error if that is not possible.
 
     Args:
-        file: path.
-        kind: class of errors.
-        largest: number of bytes that is allowed.
-        hint: next step if the file is larger.
+        file: path of the file.
+        kind: class of the exception to raise.
+        largest: largest allowed size of the file [bytes].
+        hint: next step to suggest if the file is larger.
 
     Returns:
-        Bytes, read and not mapped, because a mapped file that becomes shorter ends the process.
+        Content in memory; not memory-mapped, because a mapped file that becomes shorter ends the process.
 
     Raises:
-        kind: the file is missing, no regular file, not readable, empty, too large, or its size changes during reading.
+        kind: the file is missing, not a regular file, unreadable, empty, too large, or changes in size during reading.
     """
     try:
         if not file.exists():
@@ -93,16 +93,16 @@ def view_bytes(
 def read_utf8(
     file: Path, kind: type[BushfitError], *, largest: int = _LARGEST_BYTES, hint: str = "thin it out"
 ) -> bytes:
-    """Return the bytes of a text file in UTF-8, with the byte order mark if there is one.
+    """Return the bytes of a text file after checking that they are valid UTF-8; a byte order mark is kept.
 
     Args:
-        file: path.
-        kind: class of errors.
-        largest: number of bytes that is allowed.
-        hint: next step if the file is larger.
+        file: path of the file.
+        kind: class of the exception to raise.
+        largest: largest allowed size of the file [bytes].
+        hint: next step to suggest if the file is larger.
 
     Raises:
-        kind: as `view_bytes`, or the file is not UTF-8 text.
+        kind: the file cannot be read (see `view_bytes`), or is not UTF-8 text.
     """
     data = view_bytes(file, kind, largest=largest, hint=hint)
     if (bad := not_utf8(data)) is not None:
@@ -118,7 +118,7 @@ def read_utf8(
 
 
 def not_utf8(data: bytes) -> int | None:
-    """Return the index of the first byte that is not valid UTF-8 text; None if all are valid."""
+    """Return the index of the first byte that is zero or not valid UTF-8; None if all bytes are valid text."""
     if (zero := data.find(0)) >= 0:
         return zero
     decoder = codecs.getincrementaldecoder("utf-8")()
@@ -131,13 +131,13 @@ def not_utf8(data: bytes) -> int | None:
 
 
 def line_of(data: bytes, index: int) -> str:
-    """Line of a byte, as "line 3", from 1."""
+    """Return the line that contains the byte at an index of a text, such as "line 3"; lines count from 1."""
     number = data.count(b"\n", 0, index) + 1
     return f"line {number}"
 
 
 def sha256(data: bytes) -> Future[str]:
-    """Return the SHA-256 of a file in hexadecimal digits; of a large one in a thread."""
+    """Start computing the SHA-256 of bytes, in a thread if they are many; the result is in hexadecimal digits."""
     if len(data) <= CHUNK_BYTES:
         digest = Future[str]()
         digest.set_result(hashlib.sha256(data).hexdigest())
@@ -149,25 +149,25 @@ def sha256(data: bytes) -> Future[str]:
 
 
 def join_quoted(data: bytes) -> bytes:
-    """Return a text in UTF-8 with blanks instead of the line ends inside the quoted cells of its header."""
+    """Replace line ends inside quoted header cells of a UTF-8 text by blanks, so that the header is one line."""
     head = data[:HEAD_BYTES]
     joined = _QUOTED_LINE_END.sub(lambda match: b" ".join(match[0].split()), head)
     return data if joined == head else joined + data[HEAD_BYTES:]
 
 
 def to_utf8(data: bytes, file: Path, stated_encoding: str | None = None) -> tuple[bytes, str]:
-    """Convert a text to UTF-8.
+    """Convert the text of a file to UTF-8.
 
     Args:
         data: bytes of the file.
         file: path, for errors.
-        stated_encoding: as the user states it; default detected.
+        stated_encoding: encoding given by the user; None to detect it.
 
     Returns:
-        UTF-8 without byte order mark, and the original encoding by Python's name.
+        Text in UTF-8 without byte order mark, and Python's name of the original encoding.
 
     Raises:
-        MeasurementError: no text, or not in the encoding stated.
+        MeasurementError: the file is not text, or not in the given encoding.
     """
     if stated_encoding is None and data.isascii() and 0 not in data:
         return data, "utf-8"
@@ -202,7 +202,7 @@ def detect(data: bytes) -> str:
         data: bytes of the file.
 
     Returns:
-        Python's name of the encoding; "utf-8" if this is no text.
+        Python's name of the encoding; "utf-8" if the bytes are not text.
 
     Notes:
         Test files are ASCII but for a few letters of their header, too few for detectors that count letters, such as
@@ -235,7 +235,7 @@ def detect(data: bytes) -> str:
 
 
 def _undecodable(data: bytes, file: Path, bad: int, encoding: str) -> MeasurementError:
-    """Error for the byte at an index, which is not valid in an encoding."""
+    """Error for the byte at index `bad`, which is not valid in the encoding."""
     return MeasurementError(
         "this is not text" if data[bad] == 0 else f"this is not {encoding.upper()} text",
         file=file,

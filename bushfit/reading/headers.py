@@ -12,7 +12,7 @@ from typing import Literal
 from bushfit import units
 from bushfit.geometry import STRAINING, Motion
 
-#: Words of words.toml, by table and key.
+#: Known words in column headers, names and labels, from words.toml, by table and key.
 WORDS: Mapping[str, Mapping[str, Sequence[str]]] = tomllib.loads(
     Path(__file__).with_name("words.toml").read_text(encoding="utf-8")
 )
@@ -20,13 +20,13 @@ WORDS: Mapping[str, Mapping[str, Sequence[str]]] = tomllib.loads(
 LOOP_COLUMNS = WORDS["loop"]
 #: Names of the columns of a sweep, by role.
 SWEEP_COLUMNS = WORDS["sweep"]
-#: Names of columns that assign rows to tests, by key.
+#: Names of columns that assign rows to tests, by what they contain: direction, specimen_number or run.
 ROW_COLUMNS = {
     **WORDS["rows"],
     "specimen_number": WORDS["above"]["specimen_number"],
     "run": [*SWEEP_COLUMNS["repeat"], "block"],
 }
-#: Names that replace those above in a test of strain and modulus, by role.
+#: Names of columns in a test of strain and modulus, by role; they replace those of loops and sweeps.
 _STRAINING = {role: names for role, names in WORDS["straining"].items() if role != "amplitude_of"} | {
     "amplitude": [
         *SWEEP_COLUMNS["amplitude"],
@@ -40,9 +40,9 @@ _STRAINING = {role: names for role, names in WORDS["straining"].items() if role 
 }
 #: Roles whose names depend on the motion: displacement or strain, force or stress, stiffness or modulus.
 OF_MOTION = (*_STRAINING, "amplitude_reached", "force_amplitude", "damping_coefficient")
-#: Definition of an amplitude.
+#: Convention by which an amplitude is stated.
 AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak", "rms"]
-#: Factor to zero-to-peak.
+#: Factor that converts an amplitude to zero-to-peak, by its convention.
 ZERO_TO_PEAK: dict[AmplitudeConvention, float] = {"zero-to-peak": 1.0, "peak-to-peak": 0.5, "rms": 2.0**0.5}
 #: Pairs of columns that determine a complex stiffness and must agree, in order of preference.
 AGREEING_PAIRS = (
@@ -68,13 +68,13 @@ _LOGARITHM = re.compile(r"\s*(?P<kind>log[\s_]?10|lg|ln|log)(?=[\s_(])[\s_]*(?:\
 _LOGARITHM_OF_UNIT = re.compile(
     r"(?:(?:log_?10|lg|(?P<ln>ln))\s*\(|(?P<dB>dB)\s*\(?(?:\s*rel?f?\.?(?![^\W_]))?(?:\s*1(?=\s))?)\s*(?P<unit>[^()]*)\)?"
 )
-#: Quotation mark that stands for two primes: G".
+#: Quotation mark that means two primes: G".
 _TWO_PRIMES = re.compile(r"(?<![^\W_])([A-Za-z])\"")
 #: Words that do not change the meaning of a channel.
 _ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesure|medido|ist)\b")
-#: Units by which the symbol f does not stand for a role.
+#: Units with which the symbol f cannot mean a role, by role.
 _UNITS_NOT_F = {"force": ("Hz",), "frequency": ("N", "N m")}
-#: Units by which a short or ambiguous name stands for a role, by name and role.
+#: Units with which a short or ambiguous name means a role, by name and role.
 _UNITS_OF = {
     ("a", "amplitude"): ("m", "rad"),
     ("da", "amplitude"): ("m", "rad", "1"),
@@ -116,10 +116,10 @@ _CONVENTIONS: tuple[tuple[re.Pattern[str], AmplitudeConvention], ...] = (
 )
 #: Boundary of words in "AmpPkPk".
 _CAMEL = re.compile(r"(?<=[a-z]{2})(?=[A-Z])")
-#: Characters of the longest header that is compared; chosen: longer texts are no names.
+#: Characters of the longest header that is compared; chosen: longer texts are not names.
 _LONGEST_HEADER = 200
 _EMPTY_BRACKETS = re.compile(r"[\[(]\s*[\])]")
-#: Comma that is left where a convention was taken out: "(mm, )".
+#: Comma that remains after a convention was removed: "(mm, )".
 _DANGLING = re.compile(r"\s*[,;]\s*(?=[\])]|$)|(?<=[\[(])\s*[,;]\s*")
 #: Full-width brackets and typographic primes as plain signs; quotation marks are dropped.
 _SPELLINGS: dict[int, int | str] = {
@@ -131,7 +131,7 @@ _NAME_END = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
 
 
 def _combined_names(body: str, quantity: str) -> list[str]:
-    """Names of a quantity, such as "acceleration", before and after names of a body, such as "base"."""
+    """Column names that combine the names of a body, such as "base", with those of a quantity, such as "phase"."""
     parts = WORDS["resonance_parts"]
     return [
         name
@@ -161,23 +161,22 @@ RESONANCE_COLUMNS: Mapping[str, Sequence[str]] = {
 
 
 def of_motion(names: Mapping[str, Sequence[str]], motion: Motion) -> dict[str, Sequence[str]]:
-    """Names of columns for a kind of motion: G' names a modulus, and no stiffness."""
+    """Adapt the column names by role to a kind of motion: in a test of strain, G' names a modulus."""
     return {role: _STRAINING.get(role, usual) if motion is STRAINING else usual for role, usual in names.items()}
 
 
 @dataclass(frozen=True)
 class Column:
-    """Column of a file.
+    """Column of a table, with its meaning.
 
     Args:
-        role: quantity that it contains.
-        header: header cell.
-        index: position from 0.
-        unit: unit as stated, if it is stated.
+        role: quantity in the column, such as "displacement".
+        header: text of the header cell.
+        index: position of the column, from 0.
+        unit: unit as written in the file or campaign; None if there is none.
         scale: factor from the unit to SI.
-        convention: definition of an amplitude, if header or unit state it.
-        logarithm: base of the logarithm whose values the column contains; 0 if the values are plain, NaN if the base is
-            not known.
+        convention: convention of an amplitude; None if neither header nor unit states it.
+        logarithm: base of the logarithm if the column contains logarithms; 0 for plain values, NaN for an unknown base.
     """
 
     role: str
@@ -191,7 +190,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Heading:
-    """Meaning of a header cell: role, unit as written, amplitude convention and base of a logarithm."""
+    """Meaning of a header cell: role of its column (such as "force"), unit, convention and logarithm; see `Column`."""
 
     role: str
     unit: str | None = None
@@ -200,11 +199,11 @@ class Heading:
 
 
 class Vocabulary:
-    """Meaning of headers.
+    """Dictionary that finds the role and unit of a column from its header.
 
     Args:
-        names: usual names by role.
-        columns: the name that a user states for a role; it replaces the usual ones.
+        names: usual column names, by role.
+        columns: column name given by the user, by role; it replaces the usual names of the role.
     """
 
     def __init__(self, names: Mapping[str, Sequence[str]], columns: Mapping[str, str]) -> None:
@@ -218,17 +217,17 @@ class Vocabulary:
         self._names = {role: usual[0] for role, usual in names.items()} | dict(columns)
 
     def heading(self, header: str) -> Heading | None:
-        """Meaning of a header cell; None if it names no role."""
+        """Return the meaning of a header cell; None if the header names no known role."""
         if header not in self._known:
             self._known[header] = self._read(header) if len(header) <= _LONGEST_HEADER else None
         return self._known[header]
 
     def name_of(self, role: str) -> str:
-        """Stated name of a role, or else its first usual one."""
+        """Return the column name that the user gave for a role, or else its first usual name."""
         return self._names[role]
 
     def roles(self, cells: Sequence[str]) -> set[str]:
-        """Roles that header cells name."""
+        """Return the roles that header cells name."""
         return {heading.role for cell in cells if (heading := self.heading(cell))}
 
     def _read(self, header: str) -> Heading | None:
@@ -259,7 +258,7 @@ class Vocabulary:
         return None
 
     def _twice(self, name: str) -> Iterator[str]:
-        """Word of a header that names one quantity twice, such as "Storage modulus G'" or "Weg s"."""
+        """Words for the quantity in a header that also has its symbol, such as "Storage modulus G'" or "Weg s"."""
         for blank in re.finditer(r"[\s,(]+", name):
             word, symbol = plain(name[: blank.start()]), plain(name[blank.end() :])
             if word in self._roles and set(self._roles[word]) & set(self._roles.get(symbol, ())):
@@ -267,12 +266,12 @@ class Vocabulary:
 
 
 def fits(word: str, role: str, unit: str | None) -> bool:
-    """Return True unless the unit shows that an ambiguous name stands for another role.
+    """Return False if the unit of a column shows that its ambiguous name does not mean a role.
 
     Args:
-        word: name in the spelling of `plain`.
-        role: for which it may stand.
-        unit: of the column; None if it is not known.
+        word: column name, in the spelling that `plain` returns.
+        role: role that the name may mean.
+        unit: unit of the column; None if it is not known.
     """
     if unit and (expected := _UNITS_OF.get((word, role))):
         return any(units.is_compatible(unit, si) for si in expected)
@@ -280,7 +279,7 @@ def fits(word: str, role: str, unit: str | None) -> bool:
 
 
 def is_angular(header: str, unit: str) -> bool:
-    """Return True if a frequency is in radians, by its unit, or by its header if the unit is 1/s."""
+    """Return True if a frequency column is angular (rad/s), by its unit, or by its header if the unit is 1/s."""
     name = plain(header)
     return units.is_compatible(unit, "rad/s") or (
         "hz" not in unit.lower()
@@ -291,7 +290,7 @@ def is_angular(header: str, unit: str) -> bool:
 
 @lru_cache(maxsize=4096)
 def split_convention(text: str) -> tuple[str, AmplitudeConvention | None]:
-    """Header or unit without the words for its amplitude convention, and the convention."""
+    """Return a header or unit without the words for an amplitude convention, and the convention, or None."""
     for form in dict.fromkeys((text, _CAMEL.sub(" ", text))):
         for pattern, convention in _CONVENTIONS:
             if match := pattern.search(_folded(form)):
@@ -301,9 +300,10 @@ def split_convention(text: str) -> tuple[str, AmplitudeConvention | None]:
 
 
 def parse_unit(text: str) -> tuple[str, AmplitudeConvention | None, float]:
-    """Unit without its convention, the amplitude convention, and the base of the logarithm in it, else 0.
+    """Parse a unit that may contain an amplitude convention ("mm p-p") or a logarithm ("log10(Pa)", "dB re 1 N/mm").
 
-    20 log10 of a ratio to a reference is a logarithm too: "dB re 1 N/mm", "log10(Pa)", "ln(Pa)".
+    Returns the bare unit, the convention or None, and the base of the logarithm, 0 without one. The base of dB is
+    10^(1/20).
     """
     base = 0.0
     if match := _LOGARITHM_OF_UNIT.fullmatch(text):
@@ -314,13 +314,13 @@ def parse_unit(text: str) -> tuple[str, AmplitudeConvention | None, float]:
 
 @lru_cache(maxsize=1 << 15)  # the vocabularies have five thousand names
 def plain(name: str) -> str:
-    """Spelling of a name for comparison: letters, digits and ' | * alone, without case, accents or umlauts."""
+    """Normalise a name for comparison: only letters, digits and ' | *, in lower case without accents."""
     letters = re.sub(r"[^\w'|*]|_", "", _folded(name.translate(_SPELLINGS)).replace("ß", "ss"))
     return letters.replace("ae", "a").replace("oe", "o").replace("ue", "u")
 
 
 def split_unit(header: str) -> tuple[str, str | None, AmplitudeConvention | None]:
-    """Return name, unit and amplitude convention of a header whose name has no known meaning."""
+    """Split a header whose name has no known meaning into name, unit or None, and amplitude convention or None."""
     text, convention = split_convention(header)
     for name, unit, certain in _splits(text):
         if certain and unit is None and units.is_unit(name) and name != "-":
@@ -331,7 +331,7 @@ def split_unit(header: str) -> tuple[str, str | None, AmplitudeConvention | None
 
 
 def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
-    """Name and unit for each way to split a header, and True if the unit is in brackets."""
+    """Name and unit for each plausible split of a header, and True if the unit is in brackets or there is none."""
     name, unit = units.split_header(text)
     yield name, unit, True
     if unit is None:

@@ -1,6 +1,6 @@
 """Location of a table in its file: delimiter, header and units row.
 
-The header is the line that names the columns of a test and has rows of as many numbers below it.
+The header is the line that names the columns of a test and is followed by rows with as many numbers.
 
 Notes:
     csv.Sniffer, clevercsv, DuckDB and polars, without further information, read fewer than half of the dialects in
@@ -18,26 +18,26 @@ from bushfit import units
 from bushfit.reading.headers import Vocabulary, split_convention
 from bushfit.reading.numerals import is_like_number
 
-#: Delimiters by their names in a campaign, in the order in which they are tried.
+#: Characters that separate columns, by their names in a campaign, in the order in which they are tried.
 DELIMITERS = {"semicolon": ";", "tab": "\t", "pipe": "|", "comma": ",", "caret": "^", "blanks": " "}
-#: Filled lines at the start of a file that can contain the header; chosen: far more than preambles have.
+#: Non-empty lines at the start of a file that are searched for the header; chosen: far more than preambles have.
 MOST_HEAD_LINES = 500
-#: Columns of a table; chosen: far more than a test has.
+#: Largest number of columns of a table; chosen: far more than a test has.
 _MOST_COLUMNS = 1000
-#: Columns whose units are looked up to find the header; chosen: a test has fewer.
+#: Largest number of columns whose units are looked up to find the header; chosen: a test has fewer.
 _MOST_HEADINGS = 50
-#: Characters of a line; chosen: a longer one is no row of a table.
+#: Largest number of characters of a line; chosen: a longer line is not a row of a table.
 _LONGEST_LINE = 1 << 20
-#: Characters of a header line; chosen: ten for each of the most columns.
+#: Largest number of characters of a header line; chosen: ten for each column.
 _LONGEST_HEADER = 10_000
-#: Filled lines below a header that can contain its units row and first numbers; chosen: room for comments.
+#: Non-empty lines below a header that are searched for its units row and first numbers; chosen: room for comments.
 _LINES_BELOW_HEADER = 8
 _COMMENT_SIGNS = ("#", "%", "//")
 #: A number with a number sign: "#1".
 _NUMBERED = re.compile(r"#\s?\d+\b")
-#: Blanks between a name and the bracket of its unit, which separate no columns.
+#: Blanks between a name and the bracket of its unit, which do not separate columns.
 _BLANK_BEFORE_BRACKET = re.compile(r" {1,8}(?=[\[(])")
-#: Blanks of which two say as much.
+#: Wide gap, which is shortened to two blanks.
 _WIDE_GAP = re.compile(" {3,}")
 #: Gap between columns whose headers contain single blanks.
 _COLUMN_GAP = re.compile(r"\t|\s{2,}")
@@ -47,7 +47,7 @@ Content = str | Sequence[str | float]
 
 
 class Line(NamedTuple):
-    """Filled line of a file: its number from 1, and its content."""
+    """Non-empty line of a text or row of a sheet: its number from 1, and its content."""
 
     number: int
     content: Content
@@ -55,15 +55,15 @@ class Line(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class FileFormat:
-    """Format of a file as a user states it; None for what the file itself settles.
+    """Format of a test file as the user states it; None for a property that is to be detected.
 
     Args:
-        encoding: by Python's name, such as "cp1252".
-        delimiter: between cells.
-        decimal: mark in the numbers.
-        thousands: separator in the numbers.
-        header_line: line of the column names, from 1; of a workbook its row.
-        sheet: of a workbook.
+        encoding: Python's name of the text encoding, such as "cp1252".
+        delimiter: name of the character between cells.
+        decimal: decimal mark of the numbers.
+        thousands: thousands separator of the numbers.
+        header_line: number of the line, or row of a workbook, with the column names, from 1.
+        sheet: name of the sheet of a workbook, or of the group of channels of a recording.
     """
 
     encoding: str | None = None
@@ -76,16 +76,16 @@ class FileFormat:
 
 @dataclass(frozen=True)
 class Layout:
-    """Location of a table in its file; lines count from 1.
+    """Location and header of a table in its file; lines count from 1.
 
     Args:
-        delimiter: between cells; " " for runs of blanks; "" for cells that are separate already.
-        headers: cells of the header; numbers from 1 if the file has no header.
-        header_line: line of the header, or of the first row if the file has none.
-        units: cells of the units row, "" for a column without a unit.
-        units_line: line of the units row; None if there is none.
-        written: header cells of a wide table that name a quantity; `headers` are then those of the long table.
-        numbered: True if all rows begin with a number behind a # ("#1"), which then begins no comment.
+        delimiter: character between cells; " " for runs of blanks; "" for a sheet, whose cells are separate already.
+        headers: texts of the header cells; column numbers from 1 if the table has no header.
+        header_line: number of the header line, or of the first row if the table has no header.
+        units: units of the columns from the units row; "" for a column without one.
+        units_line: number of the units row; None if there is none.
+        written: original header cells of a wide table that name a quantity; `headers` belong to the long table.
+        numbered: True if all rows begin with a number after a # ("#1"), so that # does not mark a comment.
         headerless: True if the table has no header.
     """
 
@@ -100,15 +100,15 @@ class Layout:
 
     @property
     def lines_before_data(self) -> int:
-        """Number of the last line before the data."""
+        """Number of the last line before the first row of data: its units row, or else its header."""
         return self.units_line or self.header_line - self.headerless
 
 
 def split(content: Content, delimiter: str) -> list[str]:
-    """Return the cells of a line, without blanks around them and without empty cells at the end.
+    """Split a line into the texts of its cells, stripped of blanks and without empty cells at the end.
 
     Raises:
-        csv.Error: a line or a quoted cell is far too long.
+        csv.Error: the line or a quoted cell is far too long.
     """
     if not isinstance(content, str):
         return [cell if isinstance(cell, str) else repr(cell) for cell in content]
@@ -123,7 +123,7 @@ def split(content: Content, delimiter: str) -> list[str]:
 
 
 def is_comment(content: Content, delimiter: str) -> bool:
-    """Return True if a line is a comment; a semicolon begins one unless it is the delimiter."""
+    """Return True if a line begins with a comment sign: #, %, //, or a semicolon that is not the delimiter."""
     text = content if isinstance(content, str) else next((str(cell) for cell in content if cell != ""), "")
     return text.lstrip().startswith(_COMMENT_SIGNS if delimiter == ";" else (*_COMMENT_SIGNS, ";"))
 
@@ -131,19 +131,19 @@ def is_comment(content: Content, delimiter: str) -> bool:
 def find_layout(
     lines: Sequence[Line], vocabulary: Vocabulary, *, delimiter: str | None = None, header_line: int | None = None
 ) -> Layout:
-    """Find the header of a table: the line that names most columns of a test and has rows of as many cells below it.
+    """Find the header of a table: the line that names most columns of a test and is followed by rows as long.
 
-    A comment is taken for the header only if no other line names two columns. If no line does, the line above the first
-    rows of numbers is taken, or else the first line.
+    A comment is used as the header only if no other line names two columns. If no line names two columns, the header is
+    the line above the first rows of numbers, or else the first line.
 
     Args:
-        lines: filled lines at the start of the file.
-        vocabulary: meaning of headers.
-        delimiter: as stated; "" for a workbook.
-        header_line: line number of the header as stated.
+        lines: non-empty lines at the start of the file.
+        vocabulary: known column names.
+        delimiter: character between cells; "" for a sheet; None to detect it.
+        header_line: line number of the header, if the user states it.
 
     Returns:
-        The layout; without headers if the file has no lines.
+        Layout of the table; its headers are empty if there are no lines.
     """
     if not lines:
         return Layout(delimiter or ",", (), 1, (), None)
@@ -161,7 +161,7 @@ def find_layout(
 def _candidates(
     lines: Sequence[Line], before: Sequence[int], delimiters: Sequence[str], vocabulary: Vocabulary, commented: bool
 ) -> Iterator[tuple[tuple[int, ...], int, str, list[str]]]:
-    """Rank, index, delimiter and cells of each line that names two columns or more."""
+    """Rank, index, delimiter and cells of each possible header: a line of `before` that names two columns or more."""
     for index in before:
         for order, delimiter in enumerate(delimiters):
             content = lines[index].content
@@ -181,13 +181,13 @@ def _candidates(
 
 
 def _is_unit_alone(header: str, vocabulary: Vocabulary) -> bool:
-    """Return True if a header without a known name has a unit in brackets."""
+    """Return True if a header has a unit in brackets but no known name."""
     name, unit = units.split_header(split_convention(header)[0]) if header[-1:] in ("]", ")") else ("", None)
     return bool(name and unit) and unit != "-" and vocabulary.heading(header) is None and units.is_unit(unit or "")
 
 
 def header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
-    """Return the cells of a header in all plausible ways, without empty cells at the end."""
+    """Yield the cells of a header line for each plausible way to split it, without empty cells at the end."""
     if isinstance(content, str) and len(content := content.rstrip(f" \t{delimiter}")) > _LONGEST_HEADER:
         return
     content = _WIDE_GAP.sub("  ", content) if isinstance(content, str) else content
@@ -203,20 +203,23 @@ def header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
 
 
 def _below(lines: Sequence[Line], header: int, delimiter: str) -> Iterator[Line]:
-    """Lines just below a header that are no comments."""
+    """The first few lines below the header with this index, without comments."""
     below = lines[header + 1 : header + 1 + _LINES_BELOW_HEADER]
     return (line for line in below if not is_comment(line.content, delimiter))
 
 
 def is_row(cells: Sequence[str]) -> bool:
-    """Return True if at least two cells, and at least half of the filled ones, hold numbers."""
+    """Return True if at least two cells, and at least half of the non-empty cells, are numbers."""
     filled = [cell for cell in cells[:_MOST_COLUMNS] if cell]
     numbers = sum(map(is_like_number, filled))
     return numbers > 1 and 2 * numbers >= len(filled)
 
 
 def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> tuple[int, Sequence[str]]:
-    """Index of the first of three consecutive rows of numbers, and their delimiters; else number of lines, and all."""
+    """Index of the first of three consecutive rows of numbers, and the delimiters that split them into numbers.
+
+    Without such rows: the number of lines, and all delimiters.
+    """
     last = deque[int](maxlen=3)
     for index in (index for index, line in enumerate(lines) if not is_comment(line.content, ";")):
         last.append(index)
@@ -232,8 +235,8 @@ def _likeliest(
 ) -> tuple[int, str, list[str]]:
     """Index, delimiter and cells of the likeliest header if no line names the columns of a test.
 
-    That is the last line above the first row of numbers with as many cells, or else that row; without rows, the first
-    line.
+    The header is the last line above the first row of numbers that has as many cells, or else that row itself; without
+    rows of numbers, the first line.
     """
     if end == len(lines):
         first = next(iter(before), 0)
@@ -252,7 +255,7 @@ def _likeliest(
 
 
 def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence[str]) -> Layout:
-    """Layout of a header, with the units row that may follow it, and with unnamed columns of the rows below."""
+    """Layout of the table below a header, with its units row if there is one, and with columns that have no header."""
     units_line, row, number = None, [""] * len(headers), lines[index].number
     if all(is_like_number(cell) for cell in headers) and len(headers) > 1:
         return Layout(delimiter, tuple(map(str, range(1, len(headers) + 1))), number, tuple(row), None, headerless=True)
@@ -280,12 +283,12 @@ def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence
 
 
 def _are_counts(cells: Sequence[str]) -> bool:
-    """Return True if cells count rows from 0 or 1."""
+    """Return True if cells are row numbers, 0, 1, 2, ... or 1, 2, 3, ..."""
     return len(cells) > 2 and any(list(cells) == [str(start + n) for n in range(len(cells))] for start in (0, 1))
 
 
 def is_units_row(cells: Sequence[str]) -> bool:
-    """Return True if at least half of the filled cells are units and no cell is a number, but for the unit 1."""
+    """Return True if at least half of the non-empty cells are units and no cell is a number other than the unit 1."""
     filled = [split_convention(cell)[0] for cell in cells if cell]
     has_numbers = any(is_like_number(cell) and cell != "1" for cell in filled)
     return not has_numbers and 0 < len(filled) <= 2 * sum(units.is_unit(cell) for cell in filled)

@@ -17,12 +17,12 @@ from bushfit.geometry import Place
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Waveform = Literal["sine", "triangle"]
-#: Temperatures as near as this [K] are the same: chosen, chambers keep to less.
+#: Temperatures that differ by at most this [K] count as equal; chosen: climate chambers vary by less.
 SAME_TEMPERATURE = 2.0
-#: Quantity that changes from point to point of a run.
+#: Quantity that changes from point to point of a run of a sweep.
 Stepped = Literal["frequency", "amplitude"]
 
-#: Share of the range by which a turning point of a loop stands out from its neighbours; chosen: noise stays below it.
+#: Smallest prominence of a turning point of a loop, relative to its range; chosen: larger than noise.
 _TURN_PROMINENCE = 0.1
 
 
@@ -31,10 +31,10 @@ class Source:
     """Provenance of a measurement.
 
     Args:
-        file: path in the campaign.
-        sha256: of the file.
-        conditions: of the test that no fit uses, such as preload and date, as the campaign states them.
-        notes: sentences on the reading, such as columns that were not understood and rows left out.
+        file: path of the test file, as the campaign gives it.
+        sha256: SHA-256 of the file in hexadecimal digits.
+        conditions: conditions of the test that no fit uses, such as preload and date, by their keys in the campaign.
+        notes: sentences on how the file was read, such as columns that were not understood and rows left out.
     """
 
     file: Path
@@ -43,13 +43,13 @@ class Source:
     notes: tuple[str, ...] = ()
 
     def with_note(self, note: str) -> Source:
-        """Add a note to the provenance."""
+        """Return a copy with a further note."""
         return replace(self, notes=(*self.notes, note))
 
 
 @dataclass(frozen=True)
 class RecordPart:
-    """Position of a loop in a record of several: its first row from 0, and a sentence on the rows left out."""
+    """Position of a loop in a record of several loops: index of its first row, and a sentence on rows left out."""
 
     first_row: int
     left_out: str | None = None
@@ -60,19 +60,19 @@ class Loop:
     """Hysteresis loop, or any other record of time, displacement and force.
 
     Args:
-        name: of the test.
-        source: file of the test.
-        weight: of the test in a fit, relative to others.
-        direction: of the bushing, or the specimen.
-        time: [s], (n,).
-        displacement: [m or rad], or strain of a modulus test, (n,).
-        force: [N or N m], or stress [Pa], (n,).
-        noise: standard deviation of the force relative to its half range, if the campaign states it.
-        timed: True if time was recorded; otherwise it was rebuilt from the displacement.
+        name: name of the test.
+        source: provenance; None for a record without a file.
+        weight: weight of the test in a fit, relative to other tests.
+        direction: direction of the bushing, or the specimen, that was tested.
+        time: time [s], (n,).
+        displacement: displacement [m or rad], or strain of a modulus test, (n,).
+        force: force [N or N m], or stress [Pa], (n,).
+        noise: standard deviation of the force, relative to its half range; None if the campaign does not state it.
+        timed: True if time was recorded, False if it was rebuilt from the displacement.
         part: position in a record of several loops; None if the record is one loop.
         softening: excess stiffness of the first cycle relative to the last; None if noise and the memory of rubber
-            explain it.
-        temperature: of the test [K], if it is known.
+            explain the difference.
+        temperature: temperature of the test [K]; None if it is not known.
 
     Raises:
         MeasurementError: arrays of different length.
@@ -95,7 +95,7 @@ class Loop:
         _check_lengths(self.name, self.time, self.displacement, self.force)
 
     def select(self, rows: slice | NDArray[np.bool_]) -> Loop:
-        """Select rows of the record."""
+        """Return the loop with only some rows, selected by a slice or a mask, (n,)."""
         return replace(self, **{name: getattr(self, name)[rows] for name in ("time", "displacement", "force")})
 
 
@@ -108,16 +108,16 @@ class Sweep:
 
     Args:
         name, direction, source, weight: as in `Loop`.
-        frequency: [Hz], (n,).
-        amplitude: level of each point, zero-to-peak [m or rad, or strain], (n,).
-        stiffness: complex [N/m or N m/rad, or Pa], (n,).
-        repeat: number of the repeat, (n,); default 1.
-        noise: standard deviation of the real and of the imaginary part relative to |K|, if the campaign states it.
-        reached: amplitude that each point reached [m or rad], (n,); None if it is not known.
+        frequency: frequency [Hz], (n,).
+        amplitude: nominal displacement amplitude, zero-to-peak [m or rad, or strain], (n,).
+        stiffness: complex stiffness [N/m or N m/rad], or modulus [Pa], (n,).
+        repeat: number of the repeat to which each point belongs, from 1, (n,); by default all 1.
+        noise: standard deviation of the real and of the imaginary part, relative to |K|; None if not stated.
+        reached: amplitude that the rig actually reached [m or rad, or strain], (n,); None if it is not known.
         stepped: quantity that changes from point to point of a run; None if both change.
-        relative_error: standard deviation of the real and of the imaginary part of each point relative to |K|, (n,),
-            if the file states it.
-        temperature: of the test, or of each point, (n,) [K], if it is known.
+        relative_error: standard deviation of the real and of the imaginary part of each point, relative to |K|, (n,);
+            None if the file does not state it.
+        temperature: temperature of the test, or of each point, (n,) [K]; None if it is not known.
 
     Raises:
         MeasurementError: arrays of different length.
@@ -144,19 +144,19 @@ class Sweep:
 
     @property
     def amplitude_reached(self) -> Floats:
-        """Amplitude that each point reached, default its level [m or rad], (n,), at which a model is evaluated."""
+        """Amplitude for evaluating a model [m or rad, or strain], (n,): the one reached, or else the nominal one."""
         return self.amplitude if self.reached is None else self.reached
 
     @property
     def held(self) -> Floats:
-        """Amplitude [m or rad] or frequency [Hz] that is constant in a run, default its number, (n,)."""
+        """Amplitude [m or rad] or frequency [Hz] that is constant in each run, (n,); else the repeat number."""
         if self.stepped is None:
             return self.repeat.astype(float)
         return self.amplitude if self.stepped == "frequency" else self.frequency
 
     @property
     def step(self) -> Floats:
-        """Frequency [Hz] or amplitude [m or rad] that changes from point to point of a run, (n,)."""
+        """Frequency [Hz] or amplitude [m or rad] that changes from point to point in each run, (n,)."""
         return self.amplitude if self.stepped == "amplitude" else self.frequency
 
 
@@ -172,10 +172,10 @@ def rebuild_time(
     """Rebuild the time of a loop from its displacement and waveform.
 
     Args:
-        displacement: [m or rad], (n,), any number of strokes, with a range above zero.
+        displacement: displacement [m or rad], (n,), any number of strokes, with a range above zero.
         rate: speed [m/s or rad/s].
-        frequency: [Hz], if no rate is given.
-        waveform: of the displacement.
+        frequency: frequency [Hz], used if no rate is given.
+        waveform: shape of the displacement over time.
 
     Returns:
         Time [s], (n,), strictly increasing from zero.
@@ -210,7 +210,7 @@ def rebuild_time(
 
 
 def _stroke_edges(displacement: Floats) -> NDArray[np.intp]:
-    """Indices of the first row, the turning points, and the last row."""
+    """Indices of the first row, the turning points of the displacement, and the last row, rising."""
     from scipy.signal import find_peaks
 
     prominence = _TURN_PROMINENCE * np.ptp(displacement)
@@ -226,5 +226,5 @@ def _stroke_edges(displacement: Floats) -> NDArray[np.intp]:
 
 
 def loss_factor(stiffness: Complex) -> Floats:
-    """Ratio of loss to storage stiffness [-], (n,)."""
+    """Return the loss factor [-], (n,): the ratio of imaginary to real part of a complex stiffness, (n,)."""
     return np.imag(stiffness) / np.real(stiffness)

@@ -18,11 +18,11 @@ _APOSTROPHES = "'\u2019"
 _SIGN = "[+\\-\u2212]"
 #: Pattern of each thousands separator, by the sign with which a user states it.
 _SEPARATORS = {",": ",", ".": r"\.", " ": f"[{_BLANKS}]", "'": f"[{_APOSTROPHES}]"}
-#: Characters of the longest number; chosen: the largest float written out has 309 digits.
+#: Largest number of characters of a number; chosen: the largest float written out has 309 digits.
 _LONGEST_NUMBER = 400
 #: Text with the characters of a number, in an order that numbers may have.
 _LIKE_NUMBER = re.compile(rf"{_SIGN}?[.,]?\d[\d.,{_BLANKS}{_APOSTROPHES}]*(?:[eE]{_SIGN}?\d+)?", re.ASCII)
-#: Number whose sign may separate thousands, or be the decimal mark: 1.234.
+#: Number whose point or comma may be the thousands separator or the decimal mark: 1.234.
 _ONE_GROUP = re.compile(rf"{_SIGN}?[1-9]\d{{0,2}}([.,])\d{{3}}", re.ASCII)
 #: Number without thousands separators: 1234.5.
 _UNGROUPED = re.compile(rf"{_SIGN}?\d{{4,}}(?:[.,]\d*)?", re.ASCII)
@@ -30,7 +30,7 @@ _UNGROUPED = re.compile(rf"{_SIGN}?\d{{4,}}(?:[.,]\d*)?", re.ASCII)
 
 @dataclass(frozen=True)
 class Numerals:
-    """Notation of numbers: decimal mark, and thousands separator ",", ".", " " (any blank), "'" or None."""
+    """Notation of numbers: decimal mark "." or ",", and thousands separator ",", ".", " " (any blank), "'" or None."""
 
     decimal: str = "."
     thousands: str | None = None
@@ -44,11 +44,11 @@ class Numerals:
         return re.compile(rf"{_SIGN}?(?:{'|'.join(forms)})", re.ASCII)
 
     def allows(self, text: str) -> bool:
-        """Return True if a cell, without blanks around it, is a number in this notation."""
+        """Return True if the stripped text of a cell is a number in this notation."""
         return len(text) <= _LONGEST_NUMBER and self._pattern.fullmatch(text) is not None
 
     def value(self, text: str) -> float | None:
-        """Number in a cell; None if the cell is not one in this notation."""
+        """Return the number in a cell; None if the text is not a number in this notation."""
         if not self.allows(text):
             return None
         if self.thousands:
@@ -63,18 +63,18 @@ ALL_NUMERALS = tuple(
     if thousands != decimal
 )
 
-#: Line and column of a cell.
+#: Line number and column index of a cell.
 Place = tuple[int, int]
 
 
 @dataclass(frozen=True)
 class NumeralEvidence:
-    """Notations that fit the numbers of a table.
+    """Notations that are consistent with the numbers of a table, and the first problematic cell, if any.
 
     Args:
-        ways: notations that fit all numbers, the plainest first.
-        unclear: position and text of the first number with different values in these notations.
-        contrary: position and text of the first number that contradicts the others.
+        ways: notations in which all numbers can be read, the plainest first.
+        unclear: location and text of the first number with different values in these notations; None if there is none.
+        contrary: location and text of the first number that contradicts the others; None if there is none.
     """
 
     ways: tuple[Numerals, ...]
@@ -90,15 +90,15 @@ def is_like_number(text: str) -> bool:
 def weigh(
     cells: Iterable[tuple[Place, str]], ways: tuple[Numerals, ...] = ALL_NUMERALS, *, all_cells: bool = False
 ) -> NumeralEvidence:
-    """Find the notations that fit all numbers.
+    """Find the notations of numbers in which all cells of a table can be read.
 
     Args:
-        cells: position and text of each cell; texts that are no numbers are ignored.
-        ways: notations that are possible.
-        all_cells: True to continue after the decimal mark is settled.
+        cells: location and text of each cell; texts that are not numbers are ignored.
+        ways: candidate notations.
+        all_cells: True to continue after the decimal mark is known.
 
     Returns:
-        Notations, and the first number that is ambiguous or contradicts the others.
+        Remaining notations, and the first number that is ambiguous or contradicts the others.
 
     Notes:
         A file with thousands separators is assumed to have them in all numbers, unless the user states the separator.

@@ -20,12 +20,12 @@ from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import Numerals
 from bushfit.units import SIZES
 
-#: Smallest positive value, and largest value of a cell [SI].
+#: Smallest positive value and largest magnitude of a number in a table [SI unit].
 LEAST_VALUE, LARGEST_VALUE = SIZES
 _LINE_END = re.compile(rb"\r\n|\n|\r")
-#: Thousands separators other than the characters that may also separate columns or decimals.
+#: Thousands separators that cannot also be delimiters or decimal marks.
 _SEPARATORS = ("'", "\u2019", "\u00a0", "\u2009", "\u202f")
-#: Rows of channels that are converted at a time; chosen: they fill some MiB.
+#: Rows of channels that are converted at a time; chosen: they take a few MiB.
 _CHUNK_ROWS = 1 << 14
 #: Thousands separated by a blank.
 _GROUP_BY_BLANK = re.compile(rb"\d \d{3}(?!\d)")
@@ -33,7 +33,7 @@ _GROUP_BY_BLANK = re.compile(rb"\d \d{3}(?!\d)")
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """Delimited text in UTF-8, with the encoding that the file had, and what was found in it or parsed already."""
+    """Delimited text in UTF-8, with the original encoding of its file; search results and columns are cached."""
 
     data: bytes
     encoding: str | None
@@ -43,22 +43,22 @@ class Text:
     _parsed: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False)
 
     def head(self) -> list[Line]:
-        """Filled lines at the start of the text."""
+        """Return the first non-empty lines of the text, in which the header is searched."""
         return list(islice(_lines(io.BytesIO(self.data[:HEAD_BYTES]), 0), MOST_HEAD_LINES))
 
     def lines(self, after: int) -> Iterator[Line]:
-        """Filled lines after line number `after`."""
+        """Yield the non-empty lines after line number `after`."""
         stream = io.BytesIO(self.data)
         stream.seek(self.offset(after))
         return _lines(stream, after)
 
     def offset(self, after: int) -> int:
-        """Index of the first byte after line number `after`."""
+        """Return the index of the first byte after line number `after`."""
         ends = [0, *(end.end() for end in islice(_LINE_END.finditer(self.data), after))]
         return ends[after] if len(ends) > after else len(self.data)
 
     def has(self, sign: str, layout: Layout) -> bool:
-        """Return True if the text below the header contains a character."""
+        """Return True if the text below the header contains a character `sign`."""
         start = self.offset(layout.lines_before_data)
         if (start, sign) not in self._parsed:
             self._parsed[start, sign] = self.data.find(sign.encode(), start) >= 0
@@ -69,7 +69,7 @@ class Text:
         return self.has('"' if layout.delimiter == "," else ",", layout)
 
     def may_group(self, layout: Layout, decimal: str) -> bool:
-        """Return True if numbers below the header can have thousands separators beside this decimal mark."""
+        """Return True if numbers below the header can have thousands separators, given their decimal mark."""
         signs = _SEPARATORS if decimal == "." else (*_SEPARATORS, ".")
         if any(self.has(sign, layout) for sign in signs) or (decimal == "." and self.may_have_comma(layout)):
             return True
@@ -79,16 +79,16 @@ class Text:
     def columns(
         self, layout: Layout, first: Sequence[str], indices: frozenset[int], numerals: Numerals
     ) -> dict[int, Floats] | None:
-        """Read columns with pandas.
+        """Read columns of numbers with pandas.
 
         Args:
-            layout: header and delimiter.
+            layout: location of the table.
             first: cells of the first row of data.
-            indices: of the columns.
+            indices: indices of the columns to read, from 0.
             numerals: notation of the numbers.
 
         Returns:
-            Values by column index, (n,) each; None if a row has another length, or a cell is no number.
+            Numbers as in the file by column index, (n,) each; None if rows differ in length or a cell is not a number.
 
         Notes:
             All columns that begin with a number are parsed as numbers: a summary row such as "Mean" then fails, as it
@@ -110,9 +110,9 @@ class Text:
         return None if frame is None else {index: frame[index].to_numpy() for index in indices}
 
     def texts(self, layout: Layout, indices: Sequence[int]) -> dict[int, tuple[list[str], NDArray[np.intp]]] | None:
-        """Return the different texts of columns, and the position of that of each row among them, (n,), by index.
+        """Read columns of texts: by column index, the distinct texts, and the index of each row's text in them, (n,).
 
-        None if rows differ in length, or cells may contain delimiters.
+        Returns None if rows differ in length, or cells may contain delimiters.
         """
         if layout.delimiter == " " or self.has('"', layout):
             return None
@@ -125,7 +125,7 @@ class Text:
         return {n: (list(frame[n].cat.categories), frame[n].cat.codes.to_numpy().astype(np.intp)) for n in indices}
 
     def _frame(self, layout: Layout, width: int, used: list[int] | None, types: Any, decimal: str) -> Any:
-        """Data frame of the columns with these indices, default all; None if pandas refuses the text."""
+        """Data frame of the columns with indices `used`, or all; None if pandas cannot parse the text."""
         import pandas as pd
 
         start, mark = self.offset(layout.lines_before_data), layout.delimiter
@@ -152,9 +152,9 @@ class Text:
         return None if is_skipping else frame
 
     def suspicious(self, layout: Layout, largest_share: float) -> list[tuple[int, int, int]] | None:
-        """Return number, start and end of the lines below the header that have letters, dashes or an empty cell.
+        """Find lines below the header with letters, dashes or an empty cell, which may not be rows of data.
 
-        None if their share is too large.
+        Returns line number, first byte and end of each; None if they are more than a share of all lines.
         """
         mark = re.escape(layout.delimiter.encode())
         pattern = re.compile(
@@ -174,7 +174,7 @@ class Text:
 
 
 def _lines(data: io.BytesIO, after: int) -> Iterator[Line]:
-    """Filled lines of a stream that begins after line number `after`; closes the stream."""
+    """Non-empty lines of a stream whose first line has the number `after` + 1; closes the stream."""
     with io.TextIOWrapper(data, encoding="utf-8", errors="replace") as text:
         for number, line in enumerate(text, start=after + 1):
             if line.strip(" \t\r\n,;|^"):
@@ -186,12 +186,12 @@ class Sheet:
     """Worksheet of a workbook, or another table in memory.
 
     Args:
-        sheet: name of the worksheet.
-        content: texts and numbers of each row; "" for an empty cell.
+        sheet: name of the worksheet, or title of the table.
+        content: texts and numbers of the cells of each row; "" for an empty cell.
         lacks_values: function that returns True if the workbook has formulas without saved values.
-        encoding: None, as a sheet has no encoding.
-        layout: header, if the source of the table defines it.
-        numeric: indices of columns that contain numbers only.
+        encoding: always None; only texts have an encoding.
+        layout: header and units, if the file format defines them; None if they have to be found.
+        numeric: indices of columns that contain only numbers.
     """
 
     sheet: str
@@ -202,11 +202,11 @@ class Sheet:
     numeric: frozenset[int] = frozenset()
 
     def head(self) -> list[Line]:
-        """Filled rows at the start of the sheet."""
+        """Return the first non-empty rows of the sheet, in which the header is searched."""
         return list(islice(self.lines(0), MOST_HEAD_LINES))
 
     def lines(self, after: int) -> Iterator[Line]:
-        """Filled rows after row number `after`."""
+        """Yield the non-empty rows after row number `after`."""
         for number, cells in enumerate(islice(self.content, after, None), start=after + 1):
             if any(cell != "" for cell in cells):
                 yield Line(number, cells)
@@ -214,33 +214,33 @@ class Sheet:
 
 @dataclass(frozen=True, eq=False)
 class Combined(Sheet):
-    """Table that was put together from parts of a sheet or text.
+    """Table that was rearranged from blocks of a sheet or text.
 
     Args:
-        numbers: original lines of its rows.
-        above: lines above the first part.
+        numbers: original line number of each row.
+        above: lines above the first block.
     """
 
     numbers: Sequence[int] = ()
     above: Sequence[Line] = ()
 
     def head(self) -> list[Line]:
-        """Lines above the first part, and the first rows."""
+        """Return the lines above the first block, and the first rows."""
         return [*self.above, *islice(self.lines(0), MOST_HEAD_LINES)]
 
     def lines(self, after: int) -> Iterator[Line]:  # noqa: ARG002
-        """All rows below the header."""
+        """Yield all rows, with their original line numbers; `after` is ignored, since the header is stored apart."""
         return (Line(number, cells) for number, cells in zip(self.numbers, self.content, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
 class Channels(Sheet):
-    """Recorded channels of one length; row numbers count samples from 1.
+    """Recorded channels of equal length as the columns of a table; row numbers count samples from 1.
 
     Args:
-        arrays: values of the channels, (n,) each, as floats or as objects that are texts.
-        above: properties that the file states for all channels.
-        format: name of the file format.
+        arrays: samples of each channel, (n,) each: floats, or objects that are texts.
+        above: properties of the recording, as lines above the table.
+        format: name of the file format, such as "TDMS".
     """
 
     arrays: Sequence[NDArray[Any]] = ()
@@ -248,18 +248,18 @@ class Channels(Sheet):
     format: str = ""
 
     def head(self) -> list[Line]:
-        """Properties of the channels, and the first rows."""
+        """Return the properties of the recording, and the first rows."""
         return [*self.above, *islice(self.lines(0), MOST_HEAD_LINES)]
 
     def lines(self, after: int) -> Iterator[Line]:
-        """Rows after row number `after`."""
+        """Yield the rows after row number `after`."""
         for start in range(after, len(self.arrays[0]), _CHUNK_ROWS):
             chunk = zip(*(values[start : start + _CHUNK_ROWS].tolist() for values in self.arrays), strict=True)
             yield from (Line(number, cells) for number, cells in enumerate(chunk, start=start + 1))
 
 
 class Channel(NamedTuple):
-    """Recorded channel: values, (n,), their unit, and the channel over which they were recorded, if there is one."""
+    """Recorded channel: samples, (n,), their unit or "", and the base channel, such as time; None if there is none."""
 
     name: str
     values: NDArray[Any]
@@ -267,16 +267,16 @@ class Channel(NamedTuple):
     over: Channel | None = None
 
 
-#: Channels that a file stores together: name, channels, and properties of all as names and values or lines of text.
+#: Channels that a file stores together: name of the group, channels, and properties, (name, value) or (line,) each.
 Group = tuple[str, list[Channel], Sequence[tuple[Any, ...]]]
 
 
-#: Source of rows.
+#: Part of a file that can contain a table.
 RowSource = Text | Sheet
 
 
 def rows(source: RowSource, layout: Layout) -> Iterator[tuple[int, Sequence[str | float]]]:
-    """Line number and cells of each line below the header, without comments.
+    """Yield the line number and the cells of each line below the header, without comments.
 
     Raises:
         csv.Error: a line or a quoted cell is far too long.
@@ -287,10 +287,10 @@ def rows(source: RowSource, layout: Layout) -> Iterator[tuple[int, Sequence[str 
 
 
 def cells_of(line: Line, layout: Layout) -> Sequence[str | float]:
-    """Cells of a line.
+    """Return the cells of a line of text or row of a sheet; numbers of a sheet remain numbers.
 
     Raises:
-        csv.Error: a line or a quoted cell is far too long.
+        csv.Error: the line or a quoted cell is far too long; the message has the line number.
     """
     try:
         return split(line.content, layout.delimiter) if isinstance(line.content, str) else line.content

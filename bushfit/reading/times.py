@@ -19,12 +19,14 @@ _DATE = re.compile(r"(?P<a>\d{1,4})[-./](?P<b>\d{1,2})[-./](?P<c>\d{1,4})(?:[T\s
 _ZONE = re.compile(r"\s*(?:Z|UTC|GMT|[+-]\d\d:?\d\d)$")
 #: Day numbers of spreadsheets from 1954 to 2119; chosen: all dates of tests.
 _DAY_NUMBERS = (20_000.0, 80_000.0)
-#: Mean step of day numbers [d]; chosen: rows follow each other within 9 s.
+#: Largest mean step of day numbers [d]; chosen: rows follow each other within 9 s.
 _LARGEST_DAY_STEP = 1e-4
 
 
 def clock(text: str) -> float | None:
-    """Return the seconds of a clock, or of a date and clock since 1970; None if the text is none.
+    """Parse a clock time such as 20:07:10.1, or a date and a clock time.
+
+    Returns seconds since midnight, or since 1970 if there is a date; None if the text is neither.
 
     In 07:10:100 the last part is milliseconds. Days and months that are ambiguous are read as day and month; only the
     differences between rows are used.
@@ -54,7 +56,7 @@ def clock(text: str) -> float | None:
 
 
 def are_day_numbers(values: Floats) -> bool:
-    """Return True if numbers, (n,), are dates of a spreadsheet in days: from 1954 to 2119, and seconds apart.
+    """Return True if numbers, (n,), look like dates of a spreadsheet in days: from 1954 to 2119, and seconds apart.
 
     As seconds, the same numbers would be a record with steps below 0.1 ms that begins hours after zero.
     """
@@ -64,14 +66,14 @@ def are_day_numbers(values: Floats) -> bool:
 
 
 def without_midnight(seconds: Floats) -> Floats:
-    """Clock times [s], (n,), with a day added after each midnight."""
+    """Add a day to clock times [s], (n,), after each midnight, so that they increase."""
     return seconds + DAY * np.cumsum(np.append(0.0, np.diff(seconds) < -0.5 * DAY))
 
 
 def spread(time: Floats) -> Floats | None:
-    """Return even times of rows whose recorded time [s], (n,), was rounded, so that it repeats.
+    """Return evenly spaced times [s], (n,), for recorded times that were rounded, so that values repeat.
 
-    None if time goes back, or if no even sampling rounds to these times.
+    Returns None if time decreases, or if no even sampling rounds to these times.
 
     Notes:
         With q the smallest step between different times, an even clock t0 + i dt is rounded to within q. The line
