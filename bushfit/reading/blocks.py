@@ -11,36 +11,36 @@ from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_units_ro
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names, named_direction
 from bushfit.reading.source import Channels, Combined, RowSource, Text, cells_of
 
-#: Bytes of the largest text that is searched for blocks without a header of their own; chosen: some 100,000 rows.
+#: Largest text that is searched for blocks without their own headers [bytes]; chosen: some 100,000 rows.
 _MOST_BYTES = 1 << 22
-#: A letter that is no exponent.
+#: Letter that does not begin an exponent.
 _LETTER = re.compile(r"[^\W\d_eE]|[eE](?![+-]?\d)")
-#: Bytes of rows of numbers, which begin no block.
+#: Bytes that occur in rows of numbers, which cannot begin a block.
 _NUMERIC = b"0123456789.,+-eE \t\r\n"
 #: Complex number: "1500+150i", "(1500 + 150j)".
 _COMPLEX = re.compile(r"\(?\s*([+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*([+-]\s*[\d.,]+(?:[eE][+-]?\d+)?)\s*\*?\s*[ij]\s*\)?")
-#: Rows in which complex numbers are looked for; chosen: room for remarks.
+#: First rows that are searched for complex numbers; chosen: room for remarks.
 _FIRST = 8
-#: Amplitude conventions in the header of an added column.
+#: Text of each amplitude convention in the header of an added column.
 COUNTED: dict[AmplitudeConvention | None, str] = {
     "peak-to-peak": " p-p", "zero-to-peak": " 0-p", "rms": " rms", None: ""
 }  # fmt: skip
 
-#: Line number, cells and number of the block of a row.
+#: Row of a block: line number, cells, and index of the block from 0.
 _BlockRow = tuple[int, Sequence[str | float], int]
 
 
 def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple[RowSource, Layout]:
-    """Combine blocks into one table, and part complex numbers into two columns.
+    """Combine the blocks of a file into one table, and split complex numbers into two columns.
 
     Args:
-        source: lines of the file.
-        layout: of its first block.
-        vocabulary: meaning of headers.
+        source: lines or rows of the file.
+        layout: location and headers of the first block.
+        vocabulary: known column names.
 
     Returns:
-        Source and layout of one table, with a column "block" and a column for each quantity that the titles of the
-        blocks, or the lines between them, state; the arguments unchanged if there is one block of real numbers.
+        Source and layout of the table, with an added column "block" and a column for each quantity, such as the
+        amplitude, that all titles or lines above the blocks state; the arguments if there is only one, real, block.
     """
     if isinstance(source, Channels) or len(layout.headers) < 2 or layout.headerless:
         return source, layout
@@ -65,7 +65,7 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
 def _side_by_side(
     source: RowSource, layout: Layout, sides: Sequence[slice], vocabulary: Vocabulary
 ) -> tuple[RowSource, Layout]:
-    """Blocks side by side, below titles that may be merged cells."""
+    """Table of blocks that are side by side, each with the same headers, below titles that may be merged cells."""
     above = [split(line.content, layout.delimiter) for line in source.head() if line.number < layout.header_line]
     titles = [next(filter(None, (cell for row in reversed(above) for cell in row[side])), "") for side in sides]
     width = len([header for header in layout.headers[sides[0]] if header])
@@ -87,7 +87,7 @@ def _side_by_side(
 
 
 def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple[RowSource, Layout]:
-    """Blocks one below the other: each begins with the header again, or with lines that state a quantity."""
+    """Table of blocks one below the other, each below a repeated header or below lines that state a quantity."""
     header = [plain(text) for text in layout.headers]
     above = [line for line in source.head() if line.number < layout.header_line]
     between: list[Line] = []
@@ -129,7 +129,7 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
 def _one_table(
     source: RowSource, layout: Layout, parts: Iterable[_BlockRow], added: dict[str, list[str]]
 ) -> tuple[RowSource, Layout]:
-    """Table of the rows of all blocks, with further columns of a text for each block."""
+    """Table of the rows of all blocks, with added columns; `added` has one text per block, by header."""
     width = len(layout.headers)
     numbers: list[int] = []
     content: list[Sequence[str | float]] = []
@@ -144,16 +144,16 @@ def _one_table(
 def _label_columns(
     labels: Sequence[Labels], titles: Sequence[str], parts: Sequence[str], roles: set[str]
 ) -> dict[str, list[str]]:
-    """Columns that identify blocks.
+    """Columns to add to a table, so that its rows show the block from which they come.
 
     Args:
-        labels: of the blocks.
-        titles: of the blocks, which may name a direction.
-        parts: names of the parts in the blocks, if nothing else distinguishes the blocks.
-        roles: that have a column already.
+        labels: labels of each block.
+        titles: title of each block, which may name a direction.
+        parts: name of the part in each block, used if no quantity distinguishes the blocks.
+        roles: roles for which the blocks have a column already.
 
     Returns:
-        Texts by header, one for each block: quantities that all blocks state, direction, part, and number.
+        One text per block, by header: quantities that all blocks state, direction, part, and number of the block.
     """
     columns: dict[str, list[str]] = {}
     for role, expected in (("amplitude", "m"), ("amplitude", "rad"), ("amplitude", "1"), ("frequency", "Hz")):
@@ -180,7 +180,7 @@ def _label_columns(
 
 
 def _with_complex_parts(source: RowSource, layout: Layout) -> tuple[RowSource, Layout]:
-    """Table in which a column of complex numbers is parted into its real and its imaginary part."""
+    """Table with two columns, real and imaginary part, instead of each column of complex numbers."""
     first = [cells_of(line, layout) for line in islice(source.lines(layout.lines_before_data), _FIRST)]
     indices = {n for row in first for n, cell in enumerate(row) if isinstance(cell, str) and _COMPLEX.fullmatch(cell)}
     if not indices or max(indices) >= len(layout.headers):

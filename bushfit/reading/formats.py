@@ -1,7 +1,7 @@
 """Recordings of MATLAB, TDMS, MDF, LabVIEW, Parquet and Arrow, as groups of channels.
 
-Each reader takes the bytes of a file and its path, imports its library when a file needs it, and yields groups. A unit
-that the file does not state is "".
+Each reader takes the bytes of a file and its path, imports its library when it is called, and yields groups. The unit
+of a channel is "" if the file does not state it.
 """
 
 import io
@@ -16,18 +16,18 @@ from bushfit import units
 from bushfit.reading.files import to_utf8
 from bushfit.reading.source import Channel, Group
 
-#: Values of the largest file; chosen: ten million rows of twenty channels and more, 2 GiB.
+#: Largest number of values in a file; chosen: ten million rows of twenty channels and more, 2 GiB.
 _MOST_VALUES = 1 << 28
-#: Lines of the header of a LabVIEW measurement file; chosen: it has some twenty.
+#: Largest number of header lines of a LabVIEW measurement file; chosen: files have some twenty.
 _LVM_HEAD = 40
 _LVM_END = "***End_of_Header***"
 
 
 def matlab(data: bytes, _: Path) -> Iterator[Group]:
-    """Read the vectors of a MATLAB file.
+    """Read the vectors and matrices of a MATLAB file as channels.
 
     Yields:
-        A group for each struct.
+        A group for the variables of the file, and one for each struct.
     """
     if data.startswith(b"MATLAB 7.3"):
         import h5py
@@ -42,9 +42,10 @@ def matlab(data: bytes, _: Path) -> Iterator[Group]:
 
 
 def _from_hdf5(node: Any) -> Any:
-    """Variable of MATLAB in HDF5 as scipy returns it: a dict, a list of dicts, a text, or an array.
+    """Convert a variable of a MATLAB 7.3 file (HDF5) to the form that scipy returns for older files.
 
-    None for an object of a class, such as a table.
+    Returns a dict for a struct, a list of dicts for an array of structs, a text, or an array; None for an empty array
+    or an object of a class, such as a table.
     """
     if getattr(node, "external", None) or getattr(node, "is_virtual", False):
         raise ValueError("its data are in other files")
@@ -67,13 +68,13 @@ def _from_hdf5(node: Any) -> Any:
 
 
 def _bound(values: int) -> None:
-    """Refuse a file that unpacks to more values than a recording has."""
+    """Raise a ValueError if a file unpacks to more values than are read."""
     if values > _MOST_VALUES:
         raise ValueError(f"it unpacks to {values} values, of which at most {_MOST_VALUES} are read")
 
 
 def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
-    """Groups of the vectors and columns of matrices in a struct, and in the structs inside it."""
+    """Group with the vectors and matrix columns of a struct as channels, and the groups of the structs inside it."""
     channels: list[Channel] = []
     labels: list[tuple[str, str]] = []
     inner: dict[str, Mapping[str, Any]] = {}
@@ -97,10 +98,10 @@ def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
 
 
 def tdms(data: bytes, _: Path) -> Iterator[Group]:
-    """Read the channels of a TDMS file; a waveform is recorded over time, unless it states another unit.
+    """Read the channels of a TDMS file; the base of a waveform is time, unless the file states another unit.
 
     Yields:
-        Its groups.
+        Each group of the file.
     """
     from nptdms import TdmsFile
 
@@ -121,10 +122,10 @@ def tdms(data: bytes, _: Path) -> Iterator[Group]:
 
 
 def mdf(data: bytes, _: Path) -> Iterator[Group]:
-    """Read the channels of an MDF file over their master channels.
+    """Read the channels of an MDF file; the base of each is the master channel of its group, such as time.
 
     Yields:
-        Its groups.
+        Each group of the file.
     """
     from asammdf import MDF
 
@@ -144,7 +145,7 @@ def arrow(data: bytes, _: Path) -> Iterator[Group]:
     """Read the columns of a Parquet or Arrow file, with units from the metadata of its fields.
 
     Yields:
-        One group.
+        One group with all columns.
     """
     import pyarrow as pa
 
@@ -168,7 +169,7 @@ def arrow(data: bytes, _: Path) -> Iterator[Group]:
 
 
 def labview(data: bytes, file: Path) -> Iterator[Group]:
-    """Read the channels of a LabVIEW measurement file over their time.
+    """Read the channels of a LabVIEW measurement file, with their time or other x axis as base.
 
     Yields:
         A group for each segment.

@@ -25,27 +25,27 @@ from bushfit.reading.layout import Layout, Line
 from bushfit.reading.source import Channel, Channels, Group
 from bushfit.reading.uff import uff
 
-#: Names of the base of a recording.
+#: Names of the base channel of a recording: time or frequency.
 _BASES = Vocabulary({"time": LOOP_COLUMNS["time"], "frequency": SWEEP_COLUMNS["frequency"]}, {})
-#: Channels that have no complex values.
+#: Names of channels whose values cannot be complex.
 _REAL = Vocabulary(
     {"time": LOOP_COLUMNS["time"], **{role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}}, {}
 )
-#: Next step for files without channels.
+#: Next step to suggest for files without channels.
 _HINT = "export it again, with its channels"
 _MATLAB_HINT = 'save vectors, or structs of them, with -v7; a table by way of table2struct(T, "ToScalar", true)'
 _UFF_HINT = "export records or frequency responses as dataset 58; of data at nodes (55) only the latter are read"
 
 
 class Format(NamedTuple):
-    """Format of recordings.
+    """File format of recordings.
 
     Args:
-        name: of the format.
-        endings: of files.
-        sign: pattern of the first bytes.
-        read: function that returns the groups of channels.
-        hint: next step for a file without channels.
+        name: name of the format, such as "TDMS".
+        endings: file name endings, such as ".tdms".
+        sign: regular expression that matches the first bytes of a file.
+        read: function that takes bytes and path of a file and yields its groups of channels.
+        hint: next step to suggest for a file without channels.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Format(NamedTuple):
     hint: str
 
 
-#: Formats of recordings.
+#: Supported formats of recordings.
 _FORMATS = (
     Format("MATLAB", (".mat",), rb"MATLAB (?:5\.0|7\.3) MAT-file", matlab, _MATLAB_HINT),
     Format("TDMS", (".tdms",), rb"TDSm", tdms, _HINT),
@@ -64,20 +64,20 @@ _FORMATS = (
     Format("LabVIEW", (".lvm",), rb"LabVIEW Measurement", labview, _HINT),
     Format("Parquet or Arrow", (".parquet", ".feather", ".arrow"), rb"PAR1|ARROW1", arrow, _HINT),
 )
-#: Endings of the files of recordings.
+#: File name endings of recordings.
 RECORDINGS = tuple(ending for one in _FORMATS for ending in one.endings)
 
 
 def word_for_part(file: Path) -> str:
-    """Word for a part of a file: "group" of a recording, or "sheet" of a workbook."""
+    """Return the word for a part of a file in messages: "group" for a recording, else "sheet"."""
     return "group" if file.suffix.lower() in RECORDINGS else "sheet"
 
 
 def format_of(data: bytes, file: Path) -> Format | None:
-    """Return the format of a recording by its first bytes; None for a text or a workbook.
+    """Identify the format of a recording by its first bytes; None for a text or a workbook.
 
     Raises:
-        MeasurementError: the ending of the file is that of a recording, and its content is not.
+        MeasurementError: the file has the ending of a recording, but not its content.
     """
     by_content = next((recording for recording in _FORMATS if re.match(recording.sign, data)), None)
     by_ending = next((recording for recording in _FORMATS if file.suffix.lower() in recording.endings), None)
@@ -100,11 +100,11 @@ def read_groups(data: bytes, file: Path, recording: Format) -> tuple[Channels, .
 
     Args:
         data: bytes of the file.
-        file: path.
-        recording: its format.
+        file: path of the file.
+        recording: format of the file.
 
     Returns:
-        Channels of one length in each group, with unique titles if there are several; or the error.
+        Groups of channels of equal length, with unique titles if there are several; or the error, not raised.
     """
     with _silenced():
         try:
@@ -133,7 +133,7 @@ def read_groups(data: bytes, file: Path, recording: Format) -> tuple[Channels, .
 
 @contextmanager
 def _silenced() -> Iterator[None]:
-    """Context in which libraries and their finalizers neither warn, log nor print."""
+    """Context manager that suppresses warnings, logging and printing of libraries and their finalizers."""
     before, hook = logging.root.manager.disable, sys.unraisablehook
     logging.disable(logging.CRITICAL)
     sys.unraisablehook = lambda _: None
@@ -149,9 +149,10 @@ def _silenced() -> Iterator[None]:
 def _split_by_length(
     name: str, channels: Sequence[Channel], properties: Sequence[tuple[Any, ...]], recording: Format
 ) -> Iterator[Channels]:
-    """Channels of a group with one length and one base, which is the first channel unless another has its role.
+    """Split a group into tables of channels with equal length and the same base channel, such as time.
 
-    Channels without a base belong to all bases of their length.
+    The base becomes the first column, unless a channel of the group is named as such. Channels without a base are added
+    to all tables of their length.
     """
     lengths: dict[int, dict[bytes, list[Channel]]] = {}
     for channel in channels:
@@ -180,7 +181,7 @@ def _split_by_length(
 
 
 def _refuse_complex(channels: Sequence[Channel]) -> None:
-    """Refuse complex values that have no meaning: a time, a frequency, an amplitude, or anything recorded over time.
+    """Refuse complex values that have no meaning: of a time, frequency or amplitude, or of a channel over time.
 
     Raises:
         MeasurementError: there is such a channel.
@@ -198,7 +199,7 @@ def _refuse_complex(channels: Sequence[Channel]) -> None:
 
 
 def _real_channels(channel: Channel, several: bool) -> Iterator[Channel]:
-    """Channel as floats or texts, with dates in seconds; a complex one as magnitude and phase, named if `several`."""
+    """Channel as floats or texts, dates in seconds, complex values as magnitude and phase, named if `several`."""
     values = channel.values
     if values.dtype.kind == "c" and not np.any(values.imag):
         values = values.real

@@ -19,7 +19,7 @@ _UNITS = {
     **{"%": "%", "pct": "%", "mhz": "mHz", "hz": "Hz", "n": "N", "kn": "kN"},
     **{"degc": "degC", "gradc": "degC", "grdc": "degC", "°c": "degC", "c": "degC"},
 }
-#: Quantity in a name, with the word before it and its sign: "0.5mm", "A0,5 mm", "0p5mm", "10Hz", "2deg"; but neither
+#: Quantity in a name, with its sign and the word before it: "0.5mm", "A0,5 mm", "0p5mm", "10Hz", "2deg"; but neither
 #: "20Hz" in "5-20Hz" nor "10mm_min".
 _QUANTITY = re.compile(
     r"(?<![^\W_])(?<!\d[.,-])(?:(?P<word>[^\W\d_]+)(?P<gap>[\s_=:]*))?(?P<sign>\+/?-|±|-|\+)?\s*"
@@ -28,7 +28,7 @@ _QUANTITY = re.compile(
     r"(?![\s/_-]*(?:(?:per|pro|p)[\s_-]*)?(?:min|s|sec)(?![A-Za-z]|-s))",
     re.IGNORECASE,
 )
-#: Words before a number by the kind of quantity that they announce: amplitude, preload, size and so on.
+#: Words that can precede a number, by the kind of quantity that they announce: amplitude, preload, size and so on.
 _WORDS = {kind: frozenset(words) for kind, words in WORDS["beside"].items()}
 #: Date: 2024-05-03, 2024_05_03, 20240503 or 03.05.2024.
 _DATE = re.compile(
@@ -41,15 +41,15 @@ _SPECIMEN_NUMBER = re.compile(
     r"[\s_.:#-]*(\d[A-Za-z0-9]*)(?![^\W_]|[.,]\d)",
     re.IGNORECASE,
 )
-#: Range of test temperatures [degC]; chosen: a number with a C outside it belongs to a part.
+#: Range of test temperatures [degC]; chosen: a number with a C outside this range is part of a part number.
 _TEMPERATURES = (-100.0, 300.0)
-#: Keys of a campaign by their names above a table.
+#: Key of a campaign by each of its usual names above a table.
 _KEY_OF = {plain(name): key for key, names in WORDS["above"].items() for name in names}
-#: Names of amplitude and frequency above a table.
+#: Usual names of amplitude and frequency above a table.
 _VOCABULARY = Vocabulary({role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}, {})
-#: Separator of a name and its value above a table.
+#: Separator between a name and its value above a table.
 _AFTER_KEY = re.compile(r"\t|;|:\s|:$|\s=\s|=|,(?!\d)")
-#: Decimal comma of the number that begins a value.
+#: Decimal comma of a number at the start of a value.
 _COMMA = re.compile(r"^([+-]?\d+),(?=\d+(?!\d|[.,]\d))")
 #: Characters of the longest value above a table; chosen: a longer one is a text.
 _LONGEST_VALUE = 60
@@ -58,18 +58,18 @@ _LONGEST_VALUE = 60
 _WORD_STARTS = {start: Direction(name) for name, starts in WORDS["direction"].items() for start in starts}
 #: Direction by its abbreviation in names; in headers rad is a unit.
 _SHORT = {"ax": Direction.AXIAL, "rad": Direction.RADIAL, "tors": Direction.TORSION, "tor": Direction.TORSION}
-#: Word that is no unit behind a number.
+#: Word that is not a unit after a number.
 _WORD = re.compile(r"(?<![a-z\d.,])(?:[a-z]+)")
 
 
 class StatedQuantity(NamedTuple):
-    """Quantity in a label.
+    """Quantity with a unit in a name or in a line above a table.
 
     Args:
         text: number and unit, such as "0.05 mm".
-        unit: unit alone.
-        is_marked: True if a word or sign marks it as the amplitude or frequency.
-        convention: definition of an amplitude, if it is stated.
+        unit: unit alone, such as "mm".
+        is_marked: True if a word or sign identifies the quantity as the amplitude or frequency of the test.
+        convention: convention of an amplitude; None if it is not stated.
     """
 
     text: str
@@ -80,12 +80,12 @@ class StatedQuantity(NamedTuple):
 
 @dataclass(frozen=True)
 class Labels:
-    """Statements on a test outside its table.
+    """Information on a test from the name of its file or sheet and from the lines above its table.
 
     Args:
-        quantities: that may be its amplitude or frequency.
-        direction: of the bushing.
-        temperature, preload, date, operator, specimen_number: values of these keys of a campaign, as texts.
+        quantities: quantities that may be the amplitude or frequency of the test.
+        direction: direction of the bushing; None if it is not named.
+        temperature, preload, date, operator, specimen_number: values for these keys of a campaign, as texts.
     """
 
     quantities: tuple[StatedQuantity, ...] = ()
@@ -97,12 +97,12 @@ class Labels:
     specimen_number: str | None = None
 
     def of_dimension(self, unit: str) -> list[StatedQuantity]:
-        """Different quantities of the dimension of an SI unit; only the marked ones if there are any."""
+        """Return the distinct quantities with the dimension of an SI unit; only the marked ones if there are any."""
         fitting = [quantity for quantity in dict.fromkeys(self.quantities) if units.is_compatible(quantity.unit, unit)]
         return [quantity for quantity in fitting if quantity.is_marked] or fitting
 
     def __or__(self, labels: "Labels") -> "Labels":
-        """Labels of both; those on the left take precedence."""
+        """Combine two sets of labels; values on the left take precedence."""
         dimensions = [unit for unit in ("m", "rad", "1", "Hz") if self.of_dimension(unit)]
         added = (
             quantity
@@ -113,14 +113,14 @@ class Labels:
         return Labels(**{**values, "quantities": (*self.quantities, *added)})
 
 
-#: Labels without any statement.
+#: Labels without any information.
 NO_LABELS = Labels()
 
 
 def labels_in_names(*names: str) -> Labels:
-    """Return the labels of a test in names, of its sheet, file and so on, in their order of precedence.
+    """Extract the labels of a test from names, such as those of its sheet and file; earlier names take precedence.
 
-    Numbers without a unit, such as dates and numbers of parts, are no amplitudes.
+    Numbers without a unit, such as dates and part numbers, are not read as amplitudes.
     """
     labels = NO_LABELS
     for name in names:
@@ -129,7 +129,7 @@ def labels_in_names(*names: str) -> Labels:
 
 
 def _labels_in_name(name: str) -> Labels:
-    """Labels in one name."""
+    """Labels in the name of a file, sheet or block."""
     date, rest = _DATE.search(name), _DATE.sub(" ", name)
     number = _SPECIMEN_NUMBER.search(rest)
     quantities: list[StatedQuantity] = []
@@ -163,9 +163,9 @@ def _labels_in_name(name: str) -> Labels:
 
 
 def labels_above(lines: Iterable[Line]) -> Labels:
-    """Return the labels of a test in lines of a name and a value, such as "Temperature: 23 degC", above a table.
+    """Extract the labels of a test from lines above its table, such as "Temperature: 23 degC".
 
-    Unknown names and quantities without a unit are left out.
+    Unknown names and quantities without a unit are ignored.
     """
     labels = NO_LABELS
     for line in lines:
@@ -174,7 +174,7 @@ def labels_above(lines: Iterable[Line]) -> Labels:
 
 
 def _label_in_line(line: Line) -> Labels:
-    """Label in a line of text, or in a row of a sheet."""
+    """Label in a line of text or row of a sheet that has a name and a value; no labels in any other line."""
     if isinstance(line.content, str):
         cells = _AFTER_KEY.split(line.content.lstrip("#%/; "))
     else:
@@ -204,7 +204,7 @@ def _label_in_line(line: Line) -> Labels:
 
 
 def _is_quantity(text: str, unit: str) -> bool:
-    """Return True if a text is a quantity of the dimension of an SI unit."""
+    """Return True if a text is a quantity with the dimension of an SI unit."""
     try:
         units.parse_temperature(text) if unit == "K" else units.parse_quantity(text, unit)
     except UnitError:
@@ -213,9 +213,9 @@ def _is_quantity(text: str, unit: str) -> bool:
 
 
 def named_direction(texts: Iterable[str], *, short: bool = False) -> Direction | None:
-    """Return the direction that headers or names state; None for none or several.
+    """Return the direction of the bushing that headers or names contain; None if they name none or several.
 
-    `short` admits the abbreviations "ax", "rad" and "tors", as in names of files.
+    With `short`, the abbreviations "ax", "rad" and "tors" are recognised too, as in file names.
     """
     folded = unicodedata.normalize("NFKD", " ".join(texts)).encode("ascii", "ignore").decode().casefold()
     directions = {direction for start, direction in _WORD_STARTS.items() if re.search(rf"(?<![a-z]){start}", folded)}
@@ -225,13 +225,13 @@ def named_direction(texts: Iterable[str], *, short: bool = False) -> Direction |
 
 
 def direction_of_file(file: Path, headers: Iterable[str], *, turns: bool, sheet: str | None = None) -> Direction | None:
-    """Return the direction in the name of a sheet, else in that of a file, else in its headers; None for none.
+    """Return the direction named by a sheet, else by its file, else by the headers; None if none of them names one.
 
     Args:
-        file: path.
-        headers: of the table.
-        turns: True if the displacement is an angle: the direction is torsion unless another rotation is named.
-        sheet: name of the sheet, if there is one.
+        file: path of the test file.
+        headers: column headers of the table.
+        turns: True if the displacement is an angle; the direction is then torsion unless another rotation is named.
+        sheet: name of the sheet; None if there is none.
     """
     names = (named_direction([name], short=True) for name in (sheet or "", file.stem))
     direction = next(filter(None, names), None) or named_direction(headers)

@@ -18,19 +18,19 @@ from bushfit.reading.instruments import format_of, read_groups, word_for_part
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.source import RowSource, Sheet, Text
 
-#: Cells of all sheets that are read, including empty ones between others; chosen: a full sheet of ten columns.
+#: Largest number of cells in all sheets, including empty ones between others; chosen: a full sheet of ten columns.
 _MOST_CELLS = 10_500_000
-#: Bytes of the unpacked sheets of a workbook; chosen: 100 for each of these cells.
+#: Largest size of the unpacked sheets of a workbook [bytes]; chosen: 100 for each of these cells.
 _MOST_BYTES = 1 << 30
-#: First bytes of a zip archive, which newer workbooks are, and of the older formats of Office.
+#: First bytes of workbooks: of a zip archive (newer formats), and of the older formats of Office.
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
 #: Last cell of a sheet of an xlsx workbook, near the start of its XML.
 _DIMENSION = re.compile(rb'<(?:\w+:)?dimension ref="(?:[A-Z]+\d+:)?([A-Z]+)(\d+)"')
-#: Cell with a formula and without a value, as programs write it that do not compute.
+#: Cell with a formula but no value, as written by programs that do not compute formulas.
 _NOT_COMPUTED = re.compile(
     rb"(?:</(?:\w+:)?f>|<(?:\w+:)?f\b[^<>]*/>)\s*(?:<(?:\w+:)?v\s*/>|<(?:\w+:)?v>\s*</(?:\w+:)?v>)?\s*</(?:\w+:)?c>"
 )
-#: Parts that an error lists at most; chosen: a line or two.
+#: Largest number of parts that an error lists; chosen: a line or two.
 _MOST_LISTED = 12
 _ONE_GROUP = "a test needs its channels in one group, at one rate and of one length: resample those that differ"
 
@@ -40,10 +40,10 @@ class OpenedFile:
     """Content of a test file.
 
     Args:
-        file: path.
-        checksum: SHA-256 of the file, which may still be computed.
-        stated: format as the user states it.
-        parts: text, sheets or groups that can contain the table.
+        file: path of the file.
+        checksum: SHA-256 of the file, which may still be running in a thread.
+        stated: format of the file as the user states it.
+        parts: text, sheets or groups of channels that can contain the table.
     """
 
     file: Path
@@ -52,7 +52,7 @@ class OpenedFile:
     parts: Sequence[RowSource]
 
     def choose(self, is_usable: Callable[[RowSource], bool]) -> RowSource:
-        """Return the only part for which a function returns True.
+        """Return the only part for which a function returns True; a file with one part needs no choice.
 
         Raises:
             MeasurementError: no part, or more than one, is usable.
@@ -72,10 +72,10 @@ class OpenedFile:
 
 
 def open_file(file: Path, file_format: FileFormat) -> OpenedFile:
-    """Return the content of a text in any encoding, a workbook or a recording; `file_format.sheet` selects a part.
+    """Read a text in any encoding, a workbook or a recording; `file_format.sheet` selects one of its parts.
 
     Raises:
-        MeasurementError: the file cannot be read, or has no such part.
+        MeasurementError: the file cannot be read, or has no part with this name.
     """
     data = view_bytes(file, MeasurementError)
     checksum, parts = sha256(data), read_parts(data, file)
@@ -98,7 +98,7 @@ def open_file(file: Path, file_format: FileFormat) -> OpenedFile:
 
 
 def parts_of(file: Path) -> Sequence[Sheet]:
-    """Visible sheets of a workbook, or groups of a recording; none for a text.
+    """Return the visible sheets of a workbook, or the groups of a recording; an empty list for a text.
 
     Raises:
         MeasurementError: a workbook or recording that cannot be read.
@@ -107,7 +107,7 @@ def parts_of(file: Path) -> Sequence[Sheet]:
 
 
 def read_parts(data: bytes, file: Path) -> Sequence[tuple[Sheet, bool]]:
-    """Return the sheets of a workbook, or groups of a recording, each with True if it is visible; none for a text.
+    """Return the sheets of a workbook, or groups of a recording, each with True if visible; nothing for a text.
 
     Raises:
         MeasurementError: a workbook or recording that cannot be read.
@@ -126,10 +126,10 @@ def read_sheets(data: bytes, file: Path, kind: type[BushfitError] = MeasurementE
     Args:
         data: bytes of the file.
         file: path, for errors.
-        kind: class of errors.
+        kind: class of the exception to raise.
 
     Raises:
-        kind: no workbook, or one with more cells than can be read.
+        kind: the file is not a workbook, or has more cells than can be read.
     """
     try:
         return _sheets(data)
@@ -144,7 +144,7 @@ def read_sheets(data: bytes, file: Path, kind: type[BushfitError] = MeasurementE
 
 @lru_cache(maxsize=1)
 def _sheets(data: bytes) -> Sequence[tuple[Sheet, bool]]:
-    """Sheets of a workbook; an inspection reads the same one several times.
+    """Sheets of a workbook, each with True if visible; cached, because an inspection reads a file several times.
 
     Raises:
         OverflowError: too many cells.
@@ -174,7 +174,7 @@ def _sheets(data: bytes) -> Sequence[tuple[Sheet, bool]]:
 
 
 def _sheets_in_xml(data: bytes) -> list[tuple[str, bytes]]:
-    """Name and XML of the sheets in an xlsx workbook; of larger ones the start."""
+    """File name and XML of each sheet in an xlsx workbook; an empty list for other formats."""
     if not data.startswith(b"PK"):
         return []
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -186,7 +186,7 @@ def _sheets_in_xml(data: bytes) -> list[tuple[str, bytes]]:
 
 
 def _check_size(sheets: dict[str, bytes]) -> None:
-    """Refuse sheets whose last cell is too far from the first: the reader allocates all cells between them."""
+    """Raise an OverflowError if the last cell of a sheet is too far out: the reader allocates all cells before it."""
     for name, content in sheets.items():
         if match := _DIMENSION.search(content[:10_000]):
             column = 0
@@ -197,7 +197,7 @@ def _check_size(sheets: dict[str, bytes]) -> None:
 
 
 def _row(cells: Sequence[object]) -> list[str | float]:
-    """Cells of a row: numbers, and anything else as text on one line; without empty cells at the end."""
+    """Cells of a row as floats, or else as texts on one line; without empty cells at the end."""
     row: list[str | float] = [
         float(cell) if isinstance(cell, int | float) and not isinstance(cell, bool) else " ".join(str(cell).split())
         for cell in cells
@@ -208,5 +208,5 @@ def _row(cells: Sequence[object]) -> list[str | float]:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Names in quotation marks; of many the first."""
+    """List of names in quotation marks, shortened if there are many."""
     return ", ".join(f'"{name}"' for name in names[:_MOST_LISTED]) + (", ..." if len(names) > _MOST_LISTED else "")

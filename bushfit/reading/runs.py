@@ -13,19 +13,20 @@ from numpy.typing import NDArray
 
 from bushfit.reading.measurement import Floats, Stepped
 
-#: Span of a level in ln X at most; chosen: rigs in order miss a level by less than 4 % either way.
+#: Largest range of ln amplitude within one level; chosen: a sound rig misses a level by less than 4 % either way.
 _WIDEST_LEVEL = 0.08
-#: Distance in ln X from a level to the next over the span of a level, at least; chosen: below, they may be one.
+#: Smallest ratio of the gap between two levels to the range within a level, both in ln amplitude; chosen: with a
+#: smaller gap, the two may be one level.
 _LEAST_GAP = 3.0
-#: Largest span of a constant amplitude over the frequencies in ln X; chosen: a weak rig falls short by a third, and a
-#: mass on a mount moves through more.
+#: Largest range of ln amplitude in a run at nominally constant amplitude; chosen: a weak rig falls short by a third,
+#: and the amplitude of a mass on a mount varies more.
 _WIDEST_PASS = 0.4
-#: Smallest share of rows that repeat the frequency or level of the row before if one of them is constant.
+#: Smallest share of rows with the frequency or level of the row before from which either is constant in a run.
 _LEAST_CONSTANT = 0.1
-#: Smallest such share of rows in the order in which they were recorded.
+#: Smallest such share from which the rows are in the order in which they were recorded.
 _IN_ORDER = 0.4
-#: Fewest values of a quantity that the order of rows shows to be stepped; chosen: tables of three amplitudes are often
-#: sorted.
+#: Fewest distinct values of the stepped quantity if the order of rows decides; chosen: tables of three amplitudes are
+#: often sorted.
 _FEWEST_STEPS = 4
 #: Fewest points of a run whose levels are identified by their rank.
 _FEWEST_POINTS = 3
@@ -35,9 +36,9 @@ class Runs(NamedTuple):
     """Runs of a sweep.
 
     Args:
-        stepped: stepped quantity; None if neither frequency nor amplitude is constant in a run.
-        amplitude: level of each point, (n,).
-        repeat: number of the repeat of each point, or of its run, (n,).
+        stepped: quantity that changes in a run; None if neither frequency nor amplitude is constant in a run.
+        amplitude: nominal amplitude of each point, (n,), in the unit of the measured amplitudes.
+        repeat: number of the repeat to which each point belongs, (n,).
     """
 
     stepped: Stepped | None
@@ -48,17 +49,17 @@ class Runs(NamedTuple):
 def runs_of(
     frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | None, stepped: Stepped | None = None
 ) -> Runs:
-    """Find the runs of a sweep.
+    """Find the stepped quantity, the nominal amplitudes and the repeats of a sweep.
 
     Args:
-        frequency: [Hz] in the order of the file, (n,).
-        amplitude: nominal or reached, zero-to-peak [m or rad, or strain], (n,).
-        repeat: number of the repeat, (n,); None if the file does not state it, so that a point which occurs again at a
-            frequency and level is a repeat.
-        stepped: stepped quantity, if it is stated.
+        frequency: frequency [Hz] in the order of the file, (n,).
+        amplitude: nominal or reached amplitude, zero-to-peak [m or rad, or strain], (n,).
+        repeat: number of the repeat, (n,); None if the file does not state it, so that points at equal frequency and
+            level are numbered as repeats.
+        stepped: stepped quantity if the user states it; None to detect it.
 
     Returns:
-        Runs.
+        Runs of the sweep.
 
     Notes:
         The quantity that changes less often from row to row is constant in a run. If the rows are not in the order of
@@ -96,9 +97,9 @@ def runs_of(
 
 
 def nominal(amplitude: Floats) -> Floats:
-    """Return the level of each amplitude above zero, (n,): the median of a narrow group that is far from all others.
+    """Replace each reached amplitude, (n,), by its nominal level: the median of a narrow group of amplitudes.
 
-    The amplitudes themselves if gaps do not separate them into narrow groups of several points.
+    Returns the amplitudes themselves if wide gaps do not separate them into narrow groups of several points.
     """
     distinct, index = np.unique(amplitude, return_inverse=True)
     logs = np.log(distinct)
@@ -115,9 +116,10 @@ def nominal(amplitude: Floats) -> Floats:
 
 
 def _by_frequency(frequency: Floats, amplitude: Floats) -> Floats:
-    """Levels of amplitudes, (n,), if all frequencies have equally many levels of equally many points, in any order.
+    """Nominal amplitude of each point, (n,), by ranking the levels at each frequency.
 
-    The amplitudes themselves if the levels overlap.
+    All frequencies must have equally many levels of equally many points, and levels must not overlap; otherwise the
+    amplitudes are returned unchanged.
     """
     rank = np.empty(amplitude.size, dtype=np.intp)
     shapes = set()
@@ -130,9 +132,10 @@ def _by_frequency(frequency: Floats, amplitude: Floats) -> Floats:
 
 
 def _by_rank(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | None) -> Floats:
-    """Levels of amplitudes by their rank in a run, (n,), if all runs at all frequencies have equally many points.
+    """Nominal amplitude of each point, (n,), by its rank in a run over the amplitudes at one frequency.
 
-    The amplitudes themselves if there is one run, or if the levels overlap.
+    All runs must have equally many points, and levels must not overlap; otherwise, or if there is only one run, the
+    amplitudes are returned unchanged.
     """
     falls = np.append(False, (np.diff(amplitude) < 0.0) | (np.diff(frequency) != 0.0))
     run = np.cumsum(falls) if repeat is None else _group_numbers(frequency, repeat)
@@ -146,25 +149,25 @@ def _by_rank(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | N
 
 
 def _medians_if_separate(amplitude: Floats, rank: NDArray[np.intp]) -> Floats:
-    """Median amplitude of each rank, (n,), with equally many points per rank; the amplitudes if ranks overlap."""
+    """Median amplitude of all points of the same rank, (n,); the amplitudes themselves if ranks overlap."""
     levels = np.sort(amplitude[np.argsort(rank)].reshape(rank.max() + 1, -1), axis=1)
     return _group_medians(amplitude, rank) if (levels[:-1, -1] < levels[1:, 0]).all() else amplitude
 
 
 def rows_alike(*keys: Floats) -> list[NDArray[np.intp]]:
-    """Indices of the rows of each group with equal keys, (n,) each, in order."""
+    """Return the row indices of each group of rows that agree in all keys, (n,) each, such as frequency and level."""
     group = _group_numbers(*keys)
     return np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1])
 
 
 def _group_spans(values: Floats, group: NDArray[np.intp]) -> Floats:
-    """Range of the values in each group, (groups,)."""
+    """Largest minus smallest value in each group, (groups,)."""
     ordered, ends = values[np.lexsort((values, group))], np.cumsum(np.bincount(group))
     return ordered[ends - 1] - ordered[np.append(0, ends[:-1])]
 
 
 def _group_medians(values: Floats, group: NDArray[np.intp]) -> Floats:
-    """Median of the group of each value, (n,)."""
+    """Median of the group to which each value belongs, (n,)."""
     ordered, counts = values[np.lexsort((values, group))], np.bincount(group)
     starts = np.cumsum(counts) - counts
     medians = (ordered[starts + (counts - 1) // 2] + ordered[starts + counts // 2]) / 2.0
@@ -172,5 +175,5 @@ def _group_medians(values: Floats, group: NDArray[np.intp]) -> Floats:
 
 
 def _group_numbers(*keys: Floats | NDArray[np.int64]) -> NDArray[np.intp]:
-    """Number of the combination of keys in each row, from 0, (n,)."""
+    """Group number of each row, from 0, (n,); rows that agree in all keys are one group."""
     return np.unique(np.stack(keys), axis=1, return_inverse=True)[1].ravel()

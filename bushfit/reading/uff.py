@@ -12,24 +12,25 @@ from numpy.typing import NDArray
 
 from bushfit.reading.source import Channel, Group
 
-#: Quantities by number, with their SI unit and the factor of dataset 164 that values are divided by.
+#: Quantities by their number in UFF: name, SI unit, and key of the factor in dataset 164 that converts to SI.
 _QUANTITIES = {
     **{8: ("displacement", "m", "length"), 9: ("force", "N", "force"), 13: ("force", "N", "force")},
     **{17: ("time", "s", ""), 18: ("frequency", "Hz", "")},
 }
-#: Last line of a dataset.
+#: Line that ends a dataset.
 _MARK = b"    -1"
 #: ID line 5 of data at nodes: reference, its direction, numerator, denominator.
 _CODES = re.compile(r"(\s*-?\d+){4}\s*")
-#: First direction in which a displacement is a rotation, and a force a moment.
+#: Smallest number of a direction in which a displacement is a rotation and a force is a moment.
 _ROTATIONS = 4
 
 
 def uff(data: bytes, file: Path) -> Iterator[Group]:
-    """Read functions (dataset 58), or if there are none, data at nodes (dataset 55).
+    """Read the functions of a universal file (dataset 58), or if there are none, its data at nodes (dataset 55).
 
     Yields:
-        A group for each complex function of frequency, and one for all records over time.
+        A group for each complex function, such as a frequency response, and one for all real functions, such as
+        records over time.
     """
     import pyuff
 
@@ -63,9 +64,9 @@ def uff(data: bytes, file: Path) -> Iterator[Group]:
 
 
 def _at_nodes(steps: Iterable[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Frequency responses at nodes, with one dataset 55 for each frequency, as functions of dataset 58.
+    """Convert frequency responses at nodes, one dataset 55 per frequency, to functions as in dataset 58.
 
-    ID line 5 states reference, its direction, numerator and denominator, as in I-DEAS Test.
+    ID line 5 contains reference node, its direction, and quantity of numerator and denominator, as in I-DEAS Test.
     """
     runs: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
     for one in steps:
@@ -84,7 +85,7 @@ def _at_nodes(steps: Iterable[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
 
 
 def _text(function: Mapping[str, Any], key: str) -> str:
-    """Text of a function; "" if it is NONE."""
+    """Text field of a function; "" if the file has NONE."""
     text = " ".join(str(function[key]).split())
     return "" if text == "NONE" else text
 
@@ -92,7 +93,7 @@ def _text(function: Mapping[str, Any], key: str) -> str:
 def _axis(
     function: Mapping[str, Any], axis: str, values: NDArray[Any], direction: int, factors: Mapping[str, Any]
 ) -> Channel:
-    """Axis of a function with the name of its quantity, in the unit of its label or of dataset 164."""
+    """Values of an axis of a function as a channel, in the unit of its label or in SI by the factors of dataset 164."""
     name, si, factor = _QUANTITIES.get(function[f"{axis}_spec_data_type"], ("", "", ""))
     if label := _text(function, f"{axis}_axis_units_lab"):
         return Channel(name, values, label)

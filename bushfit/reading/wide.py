@@ -1,7 +1,7 @@
 r"""Wide tables of a sweep, turned into long ones: frequencies down and amplitudes across, or the reverse.
 
 A wide table has one block or more, side by side or one below the other. The first column of a block contains
-frequencies or amplitudes. The header of every other column states a level of the other one, and the quantity, in one
+frequencies or amplitudes. The header of every other column states an amplitude or frequency, and the quantity, in one
 cell ("K* 0.1 mm [N/mm]") or in several. Of merged header cells only the leftmost is filled:
 
     K* [N/mm];0.1 mm;0.2 mm            ;0.1 mm;       ;0.2 mm;              f [Hz];K*_0.1mm [N/mm];tan_d_0.1mm;...
@@ -24,27 +24,27 @@ from bushfit.reading.layout import DELIMITERS, Layout, is_comment, split
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.source import Combined, RowSource
 
-#: Roles of which one runs down and the other across.
+#: Roles of the two stepped quantities: one varies down the rows and the other across the columns.
 _STEPPED = ("frequency", "amplitude")
-#: Rows above a block that may be its header; chosen: a title, levels, quantities, and units.
+#: Largest number of header rows above a block; chosen: a title, levels, quantities, and units.
 _MOST_HEADER_ROWS = 4
-#: Number in a header, with its symbol ("A = 0.1") and the word behind it that may be its unit.
+#: Number in a header, with its symbol ("A = 0.1") and the word after it, which may be its unit.
 _LEVEL = re.compile(
     r"(?:(?P<name>[^\W\d_]+)\s*=\s*)?(?<![\w.,*'|])±?(?P<number>\d+(?:[.,]\d+)?(?:e[+-]?\d+)?)(?![.,]?\d)"
     r"(?:\s*[\[(]?\s*(?P<unit>[^\W\d_]+|%|°)[\])]?)?",
     re.IGNORECASE,
 )
-#: Meaning of a symbol before a level: "A = 0.1".
+#: Role of a level by the symbol before it: "A = 0.1".
 _SYMBOLS = {"f": "frequency", "a": "amplitude", "x": "amplitude", "s": "amplitude", "\u03b3": "amplitude"}
-#: Columns of a wide table; chosen: two for each of a hundred levels.
+#: Largest number of columns of a wide table; chosen: two for each of a hundred levels.
 _MOST_COLUMNS = 200
-#: Words and marks that join a level to a quantity in a header and have no meaning.
+#: Words and marks without a meaning that join a level to a quantity in a header.
 _JOINTS = re.compile(r"[\[(]\s*(?:at|bei)?\s*[\])]|(?<!\w)(?:at|bei|für|for|à|a|@|:|,|;|=|-)(?!\w)")
-#: Characters of a header; chosen: longer texts are no headers.
+#: Largest number of characters of a header; chosen: longer texts are not headers.
 _LONGEST_HEADER = 200
 #: Level that may have a thousands separator: 1,250.
 _GROUPED = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
-#: Separator of the two roles in a corner: "f [Hz] \ A [mm]".
+#: Separator of the two roles in the top left cell of a block: "f [Hz] \ A [mm]".
 _CORNER = re.compile(r"\s*[\\|]\s*|\s+/\s+")
 
 #: Line number and cells of a row.
@@ -53,13 +53,15 @@ _Row = tuple[int, list[str | float]]
 
 @dataclass(frozen=True)
 class _Meaning:
-    """Meaning of a header cell, or of all header cells of a column; None for what is not stated.
+    """Meaning of a header cell, or of all header cells of a column, of a wide table; None for what is not stated.
 
     Args:
-        role: quantity in the column, with its unit.
-        unit: of the quantity.
-        level: number of the frequency or amplitude at which the quantity was measured.
-        stepped: role of the level, with level_unit and the convention of an amplitude.
+        role: quantity in the column, such as "stiffness".
+        unit: unit of the quantity.
+        level: text of the number of the frequency or amplitude at which the quantity was measured.
+        stepped: role of the level: "frequency" or "amplitude".
+        level_unit: unit of the level.
+        convention: convention of an amplitude.
     """
 
     role: str | None = None
@@ -70,32 +72,32 @@ class _Meaning:
     convention: AmplitudeConvention | None = None
 
     def __or__(self, second: "_Meaning") -> "_Meaning":
-        """This meaning, with what it does not state from another one."""
+        """Combine two meanings; values on the left take precedence unless they are None."""
         return replace(second, **{name: value for name, value in vars(self).items() if value is not None})
 
 
-#: Column of a wide table: meaning of its header, meaning of the first column of its block, and for each row line
-#: number, cell of the first column, and cell.
+#: Column of a wide table: meaning of its headers, meaning of the first column of its block, and for each row the line
+#: number, the cell of the first column, and the cell of this column.
 _Series = tuple[_Meaning, _Meaning, list[tuple[int, str | float, str | float]]]
 
 
 def unpivot(
     source: RowSource, file: Path, vocabulary: Vocabulary, layout: Layout, delimiter: str | None
 ) -> tuple[RowSource, Layout] | None:
-    """Turn a wide table into a long one: a row for each frequency and amplitude.
+    """Turn a wide table into a long one, which has a row for each frequency and amplitude.
 
     Args:
-        source: lines of the file.
+        source: lines or rows of the file.
         file: path, for errors.
-        vocabulary: meaning of headers.
-        layout: of the file if it is read as a long table.
-        delimiter: as stated; "" for a workbook; None to try all.
+        vocabulary: known column names.
+        layout: layout of the file if it is read as a long table.
+        delimiter: character between cells; "" for a sheet; None to try all.
 
     Returns:
         Source and layout of the long table; None if the file has no wide table.
 
     Raises:
-        MeasurementError: the blocks differ, or do not state their quantity.
+        MeasurementError: the blocks have different frequencies or amplitudes, or do not state their quantity.
     """
     roles = [heading.role for cell in layout.headers if (heading := vocabulary.heading(cell))]
     is_long = len(roles) > 2 and len(set(roles)) == len(roles) and not set(roles).isdisjoint(_STEPPED)
@@ -117,10 +119,10 @@ def unpivot(
 
 
 def _find_blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple[list[list[str]], list[_Row]]]:
-    """Header cells and rows of numbers of each block, without the columns before and after it."""
+    """Header rows and rows of numbers of each possible block, without the columns to its left and right."""
 
     def first_number(cells: Sequence[str | float]) -> int | None:
-        """Index of the first filled cell if it is a number, and so are another cell and about half of the row."""
+        """Index of the first non-empty cell of a row of numbers; None if the row is not one."""
         numbers = {index: is_like_number(str(cell)) for index, cell in enumerate(cells) if cell != ""}
         first = next(iter(numbers), 0)
         return first if sum(numbers.values()) > max(1, len(numbers) / 2 - 1) and numbers[first] else None
@@ -144,7 +146,7 @@ def _find_blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple
 
 
 def _read_block(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: Vocabulary) -> list[_Series]:
-    """Columns of a block; none if it is no block of a wide table."""
+    """Columns of a block with their meanings; an empty list if it is not a block of a wide table."""
     columns = [index for index in range(1, len(data[0][1])) if any(cells[index] != "" for _, cells in data)]
     meanings = dict.fromkeys(columns, _Meaning())
     down, across = _Meaning(), _Meaning()
@@ -174,12 +176,12 @@ def _read_block(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: 
 
 
 def _read_corner(text: str, vocabulary: Vocabulary) -> list[_Meaning]:
-    """Meanings of a cell that names one role or two: "f [Hz]", "f [Hz] \\ A [mm]"."""
+    """Meanings of the top left cell of a block, which names one role or two: "f [Hz]", "f [Hz] \\ A [mm]"."""
     return [_read_header(part, vocabulary) for part in _CORNER.split(text)]
 
 
 def _read_header(text: str, vocabulary: Vocabulary) -> _Meaning:
-    """Meaning of a header cell; empty if a part of the cell is not understood."""
+    """Meaning of a header cell of a wide table; empty if a part of the cell is not understood."""
     whole, convention = split_convention(text.replace("_", " "))
     if is_like_number(text):
         return _Meaning(level=text)
@@ -212,7 +214,7 @@ def _read_header(text: str, vocabulary: Vocabulary) -> _Meaning:
 
 
 def _named(text: str, vocabulary: Vocabulary) -> _Meaning | None:
-    """Meaning of a header that names a role; None if it names none."""
+    """Meaning of a header without a level, such as "K* [N/mm]"; None if the header names no known role."""
     heading = vocabulary.heading(text)
     if heading and heading.role in _STEPPED:
         return _Meaning(stepped=heading.role, level_unit=heading.unit, convention=heading.convention)
@@ -220,7 +222,7 @@ def _named(text: str, vocabulary: Vocabulary) -> _Meaning | None:
 
 
 def _role_of_unit(unit: str | None) -> str | None:
-    """Role of a level with a unit: frequency or amplitude."""
+    """Role of a level by its unit: "frequency" or "amplitude"; None for any other unit."""
     roles = {"Hz": "frequency", "m": "amplitude", "rad": "amplitude", "1": "amplitude"}
     return next((role for si, role in roles.items() if unit and units.is_compatible(unit, si)), None)
 
@@ -228,10 +230,11 @@ def _role_of_unit(unit: str | None) -> str | None:
 def _long_table(
     series: Sequence[_Series], source: RowSource, file: Path, vocabulary: Vocabulary
 ) -> tuple[RowSource, Layout]:
-    """Long table of the columns of all blocks, with its layout.
+    """Long table with the values of the columns of all blocks, and its layout.
 
     Raises:
-        MeasurementError: a block does not state its quantity, blocks have other levels, or one thing has two units.
+        MeasurementError: a block does not state its quantity, blocks differ in their frequencies or amplitudes, or a
+            quantity has two units.
     """
     by_role: dict[str | None, list[_Series]] = {meaning.role: [] for meaning, *_ in series}
     for one in sorted(series, key=lambda one: _number(one[0].level)):
@@ -284,7 +287,7 @@ def _long_table(
 
 
 def _number(text: str | float | None) -> float:
-    """Number in a header with either decimal mark; NaN if it has separators between thousands."""
+    """Number in a header, with decimal point or comma; NaN if the text is not such a number."""
     try:
         return float(str(text).replace(",", "."))
     except ValueError:
