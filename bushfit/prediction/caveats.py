@@ -19,14 +19,14 @@ from bushfit.model.result import Result
 from bushfit.reading.measurement import SAME_TEMPERATURE
 from bushfit.units import CELSIUS, format_range, number
 
-#: Beyond the fitted range by more than this, relative to its end, a prediction is an extrapolation: rigs miss their
-#: set points by less.
+#: Largest relative distance beyond the fitted range that is no extrapolation: rigs miss their set points by less.
 MARGIN = 0.01
 #: End of the warning of a prediction outside of the tests.
 BEYOND = "extrapolated beyond"
-#: Share by which a finite bulk modulus lowers the radial stiffness, from which that is said: that of the other errors.
+#: Relative decrease of the radial stiffness by a finite bulk modulus above which a warning is due: as large as the
+#: other errors.
 _NOTED_LOWERING = 0.01
-#: Relative difference of two stiffnesses that is none.
+#: Relative difference up to which two stiffnesses are equal.
 _SAME = 1e-6
 
 
@@ -50,12 +50,12 @@ _AGREEMENT = 1.4
 
 
 def use_of(warning: str) -> str:
-    """Meaning of a warning for the use of the numbers, in one sentence."""
+    """Sentence of `uses.toml` on the consequence of a warning for the use of the numbers."""
     return next(use for pattern, use in _USES.items() if re.search(pattern, warning))
 
 
 def by_importance(warnings: Iterable[str]) -> list[str]:
-    """Warnings in the order of their importance for the use of the numbers."""
+    """Sort warnings by their importance for the use of the numbers, the most important first."""
     ranked = [
         (next(rank for rank, pattern in enumerate(_RANKS) if re.search(pattern, use_of(warning))), warning)
         for warning in warnings
@@ -64,18 +64,21 @@ def by_importance(warnings: Iterable[str]) -> list[str]:
 
 
 def warnings_of(result: Result, predicted: Iterable[Iterable[str]] = (), notes: Iterable[str] = ()) -> list[str]:
-    """All warnings for a reader of a result's numbers, each once.
+    """Collect all warnings for a reader of a result and its predictions, each once.
 
     Args:
-        result: the result.
-        predicted: warnings of each prediction that is shown.
+        result: fitted result.
+        predicted: warnings of each prediction in the report.
         notes: further warnings, which come first.
+
+    Returns:
+        Sentences.
     """
     return list(dict.fromkeys((*notes, *result.warnings, *chain.from_iterable(predicted), *caveats(result))))
 
 
 def caveats(result: Result) -> list[str]:
-    """Warnings about a result itself, independent of the prediction.
+    """List the warnings about a result itself, independent of any prediction.
 
     Args:
         result: fitted result.
@@ -112,18 +115,18 @@ def caveats(result: Result) -> list[str]:
 
 
 def rig_effects(result: Result) -> list[str]:
-    """Effects of a model that belong to the rig."""
+    """Names of the effects of a fitted model that belong to the rig and not to the bushing."""
     return [name for name in result.model.effects if get_effect(name).level is Level.INSTRUMENT]
 
 
 def agrees_within_noise(result: Result, direction: Place) -> bool:
-    """Check for measured sweeps of a direction that were not fitted and that all agree with the model."""
+    """True if a direction has measured sweeps that were not fitted, and all agree with the model within their noise."""
     misfits = [test for test in result.tests if test.place == str(direction) and test.held is None and not test.fitted]
     return bool(misfits) and all(test.reduced_chi_square <= _AGREEMENT for test in misfits)
 
 
 def unfitted(result: Result, direction: Place) -> Iterator[str]:
-    """Warnings for a direction that was not fitted, or was fitted with a formula that deviates from finite elements.
+    """Generate warnings for a direction that was not fitted, or whose formula deviates from finite elements.
 
     Args:
         result: fitted result.
@@ -168,7 +171,7 @@ def unfitted(result: Result, direction: Place) -> Iterator[str]:
 
 
 def _compressible(result: Result, bushing: Bushing) -> Iterator[str]:
-    """Warning if a bulk modulus of 2 GPa would lower the radial stiffness noticeably."""
+    """Yield a warning if a bulk modulus of 2 GPa would lower the radial stiffness by more than 1 %."""
     lowering = bushing.correction.lowering(result.model.values.get("mu", 0.0)) if bushing.correction else 0.0
     if lowering > _NOTED_LOWERING:
         percent = number(100.0 * lowering, 2)
@@ -179,7 +182,7 @@ def _compressible(result: Result, bushing: Bushing) -> Iterator[str]:
 
 
 def _radial_error(bushing: Bushing) -> str:
-    """Deviation of the bushing's radial formulas from finite elements of its shape, as part of a sentence."""
+    """Phrase on the deviation of the bushing's radial formulas from finite elements of the same shape."""
     if bushing.correction is None:
         return "which was not compared with finite elements of this shape"
     if bushing.shape == "calibrated":
@@ -197,15 +200,15 @@ def of_points(
     measured: Array | None,
     temperature: float | None,
 ) -> Iterator[str]:
-    """Warnings for predicted operating points.
+    """Generate the warnings for predicted operating points.
 
     Args:
-        result: the result.
+        result: fitted result.
         place: direction or specimen.
-        points: frequency [Hz], amplitude [m, rad or 1] and |K| [SI] of the points, (3, n).
-        rig_stiffness: |K| if the unresolved effects belong to the rig, (n,).
-        measured: measured complex stiffness, nan without a measurement, (n,).
-        temperature: [K]; None for the reference temperature.
+        points: frequency [Hz], zero-to-peak amplitude [m, rad or 1] and |K| [SI] of the points, (3, n).
+        rig_stiffness: |K| if the unresolved effects belong to the rig, (n,); None without such effects.
+        measured: measured complex stiffness, nan at points without a measurement, (n,); None without sweeps.
+        temperature: temperature of the prediction [K]; None for the reference temperature.
 
     Yields:
         Sentences.
@@ -229,7 +232,7 @@ def of_points(
 
 
 def percent_off(ratio: Array) -> str:
-    """Smallest and largest deviation of ratios from 1, such as "+1.2 to +3.4 %"."""
+    """Format the smallest and largest deviation of ratios from 1 as percentages: "+1.2 to +3.4 %"."""
     ends = [number(100.0 * end - 100.0, 2, "+") for end in (np.nanmin(ratio), np.nanmax(ratio))]
     return f"{' to '.join(dict.fromkeys(ends))} %"
 
@@ -242,15 +245,15 @@ def extrapolations(
     temperature: float | None = None,
     subject: str | None = None,
 ) -> Iterator[str]:
-    """Warnings for frequencies, strains and a temperature outside of those that were fitted.
+    """Generate warnings for frequencies, strains and a temperature outside of the fitted range.
 
     Args:
-        result: the result.
+        result: fitted result.
         direction: direction or specimen.
-        frequency: predicted frequencies [Hz], (n,).
-        amplitude: predicted amplitudes [m, rad or 1], (n,).
-        temperature: predicted temperature [K], if one was asked for.
-        subject: beginning of the warnings; default the direction.
+        frequency: frequencies of the prediction [Hz], (n,).
+        amplitude: zero-to-peak amplitudes of the prediction [m, rad or 1], (n,).
+        temperature: temperature of the prediction [K]; None for the reference temperature.
+        subject: beginning of the warnings; None for the name of the direction.
 
     Yields:
         Sentences.

@@ -22,38 +22,38 @@ from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Band, Prediction, predict
 from bushfit.units import format_aligned, format_range, number
 
-#: Probability with which chance alone makes a reported difference.
+#: Probability that chance alone causes a reported difference.
 CHANCE = 0.05
-#: Draws of the largest of many correlated errors; chosen: its 95 % quantile is then good to a hundredth.
+#: Number of random draws of the largest of many correlated errors; chosen: its 95 % quantile is then accurate to 1 %.
 _DRAWS = 20_000
 #: Eigenvalue of a correlation matrix, relative to the largest, below which it is rounding.
 _LEAST_EIGENVALUE = 1e-10
-#: Ratio of a parameter to its typical value below which its logarithm shows no differences.
+#: Smallest value of a parameter, relative to its typical value, in the derivative of its logarithm.
 _NOTHING = 1e-9
-#: Digits of a difference at most, however small its error.
+#: Largest number of digits of a difference, however small its error.
 _MOST_DIGITS = 4
-#: Logarithm of the ratio of two quantities that counts as unbounded: no parameter has bounds further apart.
+#: Largest logarithm of the ratio of two quantities: no parameter has bounds further apart.
 _FURTHEST = float(np.log(1e10))
-#: Decimals of a difference without an error at most: those that follow are rounding.
+#: Largest number of decimals of a difference without an error: further decimals are rounding errors.
 _MOST_DECIMALS = 6
-#: The parameter that the unit of another has as its exponent: alpha in Pa*s^alpha.
+#: Name of the parameter that is an exponent in the unit of another parameter: alpha in Pa*s^alpha.
 _EXPONENT = re.compile(r"\^([a-z]\w*)$")
 
 
 @dataclass(frozen=True)
 class ParameterContrast:
-    """Comparison of one parameter of both results, or of a quantity that parameters make together.
+    """Comparison of one parameter, or of a quantity computed from parameters, between two results.
 
     Args:
-        name: of the parameter, or of the quantity at a frequency.
-        unit: SI, of both values and of a difference that is not relative.
+        name: name of the parameter, or of the quantity with its frequency.
+        unit: SI unit of both values, and of a difference that is not relative.
         reference, other: value in the reference and in the other result.
-        relative: whether the difference is relative to the reference, or in the unit.
-        difference: other less reference; None if it is not tested.
-        interval: of the difference, low and high end of its 95 % interval; None if it is not tested.
-        p: probability of a difference at least as large by chance; None if it is not tested.
+        relative: True if the difference is relative to the reference; False if it is in the unit.
+        difference: other value minus reference value; None if not tested.
+        interval: lower and upper end of the 95 % interval of the difference; None if not tested.
+        p: probability of a difference at least as large by chance; None if not tested.
         holm: p adjusted for all parameters tested together (Holm, Scand. J. Statist. 6 (1979) 65).
-        note: reason why it is not tested.
+        note: reason why the difference is not tested; "" if it is tested.
     """
 
     name: str
@@ -70,12 +70,12 @@ class ParameterContrast:
 
 @dataclass(frozen=True, eq=False)
 class Contrast:
-    """Dynamic stiffness of two results at the same operating points of a place.
+    """Difference of the dynamic stiffness of two results at the same operating points of one direction.
 
     Args:
         reference, other: predictions of the two results.
-        stiffness: ln |K| of the other less that of the reference, with its 95 % band at each point.
-        loss_factor: loss factor of the other less that of the reference, with its 95 % band.
+        stiffness: ln |K| of the other result minus ln |K| of the reference, with its 95 % band at each point.
+        loss_factor: loss factor of the other result minus that of the reference, with its 95 % band at each point.
     """
 
     reference: Prediction
@@ -90,14 +90,14 @@ class Contrast:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Comparison of a result with a reference.
+    """Comparison of a fitted result with a reference result.
 
     Args:
-        parameters: parameters that both results have.
-        joint: p of the differences of all parameters together, with their correlations, and the number of parameters;
-            None if none is tested.
-        contrasts: differences of the dynamic stiffness, one per place.
-        shared: files to which both were fitted.
+        parameters: comparisons of the parameters that both results have.
+        joint: probability by chance of the differences of all parameters together, and the number of differences; None
+            if no parameter is tested.
+        contrasts: differences of the dynamic stiffness, one for each direction or specimen.
+        shared: names of the files to which both results were fitted.
     """
 
     parameters: tuple[ParameterContrast, ...]
@@ -107,10 +107,10 @@ class Comparison:
 
     @cached_property
     def widening(self) -> float:
-        """Factor on the bands of the contrasts that makes them a simultaneous 95 % band.
+        """Factor, at least 1, by which the pointwise 95 % bands of all contrasts have to be wider to hold together.
 
         Notes: the 95 % quantile of the largest of all standardised errors, whose correlations are known (T. Hothorn, F.
-        Bretz, P. Westfall, Biometrical J. 50 (2008) 346), over that of one. Drawn from a fixed seed.
+        Bretz, P. Westfall, Biometrical J. 50 (2008) 346), over the quantile of a single one. Random draws, fixed seed.
         """
         columns = [band.root for contrast in self.contrasts for band in (contrast.stiffness, contrast.loss_factor)]
         if not columns or not len(columns[0]):
@@ -125,15 +125,15 @@ class Comparison:
         return max(float(np.quantile(largest, 1.0 - CHANCE)) / Z95, 1.0)
 
     def widened(self, band: Band) -> Band:
-        """Simultaneous 95 % band: a band of the contrasts, wider by `widening`."""
+        """Widen a pointwise 95 % band by the factor `widening`, to a simultaneous 95 % band."""
         low, high = (band.value + self.widening * (end - band.value) for end in (band.low, band.high))
         return replace(band, low=low, high=high)
 
     def sentences(self) -> list[str]:
-        """Sentences on the differences of stiffness and loss factor.
+        """Write sentences on the differences of stiffness and loss factor.
 
         Returns:
-            One sentence per place: differences beyond chance, and an upper limit elsewhere.
+            One sentence per direction: differences beyond chance, and an upper limit of the difference elsewhere.
         """
         sentences = []
         for contrast in self.contrasts:
@@ -157,8 +157,9 @@ def compare(
 
     Args:
         reference, compared: fitted results.
-        places: pairs of a place of the reference and one of the compared result, of one kind of motion.
-        grids: frequencies [Hz] and amplitudes [m, rad or 1] of each pair.
+        places: pairs of directions or specimens to compare: of the reference, and of the compared result. Both have the
+            same kind of motion.
+        grids: frequencies [Hz] and zero-to-peak amplitudes [m, rad or 1] of each pair.
 
     Returns:
         Comparison over the common parameters and the grids.
@@ -177,13 +178,13 @@ def compare(
 
 
 def with_holm(comparisons: Sequence[Comparison]) -> list[Comparison]:
-    """Adjust the probabilities of parameters for the number of all parameters of all comparisons, see `holm`.
+    """Adjust the probabilities of all parameters of several comparisons for their number, see `holm`.
 
     Args:
         comparisons: comparisons with the same reference.
 
     Returns:
-        The comparisons, with `holm` in each tested parameter.
+        The comparisons, with the attribute `holm` of each tested parameter.
     """
     adjusted = iter(holm([row.p for comparison in comparisons for row in comparison.parameters if row.p is not None]))
     return [
@@ -198,7 +199,7 @@ def with_holm(comparisons: Sequence[Comparison]) -> list[Comparison]:
 
 
 def holm(probabilities: Sequence[float]) -> list[float]:
-    """Adjust the probabilities of several tests for their number (Holm 1979); same order."""
+    """Adjust the p-values of several tests for their number (Holm 1979); the order is unchanged."""
     order = np.argsort(probabilities)
     steps = np.asarray(probabilities)[order] * np.arange(len(order), 0, -1)
     adjusted = np.empty(len(order))
@@ -207,7 +208,7 @@ def holm(probabilities: Sequence[float]) -> list[float]:
 
 
 def relative(logarithm: Array) -> Array:
-    """Relative difference of two quantities from the logarithm of their ratio, which is limited to +-ln(1e10)."""
+    """Convert the logarithm of a ratio, limited to +-ln(1e10), to a relative difference: exp(logarithm) - 1."""
     return np.expm1(np.clip(logarithm, -_FURTHEST, _FURTHEST))
 
 
@@ -218,13 +219,15 @@ def compare_parameters(
 
     Args:
         reference, compared: fitted results.
-        frequency: at which a constant whose unit has an exponent is also compared as a modulus [Hz].
+        frequency: frequency [Hz] at which parameters like m [Pa s^alpha] are also compared as the modulus
+            m (2 pi f)^alpha.
 
     Returns:
-        A row for each comparison, and the probability by chance of all differences together, with their number.
+        Comparison of each parameter, and the probability by chance of all differences together with their number, or
+        None if no parameter is tested.
 
-    Notes: strictly positive parameters are compared by their logarithm. m [Pa s^alpha] and alpha make the modulus
-    m (2 pi f)^alpha, which is comparable at any alpha.
+    Notes: strictly positive parameters are compared by their logarithm. The unit of m depends on alpha, so m itself is
+    comparable only at equal alpha; the modulus is comparable at any alpha.
     """
     results, rows = (reference, compared), list[tuple[str, str | None]]()
     for name, parameter in reference.model.parameters.items():
@@ -272,22 +275,23 @@ def compare_parameters(
 
 
 def exponent_of(name: str, parameter: Parameter) -> str | None:
-    """Name of the parameter that is the exponent in the unit of another; None if the unit has no exponent."""
+    """Name of the parameter that is the exponent in a parameter's unit, such as alpha for m [Pa s^alpha]; or None."""
     match = _EXPONENT.search(parameter.unit)
     return match and "".join(name.rpartition(".")[:2]) + match[1]
 
 
 def quantities_of(result: Result, rows: Sequence[tuple[str, str | None]], omega: float) -> tuple[Array, Array]:
-    """Compute compared quantities of a result.
+    """Compute the compared quantities of a result and their derivatives by its parameters.
 
     Args:
         result: fitted result.
-        rows: names of a parameter and of its exponent, or None for the parameter alone.
-        omega: angular frequency at which a parameter with an exponent is a modulus [rad/s].
+        rows: for each of r quantities, the name of its parameter and of the parameter's exponent; None for the
+            parameter itself.
+        omega: angular frequency of the modulus of a parameter with an exponent [rad/s].
 
     Returns:
-        Quantities, or their logarithms if they are positive, (r,), and their derivatives with respect to the parameters
-        of the covariance, (r, k).
+        Quantities, or their logarithms if they are positive, (r,), and their derivatives by the k parameters of the
+        covariance, (r, k).
     """
     values, names = result.model.values, list(result.covariance.names)
     quantities, slopes = np.empty(len(rows)), np.zeros((len(rows), len(names)))
@@ -307,17 +311,17 @@ def quantities_of(result: Result, rows: Sequence[tuple[str, str | None]], omega:
 
 
 def chance_of(difference: Array, matrix: Array, freedom: Array) -> tuple[float, int] | None:
-    """Probability by chance of several differences together.
+    """Compute the probability that chance alone causes several differences together.
 
     Args:
-        difference: (k,).
+        difference: differences, (k,).
         matrix: covariance of the differences, (k, k).
         freedom: degrees of freedom of each difference, (k,).
 
     Returns:
         Probability, and the number of independent differences; None without differences.
 
-    Notes: Hotelling's T^2 with the fewest degrees of freedom of any; infinitely many make it chi-square.
+    Notes: Hotelling's T^2 with the smallest of the degrees of freedom; chi-square if they are infinite.
     """
     if not difference.size:
         return None
@@ -331,7 +335,7 @@ def chance_of(difference: Array, matrix: Array, freedom: Array) -> tuple[float, 
 
 
 def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
-    """Describe differences beyond chance with their points, and give an upper limit for the other points."""
+    """Phrase on the differences beyond chance with their points, and on an upper limit at the other points."""
 
     def figures(i: int, word: str) -> str:
         value, ends = abs(band.value[i]), sorted((abs(band.low[i]), abs(band.high[i])))
@@ -359,7 +363,7 @@ def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
 
 
 def _format_point(contrast: Contrast, i: int) -> str:
-    """Frequency and amplitude of a point as text."""
+    """Format the frequency and amplitude of the operating point with index `i`."""
     unit, factor = contrast.place.display.displacement
     frequency, amplitude = contrast.reference.frequency[i], factor * contrast.reference.amplitude[i]
     return f"{format_range('Hz', frequency)}, {format_range(unit, amplitude)}"

@@ -26,24 +26,24 @@ _AMPLITUDES_OF = {
 }
 #: Keys of [predict] that have the amplitudes of each motion.
 _AMPLITUDE_KEYS = {TRANSLATION: "amplitudes", ROTATION: "torsion_amplitudes", STRAINING: "strain_amplitudes"}
-#: Frequencies of a grid where the paper's were not measured.
+#: Number of frequencies of a grid if the measured range excludes the paper's frequencies.
 _FREQUENCIES = 9
-#: Amplitudes of a grid where the paper's were not measured.
+#: Number of amplitudes of a grid if the measured range excludes the paper's amplitudes.
 _AMPLITUDES = 3
-#: Values of a grid at most of what was stepped through as it came: tables stay readable, and lines smooth.
+#: Largest number of grid values over a range that the test did not control: tables stay readable, and curves smooth.
 _MOST_STEPS = 10
 
 
 def requested_grid(default: tuple[Array, Array], requested: PredictSettings, place: Place) -> tuple[Array, Array]:
-    """Grid of a place as requested, with defaults for what is not requested.
+    """Choose the grid of a prediction: requested values, or default values for an axis without a request.
 
     Args:
-        default: frequencies [Hz] and amplitudes [m, rad or 1].
-        requested: settings of a command or campaign.
+        default: default frequencies [Hz] and zero-to-peak amplitudes [m, rad or 1].
+        requested: settings of a command, or table [predict] of a campaign.
         place: direction or specimen.
 
     Returns:
-        Frequencies [Hz] and amplitudes [m, rad or 1].
+        Frequencies [Hz] and zero-to-peak amplitudes [m, rad or 1].
     """
     frequencies = requested.frequencies or default[0]
     amplitudes = getattr(requested, _AMPLITUDE_KEYS[place.motion]) or default[1]
@@ -51,25 +51,25 @@ def requested_grid(default: tuple[Array, Array], requested: PredictSettings, pla
 
 
 def grid_settings(requested: PredictSettings, campaign: Campaign | None) -> PredictSettings:
-    """Settings of a command, completed with the [predict] table of a campaign."""
+    """Complete the prediction settings of a command with the [predict] table of a campaign, if there is one."""
     overrides = {key: value for key, value in vars(requested).items() if value is not None}
     return replace(campaign.predict if campaign else PredictSettings(), **overrides)
 
 
 def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ()) -> tuple[Array, Array]:
-    """Default grid of a prediction.
+    """Choose the default grid of a prediction.
 
-    The first of these that exists: the points of the sweeps (at most ten values of a quantity that was stepped, and one
-    value per level); the points of the tests that the model file lists; the paper's grid within the measured range; ten
-    or fewer values over the measured range.
+    The first available of: the operating points of the sweeps (one value per level, and at most ten values over a range
+    without levels); the points of the tests in the model file; the paper's grid within the measured range; a few values
+    over the measured range.
 
     Args:
         result: fitted result.
         direction: direction or specimen.
-        sweeps: measured sweeps; those of other places are ignored.
+        sweeps: measured sweeps; sweeps of other directions are ignored.
 
     Returns:
-        Frequencies [Hz] and amplitudes [m, rad or 1], increasing.
+        Frequencies [Hz] and zero-to-peak amplitudes [m, rad or 1], increasing.
     """
     mine = [sweep for sweep in sweeps if sweep.direction == direction]
     if mine:
@@ -96,18 +96,18 @@ def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ())
 def common_grid(
     results: Sequence[Result], places: Sequence[Place], sweeps: Sequence[Sweep] = ()
 ) -> tuple[Array, Array]:
-    """Grid for the comparison of several results at one place.
+    """Choose the grid for the comparison of several results in one direction.
 
-    The default grid of the first result within the range to which all were fitted; an even grid over that range if
-    fewer than two values are in it. If there is no common range, the default grid of the first result.
+    The grid is the default grid of the first result within the range to which all results were fitted, or an even grid
+    over that range if it contains fewer than two values. Without a common range, it is the default grid.
 
     Args:
         results: fitted results.
-        places: place of each result.
+        places: direction or specimen of each result.
         sweeps: measured sweeps.
 
     Returns:
-        Frequencies [Hz] and amplitudes [m, rad or 1], increasing.
+        Frequencies [Hz] and zero-to-peak amplitudes [m, rad or 1], increasing.
     """
     fitted = [
         (result.measured, place, result) for result, place in zip(results, places, strict=True) if result.measured
@@ -121,7 +121,7 @@ def common_grid(
 
 
 def _limit(values: Array, ranges: Sequence[Any], count: int) -> Array:
-    """Values within all ranges; if fewer than two, `count` even values over the common range; all if there is none."""
+    """Values within all ranges, or `count` even values if fewer than two are; all values without a common range."""
     inside, low, high = _inside(values, ranges), max(low for low, _ in ranges), min(high for _, high in ranges)
     if low > high * (1 + MARGIN):
         return values
@@ -134,14 +134,14 @@ def _inside(values: Array, ranges: Sequence[Any]) -> Array:
 
 
 def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitude"]) -> Array:
-    """Distinct frequencies or amplitudes of sweeps of one place.
+    """List the distinct frequencies or amplitudes of the sweeps of one direction.
 
     Args:
-        sweeps: sweeps of one place.
+        sweeps: sweeps of one direction or specimen.
         axis: "frequency" or "amplitude".
 
     Returns:
-        Values [Hz, m, rad or 1], increasing; at most ten over the range of values that no program has set.
+        Values [Hz, m, rad or 1], increasing; at most ten over a range of values that the test did not control.
     """
     set_values, free_values = [np.empty(0)], [np.empty(0)]
     levels: dict[float, float] = {}
@@ -162,12 +162,12 @@ def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitu
 
 
 def _even(low: float, high: float, count: int) -> Array:
-    """Values in equal ratios, rounded to three digits."""
+    """Values from `low` to `high` in equal ratios, rounded to three digits."""
     return _distinct(np.array([float(f"{x:.3g}") for x in np.geomspace(low, high, count)]))
 
 
 def _distinct(values: Array) -> Array:
-    """Values in increasing order, without those that a rig that misses its set point may have added."""
+    """Sort values and merge values within 1 % of each other, which are one set point that the rig missed."""
     distinct: list[float] = []
     for value in np.unique(values):
         if not distinct or value > distinct[-1] * (1.0 + MARGIN):

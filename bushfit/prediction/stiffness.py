@@ -1,7 +1,8 @@
 """Dynamic stiffness with 95 % bands at any frequency and amplitude, of the bushing as the car will have it.
 
-Material and component effects are included, instrument effects are left out: the car does not have the rig's faults. An
-effect that the tests cannot distinguish from one of the rig gives two predictions; the bands span both.
+Material and component effects are included, instrument effects are excluded: the car does not have the rig's faults. If
+the tests cannot distinguish an effect of the bushing from one of the rig, the bands span the predictions with and
+without the effect; such effects are called unresolved.
 """
 
 from __future__ import annotations
@@ -43,12 +44,12 @@ _BANDS = ("stiffness", "loss_factor", "storage_stiffness", "loss_stiffness")
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """A predicted quantity with its 95 % band.
+    """Predicted quantity at n operating points, with its 95 % band.
 
     Args:
-        value, low, high: prediction and ends of its band, (n,).
-        root: changes of the quantity by independent errors of one standard deviation, (r, n); their root sum of squares
-            is its standard error; r is 0 if it has no uncertainty.
+        value, low, high: prediction, and lower and upper end of its 95 % band, (n,) each.
+        root: changes of the quantity by r independent errors of one standard deviation, (r, n); their root sum of
+            squares is the standard error. r is 0 if the uncertainty is unknown.
     """
 
     value: Array
@@ -57,12 +58,12 @@ class Band:
     root: Array = field(default_factory=lambda: np.empty((0, 1)))
 
     def logarithm(self) -> Band:
-        """Natural log of a positive quantity, with the ends of its band relative to its value."""
+        """Convert to the natural logarithm of the (positive) quantity; the ends of the band become relative to it."""
         low, high = (np.log(self.value) + end / self.value - 1.0 for end in (self.low, self.high))
         return Band(np.log(self.value), low, high, self.root / self.value)
 
     def minus(self, subtrahend: Band) -> Band:
-        """Difference of two quantities with independent errors.
+        """Subtract a quantity with independent errors.
 
         Notes: the distance from the difference to an end of its band is the root sum of squares of the distances in the
         two bands (G. Zou, A. Donner, Stat. Med. 27 (2008) 1693).
@@ -75,17 +76,20 @@ class Band:
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Dynamic stiffness over operating points, sorted by amplitude, then frequency: |K|, K''/K', K' and K''.
+    """Predicted dynamic stiffness K' + i K'' at n operating points, sorted by amplitude, then frequency.
 
     Args:
-        frequency: [Hz], (n,).
-        amplitude: zero-to-peak [m or rad], (n,).
-        stiffness, storage_stiffness, loss_stiffness: [N/m or N m/rad].
-        warnings: sentences on directions, frequencies and strains that were not fitted, on effects of the rig that are
-            left out, and on unresolved effects.
-        if_rigs: prediction if the unresolved effects belong to the rig, which all bands here span; None without
+        direction: direction or specimen.
+        frequency: frequency of each point [Hz], (n,).
+        amplitude: zero-to-peak amplitude of each point [m, rad or 1], (n,).
+        stiffness: magnitude |K| [N/m or N m/rad].
+        loss_factor: K''/K' [1].
+        storage_stiffness, loss_stiffness: K' and K'' [N/m or N m/rad].
+        warnings: sentences on directions, frequencies and strains that were not fitted, on excluded effects of the rig,
+            and on unresolved effects.
+        if_rigs: prediction if the unresolved effects belong to the rig, which the bands include; None without
             unresolved effects.
-        measured: complex stiffness of the sweeps at these points, mean of the repeats [N/m or N m/rad], (n,); nan at a
+        measured: measured complex stiffness at these points, mean of the repeats [N/m or N m/rad], (n,); nan at a
             point without a measurement; None without sweeps.
     """
 
@@ -111,25 +115,25 @@ def predict(
     sweeps: Sequence[MeasuredSweep] | None = None,
     temperature: float | None = None,
 ) -> Prediction:
-    """Dynamic stiffness on a grid, with 95 % bands from the covariance of the fit (delta method).
+    """Predict the dynamic stiffness on a grid, with 95 % bands from the covariance of the fit (delta method).
 
-    The bands span every model that the tests leave possible: with and without the unresolved effects, and with each of
-    the effects that the tests cannot distinguish.
+    The bands span all models that agree with the tests: with and without the unresolved effects, and with each of the
+    effects that the tests cannot distinguish.
 
     Args:
         result: fitted result.
         direction: direction or specimen.
-        frequencies: [Hz], in any order.
-        amplitudes: zero-to-peak [m, rad or 1], in any order.
+        frequencies: frequencies [Hz], in any order.
+        amplitudes: zero-to-peak amplitudes [m, rad or 1], in any order.
         rig: True to include the effects of the rig, as in the tests.
-        sweeps: measured data for comparison; None without any.
-        temperature: [K]; None for the reference temperature.
+        sweeps: measured sweeps for comparison; None for no comparison.
+        temperature: temperature of the rubber [K]; None for the reference temperature.
 
     Returns:
         Prediction at all combinations of frequency and amplitude.
 
     Raises:
-        ModelError: a frequency or amplitude that is not positive.
+        ModelError: a frequency or amplitude is not positive.
     """
     for name, values in (("frequency", frequencies), ("amplitude", amplitudes)):
         if not (np.size(values) and np.all(np.isfinite(values)) and np.min(values) > 0):
@@ -161,8 +165,16 @@ def predict(
 
 
 def car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
-    """Models that may hold in the car: without instrument effects, and with all (first) to none (last) of the
-    unresolved effects.
+    """List the models that may describe the bushing in the car, without instrument effects.
+
+    Each model has a different subset of the unresolved effects.
+
+    Args:
+        model: fitted model.
+        unresolved: names of effects that belong either to the bushing or to the rig.
+
+    Returns:
+        Models; the first has all unresolved effects, the last has none.
     """
     bare = model.without(Level.INSTRUMENT)
     count = range(len(unresolved) + 1)
@@ -170,7 +182,7 @@ def car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
 
 
 def _alternatives(result: Result, *, rig: bool) -> Iterator[Model]:
-    """Other models that the tests leave possible: with the effects of the rig, or as they may hold in the car."""
+    """Alternative models that agree with the tests: with the effects of the rig, or as in the car (`car_models`)."""
     resolved = {*result.model.effects} - {*result.unresolved}
     for model in (alternative.model for alternative in result.alternatives):
         twins = [effect.name for effect in model.records if effect.twins and effect.name not in resolved]
@@ -183,16 +195,16 @@ def predict_with_model(
     """Predict the stiffness with one model, with the uncertainty of the fit and the error of the model.
 
     Args:
-        result: fitted result, whose covariance and model error apply.
-        model: possible model.
+        result: fitted result, which provides the covariance and the model error.
+        model: the fitted model or a variant with fewer or other effects.
         direction: direction or specimen.
-        frequency: [Hz], (n,).
-        amplitude: zero-to-peak [m, rad or 1], (n,).
-        temperature: [K]; None for the reference temperature.
+        frequency: frequency of each point [Hz], (n,).
+        amplitude: zero-to-peak amplitude of each point [m, rad or 1], (n,).
+        temperature: temperature of the rubber [K]; None for the reference temperature.
 
     Returns:
         Prediction without warnings. An unnamed correction or a model error adds an error of the real and one of the
-        imaginary part; within the range of its nodes these include the errors of the parameters, which fade there.
+        imaginary part; within the measured range these replace the errors of the parameters.
     """
     under = Circumstances(temperature)
     names = [name for name in result.covariance.names if name in model.values]
@@ -224,16 +236,17 @@ def predict_with_model(
 
 
 def measured_stiffness(direction: Place, frequency: Array, amplitude: Array, sweeps: Sequence[MeasuredSweep]) -> Array:
-    """Mean of the measured stiffness at operating points.
+    """Average the measured stiffness at operating points.
 
     Args:
         direction: direction or specimen.
-        frequency: [Hz], (n,).
-        amplitude: zero-to-peak [m, rad or 1], (n,).
-        sweeps: measured sweeps; those of other directions are ignored.
+        frequency: frequency of each point [Hz], (n,).
+        amplitude: zero-to-peak amplitude of each point [m, rad or 1], (n,).
+        sweeps: measured sweeps; sweeps of other directions are ignored.
 
     Returns:
-        Complex stiffness [SI], (n,); nan without a measurement.
+        Mean complex stiffness of all measurements within 1 % of each point [N/m or N m/rad], (n,); nan without a
+        measurement.
     """
     mine = [sweep.with_weight() for sweep in sweeps if sweep.direction == direction]
     f, x, stiffness = (
@@ -248,17 +261,17 @@ def measured_stiffness(direction: Place, frequency: Array, amplitude: Array, swe
 
 @dataclass(frozen=True, eq=False)
 class PredictedResonance:
-    """Predicted response of a mass on a mount whose base is shaken with a sine of constant acceleration.
+    """Predicted response of a mass on a bushing whose base is shaken with a sine of constant acceleration.
 
     Args:
         place: direction or specimen.
-        mass: [kg].
-        base_acceleration: zero-to-peak [m/s^2].
-        frequency: [Hz], (n,).
-        amplitude: of the mount's deformation, zero-to-peak [m], (n,).
-        transmissibility: complex, acceleration of the mass over that of the base [-], (n,).
-        stiffness: complex, of the mount at that frequency and amplitude [N/m], (n,).
-        warnings: sentences on a place, and on frequencies and strains near the peak, that were not fitted, and on
+        mass: mass on the bushing [kg].
+        base_acceleration: zero-to-peak acceleration of the base [m/s^2].
+        frequency: frequency of each point [Hz], (n,).
+        amplitude: zero-to-peak deformation of the bushing [m], (n,).
+        transmissibility: complex ratio of the accelerations of mass and base [-], (n,).
+        stiffness: complex stiffness of the bushing at each frequency and amplitude [N/m], (n,).
+        warnings: sentences on a direction, and on frequencies and strains near the peak, that were not fitted, and on
             unresolved effects.
         if_rigs: response at these frequencies if the unresolved effects belong to the rig; None without such effects.
     """
@@ -275,7 +288,7 @@ class PredictedResonance:
 
     @property
     def peak(self) -> tuple[float, float]:
-        """Frequency of the largest transmissibility [Hz], and this |T|."""
+        """Frequency of the largest transmissibility [Hz], and its magnitude |T| [-]."""
         index = int(np.argmax(np.abs(self.transmissibility)))
         return float(self.frequency[index]), float(abs(self.transmissibility[index]))
 
@@ -293,17 +306,17 @@ def predict_resonance(
 
     Args:
         result: fitted result.
-        place: direction of translation, or specimen in shear.
-        mass: [kg].
-        base_acceleration: zero-to-peak [m/s^2].
-        frequencies: [Hz]; None for a range about the resonance.
-        temperature: [K]; None for the reference temperature.
+        place: direction of translation, or specimen with a displacement.
+        mass: mass on the bushing [kg].
+        base_acceleration: zero-to-peak acceleration of the base [m/s^2].
+        frequencies: frequencies [Hz]; None for a range about the resonance.
+        temperature: temperature of the rubber [K]; None for the reference temperature.
 
     Returns:
         Transmissibility and amplitude at the frequencies.
 
     Raises:
-        ModelError: a place without displacement and force.
+        ModelError: the direction has no displacement and force, such as torsion.
     """
     if place.motion is not TRANSLATION:
         raise ModelError("this cannot carry a mass", found=str(place), expected="a direction or mount with a stiffness")

@@ -17,13 +17,13 @@ CHUNK = 1 << 18
 
 
 def scatter(values: Floats) -> tuple[float, float]:
-    """Median of values, (n,), and their standard deviation by the median absolute deviation."""
+    """Median of values, (n,), and their standard deviation estimated from the median absolute deviation."""
     middle = float(np.median(values))
     return middle, MEDIAN_TO_SIGMA * float(np.median(np.abs(values - middle)))
 
 
 def median(values: Floats, axis: int = 0) -> Floats:
-    """Median along an axis of values without NaN, ten times as fast as NumPy's over few values."""
+    """Median of values without NaN along an axis; ten times as fast as `numpy.median` for a short axis."""
     ordered = np.sort(values, axis=axis)
     middle = ordered.shape[axis] // 2
     low = middle - 1 + ordered.shape[axis] % 2
@@ -31,18 +31,17 @@ def median(values: Floats, axis: int = 0) -> Floats:
 
 
 def by_chunks(work: Callable[[slice], _Chunk], size: int, chunk: int = CHUNK) -> list[_Chunk]:
-    """Apply a function to the chunks of a long array, on all cores.
+    """Apply a function to the chunks of a long array, in threads on all cores.
 
-    NumPy lets other threads run while it works on a chunk. The chunks, and so the numbers, are the same on any
-    number of cores.
+    The chunks, and so the numerical results, are the same on any number of cores.
 
     Args:
-        work: function of a slice.
-        size: entries of the array.
-        chunk: entries of a chunk.
+        work: function of a slice of the array.
+        size: number of entries of the array.
+        chunk: number of entries of a chunk.
 
     Returns:
-        The results, in order.
+        Results of the function, in the order of the chunks.
     """
     chunks = [slice(start, min(start + chunk, size)) for start in range(0, size, chunk)]
     if len(chunks) < 2:

@@ -1,6 +1,6 @@
 """Cycles of a motion: their limits, runs of similar cycles, and the steady part of a run.
 
-They are counted on the displacement, in arrays of all rows or of all cycles at once.
+Cycles are found in the displacement; all functions work on arrays of all rows or of all cycles.
 """
 
 from dataclasses import dataclass
@@ -15,21 +15,21 @@ from bushfit.reduction.arrays import CHUNK, scatter
 from bushfit.reduction.harmonics import basis
 from bushfit.reduction.turning_points import Integers, least_prominence, middle_crossings, motion_turns, stroke_middles
 
-#: Share of a cycle that its longest hole may take; chosen: a fundamental needs rows on all sides of it.
+#: Longest gap without rows in a cycle, relative to its period; chosen: a fundamental needs rows all around the cycle.
 HOLE = 0.34
 #: [cycles] Longest interruption of a sine, beyond which it has stopped: three cycles, give or take a tenth.
 _LONGEST_INTERRUPTION = 3.1
-#: [cycles] Distance from its phase up to which a motion goes on; chosen: another start meets it once in ten times.
+#: [cycles] Largest phase jump of a motion that resumes; chosen: an independent start meets it once in ten times.
 _SAME_PHASE = 0.05
-#: [ln] Difference of period and of range from which neighbouring cycles are not of one run: far beyond that of a step.
+#: [ln] Difference of period and of range above which neighbouring cycles are of different runs: far above the scatter.
 _OTHER_PERIOD, _OTHER_RANGE = 0.1, 0.25
-#: Determinant of the normal equations, relative to its rows, from which a cycle's fundamental can be solved for.
+#: Smallest determinant of a cycle's normal equations per row with which its fundamental is solved for.
 _LEAST_DETERMINANT = 1e-3
-#: Chi-square that a split has to save; chosen: scatter saves half as much at the best of many places.
+#: Smallest decrease of chi-square by a split; chosen: scatter decreases chi-square by half as much at best.
 _SPLIT_GAIN = 40.0
-#: Relative difference of frequency and of amplitude that is worth a split; chosen: smaller ones are a rig's wander.
+#: Smallest relative difference of frequency and of amplitude for a split; chosen: rigs wander by less.
 _SPLIT_FREQUENCY, _SPLIT_AMPLITUDE = 1e-3, 0.02
-#: Share of a period, and of an amplitude, to which they are known at best; chosen: no rig is more even.
+#: Smallest relative scatter of periods and amplitudes; chosen: no rig is more even.
 _LEAST_SCATTER = 5e-4
 #: Cycles on either side of a split: two crossings more than a line needs.
 _FEWEST_CYCLES = 2
@@ -37,13 +37,13 @@ _FEWEST_CYCLES = 2
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
-    """The cycles of a motion, from one upward crossing of its middle to the next.
+    """The m cycles of a motion, each from one upward crossing of the middle of the stroke to the next.
 
     Args:
-        time: of each row [s], (n,).
-        edges: time of the crossings [s], (m + 1,).
-        first_rows: first row after each crossing, (m + 1,).
-        range: peak to peak of each cycle [m or rad], (m,).
+        time: time of each row of the record [s], (n,).
+        edges: times of the upward crossings [s], (m + 1,).
+        first_rows: index of the first row after each crossing, (m + 1,).
+        range: peak-to-peak displacement of each cycle [m or rad], (m,).
     """
 
     time: Floats
@@ -56,11 +56,11 @@ class Cycles:
         """Find the cycles of a motion, of any frequency and of any amplitude above the noise.
 
         Args:
-            time: of each row [s], (n,).
+            time: time of each row [s], (n,).
             motion: displacement [m or rad], (n,).
 
         Returns:
-            Cycles between upward crossings; none if the motion has fewer than four turning points.
+            Cycles between upward crossings; empty if the motion has fewer than four turning points.
         """
         turns, _ = motion_turns(time, motion)
         if turns.size < 4:
@@ -73,10 +73,10 @@ class Cycles:
         return cls(time, edges, np.searchsorted(time, edges).astype(np.intp), peak - trough)
 
     def runs(self) -> list[slice]:
-        """Find runs of cycles with similar periods and ranges, without holes.
+        """Find runs of consecutive cycles with similar periods and ranges, and without gaps in the rows.
 
         Returns:
-            Slices of the cycles, in order.
+            Slices of the cycles (not rows), in order.
         """
         if self.range.size == 0:
             return []
@@ -89,14 +89,15 @@ class Cycles:
         return [run for run in stretches(changes) if not hole[run.start]]
 
     def fundamentals(self, run: slice, *channels: Floats) -> Complex:
-        """Fit the fundamental of channels in each cycle of a run by least squares.
+        """Fit the fundamental of one or more channels in each of the k cycles of a run by least squares.
 
         Args:
             run: slice of the cycles.
-            channels: values of the rows, (n,) each.
+            channels: values of each channel at all rows of the record, (n,) each.
 
         Returns:
-            Complex fundamentals, (channels, k); half the range in cycles with too few rows.
+            Complex amplitude of the fundamental, (channels, k); half the displacement range in cycles with too few
+            rows.
         """
         edges, first = self.edges[run.start : run.stop + 1], self.first_rows[run.start : run.stop + 1]
         rows, count = slice(first[0], first[-1]), np.diff(first)
@@ -115,48 +116,53 @@ class Cycles:
 
 
 def stretches(changes: NDArray[np.bool_], fewest: int = 1) -> list[slice]:
-    """Split n entries into stretches at changes, a mask of the borders between entries, (n - 1,).
+    """Split a sequence of n entries at given borders.
 
-    Stretches of fewer entries than `fewest` are left out.
+    Args:
+        changes: true at the borders between neighbouring entries where the sequence is split, (n - 1,).
+        fewest: smallest number of entries of a slice; shorter slices are omitted.
+
+    Returns:
+        Slices of the entries, in order.
     """
     border = np.concatenate(([0], 1 + np.flatnonzero(changes), [changes.size + 1])).tolist()
     return [slice(first, end) for first, end in pairwise(border) if end - first >= fewest]
 
 
 def resumes_in_phase(gap: float, *, step: float = 1.0) -> bool:
-    """Return True if a sine begins again after a gap [cycles] of up to three, whole `step`s of a cycle later."""
+    """Return True if a sine resumes in phase after a gap [cycles]: up to three cycles, and a multiple of `step`."""
     return gap < _LONGEST_INTERRUPTION and abs(gap - step * round(gap / step)) < _SAME_PHASE
 
 
 def change_after(time: Floats, motion: Floats, shift: float, rows: slice) -> Floats:
-    """Difference between a motion and the same motion a time later, or earlier.
+    """Compute the change of a motion over a given time, which is small for a periodic motion and its period.
 
     Args:
-        time: of each row [s], (n,).
-        motion: [m or rad], (n,).
-        shift: time between the two [s].
-        rows: rows that are compared.
+        time: time of each row [s], (n,).
+        motion: displacement [m or rad], (n,).
+        shift: time from each row to the compared instant [s]; negative for an earlier instant.
+        rows: rows to compare.
 
     Returns:
-        Magnitude of the difference [m or rad], (rows,).
+        Magnitude of the change [m or rad], (rows,).
     """
     return np.abs(np.interp(time[rows] + shift, time, motion) - motion[rows])
 
 
 def lone_outliers(time: Floats, values: Floats) -> NDArray[np.bool_]:
-    """Find rows of a channel that lie alone far off their neighbours, as faults of a record do.
+    """Find single rows of a channel that are far from their neighbours, as by a fault of the recording.
 
     Args:
-        time: of each row [s], (n,).
-        values: of the channel, (n,).
+        time: time of each row [s], (n,).
+        values: values of the channel, (n,).
 
     Returns:
-        Mask of these rows, (n,).
+        Mask of the outliers, (n,).
 
     Notes:
-        Such a row is farther off the cubic through the two rows before and the two after it than these spread, and than
-        noise goes; a cubic through rows at uneven times magnifies noise, which is allowed for. No sine does that,
-        however few rows it has, nor the kink of dry friction.
+        The distance of an outlier from the cubic through the two rows before and the two rows after it exceeds the
+        range of these four rows plus the noise, which the cubic magnifies at uneven times. No sine reaches this
+        distance, however few rows it has, nor does the kink of dry friction.
     """
     outliers = np.zeros(values.size, dtype=bool)
     smallest = least_prominence(values)
@@ -181,15 +187,16 @@ def pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:
     """Split a run of cycles into pieces of steady frequency and amplitude.
 
     Args:
-        edges: time of the crossings [s], (m + 1,).
-        log_amplitude: ln of the amplitude of each cycle, (m,).
+        edges: times of the upward crossings [s], (m + 1,).
+        log_amplitude: natural log of the amplitude of each cycle, (m,).
 
     Returns:
         Slices of the cycles, in order.
 
     Notes:
-        The crossings of a steady sine lie on a straight line over their number, and its amplitudes on a level one. A
-        run is cut in two where two lines fit better than one by far more than the scatter allows, and each part again.
+        Plotted over their number, the crossings of a steady sine lie on a straight line, and its amplitudes on a
+        horizontal one. A run is cut in two if two lines fit far better than one, compared with the scatter; then each
+        part again.
     """
     period = float(np.median(np.diff(edges)))
     phase = (edges - edges[0]) / period - np.arange(edges.size)
@@ -210,14 +217,14 @@ def pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:
 
 
 def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
-    """Return True if the frequency of a run sweeps all the time and does not step between its parts.
+    """Return True if the frequency of a run sweeps continuously instead of in steps.
 
     Args:
-        edges: time of the crossings [s], (m + 1,).
-        parts: parts of the run, as `pieces` gives them.
+        edges: times of the upward crossings [s], (m + 1,).
+        parts: slices of the run's cycles, from `pieces`.
 
     Returns:
-        Whether the period changes within the parts as it does between them; in steps it is constant within.
+        True if the period changes within the parts as fast as between them; in steps it is constant within a part.
     """
     parts = [part for part in parts if part.stop - part.start > _FEWEST_CYCLES]
     if len(parts) < 4:  # which may be steps
@@ -233,10 +240,10 @@ def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
 
 
 def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
-    """Number of cycles after which to cut a run; 0 if it is steady.
+    """Number of cycles after which to cut a run in two; 0 if the run is steady.
 
-    The phase of the crossings, (m + 1,), less that of an even sine, is in units of their `jitter` [periods], and the
-    level, ln of the amplitude of each cycle, (m,), in units of its `spread`.
+    `phase` is the deviation of the crossings from an even sine, (m + 1,), in units of `jitter` [periods]; `level` is ln
+    of the amplitude of each cycle, (m,), in units of `spread`.
     """
     count = level.size
     if count < 2 * _FEWEST_CYCLES:
@@ -265,18 +272,18 @@ def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
 
 
 def mean_from_steady(motion: Complex, stiffness: Complex, fewest: int) -> slice:
-    """Select the steady cycles of a step: both ends are cut so that the mean is most certain.
+    """Select the steady cycles of a step: cut both ends so that the standard error of the mean is smallest.
 
     Args:
-        motion, stiffness: complex, in each cycle [m or rad, N/m or N m/rad], (m,).
-        fewest: smallest number of remaining cycles.
+        motion, stiffness: complex displacement and stiffness of each cycle [m or rad, N/m or N m/rad], (m,).
+        fewest: smallest number of cycles to keep.
 
     Returns:
         Slice of the cycles.
 
     Notes:
         The marginal standard error rule (White 1997), over displacement and stiffness together. Up to half of the
-        cycles may be transient, and a quarter no longer steady: a rig that stops takes less.
+        cycles are cut at the beginning, and up to a quarter at the end.
     """
     series = np.stack((motion / np.median(np.abs(motion)), stiffness / np.median(np.abs(stiffness))))
     count = motion.size
@@ -286,7 +293,7 @@ def mean_from_steady(motion: Complex, stiffness: Complex, fewest: int) -> slice:
 
 
 def _truncation(series: Complex, most_cut: int) -> int:
-    """Number of entries, at most `most_cut`, to cut at the start of series, (k, m), for the least error of means."""
+    """Number of entries, at most `most_cut`, to cut at the start of k series, (k, m), for the least error of the mean."""
     if most_cut < 1:
         return 0
     back = (series - series.mean(axis=1, keepdims=True))[:, ::-1]

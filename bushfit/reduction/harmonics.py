@@ -1,7 +1,7 @@
 """Harmonics of displacement and force: Fourier series fitted by least squares to rows at any times.
 
-A series of order m has real coefficients (mean, m cosines, m negative sines), (2 m + 1,), or complex ones, mean first,
-(m + 1,): c_k is the term Re c_k exp(2 pi i k phase). Phase counts cycles.
+A series of order m has 2 m + 1 real coefficients (mean, m cosines, m negative sines) or m + 1 complex ones (mean
+first): coefficient c_k stands for the term Re c_k exp(2 pi i k phase). Phase is in cycles.
 """
 
 from collections.abc import Iterator
@@ -15,32 +15,33 @@ from scipy.special import fdtri
 
 from bushfit.reading.measurement import Complex, Floats
 
-#: Rows of a cycle behind each harmonic; two determine one, and more keep noise from being fitted.
+#: Rows of a cycle for each harmonic; two determine a harmonic, and more avoid a fit of noise.
 _ROWS_PER_HARMONIC = 5
-#: Harmonics of a step at most, and of the fits that search for its frequency.
+#: Largest number of harmonics of a step, and number of harmonics in the search for its frequency.
 _HARMONICS, _FREQUENCY_HARMONICS = 15, 3
-#: Condition number of the scaled normal equations up to which rows tell harmonics apart; chosen: errors grow tenfold.
+#: Largest condition number of the scaled normal equations with which rows separate harmonics; chosen: errors grow
+#: tenfold.
 _WORST_CONDITION = 100.0
-#: Columns up to which rows may be too few to tell them apart, and the relative singular value that shows it.
+#: Number of columns up to which rows may be too few to separate them, and the relative singular value in that case.
 _FEW_COLUMNS, _SINGULAR = 5, 1e-12
 #: Terms of the drift of a step: mean, slope and curvature.
 _DRIFT_TERMS = 3
-#: Rows of a step that are fitted at a time, so that their harmonics stay in a core's cache, and that are enough to
+#: Rows of a step in one chunk of the fit, so that their harmonics stay in a core's cache; rows that are enough to
 #: search for its frequency.
 _CHUNK_ROWS, _FREQUENCY_ROWS = 1 << 14, 1 << 17
 #: [cycles] Drift of the phase over a whole step with which its frequency is found; chosen: far below its error.
 _SETTLED_DRIFT = 1e-7
-#: Probability below which chance alone does not make cycles scatter more than white noise does; chosen.
+#: Significance level of the test that cycles scatter more than white noise does; chosen.
 _WHITE_P = 0.005
 
 
 def basis(phase: Floats, order: int, *drift: Floats) -> Floats:
-    """Basis of a Fourier series with drift.
+    """Compute the basis functions of a Fourier series with drift at the rows of a record.
 
     Args:
-        phase: of each row [cycles], (n,).
+        phase: phase of each row [cycles], (n,).
         order: number of harmonics.
-        drift: columns of a drift, (n,) each.
+        drift: values of each drift function at the rows, (n,) each.
 
     Returns:
         Columns 1, drift, cos(2 pi k phase) and -sin(2 pi k phase) for k = 1 ... order, (n, 1 + drifts + 2 order).
@@ -59,15 +60,16 @@ def basis(phase: Floats, order: int, *drift: Floats) -> Floats:
 
 
 def least_squares(columns: Floats, values: Floats, weight: NDArray[Any] | None = None) -> Floats:
-    """Real coefficients that fit values, by normal equations.
+    """Solve a linear least-squares problem by normal equations.
 
     Args:
-        columns: of `basis`, (n, k): nearly orthogonal over whole cycles, so that normal equations lose no digits.
-        values: (n,) or (n, channels).
-        weight: of each row, (n,); None for one.
+        columns: basis functions from `basis`, (n, k); nearly orthogonal over whole cycles, so that normal equations
+            lose no digits.
+        values: values to fit, (n,) or (n, channels).
+        weight: weight of each row, (n,); None for equal weights.
 
     Returns:
-        Coefficients, (k,) or (k, channels).
+        Real coefficients of the columns, (k,) or (k, channels).
     """
     weighed = columns.T if weight is None or np.all(weight == 1.0) else columns.T * weight
     gram, moments = weighed @ columns, weighed @ values
@@ -77,23 +79,23 @@ def least_squares(columns: Floats, values: Floats, weight: NDArray[Any] | None =
 
 
 def as_complex(real: Floats) -> Complex:
-    """Complex coefficients of a series, (m + 1,), from its real ones."""
+    """Convert the real coefficients of a Fourier series, (2 m + 1,), to complex ones, (m + 1,)."""
     order = real.size // 2
     return np.concatenate((real[:1], real[1 : order + 1] + 1j * real[order + 1 :]))
 
 
 def series(coefficients: Complex, phase: Floats) -> Floats:
-    """Values of a series with complex coefficients at any phase [cycles], (n,)."""
+    """Evaluate a Fourier series with complex coefficients, (m + 1,), at phases [cycles], (n,)."""
     return polyval(np.exp(2j * np.pi * phase), coefficients).real
 
 
 def resolved_order(rows_per_cycle: float, max_order: int) -> int:
-    """Number of harmonics that the rows of one cycle determine, from 1 to `max_order`."""
+    """Number of harmonics that a given number of rows per cycle determines, from 1 to `max_order`."""
     return int(np.clip(rows_per_cycle / _ROWS_PER_HARMONIC, 1, max_order))
 
 
 def spread_rows(rows: int, max_rows: int) -> NDArray[np.intp]:
-    """Numbers of up to `max_rows` rows, spread over all of them by a step that is no fraction of a cycle."""
+    """Select up to `max_rows` row indices, spread evenly but not periodically over `rows` rows."""
     count = min(rows, max_rows)
     number = np.arange(count)
     golden = 0.6180339887498949  # ratio less 1: its multiples, less whole numbers, spread evenly
@@ -101,16 +103,16 @@ def spread_rows(rows: int, max_rows: int) -> NDArray[np.intp]:
 
 
 def cycle_harmonics(phase: Floats, values: Floats, order: int, drift: int = 0) -> tuple[Floats, Complex, Floats]:
-    """Fit harmonics to columns of values by least squares.
+    """Fit harmonics to several channels by least squares.
 
     Args:
-        phase: of each row [cycles], (n,).
-        values: (n, k).
-        order: harmonics that are fitted.
-        drift: power of the phase up to which a drift is fitted with them.
+        phase: phase of each row [cycles], (n,).
+        values: values of k channels at the rows, (n, k).
+        order: number of harmonics in the fit.
+        drift: degree of the polynomial in the phase that is fitted with the harmonics; 0 for a constant.
 
     Returns:
-        Mean, complex fundamental, and standard deviation of the residuals of each column, (k,) each.
+        Mean, complex fundamental, and standard deviation of the residuals of each channel, (k,) each.
     """
     columns = basis(phase, order, *(phase**power for power in range(1, drift + 1)))
     solution = np.linalg.lstsq(columns, values, rcond=None)[0]
@@ -125,10 +127,11 @@ class HarmonicFit:
     Drift and overtones are fitted with the fundamental, so that neither leaks into it.
 
     Args:
-        coefficients: complex harmonics of displacement and force, with the mean at 0, (2, order + 1).
-        chance: expected square of each harmonic of white noise of unit variance, (order,).
-        freedom: degrees of freedom: rows less unknowns.
-        squares: products of the residuals of the channels, summed over the rows, (2, 2).
+        frequency: fundamental frequency [Hz].
+        coefficients: mean and complex harmonics of displacement [m or rad] and force [N or N m], (2, order + 1).
+        chance: expected squared magnitude of each harmonic for white noise of unit variance, (order,).
+        freedom: degrees of freedom: rows minus unknowns.
+        squares: sums over the rows of squares and products of the residuals of displacement and force, (2, 2).
         left_over: complex fundamental of the residuals in each cycle, (2, cycles).
     """
 
@@ -144,7 +147,7 @@ class HarmonicFit:
         """Fit whole cycles, at the frequency at which the phase of the displacement does not drift between cycles.
 
         Args:
-            time, displacement, force: [s], [m or rad] and [N or N m], (n,).
+            time, displacement, force: record [s, m or rad, N or N m], (n,) each.
             edges: beginnings of the cycles, and end of the last one [s], (cycles + 1,).
 
         Returns:
@@ -186,15 +189,15 @@ class HarmonicFit:
         return cls(frequency, coefficients, chance, freedom, squares, sums)
 
     def errors(self) -> Floats:
-        """Standard errors of the stiffness K.
+        """Compute the standard errors of the complex stiffness K = F/X of the fundamentals.
 
         Returns:
-            Error of |K|, relative to |K|, and of its phase [rad], (2,).
+            Relative standard error of |K|, and standard error of the phase of K [rad], (2,).
 
         Notes:
-            e = f - K x is the force residual by the noise of both channels. If e is white, its scatter over the rows
-            gives the errors. If the cycles scatter more than white noise does (hum, slow wander), the scatter of the
-            cycles gives them.
+            e = f - K x is the force residual due to the noise of both channels. If e is white, the errors follow from
+            its scatter over the rows. If the cycles scatter more than white noise does (hum, slow wander), the errors
+            follow from the scatter of the cycles.
         """
         x, f = self.coefficients[:, 1]
         k = f / x
@@ -211,7 +214,7 @@ class HarmonicFit:
         return np.sqrt(variance) / abs(f)
 
     def distortion(self) -> Floats:
-        """Total harmonic distortion of displacement and force, over their fundamental, less that of noise, (2,)."""
+        """Total harmonic distortion of displacement and force, relative to the fundamental, without noise, (2,)."""
         power = np.square(np.abs(self.coefficients[:, 1:]))
         noise = np.outer(np.diag(self.squares) / self.freedom, self.chance)
         overtones = np.maximum((power - noise)[:, 1:].sum(axis=1), 0.0)
@@ -219,7 +222,7 @@ class HarmonicFit:
 
 
 def _drift_and_harmonics(time: Floats, values: Floats, frequency: float, order: int) -> tuple[int, Floats, Floats]:
-    """Fit drift and harmonics to both channels.
+    """Fit drift and at most `order` harmonics of a frequency [Hz] to both channels, (2, n), over time [s], (n,).
 
     Returns:
         Number of harmonics that the rows determine, at most `order`; coefficients, (p, 2); and their covariance for
@@ -244,7 +247,7 @@ def _drift_and_harmonics(time: Floats, values: Floats, frequency: float, order: 
 
 
 def _chunks(time: Floats, frequency: float, order: int) -> Iterator[tuple[slice, Floats]]:
-    """Rows of each chunk, and the drift, cosines and negative sines at these rows, (3 + 2 order, m)."""
+    """Generate the rows of each chunk with the basis functions (drift, cosines, sines) there, (3 + 2 order, m)."""
     half = max(float(np.abs(time[[0, -1]]).max()), 1e-300)
     for start in range(0, time.size, _CHUNK_ROWS):
         rows = slice(start, start + _CHUNK_ROWS)

@@ -1,7 +1,8 @@
 """Loop programmes: a record of several amplitudes or rates, one after the other, split into loops.
 
 The strokes of the motion, from one turning point to the next, are compared by their range and by the time between the
-crossings of their middles. A run of similar strokes is a part; ramps, pauses and single cycles between are left out.
+crossings of their middles. A run of similar strokes is a part of the record; ramps, pauses and single cycles between
+the parts are omitted.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -23,34 +24,35 @@ from bushfit.reduction.turning_points import middle_crossings, motion_turns
 
 #: Rows that are enough to find the cycles.
 ENOUGH_ROWS = 200_000
-#: Cycles from which on the first one, which remembers what came before, goes: three, for what noise may take off them.
+#: Number of cycles above which the first cycle, which depends on the history, is omitted: three, minus a tolerance.
 THREE_CYCLES = 2.95
-#: Relative difference from the motion a period on up to which it comes again, relative to its range.
+#: Largest difference from the motion a period later, relative to its range, with which a motion is periodic.
 SAME_MOTION = 0.05
-#: Relative difference of two half cycles, or two periods, that are alike; chosen: rigs keep theirs better.
+#: Largest relative difference of two equal half cycles or periods; chosen: rigs are more even.
 _SAME_RATE = 0.08
-#: Relative difference of the ranges of two parts up to which they have one amplitude; chosen: rigs step by more.
+#: Largest relative difference of the ranges of two parts with one amplitude; chosen: rigs step by more.
 _SAME_AMPLITUDE = 0.08
-#: Share of a cycle from either end of the record up to which a part reaches to it.
+#: Distance from an end of the record, relative to a cycle, up to which a part is extended to that end.
 _AT_END = 0.1
-#: Softening from which on it is told, as it is and over the loss factor of a part after other cycles and of one from
-#: rest; chosen: less does not matter to a fit, and memory of springpot and friction makes up to 0.15 and 0.6 of it.
+#: Smallest reported softening: absolute, and over the loss factor for a part after other cycles and a part from rest;
+#: chosen: less does not matter to a fit, and the memory of springpot and friction makes up to 0.15 and 0.6 of the loss
+#: factor.
 _LEAST_SOFTENING, _MEMORY, _MEMORY_FROM_REST = 0.02, 0.25, 0.75
-#: Harmonics that are fitted to a cycle of force (a loop of rubber has next to nothing beyond), and the unknowns then,
-#: with mean and slope.
+#: Number of harmonics fitted to a cycle of force (loops of rubber have hardly more), and number of unknowns with mean
+#: and slope.
 _HARMONICS, _UNKNOWNS = 5, 12
-#: What is said of a record with a time.
+#: Campaign keys of a record that has a time column.
 _TIMED = LoopFile(file="")
 
 
 @dataclass(frozen=True)
 class SteadySpan:
-    """A part of a record with constant amplitude and rate.
+    """Part of a record with constant amplitude and rate.
 
     Args:
-        begin, end: limits of its cycles, on the clock of the record.
-        period: of its cycles, on that clock.
-        range: peak to peak [m or rad].
+        begin, end: limits of its cycles [s, or row numbers if the record has no time].
+        period: duration of one cycle, in the same unit.
+        range: peak-to-peak displacement [m or rad].
     """
 
     begin: float
@@ -64,28 +66,29 @@ class SteadySpan:
         return (self.end - self.begin) / self.period
 
     def is_like(self, span: "SteadySpan") -> bool:
-        """Return True if two parts have one amplitude and one rate."""
+        """Return True if two parts have the same amplitude and rate, both within 8 %."""
         ranges, periods = np.log(self.range / span.range), np.log(self.period / span.period)
         return bool(abs(ranges) < _SAME_AMPLITUDE and abs(periods) < _SAME_RATE)
 
 
 def programme(loop: Loop, test: LoopFile = _TIMED) -> tuple[Loop, ...]:
-    """Split a record into its loops: one for each part of constant amplitude and rate.
+    """Split a record into loops, one for each part of constant amplitude and rate.
 
     Args:
         loop: the whole record.
-        test: keys of the record in a campaign; rate, frequency and waveform give the time of a record without one.
+        test: keys of the record in a campaign; rate, frequency and waveform define the time of a record without a time
+            column.
 
     Returns:
-        The parts in order, with the time of the record and the softening of each. A record with one amplitude and rate
-        is returned whole.
+        Loops in order, each with its times in the record and its softening (see `measure_softening`). A record with one
+        amplitude and rate is returned whole.
 
     Raises:
         MeasurementError: amplitude or rate change all the time, so that no two cycles are alike.
 
     Notes:
-        The first part of a record that begins with it keeps all its cycles; of any other the first cycle, which still
-        remembers what came before, is left out where two more are left.
+        A part at the beginning of the record keeps all its cycles. Any other part loses its first cycle, which still
+        depends on the motion before, if two more cycles remain.
     """
     step = slice(None, None, -(-loop.displacement.size // ENOUGH_ROWS))
     time, motion = _clock(loop)[step], loop.displacement[step]
@@ -100,7 +103,7 @@ def programme(loop: Loop, test: LoopFile = _TIMED) -> tuple[Loop, ...]:
 
 
 def _clock(loop: Loop) -> Floats:
-    """Time of each row [s], or its number where no time was recorded, (n,)."""
+    """Time of each row [s], or row numbers if the record has no time, (n,)."""
     return loop.time if loop.timed else np.arange(loop.displacement.size, dtype=float)
 
 
@@ -108,15 +111,15 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
     """Find the parts of a motion with constant amplitude and rate.
 
     Args:
-        loop: record of the motion, for errors.
-        time: of each row [s], or row numbers, (n,).
+        loop: record of the motion, for error messages.
+        time: time of each row [s], or row numbers, (n,).
         motion: displacement without outliers [m or rad], (n,).
 
     Returns:
-        Parts in order; none if there are fewer than three strokes.
+        Parts in order; empty if there are fewer than three strokes.
 
     Raises:
-        MeasurementError: there are cycles, but no two alike.
+        MeasurementError: there are cycles, but no two of them are alike.
     """
     turns, prominence = motion_turns(time, motion)
     if turns.size < 4:
@@ -158,10 +161,11 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
 
 
 def _alike_runs(values: Floats, reach: Floats) -> Iterator[slice]:
-    """Runs of two or more values, (n,), each within its `reach`, (n,), of its neighbours, and of what comes after.
+    """Generate slices of two or more neighbouring values, (n,), that are equal within their `reach`, (n,).
 
-    Up and down may differ by three times as much, which a drift makes, where each is like the next of its kind. Over
-    two cycles nothing creeps by more than 1.5 times as much.
+    The values belong to strokes or half cycles, upward and downward in turn. Upward and downward values may differ by
+    three times the reach, as in a drift, if each equals the next value of its kind. Over two cycles the values may
+    change by 1.5 times the reach.
     """
     change = np.abs(np.diff(values))
     of_a_kind = np.concatenate(([False], np.abs(values[2:] - values[:-2]) <= reach[2:], [False]))
@@ -195,13 +199,13 @@ def _to_its_ends(span: SteadySpan, time: Floats, motion: Floats, before: float, 
 
 
 def cut_loops(loop: Loop, time: Floats, spans: Sequence[SteadySpan], test: LoopFile) -> Iterator[Loop]:
-    """Cut out a loop for each part; the first cycle is left out if two more remain.
+    """Cut a loop for each part out of a record, without the first cycle if two more remain.
 
     Args:
         loop: the whole record.
-        time: clock of the rows in which the parts were found [s, or row numbers].
-        spans: the parts.
-        test: keys of the record in a campaign, for a record without time.
+        time: time of the rows that were searched for the parts [s, or row numbers], (n,).
+        spans: parts of constant amplitude and rate.
+        test: keys of the record in a campaign, which define the time of a record without a time column.
 
     Returns:
         Iterator over the loops.
@@ -229,21 +233,26 @@ def cut_loops(loop: Loop, time: Floats, spans: Sequence[SteadySpan], test: LoopF
 
 
 def left_out(gaps: Iterable[str], cycles: float) -> str:
-    """Sentence on the gaps before and after the steady cycles, "" for no gap, and on the number of cycles used."""
+    """Write a sentence on the omitted durations before and after the steady cycles, and on the number of cycles used.
+
+    Args:
+        gaps: durations before and after the steady cycles, formatted with a unit; "" for no gap.
+        cycles: number of cycles used.
+    """
     parts = [f"{gap} {side} its steady cycles" for gap, side in zip(gaps, ("before", "after"), strict=True) if gap]
     return f"{' and '.join(parts)} are left out; {cycles:.3g} cycles are used"
 
 
 def measure_softening(loop: Loop, span: SteadySpan, *, from_rest: bool) -> float | None:
-    """Relative excess of the first cycle's stiffness over the last one.
+    """Measure the softening of the rubber in a part: relative excess of the stiffness of the first over the last cycle.
 
     Args:
         loop: the whole record.
-        span: part of the record.
-        from_rest: whether the part begins from rest.
+        span: part of the record with constant amplitude and rate.
+        from_rest: True if the part begins from rest.
 
     Returns:
-        Excess; None within chance and the memory of rubber.
+        Relative excess of |K|; None if it is within noise and the memory of the rubber (springpot and friction).
     """
     if span.cycles < 1.95:  # first and last are one
         return None
@@ -256,7 +265,7 @@ def measure_softening(loop: Loop, span: SteadySpan, *, from_rest: bool) -> float
 
 
 def _stiffness(loop: Loop, begin: float, period: float) -> tuple[complex, float]:
-    """Complex stiffness [N/m or N m/rad] of the cycle that starts at `begin`, and its relative error."""
+    """Complex stiffness [N/m or N m/rad] of the cycle that starts at `begin`, and its relative standard error."""
     clock = _clock(loop)
     first, last = np.searchsorted(clock, [begin, begin + period])
     rows = slice(first, last, max(1, (last - first) // 10_000))

@@ -1,8 +1,9 @@
 """Stiffness from resonance tests: a mass M on a mount whose base is shaken with a sine (base excitation).
 
-With the complex transmissibility T, acceleration of the mass over that of the base, the mount's stiffness is
-K = M omega^2 T/(T - 1), and its deformation |T - 1| times the base's displacement. An error dT makes the relative error
-dK/K = dT/(T (T - 1)): K is known well where |T - 1| is large, from somewhat below the resonance on, and badly below.
+With the complex transmissibility T, acceleration of the mass over acceleration of the base, the stiffness of the mount
+is K = M omega^2 T/(T - 1), and its deformation is |T - 1| times the displacement of the base. An error dT causes the
+relative error dK/K = -dT/(T (T - 1)): K is accurate for large |T - 1|, from somewhat below the resonance upwards, and
+inaccurate below.
 """
 
 from collections.abc import Callable
@@ -16,11 +17,11 @@ from bushfit.reading.measurement import Complex, Floats, Sweep
 from bushfit.reading.resonance import ResonanceTest
 from bushfit.reading.stiffness import LEAST_LOSS_FACTOR
 
-#: Points that a test is thinned to; chosen: some twenty lie within the resonance, and a fit has no use for more.
+#: Largest number of points of a reduced test; chosen: some twenty are within the resonance, and a fit needs no more.
 MOST_POINTS = 100
-#: Relative standard error of K beyond which a point is left out; chosen: it tells no fit anything.
+#: Relative standard error of K above which a point is omitted; chosen: such a point has no weight in a fit.
 LARGEST_ERROR = 0.2
-#: Share of the information in a test that has to lie on one side of zero loss, for the sign of the phases to show.
+#: Smallest share of the information in a test on one side of zero loss that determines the sign of the phases.
 _CLEAR_SHARE = 0.8
 #: Median of the magnitude of complex scatter over the standard deviation of its parts, sqrt(2 ln 2).
 _MEDIAN_TO_SIGMA = 1.1774100225154747
@@ -28,17 +29,18 @@ _MEDIAN_TO_SIGMA = 1.1774100225154747
 
 @dataclass(frozen=True, eq=False)
 class Resonance:
-    """Points of a reduced resonance test, each with the amplitude that it reached and its standard error.
+    """Stiffness of a mount at the k points of a reduced resonance test, with the amplitude reached and standard errors.
 
     Args:
-        mass: that moves on the mount [kg].
-        turned: whether the test counts phases the other way (loss is positive here).
-        frequency: [Hz], (k,).
-        amplitude: of the mount's deformation, zero-to-peak [m], (k,).
-        stiffness: complex [N/m], (k,).
-        relative_error: standard deviation of the real and of the imaginary part of K, relative to |K|, (k,).
-        rows: number of rows that each point is the mean of, (k,).
-        left_out: frequencies of points whose error is beyond LARGEST_ERROR [Hz], (j,).
+        test: measured resonance test.
+        mass: moving mass on the mount [kg].
+        turned: True if the file has the opposite sign of the phases; the stiffness here has positive loss.
+        frequency: frequency of each point [Hz], (k,).
+        amplitude: zero-to-peak deformation of the mount [m], (k,).
+        stiffness: complex stiffness of the mount [N/m], (k,).
+        relative_error: standard error of the real and of the imaginary part of K, relative to |K|, (k,).
+        rows: number of measured rows averaged in each point, (k,).
+        left_out: frequencies of the omitted points, whose error exceeds LARGEST_ERROR [Hz], (j,).
     """
 
     test: ResonanceTest
@@ -53,25 +55,25 @@ class Resonance:
 
     @property
     def peak(self) -> tuple[float, float]:
-        """Frequency of the largest transmissibility [Hz], and this |T|."""
+        """Frequency of the largest measured transmissibility [Hz], and its magnitude |T| [-]."""
         index = int(np.argmax(np.abs(self.test.transmissibility)))
         return float(self.test.frequency[index]), float(abs(self.test.transmissibility[index]))
 
     @property
     def transmissibility(self) -> Complex:
-        """Complex T of each point [-], (k,), with loss that lags behind."""
+        """Complex transmissibility of each point [-], (k,), with the sign convention of positive loss."""
         return transmissibility(self.stiffness, self.mass, self.frequency)
 
     @property
     def sweep(self) -> Sweep:
-        """The points as a sweep in which neither frequency nor amplitude is held."""
+        """Points as a sweep for the fit, in which neither frequency nor amplitude is constant."""
         test, error = self.test, self.relative_error
         points = self.frequency, self.amplitude, self.stiffness
         return Sweep(test.name, test.direction, *points, source=test.source, stepped=None, relative_error=error)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on points left out, the sign of the phases, and a resonance that was not reached."""
+        """Sentences on omitted points, the sign of the phases, and a resonance that the test did not reach."""
         sentences = []
         omitted, total = self.left_out, self.left_out.size + self.frequency.size
         if omitted.size:
@@ -93,15 +95,15 @@ class Resonance:
 
 
 def transmissibility(stiffness: Complex, mass: float, frequency: Floats) -> Complex:
-    """Complex transmissibility of a mass on a mount, T = K/(K - M omega^2).
+    """Compute the complex transmissibility of a mass on a mount, T = K/(K - M omega^2).
 
     Args:
-        stiffness: complex K of the mount [N/m], (n,).
-        mass: M [kg].
-        frequency: [Hz], (n,).
+        stiffness: complex stiffness K of the mount [N/m], (n,).
+        mass: moving mass M on the mount [kg].
+        frequency: frequency of each point [Hz], (n,).
 
     Returns:
-        Motion of the mass over that of the base [-], (n,).
+        Motion of the mass over motion of the base [-], (n,).
     """
     return stiffness / (stiffness - mass * (2.0 * np.pi * frequency) ** 2)
 
@@ -109,20 +111,21 @@ def transmissibility(stiffness: Complex, mass: float, frequency: Floats) -> Comp
 def response(
     stiffness: Callable[[Floats], Complex], mass: float, frequency: Floats, base_amplitude: Floats
 ) -> tuple[Floats, Complex]:
-    """Response of a mass on a mount whose stiffness depends on its amplitude X.
+    """Compute the response of a mass on a mount whose stiffness depends on the amplitude X of its deformation.
 
     Args:
-        stiffness: complex K [N/m], (n,), at the frequencies for zero-to-peak amplitudes of the mount [m], (n,).
-        mass: that moves on the mount [kg].
-        frequency: [Hz], (n,).
-        base_amplitude: displacement of the base, zero-to-peak [m], (n,).
+        stiffness: function that returns the complex stiffness at the frequencies [N/m], (n,), for zero-to-peak
+            amplitudes of the mount's deformation [m], (n,).
+        mass: moving mass on the mount [kg].
+        frequency: frequency of each point [Hz], (n,).
+        base_amplitude: zero-to-peak displacement of the base [m], (n,).
 
     Returns:
-        Amplitude X [m] and complex transmissibility [-], (n,) each.
+        Zero-to-peak deformation X of the mount [m] and complex transmissibility [-], (n,) each.
 
     Notes:
-        Solves X = |T(K(X)) - 1| X_base by halving an interval of ln X. If several X are solutions, as with
-        two branches of a softening resonance, the result is one of them.
+        Solves X = |T(K(X)) - 1| X_base by bisection of ln X. If several X are solutions, as in a softening resonance
+        with two branches, the result is one of them.
     """
     inertia = mass * (2.0 * np.pi * frequency) ** 2
 
@@ -143,25 +146,25 @@ def response(
 
 
 def reduce_resonance(test: ResonanceTest, mass: float) -> Resonance:
-    """Reduce a resonance test to stiffness over frequency and the amplitude reached.
+    """Reduce a resonance test to the complex stiffness of the mount over frequency and the amplitude reached.
 
     Args:
-        test: at least a dozen rows.
-        mass: that moves on the mount [kg].
+        test: transmissibility over frequency, at least a dozen rows.
+        mass: moving mass on the mount [kg].
 
     Returns:
-        Points with their standard errors.
+        Stiffness at the points of the test, with standard errors.
 
     Raises:
-        MeasurementError: phases that show no loss of either sign, a storage stiffness below zero, or no point with an
-            error within LARGEST_ERROR.
+        MeasurementError: the phases show no loss of either sign, the storage stiffness is negative, or every point has
+            an error above LARGEST_ERROR.
 
     Notes:
         Neighbouring rows are averaged to MOST_POINTS points by their flexibility 1/K = (1 - 1/T)/(M omega^2), to which
         an error of T contributes independently of |T - 1|. The relative standard error of T is the scatter of these
         points about a smooth curve (`transmissibility_scatter`), which includes errors common to neighbouring rows. It
-        includes an error common to all points, such as the gain of an accelerometer, only where no smooth stiffness
-        explains it, and never that of a wrong mass.
+        excludes errors common to all points that a smooth stiffness can explain, such as the gain of an accelerometer
+        or a wrong mass.
     """
     turned = counts_phases_backwards(test)
     ratio = np.conj(test.transmissibility) if turned else test.transmissibility
@@ -204,14 +207,14 @@ def reduce_resonance(test: ResonanceTest, mass: float) -> Resonance:
 
 
 def counts_phases_backwards(test: ResonanceTest) -> bool:
-    """Return True if the phases count the other way: with them, the loss is below zero.
+    """Return True if the phases of a resonance test have the opposite sign, so that the loss stiffness is negative.
 
     Raises:
-        MeasurementError: phases that show no loss of either sign, or a storage stiffness below zero.
+        MeasurementError: the phases show no loss of either sign, or the storage stiffness is negative.
 
     Notes:
-        Rows have the weight (ln |T|)^2: most at the resonance and far above it, where they determine K well, and the
-        same if base and mass are swapped, which then shows as a stiffness below zero.
+        Rows have the weight (ln |T|)^2, which is largest at the resonance and far above it, where they determine K
+        well. The weight is the same if base and mass are swapped; the storage stiffness is then negative.
     """
     ratio = test.transmissibility
     flexibility = (1.0 - 1.0 / ratio) / test.frequency**2
@@ -241,21 +244,21 @@ def counts_phases_backwards(test: ResonanceTest) -> bool:
 
 
 def transmissibility_scatter(frequency: Floats, amplitude: Floats, ratio: Complex) -> Floats:
-    """Standard deviation of the relative error of the transmissibility at each point, by the points around it.
+    """Estimate the relative error of the transmissibility at each point from the scatter of the points around it.
 
     Args:
-        frequency: [Hz], (k,).
-        amplitude: of the mount's deformation [m], (k,).
-        ratio: complex transmissibility T, (k,).
+        frequency: frequency of each point [Hz], (k,).
+        amplitude: zero-to-peak deformation of the mount [m], (k,).
+        ratio: complex transmissibility T [-], (k,).
 
     Returns:
         Standard deviation of the real and of the imaginary part of dT/T, (k,).
 
     Notes:
-        1/T = 1 - M omega^2/K is linear in the flexibility 1/K. That is fitted over all points by a function linear in
-        ln f and quadratic in ln X, by least squares of dT/T with Huber's weights (a point pulls less from two standard
-        deviations on); the scatter is the median of |dT/T| about it over the nearest 15 points. A true
-        stiffness that bends more adds to the scatter.
+        1/T = 1 - M omega^2/K is linear in the flexibility 1/K. The flexibility of all points is fitted by a function
+        linear in ln f and quadratic in ln X, by least squares of dT/T with Huber's weights (less weight beyond two
+        standard deviations). The scatter is the median of |dT/T| about this function over the nearest 15 points. A
+        stiffness with more curvature increases the estimate.
     """
     logs = [np.log(values) - np.mean(np.log(values)) for values in (frequency, amplitude)]
     terms = np.stack([np.ones_like(frequency), *logs, logs[1] ** 2], axis=1)

@@ -11,16 +11,16 @@ from typing_extensions import Doc, TypedDict
 from bushfit.geometry import Place
 from bushfit.units import display_unit, number
 
-#: Relative distance of an amplitude from its level that is told; chosen: |K| may then be 1 % off.
+#: Relative distance of an amplitude from its level above which a warning is due; chosen: |K| may then be 1 % off.
 MISSED_LEVEL = 0.03
-#: Rows a cycle below which a warning is due; chosen: that many tell overtones up to the sixth apart.
+#: Rows per cycle below which a warning is due; chosen: 12 rows separate overtones up to the sixth.
 _FEW_ROWS_PER_CYCLE = 12
-#: Stretches without a point that are told one by one; chosen: about as many lines as a screen has room for.
+#: Largest number of stretches without a point that are listed one by one; chosen: a screen has room for as many lines.
 _MOST_LISTED = 5
 
 
 class ReductionDocument(TypedDict, total=False):
-    """A sweep that histories or a resonance test were reduced to."""
+    """JSON document of a sweep obtained by reduction of raw histories or of a resonance test."""
 
     direction: Annotated[str, Doc("what was tested: one of the two.")]
     specimen: Annotated[str, Doc("what was tested: one of the two.")]
@@ -34,21 +34,23 @@ class ReductionDocument(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """The operating point that the steady cycles of one step of a history give.
+    """Operating point computed from the steady cycles of one step (constant frequency and amplitude) of a history.
 
     Args:
-        start, end: of the cycles used [s].
-        cycles, found: whole cycles used, and of the whole step.
+        name: name of the history.
+        start, end: time of the first and the last used cycle's outer limit [s].
+        cycles, found: number of whole cycles used, and of the whole step.
         rows_per_cycle: mean number of rows in a cycle.
-        frequency: fundamental [Hz].
-        amplitude: of the displacement's fundamental, zero-to-peak, as really reached [m or rad].
-        stiffness: complex K = F1/X1 [N/m or N m/rad].
+        frequency: fundamental frequency [Hz].
+        amplitude: zero-to-peak amplitude of the displacement's fundamental, as reached by the rig [m or rad].
+        stiffness: complex stiffness K = F1/X1 of the fundamentals [N/m or N m/rad].
         gain_error: standard error of |K|, relative to |K|.
         phase_error: standard error of the phase of K [rad].
         displacement_distortion, force_distortion: total harmonic distortion, relative to the fundamental.
-        nominal_frequency, level: frequency [Hz] and amplitude [m or rad] of the group of steps that it belongs to.
-        repeat: number of this step among those at the same nominal frequency and level, from 1.
-        mean_displacement, mean_force: that the step was recorded about [m or rad, N or N m].
+        nominal_frequency, level: common frequency [Hz] and amplitude [m or rad] of the group of steps to which this
+            step belongs.
+        repeat: number of this step among the steps at the same nominal frequency and level, from 1.
+        mean_displacement, mean_force: mean values during the step [m or rad, N or N m].
     """
 
     name: str
@@ -72,19 +74,19 @@ class Step:
 
     @property
     def loss_factor(self) -> float:
-        """Loss over storage stiffness."""
+        """Loss factor K''/K' [1]."""
         return self.stiffness.imag / self.stiffness.real
 
 
 @dataclass(frozen=True, eq=False)
 class SkippedStretch:
-    """A stretch of a history that gives no operating point.
+    """Stretch of a history that gives no operating point.
 
     Args:
-        name: of the history.
-        start, end: of the stretch [s].
-        why: reason.
-        steady: True if it has enough cycles for a step, and is no ramp or pause.
+        name: name of the history.
+        start, end: beginning and end of the stretch [s].
+        why: reason, as a phrase.
+        steady: True if the stretch has enough cycles for a step.
     """
 
     name: str
@@ -96,12 +98,13 @@ class SkippedStretch:
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """Operating points of histories of one direction.
+    """Operating points obtained from the raw histories of one direction.
 
     Args:
-        steps: in the order of the histories and of time.
-        skipped: stretches that make no step.
-        outliers: number of rows that were left out as outliers.
+        direction: direction or specimen.
+        steps: operating points in the order of the histories and of time.
+        skipped: stretches of the histories without an operating point.
+        outliers: number of rows omitted as outliers.
     """
 
     direction: Place
@@ -111,7 +114,7 @@ class Reduction:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on outliers, means, missed levels, sampling, distortion, and stretches that make no point."""
+        """Sentences on outliers, means, missed levels, sampling, distortion, and stretches without a point."""
         steps, sentences = self.steps, list[str]()
         unit, factor = self.direction.display.displacement
         if self.outliers:
@@ -161,14 +164,14 @@ class Reduction:
 
 
 def preload_warnings(steps: Sequence[Step], direction: Place) -> list[str]:
-    """A sentence on the means that the steps were recorded about, unless they are a sensor's zero.
+    """Write a warning on a preload: a mean displacement or force too large to be the zero offset of a sensor.
 
     Args:
-        steps: of one direction.
-        direction: of the steps.
+        steps: operating points of one direction.
+        direction: direction or specimen of the steps.
 
     Returns:
-        At most one sentence.
+        One sentence, or an empty list without a preload.
     """
     (motion, force, _), units = direction.motion.words, direction.display
     means = []

@@ -1,7 +1,7 @@
 """Operating points from raw stepped-sine histories: the steps are found, and each gives a complex stiffness.
 
-A history is cut into cycles at the upward crossings of its displacement. Cycles that agree make a step, and a step is
-evaluated by one least-squares fit to all of its steady cycles.
+A history is cut into cycles at the upward crossings of its displacement. Consecutive cycles of equal frequency and
+amplitude form a step, and a step is evaluated by one least-squares fit to all of its steady cycles.
 """
 
 from collections import defaultdict
@@ -20,17 +20,17 @@ from bushfit.reduction.cycles import Cycles, keeps_changing, lone_outliers, mean
 from bushfit.reduction.harmonics import HarmonicFit
 from bushfit.reduction.result import Reduction, SkippedStretch, Step
 
-#: Rows a cycle that make a point; chosen: drift and fundamental have five unknowns.
+#: Smallest number of rows per cycle for an operating point; chosen: drift and fundamental have five unknowns.
 _FEWEST_ROWS_PER_CYCLE = 5.0
-#: Relative difference up to which two frequencies are one; chosen: rigs keep theirs far better, and grids are coarser.
+#: Largest relative difference of equal frequencies; chosen: rigs are far more accurate, and frequency steps larger.
 _SAME_FREQUENCY = 2e-3
-#: Relative change or difference up to which a frequency may be one at which a controller settles.
+#: Largest relative change of the frequency in a step, or difference from a step in which the controller settles.
 _SETTLING_FREQUENCY = 0.01
-#: [ln of an amplitude] Gap from which amplitudes are levels of their own; chosen: rigs miss a level by less.
+#: [ln of an amplitude] Smallest gap between two levels; chosen: rigs miss a level by less.
 _LEVEL_GAP = 0.1
-#: Relative distance up to which a step belongs to a level that is stated; chosen: rigs miss a level by less.
+#: Largest relative distance of a step from its stated level; chosen: rigs miss a level by less.
 _LEVEL_REACH = 0.3
-#: Why a stretch makes no point whose frequency or amplitude is not steady.
+#: Reason why a stretch whose frequency or amplitude is not steady gives no point.
 _CHANGING = "its frequency or amplitude keeps changing"
 
 
@@ -38,15 +38,15 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
     """Find the steps of raw histories and reduce each to one operating point.
 
     Args:
-        histories: time, displacement and force, of one direction; steps may be joined by ramps and pauses.
-        fewest_cycles: steady cycles that make a point.
-        levels: amplitudes the test was meant to have [m or rad]; without them, close amplitudes make a level.
+        histories: records of time, displacement and force of one direction, with ramps and pauses between the steps.
+        fewest_cycles: smallest number of steady cycles for an operating point.
+        levels: set amplitudes of the test, zero-to-peak [m or rad]; if empty, close amplitudes form a level.
 
     Returns:
-        Operating points, stretches without one, and the number of outliers.
+        Operating points, stretches without an operating point, and the number of outliers.
 
     Raises:
-        MeasurementError: no steady sine in any of them, or one far off every level.
+        MeasurementError: no history has a steady sine, or the amplitude of a step is far from every level.
     """
     outliers, steps, skipped = 0, list[Step](), list[SkippedStretch]()
     for history in track("histories reduced", histories):
@@ -69,13 +69,13 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
 
 
 def steady_sines(history: Loop) -> list[tuple[float, float, int]]:
-    """Steady stretches of a history.
+    """Find the steady stretches of a history, for a quick look at an unknown record.
 
     Args:
-        history: time, displacement and force.
+        history: record of time, displacement and force.
 
     Returns:
-        Frequency [Hz], rough amplitude [m or rad] and number of cycles of each.
+        Frequency [Hz], approximate zero-to-peak amplitude [m or rad] and number of cycles of each stretch.
     """
     cycles = Cycles.count(history.time, history.displacement)
     found = []
@@ -91,14 +91,14 @@ def steady_sines(history: Loop) -> list[tuple[float, float, int]]:
 
 
 def find_steps(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStretch]]:
-    """Find the steps of a history.
+    """Find the steps of a history and compute their operating points.
 
     Args:
-        history: time, displacement and force, without outliers.
-        fewest: steady cycles that make a point.
+        history: record of time, displacement and force, without outliers.
+        fewest: smallest number of steady cycles for an operating point.
 
     Returns:
-        Operating points, and the stretches that give none.
+        Operating points, and the stretches without an operating point.
     """
     found: list[tuple[float, float, Step]] = []
     skipped: list[SkippedStretch] = []
@@ -130,16 +130,16 @@ def find_steps(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStre
 
 
 def join_broken_steps(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
-    """Join the parts of broken steps: the longest part remains.
+    """Merge steps that are parts of one interrupted step: the longest part remains.
 
-    An outlier or a creeping amplitude breaks a step: its sine goes on in phase after a cycle or two. The frequencies of
-    the parts may differ by more if one of them is brief.
+    An outlier or a creeping amplitude splits a step; its sine resumes in phase after a cycle or two. The frequencies of
+    the parts may differ by up to 1 % if one part is much shorter, else by 0.2 %.
 
     Args:
-        found: beginning and end of the cycles [s] of each step, and the step, in order.
+        found: beginning [s] and end [s] of the cycles of each step, and the step, in order of time.
 
     Returns:
-        Steps in order.
+        Steps in order of time.
     """
     joined: list[Step] = []
     last_end = -np.inf
@@ -159,9 +159,9 @@ def join_broken_steps(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
 
 
 def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: Complex, fewest: int) -> Step | None:
-    """Operating point of one piece of the cycles, without its transient; None if it is not steady.
+    """Compute the operating point of the cycles `inside`, without their transient; None if they are not steady.
 
-    Motion and force are the complex fundamental in each cycle of the piece [m or rad, N or N m], (k,).
+    Motion and force are the complex fundamentals of each of these cycles [m or rad, N or N m], (k,).
     """
     steady = mean_from_steady(motion, force / motion, fewest)
     used = slice(inside.start + steady.start, inside.start + steady.stop)
@@ -197,7 +197,7 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
 
 
 def _creeps(values: Floats, smallest: float) -> bool:
-    """Return True if values, (n,), change steadily from first to last, by more than `smallest` and their scatter."""
+    """Return True if values, (n,), have a linear trend larger than `smallest` in total and than their scatter."""
     if values.size < 3:
         return False
     number = np.arange(values.size) - (values.size - 1) / 2.0
@@ -209,18 +209,18 @@ def _creeps(values: Floats, smallest: float) -> bool:
 
 
 def group_steps(steps: Sequence[Step], levels: Sequence[float], direction: Place) -> list[Step]:
-    """Group steps by frequency and amplitude.
+    """Group steps by frequency and amplitude, and number the repeats in each group.
 
     Args:
-        steps: of one direction.
-        levels: amplitudes the test was meant to have [m or rad]; without them, close amplitudes make a level.
-        direction: of the steps.
+        steps: operating points of one direction.
+        levels: set amplitudes of the test, zero-to-peak [m or rad]; if empty, close amplitudes form a level.
+        direction: direction or specimen of the steps.
 
     Returns:
         The steps with their nominal frequency, level and repeat.
 
     Raises:
-        MeasurementError: a step is far off every level that is stated.
+        MeasurementError: the amplitude of a step is far from every stated level.
     """
     frequency, amplitude = np.array([(step.frequency, step.amplitude) for step in steps]).T
     groups = _clusters(np.log(frequency), _SAME_FREQUENCY)
@@ -250,6 +250,6 @@ def group_steps(steps: Sequence[Step], levels: Sequence[float], direction: Place
 
 
 def _clusters(values: Floats, gap: float) -> NDArray[np.intp]:
-    """Group numbers of values, (n,): sorted neighbours more than `gap` apart are in different groups."""
+    """Group index of each value, (n,): sorted neighbours more than `gap` apart are in different groups."""
     order = np.argsort(values)
     return np.concatenate(([0], np.cumsum(np.diff(values[order]) > gap)))[np.argsort(order)]

@@ -8,36 +8,36 @@ from numpy.typing import NDArray
 from bushfit.reading.measurement import Floats
 from bushfit.reduction.arrays import MEDIAN_TO_SIGMA
 
-#: Rows of an array.
+#: Array of row indices.
 Integers = NDArray[np.intp]
 
-#: Share of a record's range below which strokes may be a ripple; chosen: rigs miss their own amplitude by more.
+#: Stroke relative to the record's range below which strokes may be a ripple; chosen: rigs miss amplitudes by more.
 _RIPPLE = 0.02
-#: Share of a half cycle that a motion dwells at one value if small strokes are a test; chosen: above that of a sine.
+#: Smallest share of a half cycle spent at one value if small strokes there are a test; chosen: larger than for a sine.
 _DWELL = 0.3
-#: [ln] Difference of stroke and of duration up to which a half cycle comes again a cycle later.
+#: [ln] Largest difference of stroke and of duration between a half cycle and its repetition a cycle later.
 _SAME_HALF_CYCLE = 0.1
-#: Durations of its neighbours from which on a half cycle is a pause; chosen: saws are more even.
+#: Duration of a pause over the duration of the neighbouring half cycles, at least; chosen: sawtooth waves are more even.
 _PAUSE = 2.5
 
 
 def reversals(values: Floats, rows: Integers) -> Integers:
-    """Select the rows, of increasing numbers, at which the values change direction, ends included."""
+    """Select those of the given rows (increasing indices) at which the values change direction, and both ends."""
     direction = np.sign(np.diff(values[rows]))
     inner = 1 + np.flatnonzero(direction[1:] != direction[:-1])
     return np.concatenate((rows[:1], rows[inner], rows[1:][-1:]))
 
 
 def prominent_turns(values: Floats, turns: Integers, prominence: float) -> Integers:
-    """The subset of turning points that stand out by `prominence` or more, highs and lows in turn.
+    """Select the turning points that differ from their neighbours by `prominence` or more.
 
     Args:
-        values: of a channel, (n,).
-        turns: rows of turning points, highs and lows in turn, (turns,).
+        values: values of a channel, (n,).
+        turns: row indices of turning points, maxima and minima in turn, (turns,).
         prominence: smallest difference between neighbouring turning points, in the unit of the values.
 
     Returns:
-        Row numbers, (fewer turns,).
+        Row indices of the selected turning points, maxima and minima in turn.
 
     Notes:
         Neighbouring turning points less than `prominence` apart are removed in pairs, the closest first, many pairs at
@@ -64,24 +64,26 @@ def prominent_turns(values: Floats, turns: Integers, prominence: float) -> Integ
 
 
 def motion_turns(time: Floats, motion: Floats) -> tuple[Integers, float]:
-    """Find the turning points of a motion, without those of a ripple on it: hum, a hunting servo, a flickering sensor.
+    """Find the turning points of a motion, without those of noise and of a ripple: hum, servo hunting, sensor flicker.
 
     Args:
-        time: of each row [s], or row numbers, (n,).
+        time: time of each row [s], or row numbers, (n,).
         motion: displacement [m or rad], (n,).
 
     Returns:
-        Rows of the turning points, (turns,), increasing, highs and lows in turn, ends included; and the smallest stroke
-        that is not noise [m or rad].
+        Row indices of the turning points, (turns,), increasing, maxima and minima in turn, both ends included; and the
+        smallest stroke that is not noise [m or rad].
 
     Notes:
-        Strokes below 2 % of the record's range are candidates: rigs miss their own amplitude by more. A record may well
-        hold a test of so small an amplitude besides larger ones, or about a preload. Such a test has its time for
-        itself; a ripple shares it with a larger motion. The half cycles of the larger motion, from one crossing of its
-        middle to the next, therefore decide. Where they come again a cycle later, the larger motion is the test. Else
-        small strokes are a ripple unless the motion dwells at one value for a good part of the half cycle (a sine is
-        within 2 % of its range of a peak for 18 % of the time). Where a half cycle is much longer than its neighbours,
-        it is a pause of the larger motion, and something else is tested meanwhile.
+        Strokes below 2 % of the record's range may be a ripple: rigs miss their own amplitude by more. They may also be
+        a test of small amplitude in a record with larger amplitudes or with a preload. A test of small amplitude is
+        separate in time from larger motions, whereas a ripple coincides with one. Therefore each half cycle of the
+        larger motion, from one crossing of its middle to the next, is classified:
+
+        - If the half cycle recurs a cycle later, the larger motion is the test, and small strokes are a ripple.
+        - Otherwise small strokes are a ripple unless the motion stays near one value for 30 % of the half cycle. A sine
+          is within 2 % of its range of a peak for 18 % of the time.
+        - If the half cycle is much longer than its neighbours, the larger motion pauses, and small strokes are a test.
     """
     prominence = least_prominence(motion)
     moving = np.concatenate(([0], 1 + np.flatnonzero(np.diff(motion) != 0.0)))
@@ -109,9 +111,9 @@ def motion_turns(time: Floats, motion: Floats) -> tuple[Integers, float]:
 
 
 def stroke_middles(height: Floats) -> Floats:
-    """Middle of each stroke between turning points of these heights, (turns,): (turns - 1,).
+    """Mean displacement of each stroke, (turns - 1,), between turning points at displacements `height`, (turns,).
 
-    The record cuts the first and the last stroke short: their middles continue those of the others.
+    The first and the last stroke may be incomplete: their values are extrapolated from their neighbours.
     """
     middle = (height[1:] + height[:-1]) / 2.0
     if middle.size > 4:
@@ -120,16 +122,16 @@ def stroke_middles(height: Floats) -> Floats:
 
 
 def middle_crossings(time: Floats, motion: Floats, turns: Integers, middle: Floats) -> Floats:
-    """Time at which each stroke, from one turning point to the next, crosses its middle.
+    """Interpolate the time at which each stroke, from one turning point to the next, crosses its middle.
 
     Args:
-        time: of each row [s], (n,).
-        motion: [m or rad], (n,).
-        turns: rows of the turning points, (strokes + 1,).
-        middle: of each stroke [m or rad], (strokes,).
+        time: time of each row [s], (n,).
+        motion: displacement [m or rad], (n,).
+        turns: row indices of the turning points, (strokes + 1,).
+        middle: displacement in the middle of each stroke [m or rad], (strokes,).
 
     Returns:
-        Times [s], (strokes,).
+        Times of the crossings [s], (strokes,).
     """
     sense, length = np.sign(np.diff(motion[turns])), np.diff(turns)
     strokes = motion[turns[0] : turns[-1]]
@@ -142,17 +144,17 @@ def middle_crossings(time: Floats, motion: Floats, turns: Integers, middle: Floa
 
 
 def least_prominence(values: Floats) -> float:
-    """Smallest prominence of a turning point that is no noise.
+    """Estimate the smallest difference between neighbouring turning points that is not noise.
 
     Args:
-        values: of a channel, (n,).
+        values: values of a channel, (n,).
 
     Returns:
-        Prominence in the unit of the values.
+        Smallest difference, in the unit of the values.
 
     Notes:
         The largest of 0.1 % of the range, ten standard deviations of the noise (whose extremes in 10^6 rows are half
-        that), and four steps of the analogue-to-digital converter. The noise is estimated from sixth differences in
+        as large), and four steps of the analogue-to-digital converter. The noise is estimated from sixth differences in
         the windows with the least motion; a sine of ten rows per cycle contributes 0.2 % of its amplitude to them.
     """
     change = np.abs(np.diff(values))
