@@ -293,7 +293,7 @@ def mean_from_steady(motion: Complex, stiffness: Complex, fewest: int) -> slice:
 
 
 def _truncation(series: Complex, most_cut: int) -> int:
-    """Number of entries, at most `most_cut`, to cut at the start of k series, (k, m), for the least error of the mean."""
+    """Number of entries, at most `most_cut`, to cut at the start of k series, (k, m), for the least error of means."""
     if most_cut < 1:
         return 0
     back = (series - series.mean(axis=1, keepdims=True))[:, ::-1]

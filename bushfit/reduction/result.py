@@ -38,7 +38,7 @@ class Step:
 
     Args:
         name: name of the history.
-        start, end: time of the first and the last used cycle's outer limit [s].
+        start, end: beginning and end of the used cycles [s].
         cycles, found: number of whole cycles used, and of the whole step.
         rows_per_cycle: mean number of rows in a cycle.
         frequency: fundamental frequency [Hz].

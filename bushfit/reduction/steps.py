@@ -69,7 +69,7 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
 
 
 def steady_sines(history: Loop) -> list[tuple[float, float, int]]:
-    """Find the steady stretches of a history, for a quick look at an unknown record.
+    """Find the steady stretches of a history, without computing operating points.
 
     Args:
         history: record of time, displacement and force.

@@ -17,7 +17,7 @@ _RIPPLE = 0.02
 _DWELL = 0.3
 #: [ln] Largest difference of stroke and of duration between a half cycle and its repetition a cycle later.
 _SAME_HALF_CYCLE = 0.1
-#: Duration of a pause over the duration of the neighbouring half cycles, at least; chosen: sawtooth waves are more even.
+#: Smallest duration of a pause over that of the neighbouring half cycles; chosen: sawtooth waves are more even.
 _PAUSE = 2.5
 
 
