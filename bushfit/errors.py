@@ -54,7 +54,7 @@ class BushfitError(Exception):
         return "\n".join(label + printable(text) for label, text in lines if text)
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Recipe for pickle, because errors are passed between the processes of a batch."""
+        """Return a constructor call for pickle, because the processes of a batch pass errors to one another."""
         state = {key: getattr(self, key) for key in ("file", "place", "found", "expected", "hint")}
         return partial(type(self), self.problem, **state), ()
 
@@ -75,28 +75,28 @@ def error_location(file: Path | None = None, place: str | None = None) -> Iterat
 
 
 def did_you_mean(name: str, candidates: Collection[str], *, similarity: float = 0.6) -> str | None:
-    """Hint that suggests the most similar name.
+    """Return a hint that suggests the known name most similar to a mistyped one.
 
     Args:
         name: unknown name.
         candidates: known names.
-        similarity: least ratio of `difflib.SequenceMatcher`, between 0 and 1.
+        similarity: minimum ratio of `difflib.SequenceMatcher`, between 0 and 1.
 
     Returns:
-        The hint, or None if no candidate is similar enough.
+        Text such as 'did you mean "axial"?', or None if no candidate is similar enough.
     """
     near = get_close_matches(name, [candidate for candidate in candidates if candidate != name], n=1, cutoff=similarity)
     return f'did you mean "{near[0]}"?' if near else None
 
 
 def printable(text: str, *, lines: bool = False) -> str:
-    """Text with control characters replaced by escape sequences.
+    """Replace the control characters of a text by escape sequences.
 
     Every text from a measurement or campaign file passes through this function before it is printed or put on a page.
 
     Args:
         text: any text.
-        lines: keep line breaks.
+        lines: True to keep line breaks.
     """
     if lines:
         return "\n".join(map(printable, text.split("\n")))
@@ -116,11 +116,11 @@ class MeasurementError(BushfitError):
 
 
 class NoTestError(MeasurementError):
-    """A table without a test."""
+    """A table that contains neither a loop nor a sweep."""
 
 
 class NoColumnError(MeasurementError):
-    """A table without a column of the header that was given."""
+    """A table that lacks the column header that the user stated."""
 
 
 class ModelError(BushfitError):
@@ -140,5 +140,5 @@ class BatchError(BushfitError):
 
 
 def quote_path(path: Path) -> str:
-    """A path as it is typed in a terminal, in quotes if it contains characters that a shell would interpret."""
+    """Return a path as it is typed in a terminal: in quotes if it contains characters that a shell would interpret."""
     return f'"{path}"' if _SHELL_CHARACTERS.search(str(path)) else str(path)

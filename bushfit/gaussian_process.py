@@ -1,7 +1,7 @@
 """Gaussian processes over frequency, strain and temperature: kernel, patterns, restricted likelihood, conditioning.
 
-The one place for smooth functions of no particular form: the discrepancy of a model from its tests, in the fit and in
-the diagnosis, and the correction that a model carries.
+A Gaussian process (here: process) represents a smooth function without a particular formula: the discrepancy between a
+model and its tests, in the fit and in the diagnosis, and the correction that a model file may contain.
 
 Notes:
     Kernel and conditioning: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, Eqs. 2.25, 2.26 and
@@ -18,52 +18,54 @@ from scipy.special import logsumexp
 
 Array = NDArray[Any]
 
-#: Variance, relative to the kernel's, that keeps its matrix invertible; far below what tests show.
+#: Variance added to the diagonal of the correlation matrix to keep it invertible; far below the scatter of tests.
 _JITTER = 1e-8
-#: Nodes at most; chosen: all points of the paper's plan, and little time.
+#: Maximum number of nodes; chosen: all points of the paper's test plan, and little computing time.
 MAXIMUM_NODES = 100
-#: Patterns at most, and the variance of one, relative to the largest, that counts; chosen for time.
+#: Maximum number of patterns, and minimum variance of a pattern relative to the largest; chosen for computing time.
 _MAXIMUM_PATTERNS, _MINIMUM_VARIANCE = 60, 1e-5
-#: Digits of coordinates, in lengths, that tell points apart; of more points than the number given, two: their
-#: correlation is then still known within 1e-4.
+#: Decimals of the coordinates, in correlation lengths, by which points are distinguished; only two if there are more
+#: than `_MANY` points, which changes their correlation by less than 1e-4.
 _DIGITS, _MANY = 6, 500
-#: Change of temperature [K] that counts as a neper of frequency: near room temperature, the time scale of most rubber
-#: shifts by as much in 8 to 20 K.
+#: Change of temperature [K] equivalent to a factor e of frequency: near room temperature, 8 to 20 K shift the time
+#: scale of most rubber by that factor.
 _KELVIN = 10.0
 
 
 def coordinates(frequency: Array, strain: Array, temperature: Array | None = None) -> Array:
-    """Coordinates of operating points in which a process is stationary.
+    """Coordinates of operating points in which a Gaussian process is stationary.
 
     Args:
-        frequency: [Hz], (...).
-        strain: equivalent strain amplitude, (...).
-        temperature: [K], (...); None where the process does not depend on it.
+        frequency: frequencies [Hz], (...).
+        strain: equivalent strain amplitudes [1], (...).
+        temperature: temperatures [K], (...); None if the process does not depend on temperature.
 
     Returns:
-        ln frequency, ln strain and, if given, temperature in units that change the time scale as a neper of frequency
-        does, (..., 2 or 3).
+        ln frequency, ln strain and, if given, temperature/10 K, which shifts the time scale of rubber by about a factor
+        e per unit, (..., 2 or 3).
     """
     axes = [np.log(frequency), np.log(strain)] + ([] if temperature is None else [temperature / _KELVIN])
     return np.stack(np.broadcast_arrays(*axes), axis=-1)
 
 
 def in_lengths(points: Array, lengths: Sequence[float]) -> Array:
-    """Points divided by the correlation lengths of a process.
+    """Points divided by the correlation lengths of a Gaussian process.
 
     Args:
-        points: from `coordinates`, (..., 2 or 3).
-        lengths: in ln frequency and ln strain; temperature has that of frequency.
+        points: coordinates from `coordinates`, (..., 2 or 3).
+        lengths: correlation lengths in ln frequency and ln strain; temperature has the length of ln frequency.
 
     Returns:
-        (..., 2 or 3).
+        Dimensionless coordinates, (..., 2 or 3).
     """
     over_frequency, over_strain = lengths
     return points / (over_frequency, over_strain, over_frequency)[: points.shape[-1]]
 
 
 def matern(points: Array, nodes: Array) -> Array:
-    """Matern 5/2 correlation of points with nodes, both in units of the lengths, (..., n, d), (m, d) -> (..., n, m).
+    """Matern 5/2 correlation of points with nodes.
+
+    Both are in units of the correlation lengths: points (..., n, d), nodes (m, d) -> correlation (..., n, m).
 
     >>> matern(np.zeros((1, 2)), np.array([[0.0, 0.0], [1.0, 0.0], [9.0, 0.0]])).round(3)
     array([[1.   , 0.524, 0.   ]])
@@ -76,14 +78,15 @@ def matern(points: Array, nodes: Array) -> Array:
 
 
 def condition(points: Array, nodes: Array) -> tuple[Array, Array]:
-    """Condition a process of unit variance on its values at nodes.
+    """Condition a Gaussian process of unit variance on its values at nodes.
 
     Args:
-        points: in units of the lengths, (..., n, d).
-        nodes: in the same units, (m, d).
+        points: points in units of the correlation lengths, (..., n, d).
+        nodes: nodes in the same units, (m, d).
 
     Returns:
-        Weights of the nodes' values in the mean at each point, (..., n, m), and the variance that is left, (..., n).
+        Weights of the nodes' values in the conditional mean at each point, (..., n, m), and the conditional variance at
+        each point, (..., n).
     """
     correlation = matern(points, nodes)
     weights = correlation @ np.linalg.inv(matern(nodes, nodes) + _JITTER * np.eye(len(nodes)))
@@ -94,11 +97,11 @@ def spread_nodes(points: Array, count: int) -> Array:
     """Choose points that lie far from one another, each the farthest from those before it.
 
     Args:
-        points: (n, d).
-        count: of nodes at most; fewer where points coincide.
+        points: candidate points, (n, d).
+        count: maximum number of chosen points; fewer are chosen if points coincide.
 
     Returns:
-        Indices of the points, (m,).
+        Indices of the chosen points, (m,).
     """
     chosen, distance, axes = [0], np.full(len(points), np.inf), np.ascontiguousarray(points.T)
     while len(chosen) < count:
@@ -112,16 +115,18 @@ def spread_nodes(points: Array, count: int) -> Array:
 def patterns(
     points: Array, nodes: int = MAXIMUM_NODES, count: int = _MAXIMUM_PATTERNS, minimum: float = _MINIMUM_VARIANCE
 ) -> tuple[Array, Array]:
-    """Principal patterns of a process of unit variance: independent amounts of unit variance make the process.
+    """Principal components of a Gaussian process of unit variance.
+
+    The process at all points is approximately a sum of patterns, each times an independent standard normal number.
 
     Args:
-        points: in units of the lengths, (n, d); points that coincide share the process.
-        nodes: number of points at most that the patterns are computed from.
-        count: of patterns at most.
-        minimum: variance of a pattern, relative to the largest, below which it is left out.
+        points: points in units of the correlation lengths, (n, d); points that coincide have the same process value.
+        nodes: maximum number of points from which the patterns are computed.
+        count: maximum number of patterns.
+        minimum: variance, relative to the largest pattern's, at or below which a pattern is left out.
 
     Returns:
-        Indices of the nodes, (m,), and the patterns at all points, (q, n).
+        Indices of the nodes among the points, (m,), and the patterns at all points, (q, n).
     """
     for digits in (_DIGITS, 2):
         distinct, first, inverse = np.unique(points.round(digits), axis=0, return_index=True, return_inverse=True)
@@ -137,15 +142,15 @@ def patterns(
 
 @dataclass(frozen=True, eq=False)
 class RestrictedLikelihood:
-    """Restricted likelihood of the size of a process beside fitted parameters.
+    """Restricted likelihood of the size (standard deviation) of a Gaussian process added to a fitted model.
 
     Args:
-        values: eigenvalues of U^T P U, (q,): U are the whitened residuals that a unit of each amount makes, P projects
-            out what the parameters absorb.
-        squares: squared components b^2 of U^T P r along the eigenvectors, (q,); r are the residuals.
+        values: eigenvalues l of U^T P U, (q,). The columns of U are the whitened residuals for a unit of each pattern;
+            P projects out the changes of the residuals that the fitted parameters can absorb.
+        squares: squared components b^2 of U^T P r along the eigenvectors, (q,); r are the whitened residuals.
 
     Notes:
-        A size v adds sum(v^2 b^2/(1 + v^2 l) - ln(1 + v^2 l))/2 to the logarithm of the likelihood.
+        A size v adds sum(v^2 b^2/(1 + v^2 l) - ln(1 + v^2 l))/2 to the natural logarithm of the likelihood.
     """
 
     values: Array
@@ -153,27 +158,27 @@ class RestrictedLikelihood:
 
     @classmethod
     def from_columns(cls, columns: Array, residual: Array, span: Array) -> "RestrictedLikelihood":
-        """The likelihood of columns beside parameters.
+        """Build the likelihood from the whitened residuals of the patterns and of the fit.
 
         Args:
-            columns: whitened residuals of a unit of each amount, (q, n).
-            residual: whitened, the span already taken out, (n,).
-            span: orthonormal directions that the parameters absorb, (k, n).
+            columns: whitened residuals for a unit of each pattern, (q, n).
+            residual: whitened residuals of the fit, already projected out of the span, (n,).
+            span: orthonormal basis of the residual changes that the fitted parameters can absorb, (k, n).
         """
         absorbed = columns @ span.T
         values, vectors = np.linalg.eigh(columns @ columns.T - absorbed @ absorbed.T)
         return cls(np.maximum(values, 0.0), np.square(vectors.T @ (columns @ residual)))
 
     def gains(self, sizes: Array) -> Array:
-        """Gain of the log likelihood by each size over none, (s,) -> (s,)."""
+        """Increase of the log likelihood for each size compared with size zero, (s,) -> (s,)."""
         grown = 1.0 + np.square(sizes)[:, None] * self.values
         return 0.5 * np.sum(np.square(sizes)[:, None] * self.squares / grown - np.log(grown), axis=-1)
 
     def log_evidence(self, sizes: Array) -> float:
-        """Log of the mean likelihood over sizes, each equally probable, relative to none."""
+        """Natural log of the likelihood averaged over equally probable sizes, relative to size zero."""
         return float(logsumexp(self.gains(sizes)) - np.log(sizes.size))
 
     def freedom(self, size: float) -> float:
-        """Degrees of freedom that determine a size, at least 1."""
+        """Effective number of patterns that the data determine at a given size, at least 1."""
         share = np.square(size) * self.values / (1.0 + np.square(size) * self.values)
         return max(float(np.sum(np.square(share))), 1.0)

@@ -25,9 +25,9 @@ def track(description: str, items: Iterable[Item], total: int = 0, remark: Calla
     """Iterate over items and report the progress to the listener.
 
     Args:
-        description: of the work, such as "loops simulated".
-        items: to iterate over.
-        total: number of items, if they have no length.
+        description: name of the work, such as "loops simulated".
+        items: items to iterate over.
+        total: number of items if they have no length, such as a generator.
         remark: called after each item; returns a short text about the state of the work.
 
     Yields:

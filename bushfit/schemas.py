@@ -1,7 +1,7 @@
 """JSON Schemas (draft 2020-12) of the JSON files that bushfit writes, and of the TOML files that it is given.
 
-They are made on demand of the types by which these files are read and written, descriptions from what these say of
-their keys: in the docstring of a dataclass, beside each key of a TypedDict. So none can be out of date.
+Each schema is generated on demand from the type that reads or writes the file. The descriptions of keys come from the
+docstring of a dataclass, or from the annotation of each key of a TypedDict, so a schema cannot be out of date.
 """
 
 import importlib
@@ -20,13 +20,13 @@ from bushfit.errors import BushfitError, did_you_mean
 
 @dataclass(frozen=True)
 class Described:
-    """Files that a schema describes.
+    """A kind of file that has a JSON Schema.
 
     Args:
-        files: by their names, and commands whose `--json` prints the same.
-        type: module of bushfit and name of the type of a whole file.
-        way: "written" where every key is there; "read" where what has a default may be left out, as in older files;
-            "toml" where people write it, and there is no null.
+        files: names of the files, and commands whose `--json` prints the same content.
+        type: module and name of the type of a whole file, below the package bushfit.
+        way: "written" if every key is present; "read" if keys with a default may be missing, as in older files; "toml"
+            if users write the file, which cannot contain null.
     """
 
     files: str
@@ -39,22 +39,25 @@ DESCRIBED = {
     name: Described(**row)
     for name, row in tomllib.loads(Path(__file__).with_name("schemas.toml").read_text(encoding="utf-8")).items()
 }
-#: Keywords that pydantic leaves beside the type of a text that becomes a number; JSON Schema does not know them.
+#: Keywords of pydantic for a text that becomes a number; they are not part of JSON Schema.
 _NO_KEYWORDS = frozenset({"gt", "ge", "lt", "le"})
 #: The list of arguments in a docstring, up to its end or the next heading.
 _ARGS = re.compile(r"^Args:\n(.*?)(?=^\S|\Z)", re.MULTILINE | re.DOTALL)
-#: An argument, or several, with what is said of them.
+#: One or several argument names and their description.
 _ARG = re.compile(r"^    (\S[^:]*): +(.*?)(?=^    \S|\Z)", re.MULTILINE | re.DOTALL)
 
 
 def schema(name: str) -> dict[str, Any]:
     """JSON Schema of a file that bushfit reads or writes.
 
+    Args:
+        name: key of `DESCRIBED`, such as "campaign".
+
     Returns:
-        The schema, as JSON data.
+        The schema as JSON-compatible data.
 
     Raises:
-        BushfitError: there is none.
+        BushfitError: no schema has this name.
     """
     from pydantic import TypeAdapter
 
@@ -80,7 +83,7 @@ def schema(name: str) -> dict[str, Any]:
 
 
 def _generator(way: str) -> Any:
-    """pydantic's generator, which is slow to import, with descriptions from docstrings."""
+    """Schema generator of pydantic (slow to import) that adds descriptions from docstrings."""
     from pydantic.json_schema import GenerateJsonSchema
 
     class Generator(GenerateJsonSchema):
@@ -103,7 +106,7 @@ def _generator(way: str) -> Any:
 
 
 def _explained(table_schema: dict[str, Any], kind: type) -> dict[str, Any]:
-    """The schema of a table with what its type says of it and of its keys."""
+    """Add the descriptions in the docstring of a table's type to its schema."""
     from bushfit.validation import inline_fields
 
     properties: dict[str, Any] = table_schema["properties"]
@@ -135,7 +138,7 @@ def _beside_keys(kind: type) -> dict[str, str]:
 
 
 def _tidied(node: Any) -> Any:
-    """A schema without what is no keyword of it, and without defaults that say nothing."""
+    """Remove keywords unknown to JSON Schema, and defaults of null, from a schema."""
     if isinstance(node, Mapping):
         keywords = (key for key, value in node.items() if key not in _NO_KEYWORDS and (key, value) != ("default", None))
         return {key: _tidied(node[key]) for key in keywords}

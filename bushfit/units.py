@@ -76,14 +76,14 @@ def is_number(text: str) -> bool:
 
 
 def split_header(text: str) -> tuple[str, str | None]:
-    """Name and unit of a header cell such as "force [N]" or "force (kN)"; the unit is None if the cell has no unit."""
+    """Split a header cell such as "force [N]" into name and unit; the unit is None if the cell has no brackets."""
     text = text.strip()
     match = _BRACKETS.fullmatch(text) if text.endswith(("]", ")")) and len(text) <= _LONGEST_HEADER else None
     return (match["name"], match["unit"].strip()) if match else (text, None)
 
 
 def si_factor(text: str, expected: str) -> float:
-    """Factor that converts values in a unit to SI; for temperatures, differences of values.
+    """Factor that converts values in a unit to SI; for temperatures, the factor of temperature differences.
 
     Args:
         text: unit such as "kN" or "N/mm"; "-" and "" mean a ratio.
@@ -124,11 +124,11 @@ def parse_quantity(value: object, *expected: str) -> float:
     """SI value of a text such as "10 mm".
 
     Args:
-        value: text of a number and a unit.
+        value: text with a number and a unit.
         expected: SI units, such as "m"; the unit must be compatible with one of them.
 
     Returns:
-        Value in the compatible SI unit, rounded to 15 digits.
+        Value in the compatible SI unit, rounded to 15 significant digits.
 
     Raises:
         UnitError: no text, no number, no unit, or a unit of another dimension.
@@ -159,11 +159,11 @@ def check_size(value: float, unit: str) -> float:
     """Return an SI value unchanged if its magnitude is plausible.
 
     Args:
-        value: in the unit.
-        unit: SI unit.
+        value: SI value.
+        unit: its SI unit.
 
     Raises:
-        UnitError: not zero, and smaller or larger than any quantity of a bushing, its tests or its rig.
+        UnitError: the value is not zero, and smaller or larger than any quantity of a bushing, its tests or its rig.
     """
     smallest, largest = _SIZES.get(unit, SIZES)
     if value == 0.0 or smallest <= abs(value) <= largest:
@@ -182,7 +182,7 @@ def display_unit(unit: str, factor: float, size: float) -> tuple[str, float]:
 
     Args:
         unit: SI unit, or another unit together with its factor from SI.
-        factor: from SI to the unit.
+        factor: factor that converts SI values to `unit`.
         size: magnitude of the value [SI].
 
     Returns:
@@ -226,8 +226,8 @@ def format_aligned(values: Sequence[float], digits: int, minimum_digits: int = 0
 
     Args:
         values: at least one; the first determines the decimals.
-        digits: significant digits of the first.
-        minimum_digits: least significant digits of the others; with 0, values too small to show become "0".
+        digits: number of significant digits of the first value.
+        minimum_digits: minimum number of significant digits of the others; with 0, values too small to show become "0".
 
     Returns:
         One text per value.
@@ -249,7 +249,7 @@ def format_aligned(values: Sequence[float], digits: int, minimum_digits: int = 0
 
 
 def regular_steps(start: float, stop: float, step: float) -> tuple[float, ...]:
-    """Regular values from start to stop, both included.
+    """Values from start to at most stop at a regular distance.
 
     Args:
         start: first value.
@@ -272,7 +272,7 @@ def format_range(unit: str, *values: float, digits: int = 3) -> str:
     Args:
         unit: SI unit.
         values: one or more positive SI values; equal texts are shown once.
-        digits: significant digits.
+        digits: number of significant digits.
     """
     unit, factor = display_unit(unit, 1.0, math.sqrt(abs(min(values) * max(values))))
     return f"{' to '.join(dict.fromkeys(number(value * factor, digits) for value in values))} {unit}"
@@ -295,14 +295,14 @@ def _kind(expected: str) -> tuple[str, str]:
 
 @lru_cache(maxsize=256)
 def _resolve(text: str) -> tuple[float, str]:
-    """Factor to SI and SI base unit; angles keep their radian."""
+    """Factor to SI, and SI base unit, of a unit; the base unit of an angle is the radian."""
     text = text.strip().rstrip(".")
     unit = "1" if text in ("", "-") else text
     return _EVERYDAY.get(unit) or _by_pint(unit)
 
 
 def _by_pint(text: str) -> tuple[float, str]:
-    """Factor to SI and SI base unit from pint, for words, powers, products and quotients of units."""
+    """Factor to SI, and SI base unit, of a unit that pint has to parse: words, powers, products and quotients."""
     unknown = UnitError(
         "unknown unit", found=f'"{text[:_LONGEST_UNIT]}"', expected="a unit such as mm, N, kN/mm, deg, Hz or %"
     )
@@ -333,7 +333,7 @@ def _registry() -> pint.UnitRegistry[Any]:
 
 
 def kelvin_scale(unit: str) -> tuple[float, float] | None:
-    """Kelvin per unit, and kelvin at zero, of a unit of temperature such as "°C"; None for other texts."""
+    """Kelvin per unit, and kelvin at zero, of a temperature unit such as "°C"; None for other texts."""
     return _TEMPERATURES.get(unit.replace("℃", "°C").replace("°", "deg").replace(" ", "").lower())
 
 

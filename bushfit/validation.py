@@ -77,8 +77,8 @@ def converter(
     """Validator of pydantic that converts a raw value and keeps the message of a BushfitError.
 
     Args:
-        convert: function of the raw value and the validation info.
-        written: JSON Schema of the raw value in the file; by default the schema of the converted value.
+        convert: function that takes the raw value and pydantic's validation info, and returns the converted value.
+        written: JSON Schema of the raw value in the file; None for the schema of the converted value.
 
     Returns:
         Validator for an Annotated type.
@@ -96,10 +96,10 @@ def converter(
 
 
 def inline_keys(keys: Callable[[], Iterable[str]]) -> Mapping[str, Any]:
-    """Metadata of a dataclass field whose keys are in the table itself.
+    """Metadata of a dataclass field whose keys are written in the surrounding table, not in a table of their own.
 
     Args:
-        keys: returns the keys.
+        keys: function that returns the keys.
     """
     return {_INLINE: keys}
 
@@ -122,7 +122,7 @@ def validate_tables(
 
     Args:
         tables: parsed file, or a part of it.
-        file: for error messages.
+        file: path of the file, for error messages.
         schema: dataclass with annotations of pydantic.
         place: location of the part in the file, for error messages.
         kind: class of the error for keys or values that are not valid.
@@ -151,7 +151,7 @@ def to_json_data(value: Any, schema: Any) -> Any:
 
 
 def _complaint(detail: ErrorDetails, schema: type, kind: type[BushfitError]) -> BushfitError:
-    """Error of the project for an error of pydantic, with its location in the file."""
+    """Convert an error of pydantic to a BushfitError with its location in the file."""
     location = detail["loc"]
     place = _place(schema, location)
     cause = detail.get("ctx", {}).get("error")
@@ -175,7 +175,7 @@ def _complaint(detail: ErrorDetails, schema: type, kind: type[BushfitError]) -> 
 
 
 def _place(table: type, location: tuple[int | str, ...]) -> str:
-    """Location as in the file, such as "simulate.loops #2.frequency"; tables of an array are numbered from 1."""
+    """Location as messages show it, such as "simulate.loops #2.frequency"; tables of an array are numbered from 1."""
     words: list[str] = []
     for key in location:
         if isinstance(key, int):
@@ -187,19 +187,19 @@ def _place(table: type, location: tuple[int | str, ...]) -> str:
 
 
 def known_keys(table: type) -> Sequence[str]:
-    """All keys that a table of the file may contain."""
+    """All keys that a table of a file may contain, from the dataclass that describes the table."""
     inside = inline_fields(table)
     return [key for entry in fields(table) for key in (inside[entry.name]() if entry.name in inside else [entry.name])]
 
 
 def inline_fields(table: type) -> Mapping[str, Callable[[], Iterable[str]]]:
-    """Names of the fields with inline keys, and the functions that return the keys."""
+    """Fields of a dataclass with inline keys: by field name, the function that returns the keys."""
     members = fields(table) if is_dataclass(table) else ()
     return {member.name: member.metadata[_INLINE] for member in members if _INLINE in member.metadata}
 
 
 def _table_at(table: type, location: tuple[int | str, ...]) -> type:
-    """Dataclass of the table at a location below another table, or the nearest dataclass above it."""
+    """Dataclass that describes the table at a location below another table, or the nearest dataclass above it."""
     for key in location:
         if key in (hints := get_type_hints(table)):
             inside = (part for part in _parts(hints[key]) if isinstance(part, type) and is_dataclass(part))
@@ -225,22 +225,22 @@ ParameterValue = Annotated[
 
 
 def si(*units: str) -> BeforeValidator:
-    """Validator that converts a text with a unit compatible with one of the SI units to SI."""
+    """Validator that converts a text such as "10 mm" to SI; its unit must be compatible with one of the SI units."""
     return converter(lambda raw, _: parse_quantity(raw, *units), text(f"a number with a unit of {' or '.join(units)}"))
 
 
 def text(words: str) -> dict[str, Any]:
-    """JSON Schema of a text with a description."""
+    """JSON Schema of a text, described by the words."""
     return {"type": "string", "description": words}
 
 
 def table(convert: Callable[[dict[str, Any]], Any], written: Mapping[str, Any] | None = None) -> BeforeValidator:
-    """Validator that converts a table with the given JSON Schema; other values are left to pydantic."""
+    """Validator that converts a table; pydantic checks other values. `written` is the JSON Schema of the table."""
     return converter(lambda raw, _: convert(raw) if isinstance(raw, dict) else raw, written)
 
 
 def _frequencies(raw: dict[str, Any]) -> list[str]:
-    """Texts of the frequencies from a table with start, stop and step, both ends included."""
+    """Frequencies, as texts in Hz, of a table with start, stop and step; both ends are included."""
     expected = '{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }, or a list such as ["5 Hz", "15 Hz"]'
     if set(raw) != {"start", "stop", "step"}:
         raise CampaignError("this is no range of frequencies", found=str(raw), expected=expected)
