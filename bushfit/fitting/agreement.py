@@ -1,6 +1,6 @@
 """Prediction against measurement: how well a model meets each test and run, and within what it is usable.
 
-Where each test, and each level of it, has its own figures, thousands of rows of a loop do not hide a sweep that is off.
+Each test and each run has its own figures, so that the thousands of rows of a loop do not hide a sweep that is missed.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,7 +31,8 @@ _ENOUGH = 0.5
 
 
 class _Run(NamedTuple):
-    """Run of a test: the quantity held, its value and unit, and its points, as a mask (n,) or a slice."""
+    """Run of a test: the quantity held constant (None: none), its value and unit, and its points: a mask (n,) or slice.
+    """
 
     held: Literal["amplitude", "frequency"] | None
     value: float | None
@@ -41,13 +42,13 @@ class _Run(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LeaveOut:
-    """A fit that predicts how its parameters and residuals would change without some of its rows.
+    """Linearised fit that predicts how its parameters and residuals would change if some rows were left out.
 
     Args:
-        basis: orthonormal basis of what the parameters can do to the whitened residuals, (n, m).
-        back: how far the parameters move, in coordinates, with a unit along the basis, (k, m).
-        components: the residuals along the basis, (m,).
-        residual: the whitened residuals, (n,).
+        basis: orthonormal basis of the column space of the Jacobian of the whitened residuals, (n, m).
+        back: change of the k parameter coordinates per unit step along each basis vector, (k, m).
+        components: components of the residuals along the basis, (m,).
+        residual: whitened residuals of the fit, (n,).
     """
 
     basis: Array
@@ -57,10 +58,9 @@ class LeaveOut:
 
     @classmethod
     def from_fit(cls, jacobian: Array, residual: Array) -> "LeaveOut":
-        """Prepare a fit, given by the derivatives of the whitened residuals by coordinate, (k, n), and the residuals,
-        (n,).
+        """Build from the Jacobian of the whitened residuals by coordinate, (k, n), and the whitened residuals, (n,).
 
-        What all rows together leave open moves no residual, and stays where it is.
+        Combinations of parameters that even all rows together do not determine are kept unchanged.
         """
         basis, size, directions = np.linalg.svd(jacobian.T, full_matrices=False)
         determined = size > _LEAST_SEEN * size.max(initial=0.0)
@@ -68,16 +68,16 @@ class LeaveOut:
         return cls(basis, directions[determined].T / size[determined], basis.T @ residual, residual)
 
     def open(self, rows: Array) -> Array:
-        """Mask of the parameters that the remaining rows do not determine, (k,)."""
+        """Mask of the parameters that are not determined once `rows` (indices or mask) are left out, (k,)."""
         size, vectors = np.linalg.eigh(self._rest(rows))
         without = np.square(self.back @ vectors) @ (1.0 / np.maximum(size, _LEAST_SEEN**2))
         return without > _MOST_GROWTH * np.sum(np.square(self.back), axis=1)
 
     def step(self, rows: Array) -> Array | None:
-        """Change of the parameters without these rows, in coordinates, (k,).
+        """Change of the parameters if `rows` (indices or mask) are left out of the fit, in coordinates, (k,).
 
-        It is one Gauss-Newton step, which is exact where the model is linear over that step; None if the step is too
-        long to predict a refit, or if the remaining rows do not determine one of these parameters.
+        The change is one Gauss-Newton step, which is exact for a linear model. None if the step is too long to predict
+        a refit, or if the remaining rows do not determine one of the parameters.
         """
         if self.open(rows).any():
             return None
@@ -85,20 +85,20 @@ class LeaveOut:
         return None if np.abs(change).max(initial=0.0) > _LONGEST_STEP else change
 
     def predicted(self, rows: Array, clusters: Array, *, stepped: bool = True) -> tuple[Array, Array]:
-        """Residuals of some rows, predicted from the fit to the others.
+        """Residuals of held-out rows, predicted by the fit to the other rows.
 
         Args:
-            rows: which the rest determines, (all rows,) bool.
-            stepped: False where the fit is one to the rest already.
-            clusters: number of the group of rows whose misfit is of one kind that each row belongs to, (all rows,).
+            rows: mask of the n held-out rows, (all rows,); the other rows must determine all parameters.
+            clusters: index of the cluster of each row, (all rows,); misfits within a cluster are correlated.
+            stepped: False if the fit already excludes the held-out rows.
 
         Returns:
-            Residuals in units of noise, and whitened by the error of the prediction as well, (n,) each.
+            Residuals in units of noise, and residuals whitened by the error of the prediction as well, (n,) each.
 
         Notes:
-            The whitened ones have the covariance 1 + J C J^T before, with the robust covariance C of the fit to the
-            rest: A^-1 M A^-1, where M adds what each cluster pulls at the parameters (Liang and Zeger 1986, sandwich).
-            Of the noise that the tests are known to have no direction may have less.
+            The residuals in units of noise have the covariance 1 + J C J^T, with the robust covariance C = A^-1 M A^-1
+            of the fit to the other rows, where M sums the scores of each cluster (Liang and Zeger 1986, sandwich).
+            C is never below the covariance by noise alone, in any direction.
         """
         step, out = self._basis_step(rows) * stepped, self.basis[rows]
         plain = self.residual[rows] + out @ step
@@ -113,8 +113,16 @@ class LeaveOut:
         return plain, plain - directions @ ((1.0 - 1.0 / np.hypot(1.0, scale)) * (directions.T @ plain))
 
     def pulled(self, rows: Array, predicted: Array) -> Array:
-        """Derivatives of half the sum of squares of predicted rows with respect to the noise of each row, (all rows,):
-        directly, and through the parameters that the other rows determine.
+        """Derivatives of half the sum of squares of the predicted residuals with respect to the noise of each row.
+
+        The noise acts directly on held-out rows, and on the others through the parameters that they determine.
+
+        Args:
+            rows: mask of the n held-out rows, (all rows,).
+            predicted: predicted residuals of the held-out rows, (n,).
+
+        Returns:
+            Derivatives, (all rows,).
         """
         through = self.basis @ np.linalg.solve(self._rest(rows), self.basis[rows].T @ predicted)
         pull = -through
@@ -122,16 +130,16 @@ class LeaveOut:
         return pull
 
     def _rest(self, rows: Array) -> Array:
-        """Fisher information of the other rows along the basis, (m, m)."""
+        """Fisher information of all rows but `rows`, along the basis, (m, m)."""
         return np.eye(self.components.size) - self.basis[rows].T @ self.basis[rows]
 
     def _basis_step(self, rows: Array) -> Array:
-        """Gauss-Newton step without these rows, along the basis, (m,)."""
+        """Gauss-Newton step of the fit without `rows`, along the basis, (m,)."""
         return -np.linalg.solve(self._rest(rows), self.components - self.basis[rows].T @ self.residual[rows])
 
 
 def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest] = ()) -> tuple[Misfit, ...]:
-    """Agreement of a model with each test, and with each run of those that have several.
+    """Agreement of a model with each test, and with each run (frequency or amplitude sweep) of tests with several runs.
 
     Args:
         model: fitted model.
@@ -167,14 +175,14 @@ def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[Mea
 
 
 def usable(solution: FitResult, unfitted: Sequence[MeasuredTest] = ()) -> tuple[Usable, ...]:
-    """Expected error of a fitted model in stiffness and loss factor: 95 % of the points of a direction are closer.
+    """Expected error of a fitted model in stiffness and loss factor: 95 % of the points of a direction have less.
 
-    Each run is predicted from the fit without it if the rest determines all parameters and moves none far; a test that
-    was not fitted is predicted in any case. If fewer than half the points of a direction are predicted so, all count as
-    the fit has them.
+    Each run is held out, and predicted from the fit to the other runs, if these determine all parameters and change
+    none by much; a test that was not fitted is always a prediction. If fewer than half the points of a direction can be
+    predicted, the errors of the fit itself at all its points are used.
 
     Args:
-        solution: the fit.
+        solution: result of the fit.
         unfitted: tests that were not fitted.
 
     Returns:
@@ -200,7 +208,7 @@ def usable(solution: FitResult, unfitted: Sequence[MeasuredTest] = ()) -> tuple[
 
 
 def met_within(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest]) -> tuple[Usable, ...]:
-    """Expected error of a model without its fit: residuals of the fitted tests stand for held-out ones.
+    """Expected error of a model without refits: errors at fitted points are used where too few points were not fitted.
 
     Args:
         model: fitted model.
@@ -218,9 +226,10 @@ def met_within(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[
 
 
 def _by_place(parts: Sequence[tuple[str, Array, bool]]) -> tuple[Usable, ...]:
-    """Expected error of each direction, from its predicted points if these are enough, else from all.
+    """Expected error of each direction, from its predicted points if these are at least half, else from all its points.
 
-    Each part has the name of the direction, the differences, (2, n), and True if they were predicted from other runs.
+    Each part has the name of the direction, the differences in stiffness and loss factor, (2, n), and True if they are
+    predicted from other runs.
     """
     found = []
     for place in dict.fromkeys(place for place, _, _ in parts):
@@ -235,12 +244,12 @@ def _by_place(parts: Sequence[tuple[str, Array, bool]]) -> tuple[Usable, ...]:
 
 
 def _absolute_difference(modelled: Array, measured: Array) -> Array:
-    """Absolute relative difference of |K|, and absolute difference of the loss factor, (2, n)."""
+    """Absolute relative difference of |K| and absolute difference of the loss factor of complex stiffnesses, (2, n)."""
     return np.abs([np.abs(modelled / measured) - 1.0, loss_factor(modelled) - loss_factor(measured)])
 
 
 def _runs(data_set: MeasuredTest) -> Iterator[_Run]:
-    """Runs of a test, one for each value held; a loop, and a sweep that holds nothing, is one run."""
+    """Runs of a test, one per amplitude or frequency held constant; a loop, or a sweep without one, is a single run."""
     if not isinstance(data_set, MeasuredSweep) or data_set.sweep.stepped is None:
         yield _Run(None, None, None, np.ones(data_set.frequency.size, dtype=bool))
         return

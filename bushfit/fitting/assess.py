@@ -47,12 +47,12 @@ _CHECK = "check the units of displacement and force, and the dimensions of what 
 
 @dataclass(frozen=True, eq=False)
 class FitStage:
-    """One fit of a procedure.
+    """One of the fits that a procedure makes in turn, such as the static one.
 
     Args:
-        names: parameters that it moved.
-        data_sets: its tests.
-        process: error of the model, where the model misses the tests.
+        names: names of the parameters that the fit estimated.
+        data_sets: tests that the fit used.
+        process: estimated error of the model, if the model misses the tests by more than their noise; else None.
     """
 
     names: tuple[str, ...]
@@ -66,12 +66,12 @@ def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | Non
     Args:
         model: fitted model.
         stages: fits of the procedure, in order.
-        fixed: covariance of parameters that all stages kept fixed.
+        fixed: covariance of parameters that all stages kept fixed; None if these are exact.
 
     Returns:
-        Covariance by parameter value. Where the residuals of a stage, or of one test of it, exceed its noise, the share
-        of each test is inflated by the larger of the two reduced chi-squares. What the error of an estimated noise adds
-        is counted as Kenward and Roger (1997) do, and how far the covariance may be off for it is in `spread`.
+        Covariance of the parameter values in SI units. If the residuals of a stage, or of one of its tests, exceed the
+        noise, the variance that a test contributes is multiplied by the larger of the two reduced chi-squares. Errors
+        of an estimated noise are added by Kenward and Roger (1997); `spread` is their effect on the covariance itself.
 
     Notes:
         Each stage solves J_own (J_own^T d_own + J_rest^T d_rest + noise) = 0 for its own parameters while the rest
@@ -131,10 +131,16 @@ def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | Non
 def _changes_by_noise(
     data_sets: Sequence[MeasuredTest], influence: Array, basis: Array
 ) -> dict[Hashable, tuple[Array, Array]]:
-    """Changes of a covariance by each estimated variance of the noise: by its standard error, and by the wrong weights
-    that follow from it, (k, k) each.
+    """Changes of the covariance by errors of the estimated noise variances, by identifier of the noise variance.
 
-    The influence of each residual on the parameters is (k, n), the basis of the stage's own equations (own, n).
+    Args:
+        data_sets: tests of one stage.
+        influence: change of each parameter by a unit of each residual, (k, n).
+        basis: orthogonal rows that span the Jacobian of the stage's own parameters, (own, n).
+
+    Returns:
+        By noise variance: change of the covariance by one standard error of the noise variance, and the covariance
+        that the wrong weights of the fit add, (k, k) each.
     """
     unit, sums = basis / np.linalg.norm(basis[0]), dict[Hashable, list[Array]]()
     for test, rows in zip(data_sets, rows_of(data_sets), strict=True):
@@ -153,15 +159,15 @@ def _inverse(system: Array) -> Array:
 
 
 def linear_errors(slope: Array) -> Array:
-    """Standard errors of parameters in coordinates, (k,), from the derivatives of whitened residuals, (k, n).
+    """Standard errors of parameters in coordinates, (k,), from the Jacobian of whitened residuals, (k, n).
 
-    The noise is assumed known and the model correct; `covariance` adds the errors that this leaves out.
+    The noise is assumed known and the model correct; `covariance` adds the errors of both.
     """
     return np.linalg.norm(_inverse(np.linalg.qr(slope.T)[1]), axis=1)
 
 
 def reduced(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> tuple[float, int]:
-    """Reduced chi-square of a model and its degrees of freedom.
+    """Reduced chi-square of a model over all tests, and its degrees of freedom.
 
     Args:
         model: model to compare.
@@ -185,7 +191,7 @@ def lack_of_fit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int
 
 
 def beyond_noise(chi_square: float, freedom: int) -> float | None:
-    """A reduced chi-square if it is larger than noise explains; else None."""
+    """The given reduced chi-square if it exceeds 1 by more than noise explains (5 standard deviations); else None."""
     return chi_square if chi_square > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else None
 
 
@@ -196,7 +202,7 @@ def misfit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int, adv
         model: fitted model.
         data_sets: tests.
         parameters: number of fitted parameters.
-        advice: end of the sentence.
+        advice: text to append to the sentence.
 
     Returns:
         The sentence, or an empty list.
@@ -215,7 +221,7 @@ def misfit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int, adv
 
 
 def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> Quality:
-    """Agreement of a model with its tests: NRMSE, reduced chi-square, number of residuals, relative noise.
+    """Agreement of a model with all its tests: NRMSE, reduced chi-square, number of residuals, relative noise.
 
     Args:
         model: fitted model.
@@ -223,7 +229,7 @@ def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) ->
         parameters: number of fitted parameters.
 
     Returns:
-        Figures of the fit over all tests.
+        Figures over all tests together; `loop_gain_error` is None without loops.
     """
     relative, counts = (
         np.concatenate([test.relative(model) for test in data_sets]),
@@ -241,7 +247,7 @@ def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) ->
 
 
 def measured_range(model: Model, data_sets: Sequence[MeasuredTest]) -> Range:
-    """Range of frequencies [Hz], equivalent strains and temperatures [K] of tests, and their directions."""
+    """Range of frequencies [Hz], equivalent strain amplitudes and temperatures [K] of tests, and their directions."""
     found = [str(data_set.direction) for data_set in data_sets]
     directions = tuple(dict.fromkeys([*(str(direction) for direction in Direction if direction in found), *found]))
     kelvin = [np.ravel(data_set.test.temperature) for data_set in data_sets if data_set.test.temperature is not None]
@@ -251,8 +257,7 @@ def measured_range(model: Model, data_sets: Sequence[MeasuredTest]) -> Range:
 
 
 def implausible(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> list[str]:
-    """Warning about moduli that no rubber has, or tests too different to be of one bushing, usually because of a wrong
-    unit.
+    """Warning about shear moduli that no rubber has, or that differ too much between tests, usually by a wrong unit.
 
     Returns:
         At most one sentence.
@@ -270,9 +275,7 @@ def implausible(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> l
 
 
 def refuse_strain(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> None:
-    """Raise a FitError if a test strains its rubber by more than any rubber bears, usually because of a wrong unit or
-    size.
-    """
+    """Raise a FitError if the strain of a test is beyond any rubber, usually because of a wrong unit or dimension."""
     for data_set in data_sets:
         largest = float(np.max(data_set.amplitude))
         if (strain := largest * unit_strain(bushing, data_set.direction)) > _MOST_STRAIN:
@@ -339,7 +342,7 @@ def unfitted(model: Model, data_sets: Sequence[MeasuredTest], advice: str) -> li
     Args:
         model: fitted model.
         data_sets: tests that were not fitted.
-        advice: end of each sentence.
+        advice: text to append to each sentence.
 
     Returns:
         Sentences; empty if the model predicts all these tests within their noise.

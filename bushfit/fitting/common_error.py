@@ -20,20 +20,20 @@ _ROUNDING = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class CommonError:
-    """An error of several independent amounts that each change many residuals.
+    """Errors shared by many residuals, such as the gain error of a run: q independent random amounts.
 
     Args:
         columns: change of the residuals, in units of noise, by one standard deviation of each amount, (q, n).
 
     Notes:
-        The covariance of the residuals is S = 1 + U^T U, U the columns. S^(-1/2) whitens them.
+        The covariance of the residuals is S = 1 + U^T U, where U is `columns`. S^(-1/2) whitens the residuals.
     """
 
     columns: Array
 
     @cached_property
     def principal_errors(self) -> tuple[Array, Array]:
-        """Orthonormal directions that the error takes, (n, q), and its standard deviation along each, (q,)."""
+        """Principal directions of the shared error, orthonormal, (n, r), and its standard deviations, (r,), r <= q."""
         variance, mixed = np.linalg.eigh(self.columns @ self.columns.T)
         significant = variance > _ROUNDING * variance.max(initial=0.0)
         size = np.sqrt(variance[significant])
@@ -41,22 +41,22 @@ class CommonError:
 
     @property
     def log_size(self) -> float:
-        """Natural log of the determinant of the covariance S."""
+        """Natural log of the determinant of the residuals' covariance S."""
         return float(np.sum(np.log1p(np.square(self.principal_errors[1]))))
 
     def whiten(self, rows: Array) -> Array:
-        """Residuals in units of noise, (..., n), as independent numbers of unit variance."""
+        """Whiten residuals or derivatives in units of noise, (..., n), so that their covariance is 1; same shape."""
         directions, size = self.principal_errors
         return rows - (rows @ directions * (1.0 - 1.0 / np.hypot(1.0, size))) @ directions.T
 
 
 class ErrorProducts(NamedTuple):
-    """Inner products of whitened rows, such as a residual and its derivatives, beside an error of unknown size.
+    """Inner products of m rows, such as residuals and derivatives, from which any size of a shared error is projected.
 
     Args:
-        products: of the rows in noise, (m, m).
-        components: components of the rows along independent amounts of the error, (m, c).
-        variance: by a unit of the error in each, (c,).
+        products: inner products of the rows in units of noise, (m, m).
+        components: components of the rows along the c independent directions of the shared error, (m, c).
+        variance: variance along each direction, in units of noise, if the error has size 1, (c,).
     """
 
     products: Array
@@ -66,7 +66,12 @@ class ErrorProducts(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Joined(Sequence["MeasuredTest"]):
-    """Tests with an error in common beside the noise of each: their residuals are whitened together."""
+    """Tests that share an error in addition to the noise of each: their residuals are whitened together.
+
+    Args:
+        data_sets: tests.
+        error: shared error, over the residuals of all tests in order.
+    """
 
     data_sets: tuple[MeasuredTest, ...]
     error: CommonError

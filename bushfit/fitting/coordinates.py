@@ -16,17 +16,22 @@ from bushfit.fitting.common_error import Joined
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.model.model import Model
 
-#: Lower and upper limit of parameters [SI], by name; None where the parameter's own limit counts.
+#: Lower and upper limit of parameters [SI], by name; None for the parameter's default limit.
 Bounds = Mapping[str, tuple[float | None, float | None]]
 
-#: Smallest singular value of derivatives, or eigenvalue of their squares once scaled, that counts, relative to the
-#: largest: below it is their rounding.
+#: Smallest significant singular value of a Jacobian, or eigenvalue of a scaled information matrix, relative to the
+#: largest: smaller ones are rounding errors.
 ROUNDING = 1e-10
 
 
 @dataclass(frozen=True)
 class Coordinates:
-    """The map between parameter values and the coordinates in which a fit moves."""
+    """Map between parameter values and dimensionless coordinates: ln value, or value over typical size.
+
+    Args:
+        names: names of the k parameters.
+        parameters: definitions of the parameters, in the same order.
+    """
 
     names: tuple[str, ...]
     parameters: tuple[Parameter, ...]
@@ -36,29 +41,29 @@ class Coordinates:
         return cls(tuple(names), tuple(model.parameters[name] for name in names))
 
     def forward(self, name: str, value: float) -> float:
-        """Coordinate of a value of one parameter."""
+        """Coordinate of one parameter that has the given value in SI units."""
         parameter = self.parameters[self.names.index(name)]
         return float(np.log(value)) if parameter.log else value / parameter.typical
 
     def point(self, values: Mapping[str, float]) -> Array:
-        """Coordinates of parameter values, (k,)."""
+        """Coordinates, (k,), from parameter values in SI units by name."""
         return np.array([self.forward(name, values[name]) for name in self.names])
 
     def values(self, point: Sequence[float] | Array) -> dict[str, float]:
-        """Parameter values at a point."""
+        """Parameter values in SI units by name, from coordinates, (k,)."""
         return {
             name: float(np.exp(u)) if parameter.log else float(u) * parameter.typical
             for name, parameter, u in zip(self.names, self.parameters, point, strict=True)
         }
 
     def slopes(self, values: Mapping[str, float]) -> Array:
-        """Derivatives of parameter values by coordinate, (k,)."""
+        """Derivative of each parameter value (SI units, by name) by its coordinate, (k,)."""
         pairs = zip(self.names, self.parameters, strict=True)
         return np.array([values[name] if parameter.log else parameter.typical for name, parameter in pairs])
 
 
 def coordinate_bounds(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, Array]:
-    """Lower and upper bound of each coordinate, (k,) each; where `bounds` has none, the parameter's own."""
+    """Lower and upper bound of each coordinate, (k,) each; the parameter's default limit where `bounds` has none."""
     ends = []
     for name, parameter in zip(coordinates.names, coordinates.parameters, strict=True):
         limits = zip(bounds.get(name, (None, None)), parameter.bounds, strict=True)
@@ -68,7 +73,7 @@ def coordinate_bounds(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, 
 
 
 def residual(model: Model, data_sets: Sequence[MeasuredTest]) -> Array:
-    """Whitened residuals of all tests, (n,)."""
+    """Whitened residuals of all tests in order, modelled minus measured in units of noise, (n,)."""
     return together(data_sets, np.concatenate(list(map(methodcaller("residual", model), data_sets))))
 
 
@@ -78,7 +83,7 @@ def jacobian(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[st
     Args:
         model: model at whose values the derivatives are taken.
         data_sets: tests.
-        names: k parameters.
+        names: names of the parameters.
     """
     slopes = Coordinates.of_parameters(model, names).slopes(model.values)
     by_value = np.concatenate(list(map(methodcaller("jacobian", model, names), data_sets)), axis=-1)
@@ -86,5 +91,5 @@ def jacobian(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[st
 
 
 def together(data_sets: Sequence[MeasuredTest], rows: Array) -> Array:
-    """Whiten residuals of all tests, (..., n), by an error that the tests share, if they share one."""
+    """Whiten residuals or derivatives of all tests, (..., n), by the error that the tests share (`Joined`), if any."""
     return data_sets.error.whiten(rows) if isinstance(data_sets, Joined) else rows

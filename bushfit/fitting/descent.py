@@ -1,15 +1,16 @@
 """A least-squares fit that goes step by step: several can go side by side, and one that cannot win be stopped.
 
-Every fit is made so but those of the paper's own procedure, which lmfit makes, see `solve`.
+All fits use this method except the paper's own procedure, which uses lmfit, see `solve`.
 
 Notes:
     Levenberg-Marquardt, damped as Nielsen does (Damping parameter in Marquardt's method, IMM-REP-1999-05, Lyngby
-    1999), with bounds: what a step would carry beyond one stays there, and the others go on without it.
+    1999), with bounds: a parameter that a step would move beyond a bound stops there, and the step of the other
+    parameters is solved for again.
 
-    Parameters that trade off make chi-square a narrow valley with a bend, in which straight steps creep. So a step that
-    goes on as the last one went follows the bend which the derivatives showed over that one: geodesic acceleration
-    (M. K. Transtrum, J. P. Sethna, arXiv:1201.5885, 2012), at no evaluation more. On four campaigns with gaps that no
-    effect closes, it took 4 to 29 % off all evaluations of the diagnosis.
+    Correlated parameters make chi-square a narrow curved valley, in which straight steps are short. A step in nearly
+    the same direction as the last one is therefore bent by the second derivative measured over the last step: geodesic
+    acceleration (M. K. Transtrum, J. P. Sethna, arXiv:1201.5885, 2012), without additional evaluations. On four
+    campaigns whose misfit no effect explains, it saved 4 to 29 % of all evaluations of the diagnosis.
 """
 
 from dataclasses import dataclass, replace
@@ -33,7 +34,7 @@ _FIRST_GROWTH = 2.0
 _LONGEST_STEP = 2.0
 #: Least fall of chi-square with which a step is taken, relative to the fall expected (usual for such methods).
 _LEAST_GAIN_RATIO = 1e-4
-#: Cosine between a step and the last one, in units of noise, from which it goes on as that one went: chosen.
+#: Cosine between a step and the last one, in units of noise, from which the step is bent along the valley: chosen.
 _SAME_WAY = 0.8
 #: Share of a step's length that its bend may have, both in units of noise; chosen: further on the way bends otherwise,
 #: and nearly all steps fail.
@@ -48,21 +49,21 @@ _LEAST_SENSITIVITY = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """A least-squares fit in progress; its model is the best so far.
+    """State of a least-squares fit in progress, with the best model so far.
 
     Args:
         problem: parameters to fit, tests and bounds.
         model: best model so far.
-        point: its coordinates, (k,).
-        residual: whitened residuals of that model, (n,).
-        jacobian: their derivatives by coordinate, (k, n).
-        tolerance: the last step is one that is expected to lower chi-square by this share; None for the small absolute
-            fall by which models are compared.
-        evaluations: of the model.
+        point: coordinates of its k fitted parameters, (k,).
+        residual: whitened residuals of the best model, (n,).
+        jacobian: derivatives of the residuals by coordinate, (k, n).
+        tolerance: expected relative fall of chi-square below which the fit has converged; None for an absolute fall of
+            0.01, which is fine enough to compare models.
+        evaluations: number of model evaluations so far.
         converged: True after the last step.
-        damping: of the next step, relative to the curvature.
-        growth: factor on the damping should that step fail.
-        last: the step that led here, (k,), and the second derivative of the residuals along it, (n,); None at first.
+        damping: damping of the next step, relative to the curvature.
+        growth: factor on the damping if the next step fails.
+        last: last successful step, (k,), and the second derivative of the residuals along it, (n,); None at first.
     """
 
     problem: FitProblem
@@ -79,18 +80,18 @@ class Descent:
 
     @classmethod
     def start(cls, problem: FitProblem, tolerance: float | None = None) -> "Descent":
-        """The fit before its first step.
+        """Start a fit at the start values of its problem, before the first step.
 
         Args:
             problem: parameters to fit, tests and bounds.
-            tolerance: relative fall of chi-square at which the fit ends; None for models that are compared.
+            tolerance: expected relative fall of chi-square at which the fit ends; None for the absolute fall of 0.01.
 
         Returns:
             The fit at the start values.
 
         Raises:
-            FitError: fewer data than parameters, or no finite response.
-            ModelError: no response.
+            FitError: fewer data than parameters, or the response of the model is not finite.
+            ModelError: the model has no response at the start values.
         """
         point = problem.start
         model = problem.model.with_values(problem.coordinates.values(point))
@@ -106,32 +107,32 @@ class Descent:
 
     @property
     def chi_square(self) -> float:
-        """Sum of the squared residuals."""
+        """Sum of the squared whitened residuals of the best model so far."""
         return float(self.residual @ self.residual)
 
     @property
     def expected_fall(self) -> float:
-        """Fall of chi-square that is left if the model is linear."""
+        """Fall of chi-square still to be expected until convergence, from the linearised model."""
         return max(self._step(0.0)[1], 0.0)
 
     @property
     def solution(self) -> FitResult:
-        """State of the fit as a result."""
+        """Result of the fit in its present state, converged or not."""
         at_bound = self.problem.at_bound(self.point)
         state = self.model, self.residual, self.jacobian, self.evaluations, at_bound, not self.converged
         return FitResult(self.problem, *state)
 
     def stepped(self) -> "Descent":
-        """The fit after one more evaluation of the model."""
+        """Return the fit after one more evaluation of the model."""
         return self.finished(self.evaluations + 1)
 
     def finished(self, evaluations: int) -> "Descent":
         """Take steps until the fit has converged or has used up its evaluations of the model.
 
-        Each step leads to a lower chi-square with less damping, or leaves the fit where it was with more.
+        A step that lowers chi-square is taken and reduces the damping; any other step is undone and increases it.
 
         Args:
-            evaluations: of the model at most, counted from the start.
+            evaluations: maximum number of model evaluations, counted from the start of the fit.
 
         Returns:
             The fit after these steps.
@@ -189,21 +190,21 @@ class Descent:
 
     @cached_property
     def _normal(self) -> tuple[Array, Array]:
-        """Curvature, (k, k), and slope, (k,), of half of chi-square by coordinate."""
+        """Gauss-Newton Hessian, (k, k), and gradient, (k,), of half of chi-square by coordinate."""
         return self.jacobian @ self.jacobian.T, self.jacobian @ self.residual
 
     @cached_property
     def _reach(self) -> tuple[Array, Array]:
-        """Least and largest coordinates that one step may reach, (k,) each."""
+        """Smallest and largest coordinates that the next step may reach, (k,) each."""
         parameters, (low, high) = self.problem.coordinates.parameters, self.problem.limits
         longest = np.array([_LONGEST_STEP if parameter.log else np.inf for parameter in parameters])
         return np.maximum(low, self.point - longest), np.minimum(high, self.point + longest)
 
     def _step(self, damping: float) -> tuple[Array, float]:
-        """The damped step within the bounds, (k,), and the fall of chi-square that it is expected to bring.
+        """Damped Gauss-Newton step within the bounds, (k,), and the fall of chi-square expected from the step.
 
-        What would pass a bound stays on it, and the others are solved for again; what rests on a bound and is drawn
-        outwards, and what the data do not see, does not move.
+        A parameter that would pass a bound stops there, and the others are solved for again. A parameter at a bound
+        whose gradient points outwards does not move, nor does one to which the residuals are insensitive.
         """
         curvature, slope = self._normal
         size = np.diag(curvature)
@@ -238,12 +239,12 @@ class Descent:
         return bend
 
     def _length(self, step: Array) -> float:
-        """Length of a step in units of noise, with each parameter alone."""
+        """Length of a step in units of noise, correlations of the parameters ignored."""
         return float(np.sqrt(np.diag(self._normal[0]) @ np.square(step)))
 
 
 def _solved(curvature: Array, pull: Array, free: Array) -> Array:
-    """Step of the free parameters at which the curvature meets a pull; 0 in directions that rounding decides."""
+    """Solve curvature @ step = pull for the free parameters (mask), with 0 in directions that are rounding errors."""
     scale = np.sqrt(np.diag(curvature)[free])
     scaled = curvature[np.ix_(free, free)] / np.outer(scale, scale)
     return np.linalg.lstsq(scaled, pull[free] / scale, rcond=ROUNDING)[0] / scale

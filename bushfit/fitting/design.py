@@ -1,4 +1,7 @@
-"""Fits of effects that are added: from a small design of their shapes, as one start may lie in another valley."""
+"""Fits of effects that are added: from a small design of their shapes, as one start may lie in another valley.
+
+The shape parameters of an effect are its times, gaps, orders and frequencies; a valley is a local minimum.
+"""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -21,8 +24,8 @@ _PROBES = 5
 _ORDERS = (0.05, 0.9)
 #: Least and largest onset of a drift, as a share of the session: from its first points to what is even.
 _SESSION = (0.01, 10.0)
-#: Factors on a shape parameter of an effect in place of a branch, besides 1, that a fit is started from; chosen: within
-#: the decade that the tests of a bushing span, and apart enough to lie in other valleys.
+#: Factors, besides 1, on a start value of a shape parameter that has no scale in the tests; chosen: within the decade
+#: that the tests of a bushing span, and far enough apart to reach other local minima.
 _FACTORS = (0.25, 4.0)
 #: Evaluations of the model in the first round of all starts.
 _FIRST = 12
@@ -37,17 +40,17 @@ _MOST = 200
 def designed(
     model: Model, plain: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds
 ) -> Model:
-    """A model to start a fit from, with effects added in turn to the best fit of those before.
+    """Choose start values for a fit with added effects: each effect is added in turn to the best fit without it.
 
     Args:
         model: model with all effects, at the start values.
-        plain: the same without the effects that are to be added, and with the branches that they replace.
+        plain: the same model without the added effects, and with the branches that these effects replace.
         data_sets: tests.
-        fixed: parameters that do not move.
-        bounds: limits inside the parameters' own [SI].
+        fixed: names of parameters that stay fixed.
+        bounds: limits of parameters [SI], inside their default limits.
 
     Returns:
-        The better of the model itself and the one built up effect by effect.
+        The given model, or that model with the values built up effect by effect if these give a lower chi-square.
     """
     added = [get_effect(name) for name in model.effects if name not in plain.effects]
     with suppress(FitError, ModelError):  # no response, or too few points; the fit then says what is wrong
@@ -64,20 +67,20 @@ def designed(
 def with_effect(
     solution: FitResult, data_sets: Sequence[MeasuredTest], effect: Effect, fixed: Sequence[str], bounds: Bounds
 ) -> FitResult:
-    """Add an effect to a fitted model, or replace a branch by it, as the best fit of several starts.
+    """Add an effect to a fitted model, or replace a branch by it, and fit all parameters from several starts.
 
     Args:
         solution: fit without the effect.
         data_sets: tests.
         effect: effect to add.
-        fixed: names of parameters that do not move.
-        bounds: limits inside the parameters' own [SI].
+        fixed: names of parameters that stay fixed.
+        bounds: limits of parameters [SI], inside their default limits.
 
     Returns:
-        The best fit.
+        The fit with the lowest chi-square.
 
     Raises:
-        FitError: no start has a finite response.
+        FitError: the response of the model is not finite at any start.
     """
     # what has a neutral amount starts at a tenth of its typical one: at its neutral value a fit may not see its shape
     small_amount = {} if effect.replaces else {qualified_name(effect, effect.amount): effect.amount.sized(0.1)}
@@ -99,19 +102,19 @@ def with_effect(
 
 
 def fit_from(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds) -> Descent:
-    """Prepare a fit of all parameters of a model except the fixed ones, from its own values.
+    """Prepare a fit of all parameters of a model except the fixed ones, from the values of the model.
 
     Args:
         model: model with the start values.
         data_sets: tests.
-        fixed: names of parameters that do not move.
-        bounds: limits inside the parameters' own [SI].
+        fixed: names of parameters that stay fixed.
+        bounds: limits of parameters [SI], inside their default limits.
     """
     return Descent.start(FitProblem.with_fixed(model, data_sets, fixed, bounds))
 
 
 def probes(data_sets: Sequence[MeasuredTest], model: Model, parameter: Parameter) -> Array:
-    """Start values of a shape parameter within the range that the tests can show.
+    """Start values of a shape parameter (time, gap, order, frequency) over the range that the tests can determine.
 
     Args:
         data_sets: tests.

@@ -1,6 +1,7 @@
 """The discrepancy of a fitted model from its tests: a Gaussian process of its relative error, conditioned on them.
 
-Sizes and lengths are those of the largest restricted likelihood, see `gaussian_process`.
+The process has a size (standard deviation relative to |K|) and correlation lengths (in ln frequency and ln strain).
+Both maximise the restricted likelihood, see `gaussian_process`.
 """
 
 from __future__ import annotations
@@ -27,25 +28,26 @@ from bushfit.model.covariance import Z95
 SIZES = np.geomspace(1e-3, 0.4, 25)
 #: Lengths tried, in ln frequency and in ln strain: from next points apart to a decade.
 OVER_FREQUENCY, OVER_STRAIN = (0.15, 0.4, 0.9, 2.0), (0.4, 0.9, 2.0)
-#: Likelihood of a process relative to the likeliest, from which on it counts; chosen for time.
+#: Smallest likelihood, relative to the largest, of a process that enters the average; chosen for time.
 _COUNTS = 0.05
-#: Degrees of freedom at least of a size: Student's t of fewer has no variance.
+#: Smallest number of degrees of freedom of a size: Student's t of fewer has no variance.
 _MINIMUM_FREEDOM = 3.0
 
-#: Directions and specimens, by name, in groups that share a process.
+#: Names of directions or specimens, in groups whose members share one relative error of the model.
 Groups = tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True, eq=False)
 class FittedTests:
-    """A fitted model and its tests: changes of the residuals by relative changes of the stiffness.
+    """A fitted model and its tests at p operating points, to convert changes of stiffness into changes of residuals.
 
-    Changes of the stiffness move all residuals of a sweep, but only two combinations of those of a loop. Residuals are
-    therefore given by d components: all of a sweep, two of a loop.
+    A change of the stiffness changes all residuals of a sweep, but only two combinations of the residuals of a loop.
+    The residuals of all tests are therefore reduced to d components: all residuals of a sweep, two numbers of a loop.
 
     Args:
-        solution: the fit, each test whitened by itself.
-        rig_errors: of each test, whitened residuals by one standard deviation of each of the rig's errors, (w, n).
+        solution: result of the fit, with each test whitened separately.
+        rig_errors: for each test, change of its n whitened residuals by one standard deviation of each of the w errors
+            of the rig, (w, n).
     """
 
     solution: FitResult
@@ -53,18 +55,18 @@ class FittedTests:
 
     @property
     def data_sets(self) -> Sequence[MeasuredTest]:
-        """The tests."""
+        """Tests that the model was fitted to."""
         return self.solution.minimised
 
     @cached_property
     def directions(self) -> Array:
-        """Direction or specimen of each operating point, by name, (p,)."""
+        """Name of the direction or specimen at each operating point, (p,)."""
         counts = [data_set.frequency.size for data_set in self.data_sets]
         return np.repeat([str(data_set.direction) for data_set in self.data_sets], counts)
 
     @cached_property
     def conditions(self) -> list[Array]:
-        """Frequency [Hz], equivalent strain and, if the model depends on it, temperature [K] of the points."""
+        """Frequency [Hz], equivalent strain and, if the model uses it, temperature [K] of the points, (p,) each."""
         model = self.solution.model
         axes = [*operating_conditions(model.bushing, self.data_sets)]
         if model.knows_temperature:
@@ -80,12 +82,12 @@ class FittedTests:
 
     @property
     def moving(self) -> Array:
-        """Derivatives of the residuals by coordinate of the parameters that are at no bound, (k, n)."""
+        """Derivatives of the whitened residuals by coordinate of the k parameters that are not at a bound, (k, n)."""
         return self.solution.jacobian[self.solution.moving]
 
     @cached_property
     def slopes(self) -> Array:
-        """Derivatives of ln K at the points by coordinate of these parameters, complex (k, p)."""
+        """Derivatives of ln K at the points by coordinate of the k parameters not at a bound, complex (k, p)."""
         model, moving = self.solution.model, self.solution.moving
         names = [self.solution.names[i] for i in moving]
         slopes = np.concatenate([log_slopes(model, data_set, names) for data_set in self.data_sets], axis=-1)
@@ -93,8 +95,10 @@ class FittedTests:
 
     @cached_property
     def _blocks(self) -> list[tuple[MeasuredTest, slice, Array | None, Array]]:
-        """Each test, its rows, and for a loop the orthonormal directions in which a change of stiffness moves its
-        residuals, (n, 2), with the components of 1 and i along them, (2, 2).
+        """Each test, its rows, its orthonormal directions, (n, 2), and the components of a change of 1 and of i N/m.
+
+        The directions span the changes of a loop's residuals by a change of the stiffness; None for a sweep. The
+        components are along these directions, (2, 2).
         """
         units, blocks = np.array([[1.0], [1.0j]]), list[tuple[MeasuredTest, slice, Array | None, Array]]()
         for test, rows in zip(self.data_sets, rows_of(self.data_sets), strict=True):
@@ -106,7 +110,7 @@ class FittedTests:
         return blocks
 
     def project(self, rows: Array) -> Array:
-        """Components of residuals, (..., n) -> (..., d)."""
+        """Reduce whitened residuals of all tests, (..., n), to their components, (..., d)."""
         parts = [
             rows[..., block] if directions is None else rows[..., block] @ directions
             for _, block, directions, _ in self._blocks
@@ -114,13 +118,13 @@ class FittedTests:
         return np.concatenate(parts, axis=-1)
 
     def columns(self, shapes: Array) -> Array:
-        """Components of the residuals by relative changes of the stiffness.
+        """Convert relative changes of the stiffness into changes of the residuals' components.
 
         Args:
-            shapes: relative changes at the operating points, complex (c, p).
+            shapes: c relative changes of the stiffness at the operating points, complex (c, p).
 
         Returns:
-            (c, d).
+            Components of the whitened residuals for each change, (c, d).
         """
         columns, first, changes = [], 0, shapes * self._stiffness
         for test, _, directions, components in self._blocks:
@@ -138,7 +142,7 @@ class FittedTests:
 
     @cached_property
     def remainder(self) -> tuple[Array, Array]:
-        """Directions that parameters and rig errors absorb, (k, d), and components of the remaining residual, (d,)."""
+        """Orthonormal directions absorbed by parameters and rig errors, (k, d), and residual without these, (d,)."""
         rows, residual = self.solution.jacobian, self.solution.residual
         pairs = list(zip(self._blocks, self.rig_errors, strict=True))
         across = np.concatenate([rows[:, block] @ errors.T for (_, block, *_), errors in pairs], axis=1)
@@ -159,14 +163,15 @@ class FittedTests:
 
 @dataclass(frozen=True, eq=False)
 class Discrepancy:
-    """A Gaussian process of the relative error of a fitted model.
+    """Gaussian process of the relative error of a fitted model, over frequency, strain and temperature.
 
     Args:
-        groups: directions and specimens that share the process, by name.
-        lengths: in ln frequency and ln strain.
-        nodes: of each group, indices of points, (m,).
-        shapes: patterns at the points, (q, p).
-        sizes: tried, relative to |K|, rising, (s,).
+        tests: fitted model and its tests, with p operating points.
+        groups: groups of directions or specimens; the members of a group share one error.
+        lengths: correlation lengths in ln frequency and ln strain.
+        nodes: for each group, indices of the operating points that are its nodes, (m,).
+        shapes: principal patterns of the process at the operating points, (q, p).
+        sizes: candidate standard deviations of the process, relative to |K|, ascending, (s,).
     """
 
     tests: FittedTests
@@ -184,9 +189,9 @@ class Discrepancy:
 
         Args:
             tests: fitted model and tests.
-            groups: directions and specimens that share the process.
-            lengths: in ln frequency and ln strain.
-            maximum_nodes: number of nodes of a group at most.
+            groups: groups of directions or specimens; the members of a group share one error.
+            lengths: correlation lengths in ln frequency and ln strain.
+            maximum_nodes: largest number of nodes per group.
 
         Returns:
             The process, not yet conditioned.
@@ -202,18 +207,18 @@ class Discrepancy:
 
     @cached_property
     def complex_shapes(self) -> Array:
-        """Patterns of the process in phase, then in quadrature, complex (2 q, p)."""
+        """Patterns of the process, first in phase and then in quadrature with the stiffness, complex (2 q, p)."""
         return np.concatenate((self.shapes, 1j * self.shapes))
 
     @cached_property
     def likelihood(self) -> RestrictedLikelihood:
-        """Restricted likelihood of the size of the process."""
+        """Restricted likelihood of the size of the process, given the tests."""
         span, remainder = self.tests.remainder
         return RestrictedLikelihood.from_columns(self.tests.columns(self.complex_shapes), remainder, span)
 
     @cached_property
     def best(self) -> tuple[float, float]:
-        """Largest gain of the log likelihood, and the size at which it occurs."""
+        """Largest gain of the log likelihood over no process, and the size (relative to |K|) at which it occurs."""
         gains = self.likelihood.gains(self.sizes)
         return float(gains.max()), float(self.sizes[gains.argmax()])
 
@@ -221,8 +226,8 @@ class Discrepancy:
         """Condition the process, at its best size, on the tests.
 
         Returns:
-            Mean at the operating points, complex (p,), and standard deviation of its two parts with those of the
-            parameters, (2, p).
+            Mean relative error of the model at the operating points, complex (p,), and the standard deviation of its
+            real and imaginary parts, errors of the parameters included, (2, p).
         """
         size, columns, rows = self.best[1], self.tests.columns(self.complex_shapes), self.tests.moving
         inverse = np.linalg.inv(columns @ columns.T + np.eye(len(columns)) / size**2)
@@ -239,14 +244,13 @@ class Discrepancy:
 
 
 def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
-    """Average of processes conditioned on the tests, weighted by their likelihood.
+    """Average of processes conditioned on the tests, weighted by their likelihood, as a correction of the model.
 
-    Between the nodes, and in sharing directions, it is as the likeliest, over lengths of the mean logarithm. Its sizes
-    are known by few degrees of freedom: standard deviations are those by which a normal interval is as wide as
-    Student's t has it.
+    Nodes and groups are those of the likeliest process; lengths are geometric means. As few degrees of freedom
+    determine the size, standard deviations are enlarged so that a normal 95 % interval is as wide as Student's t.
 
     Returns:
-        Correction at nodes, with its standard deviation, relative to the stiffness.
+        Correction at the nodes, with its standard deviation, both relative to the stiffness.
     """
     gains = np.array([process.best[0] for process in processes])
     share = np.exp(gains - gains.max())
@@ -269,7 +273,7 @@ def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
 
 
 def discrepancies(tests: FittedTests) -> list[Discrepancy]:
-    """Processes of all lengths, shared by all directions and separate for each direction."""
+    """Processes with all candidate lengths, each once shared by all directions and once separate for each direction."""
     names = tuple(dict.fromkeys(tests.directions.tolist()))
     shared = dict.fromkeys([(names,), tuple((name,) for name in names)])
     pairs = product(shared, product(OVER_FREQUENCY, OVER_STRAIN))

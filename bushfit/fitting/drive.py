@@ -30,12 +30,12 @@ from bushfit.reading.measurement import Loop
 from bushfit.reduction.harmonics import as_complex, basis, least_squares, series
 from bushfit.units import display_unit, number
 
-#: Share of the amplitude, or of half the force's range, from which on a mean is told as a preload; chosen: sensors are
-#: off zero by less.
+#: Share of the amplitude, or of half the force's range, above which a mean is reported as a preload; chosen: zero
+#: errors of sensors are smaller.
 TOLD_MEAN = 0.05
-#: Share of the half range by which first displacement and first force may be off where rest is, for a start from rest.
+#: Largest distance of the first displacement and force from rest, relative to half the range, for a start from rest.
 _AT_REST = 0.02
-#: Standard deviations of the noise from which on a change, or energy that a loop gives, is no chance.
+#: Number of standard deviations beyond which a change of force, or energy that a loop releases, is not chance.
 _CERTAIN = 5.0
 #: Loss factor up to which a loop may give energy, for the delay of a rig.
 _NO_LOSS = 2e-3
@@ -52,22 +52,23 @@ class Drive:
     """A measured loop, prepared as an input of the model: its motion without noise, and its force with weights.
 
     Args:
-        frequency: [Hz], found from the displacement.
-        cycles: whole and broken cycles in the record.
-        from_rest: True where the record begins at rest, False where the loop had settled.
+        loop: measured loop, reduced to its steady cycles.
+        frequency: frequency of the displacement [Hz].
+        cycles: number of cycles in the loop, including fractions.
+        from_rest: True if the record begins at rest, False if the loop is settled.
         phase: position of each row [cycles from the first row], (n,).
-        force: measured force per row, or per bin of phase where the loop is long, (n,).
-        weight: rows behind each entry of force, 0 at the turning points, (n,).
+        force: measured force per row, or per bin of phase if the loop is long [N or N m], (n,).
+        weight: number of rows behind each entry of `force`, 0 at the turning points, (n,).
         noise: standard deviation of one row's force [N or N m].
-        coefficients: complex harmonics of the displacement, mean first.
-        half_range: half of the range of the measured force, outliers aside [N or N m].
-        datum: mean of the measured force where the motion lies off zero or starts from rest off zero, the force is a
-            preload's, or other cycles went before in the record; else None. Whether a sensor's zero, a preload or the
-            memory of rubber put it there is not known, so such a loop counts from its own middle.
-        notes: sentences on what of the record was left out, and on a time that does not go with its rows.
-        outliers: by column, rows of the loop that are faults of the record, and how far they lie off [noise].
-        first_row: row of the whole record that the loop begins with.
-        row_noise: how the noise of a row depends on that of the rows before.
+        coefficients: complex harmonics of the displacement, mean first [m or rad].
+        half_range: half of the range of the measured force without outliers [N or N m].
+        datum: mean force [N or N m] that the fit subtracts, because a zero error of the sensor, a preload and the
+            memory of the rubber cannot be distinguished: the motion is not about zero or starts from rest at another
+            position, the force has a preload, or other cycles precede the loop. None: the fit uses the force itself.
+        notes: sentences on parts of the record that were left out, and on times that do not agree with the rows.
+        outliers: by column, indices of faulty rows, and their distance from the others [noise].
+        first_row: index of the loop's first row in the whole record.
+        row_noise: correlation of the noise of a row with that of the rows before.
     """
 
     loop: Loop
@@ -103,31 +104,31 @@ class Drive:
         return f", correlated over about {number(rows, 2)} rows ({number(time, 2)} s)"
 
     def displacement(self, phase: Array) -> Array:
-        """Displacement without noise at any phase [cycles], [m or rad], (n,)."""
+        """Displacement without noise [m or rad], (n,), at phases in cycles, (n,)."""
         return series(self.coefficients, phase)
 
     def first_harmonic(self) -> complex:
-        """Complex stiffness of the loop's fundamental, force over displacement [N/m or N m/rad]."""
+        """Complex stiffness of the loop at its fundamental, force over displacement [N/m or N m/rad]."""
         root = np.sqrt(self.weight)
         _, force = as_complex(least_squares(basis(self.phase, 1) * root[:, None], self.force * root))
         return complex(force / self.coefficients[1])
 
     def history(self, settles: bool) -> History:
-        """Displacement that drives the model: one settled cycle of GRID samples, or the whole record if it begins at
-        rest or the model `settles`.
+        """Displacement that drives the model: one settled cycle of GRID samples, or the whole record.
 
-        In a part after other cycles the model has settled.
+        The whole record is used if it begins at rest, or if the response of the model changes over the first cycles
+        (`settles`). A loop that other cycles precede is settled in any case.
         """
         return self._settling if settles and not (self.from_rest or self.follows) else self._motion
 
     @property
     def follows(self) -> bool:
-        """True if earlier rows of the same record precede the loop, which the rubber remembers."""
+        """True if earlier rows of the same record, which the rubber remembers, precede the loop."""
         return self.loop.part is not None and self.loop.part.first_row > 0
 
     @property
     def _rounding(self) -> float:
-        """Half a row in cycles: by so much the record may miss a whole number of cycles."""
+        """Half a row in cycles: tolerance for a whole number of cycles."""
         return 0.5 * self.cycles / self.loop.time.size
 
     @cached_property
@@ -145,9 +146,9 @@ class Drive:
         return replace(motion, accuracy=_ACCURACY)
 
     def at_rows(self, response: Array) -> Array:
-        """A response over `history`, (..., samples), linearly interpolated at the rows.
+        """Interpolate a response of the model over `history`, (..., samples), linearly at the measured rows.
 
-        The mean is taken out if the fit uses the loop about its own mean.
+        The mean is subtracted if the fit uses the loop about its mean (`datum`).
 
         Returns:
             Response at the rows, (..., n).
@@ -168,12 +169,13 @@ class Drive:
 
 
 def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
-    """Find the cycles of a loop, clear its displacement of noise, and weigh its force.
+    """Prepare a loop for the model: find its cycles, remove the noise of its displacement, and weight its force.
 
-    Outliers of either column do not disturb that; `without_outliers`, rows whose force is one carry no weight.
+    Outliers of displacement or force do not affect cycles, motion and noise. With `without_outliers`, rows whose force
+    is an outlier get no weight.
 
     Returns:
-        The loop made ready for the model.
+        The loop as an input of the model.
 
     Raises:
         FitError: the displacement is not one whole cycle or more of a periodic motion, rows are missing, or the loop
@@ -228,7 +230,7 @@ def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
 
 
 def _check_loses_energy(drive: Drive) -> None:
-    """Raise a FitError if the force lags behind the displacement by more than noise and the delay of a rig explain."""
+    """Raise a FitError if the force lags behind the displacement by more than noise and the rig's delay explain."""
     stiffness = drive.first_harmonic()
     rows = drive.weight.sum() / drive.row_noise.rows_as_one
     chance = drive.noise * np.sqrt(2.0 / rows) / abs(drive.coefficients[1])
@@ -246,9 +248,9 @@ def _check_loses_energy(drive: Drive) -> None:
 
 
 def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
-    """Estimate the noise of the rows, or bins, of a loop from its whole cycles.
+    """Estimate size and correlation of the noise of a loop's rows, or bins, from its whole cycles.
 
-    Where that leaves no cycle, or no noise above that of any rig, rows count as independent.
+    If there is no whole cycle, or the noise is below that of any rig, the rows are taken to be independent.
     """
     binned = drive.force.size < drive.loop.force.size
     turn = drive.phase.astype(np.intp)
@@ -286,7 +288,7 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
 
 
 def _at_reversal(drive: Drive) -> Array:
-    """Mask of the rows within a grid step of a turning point, (n,), where dry friction jumps."""
+    """Mask of the rows within 1.5 grid steps of a turning point, where dry friction jumps, (n,)."""
     motion, position = drive.history(settles=False).value, drive.phase * GRID
     if drive.from_rest:
         turns = np.flatnonzero(reversals(motion))
@@ -301,10 +303,18 @@ def _at_reversal(drive: Drive) -> Array:
 def _rests(
     loop: Loop, found: LoopHarmonics, frequency: float, half_motion: float, half_force: float, noise: float
 ) -> tuple[bool, bool]:
-    """Find out if the record begins at rest at zero, and if it begins at rest about a preload.
+    """Return two flags: the record begins at rest at zero, and it begins at rest about a preload.
 
-    A settled loop may pass the origin too, where its load cell is off zero, but then it passes it every cycle: at rest
-    the force at the start differs from that a cycle later by more than noise explains.
+    A record that begins at rest differs at its start from the force one cycle later by more than noise explains. A
+    settled loop does not, even if it passes through the origin, as with a zero error of its load cell.
+
+    Args:
+        loop: steady cycles of the record.
+        found: harmonics of the loop.
+        frequency: frequency of the motion [Hz].
+        half_motion: half of the range of the displacement [m or rad].
+        half_force: half of the range of the force [N or N m].
+        noise: standard deviation of one row's force [N or N m].
     """
     end = np.searchsorted(loop.time, loop.time[0] + 2.0 / frequency)
     clock, force = loop.time[:end] - loop.time[0], loop.force[:end]
@@ -325,7 +335,7 @@ def _rests(
 
 
 def _preload(drive: Drive) -> Iterator[str]:
-    """Note on mean values of a loop that are too large for a wrong zero of a sensor."""
+    """Yield a note on mean displacement and force of a loop if these are too large for a zero error of a sensor."""
     if drive.datum is None:
         return
     (motion, force, _), units = drive.loop.direction.motion.words, drive.loop.direction.display
