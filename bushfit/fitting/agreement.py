@@ -31,8 +31,7 @@ _ENOUGH = 0.5
 
 
 class _Run(NamedTuple):
-    """Run of a test: the quantity held constant (None: none), its value and unit, and its points: a mask (n,) or slice.
-    """
+    """Run of a test: the quantity held constant (or None), its value and unit, and its points: mask (n,) or slice."""
 
     held: Literal["amplitude", "frequency"] | None
     value: float | None
