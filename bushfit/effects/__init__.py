@@ -20,15 +20,16 @@ from bushfit.effects.history import History as History
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.geometry import Direction
 
-#: Directions along lines.
+#: Directions of translation.
 _LINES = (Direction.AXIAL, Direction.RADIAL)
-#: Selection of the places of a search from the tested places (axial first), by keyword in library.toml.
+#: Functions that select the places (directions and specimens) that a search considers from the tested places (axial
+#: first), by keyword in library.toml.
 _SOUGHT: dict[str, Callable[[Sequence[str]], Sequence[str]]] = {
     "others": lambda places: places[1:],
     "lines": lambda places: [place for place in places if place in _LINES],
 }
 _TABLE: dict[str, Any] = tomllib.loads(Path(__file__).with_name("library.toml").read_text(encoding="utf-8"))
-#: Fields of the record of an effect that its file may define.
+#: Fields of an effect's record that the Python file of the effect may define.
 _LAW = (
     *("modulus", "stress", "modulus_sensitivities", "stress_sensitivities", "in_place_of"),  # of a branch
     *("adjust", "shift_factor", "stiffness", "force"),  # of a modifier, and of a layer
@@ -38,7 +39,7 @@ _KINDS: dict[str, type[Effect]] = {"modulus": Branch, "adjust": Modifier, "stiff
 
 
 def _entry(name: str) -> dict[str, Any]:
-    """Table of an effect in library.toml, completed by the effect that it is like; "law" is the file of its law."""
+    """Table of an effect in library.toml, completed by the table that "like" names; "law" names the Python file."""
     entry: dict[str, Any] = dict(_TABLE[name])
     if "like" not in entry:
         return {"law": name.partition(".")[0], **entry}
@@ -46,7 +47,7 @@ def _entry(name: str) -> dict[str, Any]:
 
 
 def _record(name: str) -> Effect | Family:
-    """Effect of a table of library.toml, or family of effects of places."""
+    """Build the effect, or the family of effects (one per direction or specimen), of a table in library.toml."""
     entry = _entry(name)
     module = import_module(f"{__name__}.{entry.pop('law')}")
     law = {part: getattr(module, part) for part in _LAW if hasattr(module, part)}
@@ -64,20 +65,26 @@ def _record(name: str) -> Effect | Family:
 
 
 _RECORDS = [_record(name) for name in _TABLE]
-#: Families of effects of places, by name.
+#: Families of effects (one effect per direction or specimen), by name.
 FAMILIES = {each.name: each for each in _RECORDS if isinstance(each, Family)}
-#: All effects by name, from the rubber outward; of a family, the effect of the radial direction.
+#: All effects by name, from the rubber outward; a family is represented by its effect for the radial direction.
 LIBRARY = {
     effect.name: effect
     for effect in (each.of_place(Direction.RADIAL) if isinstance(each, Family) else each for each in _RECORDS)
 }
 
-#: The paper's model.
+#: Names of the effects in the paper's model.
 BASE = ("elastic", "springpot", "friction")
 
 
 def with_base(names: Iterable[str]) -> tuple[str, ...]:
-    """Names of the paper's branches that the effects do not replace, followed by the effects.
+    """Add effects to the paper's model, leaving out the branches of the paper that they replace.
+
+    Args:
+        names: names of the effects to add.
+
+    Returns:
+        Names of the remaining branches of the paper, followed by the added names.
 
     >>> with_base(["sliders", "inertia"])
     ('elastic', 'springpot', 'sliders', 'inertia')
@@ -88,13 +95,10 @@ def with_base(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def get_effect(name: str) -> Effect:
-    """Effect of a name.
-
-    Returns:
-        Record of the effect.
+    """Return the effect with the given name.
 
     Raises:
-        ModelError: an unknown name; the message suggests the most similar one.
+        ModelError: the name is unknown; the message suggests the most similar name.
 
     >>> get_effect("inertia").phrase
     'moving mass between bushing and load cell'
@@ -110,7 +114,7 @@ def get_effect(name: str) -> Effect:
 
 
 def place_suffix(name: str) -> str | None:
-    """Place in the name of an effect of a family, or of its parameter; None for other names.
+    """Direction or specimen in the name of an effect or parameter, the part after the dot; None if it names neither.
 
     >>> place_suffix("stiffness_factor.radial"), place_suffix("inertia.mass")
     ('radial', None)
@@ -121,7 +125,9 @@ def place_suffix(name: str) -> str | None:
 
 
 def twins_of(name: str) -> tuple[str, ...]:
-    """Names of an effect and its twins, the effect of the bushing first; (name,) without twins.
+    """Names of the effects that no test can distinguish from the named effect (its twins), including its own name.
+
+    The effect of the bushing comes first. Without twins the result is (name,).
 
     >>> twins_of("guide_friction")
     ('interface_slip', 'guide_friction')
@@ -135,7 +141,7 @@ def twins_of(name: str) -> tuple[str, ...]:
 def qualified_name(effect: Effect, parameter: Parameter) -> str:
     """Name of a parameter in files and reports: `<effect>.<name>`, or `<name>` for the paper's three effects.
 
-    The one parameter of an effect of a place, such as `stiffness_factor.radial`, has the name of the effect.
+    If the effect is for one direction or specimen, as `stiffness_factor.radial`, its parameter has the effect's name.
 
     >>> names = ("elastic", "inertia", "stiffness_factor.radial")
     >>> [qualified_name(LIBRARY[name], LIBRARY[name].amount) for name in names]
@@ -147,7 +153,7 @@ def qualified_name(effect: Effect, parameter: Parameter) -> str:
 
 
 def effect_name_of(name: str) -> str:
-    """Name of the effect that a parameter belongs to.
+    """Name of the effect that a parameter, given by its name in files and reports, belongs to.
 
     >>> effect_name_of("inertia.mass"), effect_name_of("alpha")
     ('inertia', 'springpot')
@@ -167,17 +173,17 @@ def _parameters() -> dict[str, Parameter]:
 
 
 def parameter_names() -> tuple[str, ...]:
-    """Names of all parameters in the order of the library."""
+    """Names of all parameters in files and reports, in the order of the library."""
     return tuple(_parameters())
 
 
 def is_parameter(name: str) -> bool:
-    """Return True if the name is that of a parameter."""
+    """Return True if a parameter has this name in files and reports."""
     return name in _parameters() or place_suffix(name) is not None
 
 
 def get_parameter(name: str) -> Parameter:
-    """Parameter of a name in files and reports.
+    """Return the parameter with the given name in files and reports.
 
     >>> get_parameter("inertia.mass").meaning
     'moving mass'
@@ -186,13 +192,14 @@ def get_parameter(name: str) -> Parameter:
 
 
 def effects_for_places(places: Iterable[str]) -> dict[str, Effect]:
-    """Effects that a search considers for tests in some directions and specimens.
+    """Effects that a search considers for tests of the given directions and specimens.
 
     Args:
-        places: names of directions and specimens; the moduli are those of the axial direction, or else of the first.
+        places: names of the tested directions and specimens. The axial direction, or else the first place, is the
+            reference for the factors of the others.
 
     Returns:
-        Effects by name; of twins, the effect of the bushing alone.
+        Effects by name. Of effects that no test can distinguish (twins), only the effect of the bushing is included.
 
     >>> [name for name in effects_for_places(["axial", "mount"]) if name.endswith("mount")]
     ['elastic_preload.mount', 'strain_scale.mount', 'stiffness_factor.mount', 'displacement_gain.mount']

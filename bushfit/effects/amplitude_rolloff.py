@@ -4,25 +4,27 @@ import numpy as np
 
 from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Value, Values
 
-#: Frequency at which the amplitude has lost the share c [Hz]: the highest of the paper's sweeps.
+#: Frequency at which the amplitude is reduced by the share c [Hz]: the highest of the paper's sweeps.
 _HIGHEST_FREQUENCY = 155.0
 
 
 def _share(p: Values, omega: Array | float) -> Value:
-    """1 - c (f/155 Hz)^2, at least 5 %: the law must not reverse the motion."""
+    """Ratio of the true to the requested amplitude, 1 - c (f/155 Hz)^2, at least 0.05."""
     ratio = np.asarray(omega) / (2.0 * np.pi * _HIGHEST_FREQUENCY)
     return np.maximum(1.0 - p["c"] * ratio**2, 0.05)
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """Complex stiffness with a rig that falls short of the amplitude at high frequency.
+    """Complex stiffness with a rig that does not reach the requested amplitude at high frequency.
 
     Args:
-        p: values of c [1].
-        below, omega, amplitude, setting: see `contract.Layer`.
+        p: parameter values by name: c [1].
+        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N/m or N m/rad].
+        Complex stiffness above the layer [N/m or N m/rad], (..., n).
 
     Notes:
         K at the amplitude X (1 - c (f/155 Hz)^2).
@@ -35,17 +37,19 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """Force with a rig that falls short of the amplitude at high frequency.
+    """Force with a rig that does not reach the requested amplitude at high frequency.
 
     Args:
-        p: values of c [1].
-        below, history, setting: see `contract.Layer`.
+        p: parameter values by name: c [1].
+        below: force of the bushing and the inner layers, as a function of the displacement history.
+        history: displacement over time [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N or N m].
+        Force above the layer at each sample [N or N m], (..., n).
 
     Notes:
-        F of the true motion, scaled as the rig's stiffness is: by the motion asked for over the true one.
+        F of the true motion, multiplied by the ratio of the requested to the true motion.
     """
     share = _share(p, history.omega)
     return below(history.with_value(history.value * share)) / share

@@ -9,14 +9,14 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """Complex modulus of the asymmetric elastic term.
 
     Args:
-        p: values of c2 [1]; and mu.
-        omega, strain: see `contract.Branch`.
+        p: parameter values by name: c2 [1], and of the base model mu [Pa].
+        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
-        mu^ = 0: an even stress has a mean and even harmonics, and no first one.
+        mu^ = 0: an even stress has a mean and even harmonics, but no first harmonic.
     """
     return np.zeros(1)
 
@@ -25,11 +25,11 @@ def stress(p: Values, history: History) -> Array:
     """Stress of the asymmetric elastic term.
 
     Args:
-        p: values of c2 [1]; and mu.
-        history: see `contract.Branch`.
+        p: parameter values by name: c2 [1], and of the base model mu [Pa].
+        history: strain over time, (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Stress at each sample [Pa], (..., n).
 
     Notes:
         s = 2 mu c2 e^2.

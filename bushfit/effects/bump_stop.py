@@ -8,11 +8,13 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a stop on both sides beyond a gap.
 
     Args:
-        p: values of gap [m], stiffness [N/m].
-        below, omega, amplitude, setting: see `contract.Layer`.
+        p: parameter values by name: gap [m], stiffness [N/m].
+        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N/m or N m/rad].
+        Complex stiffness above the layer [N/m or N m/rad], (..., n).
 
     Notes:
         K + k N(gap/X) [N/m], N of `dead_zone.first_harmonic`; exactly K up to the gap, and in torsion.
@@ -27,11 +29,13 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a stop on both sides beyond a gap.
 
     Args:
-        p: values of gap [m], stiffness [N/m].
-        below, history, setting: see `contract.Layer`.
+        p: parameter values by name: gap [m], stiffness [N/m].
+        below: force of the bushing and the inner layers, as a function of the displacement history.
+        history: displacement over time [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N or N m].
+        Force above the layer at each sample [N or N m], (..., n).
 
     Notes:
         F + k (x - gap) above the gap, k (x + gap) below -gap.

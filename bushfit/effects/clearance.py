@@ -5,8 +5,8 @@ import numpy as np
 from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 from bushfit.effects.dead_zone import dead_zone, first_harmonic
 
-#: Samples of the cycle from which the first harmonic of the bent waveform is taken: chosen, more change no digit that
-#: a test resolves.
+#: Samples per cycle for the first harmonic of the distorted waveform; chosen: more samples change no digit that a test
+#: resolves.
 SAMPLES = 64
 #: Factors of the samples in the complex first harmonic of a cycle that starts at the top of the motion.
 FIRST = 2.0 / SAMPLES * np.exp(-2j * np.pi * np.arange(SAMPLES) / SAMPLES)
@@ -16,19 +16,21 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with play between the bushing and its drive.
 
     Args:
-        p: values of delta [m].
-        below, omega, amplitude, setting: see `contract.Layer`.
+        p: parameter values by name: delta [m].
+        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N/m or N m/rad].
+        Complex stiffness above the layer [N/m or N m/rad], (..., n).
 
     Notes:
-        K(omega, X - delta) N(delta/X) + what friction makes of the bent waveform; 0 within the play.
+        K(omega, X - delta) N(delta/X) + correction of friction for the distorted waveform; 0 within the play.
 
-        The bushing is moved by what a sine reaches beyond the play, a motion of first harmonic X N (N of
-        `dead_zone.first_harmonic`) and peak X - delta. The first term is exact where the bushing is linear. Friction
-        answers to the path, not to its first harmonic (0.5 to 3 % of K at delta/X = 0.2). The second term is that
-        difference: the first harmonic of one steady cycle, less the first term from the same samples.
+        The motion of the bushing is the excess of a sine over the play, with first harmonic X N (N of
+        `dead_zone.first_harmonic`) and peak X - delta. The first term is exact if the bushing is linear. Friction
+        depends on the path, not on its first harmonic (0.5 to 3 % of K at delta/X = 0.2). The second term is this
+        difference: the first harmonic of one steady cycle minus the first term computed from the same samples.
     """
     delta = p["delta"]
     if not np.any(delta):
@@ -50,14 +52,16 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with play between the bushing and its drive.
 
     Args:
-        p: values of delta [m].
-        below, history, setting: see `contract.Layer`.
+        p: parameter values by name: delta [m].
+        below: force of the bushing and the inner layers, as a function of the displacement history.
+        history: displacement over time [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N or N m].
+        Force above the layer at each sample [N or N m], (..., n).
 
     Notes:
-        The force of the bushing moved by what exceeds +-delta.
+        Force of the bushing, whose displacement is the excess over +-delta.
 
     >>> motion = History.steady(np.array([0.2, 1.0, -1.0]), 1.0)
     >>> force({"delta": 0.25}, lambda history: 2.0 * history.value, motion, loop)

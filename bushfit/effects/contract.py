@@ -35,7 +35,7 @@ from bushfit.geometry import Bushing, Direction, Place
 if TYPE_CHECKING:
     from bushfit.effects.unnamed import Unnamed
 
-#: Frequency [Hz] and strain amplitude [1] at which laws compare: within the range of most tests.
+#: Frequency [Hz] and strain amplitude [1] at which the effect laws have their reference value; most tests include it.
 REFERENCE_FREQUENCY = 25.0
 REFERENCE_STRAIN = 0.01
 
@@ -43,18 +43,18 @@ REFERENCE_STRAIN = 0.01
 Value = Any
 #: Parameter values by name.
 Values = Mapping[str, Value]
-#: Force [N or N m] that answers a displacement history.
+#: Function from a displacement history to the force [N or N m] of the bushing and the inner layers.
 ForceBelow = Callable[[History], Array]
 
 
 @dataclass(frozen=True)
 class StiffnessBelow:
-    """The response below a layer in the frequency face.
+    """Steady response of the bushing and the layers inside a given layer.
 
     Args:
         stiffness: (omega [rad/s], amplitude [m or rad]) -> complex dynamic stiffness.
-        cycle: (omega, one steady cycle of motion per operating point, (..., n, samples), which of the test's operating
-            points these are, as an index) -> force of the same shape, for the layers that bend the waveform.
+        cycle: (omega, displacement over one steady cycle per operating point, (..., n, samples), index of these
+            operating points in the test) -> force of the same shape; for layers that distort the waveform.
     """
 
     stiffness: Callable[[Array, Array], Array]
@@ -65,7 +65,7 @@ class StiffnessBelow:
 
 
 class Level(IntEnum):
-    """Level at which an effect acts, from the rubber outward; predictions exclude instrument and record."""
+    """Level at which an effect acts, from the rubber outward; predictions leave out instrument and record effects."""
 
     MATERIAL = 1
     COMPONENT = 2
@@ -81,16 +81,16 @@ class Parameter:
     """One parameter of an effect.
 
     Args:
-        name: ASCII name, in files and reports `<effect>.<name>` except for the paper's effects.
-        bounds: least and largest plausible value.
+        name: ASCII name; files and reports use `<effect>.<name>`, except for the paper's effects.
         unit: SI unit; "1" for a ratio.
+        bounds: smallest and largest plausible value.
         neutral: value at which the effect vanishes; None if another parameter has this value.
-        typical: usual distance from the neutral value; scale of the parameter in a fit.
+        typical: usual distance from the neutral value, by which a fit scales the parameter.
         meaning: description for users.
         log: True if a fit varies the logarithm of the (positive) parameter.
-        scale: quantity of the tests that determines the start of a search: "period", "frequency", "displacement",
-            "strain" or "force"; "session" for a share of its duration; "order" for the order of a derivative; None if
-            `typical` suits all tests.
+        scale: quantity of the tests that determines the start value in a search: "period", "frequency", "displacement",
+            "strain" or "force"; "session" for a share of the session's duration; "order" for the order of a
+            derivative; None if `typical` suits all tests.
     """
 
     name: str
@@ -103,7 +103,7 @@ class Parameter:
     scale: Literal["period", "frequency", "displacement", "strain", "force", "order", "session"] | None = None
 
     def sized(self, share: float) -> float:
-        """Value at a share of the typical distance from the neutral value, or from 0 without a neutral value.
+        """Parameter value at a share (1 = typical) of the typical distance from the neutral value (0 if None).
 
         >>> Parameter("c3", "1", (0.0, 1e5), 0.0, 20.0, "cubic stress coefficient over mu").sized(0.5)
         10.0
@@ -117,11 +117,10 @@ class Circumstances:
 
     Args:
         temperature: of the rubber [K], a number or one per operating point, (n,).
-        turn: when in the session a point was measured, from 0 for the first to 1 for the last; a number or (n,), as all
-            that follows.
-        strained: largest strain amplitude that the rubber had seen before [1].
-        left: last strain amplitude before that was larger than the point's [1]; 0 where none was.
-        rested: turns since then.
+        turn: time of the measurement as a share of the session, from 0 for the first point to 1 for the last, (n,).
+        strained: largest strain amplitude that the rubber had undergone before the measurement [1], (n,).
+        left: most recent earlier strain amplitude larger than that of the point [1], (n,); 0 if there was none.
+        rested: time since that larger amplitude, as a share of the session, (n,).
     """
 
     temperature: Array | float | None = None
@@ -131,7 +130,7 @@ class Circumstances:
     rested: Array | float | None = None
 
     def select(self, points: Any) -> Circumstances:
-        """Circumstances of the operating points of an index; numbers apply to all points."""
+        """Select the circumstances of some operating points by a numpy index; single numbers apply to all points."""
         quantities = (self.temperature, self.turn, self.strained, self.left, self.rested)
         return Circumstances(*(value[points] if isinstance(value, np.ndarray) else value for value in quantities))
 
@@ -142,14 +141,14 @@ UNKNOWN = Circumstances()
 
 @dataclass(frozen=True)
 class Setting:
-    """The test that a response belongs to.
+    """Test for which a response is computed.
 
     Args:
-        bushing: on whose rig the test is made; None where specimens alone are tested.
-        direction: of the motion, or the specimen under test.
-        kind: of the test: some effects belong to the rig that makes one of the two.
-        under: what it was made under.
-        unnamed: the data of the model's effect of that name.
+        bushing: geometry of the bushing; None if only specimens are tested.
+        direction: direction of the motion, or the specimen under test.
+        kind: "sweep" or "loop"; some effects belong to the rig of one kind only.
+        under: temperature and history of the rubber during the test.
+        unnamed: data of the smooth correction `unnamed`; None if the model does not include this effect.
     """
 
     bushing: Bushing | None
@@ -161,13 +160,14 @@ class Setting:
 
 @dataclass(frozen=True)
 class Condition:
-    """The operating condition that a modifier may depend on.
+    """Operating condition that a modifier may depend on.
 
     Args:
-        omega: angular frequency [rad/s].
-        amplitude, strain: of the displacement [m or rad], and the equivalent strain amplitude [1].
-        stiffness: complex stiffness of the bushing [N/m or N m/rad] by parameter values.
-        moduli: names of the rubber's moduli and stresses, which go up and down together with its stiffness.
+        setting: the test.
+        omega: angular frequency [rad/s], (..., n).
+        amplitude, strain: displacement amplitude [m or rad] and equivalent strain amplitude [1], (..., n).
+        stiffness: function from parameter values to the complex stiffness of the bushing [N/m or N m/rad].
+        moduli: names of the moduli and stresses; if all are scaled by a factor, so is the stiffness.
     """
 
     setting: Setting
@@ -183,29 +183,29 @@ class Effect:
     """Properties that all effects have.
 
     Args:
-        name: name in files, reports and options, and of the file of its law.
+        name: name in files, reports and options; also that of the Python file with the equations.
         sentence: description for an engineer.
-        equation: first-harmonic form, ASCII.
+        equation: equation of the first harmonic, ASCII.
         level: level at which it acts.
-        parameters: its parameters.
-        source: literature.
+        parameters: parameters of the effect.
+        source: literature reference.
         confirmed_by: simplest test that would confirm the effect.
-        harmonic_error: relative error of the first-harmonic face compared with the time face; 0 if exact.
+        harmonic_error: relative error of the first-harmonic equation compared with the equation in time; 0 if exact.
         settles: True if the response changes from cycle to cycle, so that all cycles of a loop are computed.
-        corrects: direction or specimen whose stiffness formula it scales by a fitted factor, so that the error of the
-            formula needs no warning; None for other effects.
+        corrects: direction or specimen whose stiffness formula the effect scales by a fitted factor, so that the error
+            of the formula needs no warning; None for other effects.
         twins: effects with the same equation in all tests, mostly of the rig. The effect of the bushing, which lists
             the twins, is proposed; the tests determine its size but cannot distinguish it from its twins.
-        replaces: branch of the paper that it replaces; None if it is added.
-        under: quantities of `Circumstances` that it depends on.
+        replaces: name of the paper's branch that the effect replaces; None if the effect is added.
+        under: names of the `Circumstances` that the effect depends on.
         assumption: sentence on the value of these quantities in a prediction; empty for effects of the rig.
-        in_place_of: of an effect that replaces a branch, start values of a fit from the values of that branch, the most
-            probable first.
-        harmonic_only: True if it has no law in time: in loops it contributes to the first harmonic alone (see
-            `harmonic_response`), and the virtual rig refuses it.
+        in_place_of: function from the values of the replaced branch to start values for a fit, the most probable
+            first; None if the effect replaces no branch.
+        harmonic_only: True if the effect has no equation in time: in loops it contributes to the first harmonic alone
+            (see `harmonic_response`), and the virtual rig refuses it.
         after: effect that must be in the model before this effect is searched.
-        never_with: effects beside which this effect is not searched, because both together fit any law.
-        limit: simpler effect that it becomes at the end of its range; None without such a limit.
+        never_with: effects with which this effect is not combined in a search, because together they fit any data.
+        limit: simpler effect that this effect becomes at a bound of its parameters; None without such a limit.
     """
 
     name: str
@@ -235,27 +235,27 @@ class Effect:
         return short[0].lower() + short[1:]
 
     def acts_at(self, place: Place) -> bool:
-        """Return True if the effect acts in a direction or specimen; the name restricts it to one."""
+        """Return True if the effect acts in this direction or specimen; a name such as `inertia` has no restriction."""
         return self.name.partition(".")[2] in ("", str(place))
 
     @property
     def amount(self) -> Parameter:
-        """First parameter with a neutral value; a search varies this parameter."""
+        """First parameter with a neutral value; a search for the effect varies this parameter."""
         return next(parameter for parameter in self.parameters if parameter.neutral is not None)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Branch(Effect):
-    """Stress of the material in parallel with the other branches.
+    """Effect that adds a stress of the rubber, in parallel with the other branches.
 
     Args:
         modulus: (values, omega [rad/s], strain amplitude) -> complex modulus s~ / (2 e~) of the first harmonic [Pa].
         stress: (values, strain history) -> stress [Pa].
-        modulus_sensitivities: derivatives of the modulus by its own parameters; None for numerical derivatives.
-        stress_sensitivities: derivatives of the stress by its own parameters; None for numerical derivatives.
-        uses: parameters of the paper that it reads.
-        size: parameter that the modulus of a linear viscoelastic branch is proportional to, so that Maxwell arms can
-            replace the branch; None for other branches.
+        modulus_sensitivities: derivatives of the modulus by the branch's parameters; None for numerical derivatives.
+        stress_sensitivities: derivatives of the stress by the branch's parameters; None for numerical derivatives.
+        uses: names of the paper's parameters that the branch reads.
+        size: name of the parameter that the modulus of a linear viscoelastic branch is proportional to, so that Maxwell
+            arms can replace the branch; None for other branches.
     """
 
     level: Level = Level.MATERIAL
@@ -269,10 +269,10 @@ class Branch(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Modifier(Effect):
-    """Change of the parameter values of other effects, by operating condition.
+    """Effect that changes the parameter values of other effects, depending on the operating condition.
 
     Args:
-        adjust: (values, condition) -> the changed values only.
+        adjust: (values, condition) -> the changed values only, by parameter name.
         shift_factor: (values, circumstances) -> time-temperature shift factor a_T; None without a shift.
     """
 
@@ -283,13 +283,13 @@ class Modifier(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Layer(Effect):
-    """Layer around the response of the rubber and of the layers below it.
+    """Effect that converts the response of the rubber and the inner layers into the response outside the layer.
 
     Args:
-        turns: True if it also acts in torsion.
-        adds: parameter that adds up over neighbouring layers of the same law, such as compliances in series.
-        stiffness: (values, response below, omega [rad/s], amplitude [m or rad], setting) -> complex stiffness above.
-        force: (values, force below, displacement history, setting) -> force above [N or N m].
+        turns: True if the layer also acts in torsion.
+        adds: name of the parameter to sum over adjacent layers with the same equation, such as compliances in series.
+        stiffness: (values, response below, omega [rad/s], amplitude [m or rad], setting) -> complex stiffness outside.
+        force: (values, force below, displacement history, setting) -> force outside the layer [N or N m].
     """
 
     turns: bool = True
@@ -300,12 +300,12 @@ class Layer(Effect):
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Effects of the same law, one for each direction or specimen.
+    """Effects with the same equation, one for each direction or specimen ("place").
 
     Args:
-        record: effect with the placeholder {place} in its texts. The effect of a place acts there alone; the effect and
-            its one parameter are named `<name>.<place>`.
-        places: selects the places of a search from the tested places.
+        record: effect with the placeholder {place} in its texts. The effect for a place acts only in tests of this
+            place; the effect and its one parameter are named `<name>.<place>`.
+        places: function from the tested places to the places that a search considers.
         radial: texts for the radial direction that differ from those of the record.
     """
 
@@ -315,12 +315,12 @@ class Family:
 
     @property
     def name(self) -> str:
-        """Name without the place."""
+        """Name of the family: the name of the effects without the direction or specimen."""
         return self.record.name.partition(".")[0]
 
     @cache  # noqa: B019  # the families live as long as the program
     def of_place(self, place: str) -> Effect:
-        """Effect of one place; cached."""
+        """Return the family's effect for one direction or specimen; cached."""
         record = replace(self.record, **(self.radial if place == Direction.RADIAL else {}))
         values = {member.name: getattr(record, member.name) for member in fields(record)}
         texts: dict[str, Any] = {key: text.format(place=place) for key, text in values.items() if isinstance(text, str)}
@@ -330,15 +330,15 @@ class Family:
 
 
 def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str, Value]:
-    """Multiply values by a factor, as most modifiers do.
+    """Multiply some parameter values by a factor, as most modifiers do.
 
     Args:
-        p: parameter values.
-        names: of the values to multiply; names without a value are ignored.
+        p: parameter values by name.
+        names: names of the values to multiply; names without a value are ignored.
         factor: number, or array that broadcasts against operating points.
 
     Returns:
-        The changed values.
+        The changed values by name.
 
     >>> scaled_values({"mu": 1e6}, ("mu", "m"), 0.5)
     {'mu': 500000.0}
@@ -349,34 +349,35 @@ def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str,
 def scaled_response(
     factor: Callable[[Values, Setting], Value], p: Values, below: Callable[..., Array], *motion_and_setting: Any
 ) -> Array:
-    """Response below a layer times a factor; the same for stiffness and force.
+    """Multiply the stiffness or force of the bushing and the inner layers by a factor.
 
     Args:
-        factor: (values, setting) -> factor.
+        factor: function of the values and the setting that gives the factor.
         p: parameter values of the layer.
-        below: response below the layer.
-        motion_and_setting: omega and amplitude, or history; then the setting.
+        below: stiffness or force of the bushing and the inner layers.
+        motion_and_setting: arguments of `below` (omega and amplitude, or history), then the setting.
     """
     *motion, setting = motion_and_setting
     return factor(p, setting) * below(*motion)
 
 
 def linear_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:
-    """Steady stress of a linear branch over one cycle: s_h = 2 mu^(h omega) e_h for every harmonic h.
+    """Steady stress [Pa] of a linear branch over one cycle: s_h = 2 mu^(h omega) e_h for every harmonic h.
 
     Args:
-        modulus: of the branch; it must be finite at omega = 0, where it multiplies the mean strain.
-        p: parameter values.
-        history: a steady cycle of the strain.
+        modulus: complex modulus of the branch [Pa]; must be finite at omega = 0, where it multiplies the mean strain.
+        p: parameter values by name.
+        history: strain over a steady cycle, (..., n).
     """
     return history.response(lambda omega: 2.0 * modulus(p, omega, history.amplitude))
 
 
 def harmonic_response(transfer: Value, history: History) -> Array:
-    """Response of an effect without a law in time: complex ratio times the first harmonic of the motion.
+    """First-harmonic response over time of an effect that has no equation in time, same shape as the motion.
 
     Args:
-        transfer: stress over strain (2 mu^) or force over displacement (K), (..., 1).
+        transfer: complex stress over strain (2 mu^ [Pa]) or force over displacement (K [N/m]), (..., 1).
+        history: strain or displacement over time, (..., n).
 
     >>> harmonic_response(2.0, History.steady(np.array([3.0, 2.0, -1.0, 0.0]), 1.0)).round(6)
     array([ 4.,  2., -4., -2.])
@@ -385,11 +386,11 @@ def harmonic_response(transfer: Value, history: History) -> Array:
 
 
 def harmonic_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:
-    """Stress of a branch without a law in time: s_1 = 2 mu^(omega, e0) e_1, without mean and overtones.
+    """Stress [Pa] of a branch that has no equation in time: s_1 = 2 mu^(omega, e0) e_1, without mean and overtones.
 
     Args:
-        modulus: of the branch.
-        p: parameter values.
-        history: strain over time.
+        modulus: complex modulus of the branch [Pa].
+        p: parameter values by name.
+        history: strain over time, (..., n).
     """
     return harmonic_response(2.0 * modulus(p, np.atleast_1d(history.omega), history.amplitude), history)

@@ -6,7 +6,7 @@ from bushfit.effects.contract import REFERENCE_STRAIN, Condition, Value, Values,
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """m (e0/0.01)^(-q) [Pa s^alpha].
+    """Springpot coefficient m (e0/0.01)^(-q) [Pa s^alpha] at the strain amplitudes e0 of the condition.
 
     >>> model = paper.with_effect("coupled_breakdown", {"coupled_breakdown.q": 0.1})
     >>> [round(model.values_at("axial", 25.0, x)["m"]) for x in (1e-4, 1e-3)]

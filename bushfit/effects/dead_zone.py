@@ -23,11 +23,11 @@ def first_harmonic(amplitude: Array, half_width: Value) -> Array:
     """Describing function N of a dead zone: first harmonic of the output over the amplitude of a sine.
 
     Args:
-        amplitude: of the sine, any shape.
-        half_width: of the dead zone, in the same unit.
+        amplitude: amplitude of the sine, any shape.
+        half_width: half width of the dead zone, in the same unit.
 
     Returns:
-        N, between 0 and 1, broadcast shape of the two.
+        N between 0 and 1, in the broadcast shape of the two.
 
     Notes:
         A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B.

@@ -9,11 +9,13 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a delay between force and displacement.
 
     Args:
-        p: values of tau [s].
-        below, omega, amplitude, setting: see `contract.Layer`.
+        p: parameter values by name: tau [s].
+        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N/m or N m/rad].
+        Complex stiffness above the layer [N/m or N m/rad], (..., n).
 
     Notes:
         K exp(-i omega tau).
@@ -28,16 +30,18 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a delay between force and displacement.
 
     Args:
-        p: values of tau [s].
-        below, history, setting: see `contract.Layer`.
+        p: parameter values by name: tau [s].
+        below: force of the bushing and the inner layers, as a function of the displacement history.
+        history: displacement over time [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N or N m].
+        Force above the layer at each sample [N or N m], (..., n).
 
     Notes:
-        F(t - tau): every harmonic turned in a steady cycle, straight lines between samples from rest.
+        F(t - tau): by the phase of every harmonic in a steady cycle, by linear interpolation from rest.
 
-        What an early force (tau < 0) does after the last sample is taken from the same phase of the last cycle.
+        For tau < 0, the force after the last sample is taken from the same phase of the last cycle.
     """
     undelayed = below(history)
     if history.periodic:

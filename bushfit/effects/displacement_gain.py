@@ -11,14 +11,16 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a wrong gain of the displacement transducer.
 
     Args:
-        p: values of scale [1].
-        below, omega, amplitude, setting: see `contract.Layer`.
+        p: parameter values by name: scale [1].
+        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N/m or N m/rad].
+        Complex stiffness above the layer [N/m or N m/rad], (..., n).
 
     Notes:
-        scale K(scale X): the force of the true motion, over the motion that was read.
+        scale K(scale X): ratio of the force, at the true amplitude scale X, to the recorded amplitude X.
 
     >>> stiffness({"scale": 1.02}, spring, 1.0, 1e-4, sweep)
     510000.0
@@ -30,13 +32,15 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a wrong gain of the displacement transducer.
 
     Args:
-        p: values of scale [1].
-        below, history, setting: see `contract.Layer`.
+        p: parameter values by name: scale [1].
+        below: force of the bushing and the inner layers, as a function of the displacement history.
+        history: displacement over time [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N or N m].
+        Force above the layer at each sample [N or N m], (..., n).
 
     Notes:
-        F of scale times the motion that was read.
+        F of scale times the recorded motion.
     """
     return below(history.with_value(p["scale"] * history.value))

@@ -14,9 +14,9 @@ from bushfit.effects.sliders import parallel_elements
 
 #: Nodes of the Gauss-Chebyshev rule: the storage modulus is exact to 1e-6 at the smallest spread.
 _NODES = 120
-#: Elements in which the distribution is divided along motions other than a steady one to and fro.
+#: Number of elements that represent the distribution in motions other than a steady cycle with two turning points.
 _ELEMENTS = 120
-#: Standard deviations of the distribution that the elements cover, to either side.
+#: Range of the distribution that the elements cover, in standard deviations to either side.
 _COVERED = 4.5
 
 _ANGLES = np.pi * np.arange(1, _NODES + 1) / (_NODES + 1)
@@ -25,16 +25,16 @@ _WEIGHTS, _STRAINS = 2.0 / (_NODES + 1) * np.sin(_ANGLES) ** 2, np.sin(0.5 * _AN
 
 
 def _standardised(strain: Value, e_s: Value, spread: Value) -> Array:
-    """Logarithm of the strain over the median, in standard deviations; no strain is less than 1e-30 of the median."""
+    """Logarithm of the ratio of strain to median yield strain e_s, in units of `spread`; ratios are at least 1e-30."""
     return np.log(np.maximum(strain / e_s, 1e-30)) / spread
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """Modulus of the first harmonic.
+    """Complex modulus of the sliders.
 
     Args:
-        p: values of delta [Pa], e_s and spread.
-        omega: not used: the law does not depend on the rate.
+        p: parameter values by name: delta [Pa], e_s [1], spread [1].
+        omega: not used, because the branch does not depend on the rate.
         strain: strain amplitude e0, (..., n).
 
     Returns:
@@ -58,7 +58,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def _first_loading(strain: Array, e_s: Value, spread: Value) -> Array:
-    """Stress at a strain, loaded from rest, over 2 delta: the strain of the elements in the mean."""
+    """Mean elastic strain of the elements on first loading to a strain: the stress divided by 2 delta."""
     z = _standardised(strain, e_s, spread)
     return strain * ndtr(-z) + e_s * np.exp(0.5 * spread**2) * ndtr(z - spread)
 
@@ -67,15 +67,15 @@ def stress(p: Values, history: History) -> Array:
     """Stress of all elements, from rest or over a steady cycle.
 
     Args:
-        p: values of delta [Pa], e_s and spread.
+        p: parameter values by name: delta [Pa], e_s [1], spread [1].
         history: strain over time, (..., n).
 
     Returns:
         Stress [Pa], (..., n).
 
     Notes:
-        On a steady motion to and fro every branch of the loop is the first loading at twice its size (G. Masing, Proc.
-        2nd Int. Congr. Appl. Mech., 1926). Along any other motion 120 elements represent the distribution.
+        In a steady cycle with two turning points, each half of the loop is the first-loading curve at twice its size (G.
+        Masing, Proc. 2nd Int. Congr. Appl. Mech., 1926). For other motions 120 elements represent the distribution.
     """
     e_s, spread = np.atleast_1d(p["e_s"]), np.asarray(p["spread"])
     turning = history.turning
@@ -92,6 +92,13 @@ def stress(p: Values, history: History) -> Array:
 
 
 def in_place_of(p: Values) -> list[dict[str, float]]:
-    """Start values from those of the friction branch: equal modulus at rest and equal largest stress."""
+    """Derive start values from the friction branch: equal modulus at zero strain and equal largest stress.
+
+    Args:
+        p: parameter values by name, with sigma_fmax [Pa] and eps_half [1] of the friction branch.
+
+    Returns:
+        One dictionary of delta [Pa], e_s [1] and spread [1] for each start.
+    """
     at_rest = p["sigma_fmax"] / (2.0 * p["eps_half"])
     return [{"delta": at_rest, "e_s": p["eps_half"] * np.exp(-0.5 * width**2), "spread": width} for width in (1.0, 1.5)]

@@ -12,8 +12,9 @@ from bushfit.effects.contract import Setting, Value, Values, scaled_response
 
 
 def _gain(p: Values, setting: Setting) -> Value:
-    """1 + gain ln(1 + t/onset)/ln(1 + 1/onset), t from 0 at the first point of the session to 1 at the last; 1 if t is
-    not known.
+    """Relative gain 1 + gain ln(1 + t/onset)/ln(1 + 1/onset) of the force at the time t of a test; 1 if t is unknown.
+
+    t is a share of the session, from 0 at the first point to 1 at the last.
 
     >>> from bushfit.effects.contract import Circumstances
     >>> halfway = Setting(None, "axial", "sweep", Circumstances(turn=0.5))

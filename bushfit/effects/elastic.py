@@ -9,14 +9,14 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """Complex modulus of the elastic branch.
 
     Args:
-        p: values of mu [Pa].
-        omega, strain: see `contract.Branch`.
+        p: parameter values by name: mu [Pa].
+        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
-        mu^ = mu [Pa], whatever the frequency and the amplitude.
+        mu^ = mu [Pa] at all frequencies and amplitudes.
 
     >>> float(modulus({"mu": 1.09e6}, 100.0, 0.01))
     1090000.0
@@ -28,11 +28,11 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
     """Derivatives of the complex modulus of the elastic branch by its parameters.
 
     Args:
-        p: values of mu [Pa].
-        omega, strain: see `contract.Branch`.
+        p: parameter values by name: mu [Pa].
+        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
 
     Returns:
-        Array (..., n) by parameter.
+        Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
 
     Notes:
         d/dmu = 1.
@@ -44,11 +44,11 @@ def stress(p: Values, history: History) -> Array:
     """Stress of the elastic branch.
 
     Args:
-        p: values of mu [Pa].
-        history: see `contract.Branch`.
+        p: parameter values by name: mu [Pa].
+        history: strain over time, (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Stress at each sample [Pa], (..., n).
 
     Notes:
         s_e = 2 mu e (Eq. 1).
@@ -60,11 +60,11 @@ def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
     """Derivatives of the stress of the elastic branch by its parameters.
 
     Args:
-        p: values of mu [Pa].
-        history: see `contract.Branch`.
+        p: parameter values by name: mu [Pa].
+        history: strain over time, (..., n).
 
     Returns:
-        Array (..., n) by parameter.
+        Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
 
     Notes:
         d/dmu = 2 e.

@@ -4,7 +4,7 @@ from bushfit.effects.contract import Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """mu times the factor.
+    """Static shear modulus mu [Pa] times the factor of the preload.
 
     >>> adjust({"mu": 1e6, "m": 2e5, "factor": 1.1}, None)
     {'mu': 1100000.0}

@@ -6,14 +6,15 @@ from bushfit.effects.contract import Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """sigma_fmax times 1 - share (1 - (e0/e_l)^2) exp(-t/tau), t since the last strain amplitude e_l larger than e0.
+    """Friction stress sigma_fmax [Pa], reduced after a larger strain amplitude and recovering with time.
 
     Returns:
-        The changed sigma_fmax; nothing if the history of the test is unknown.
+        sigma_fmax (1 - share (1 - (e0/e_l)^2) exp(-t/tau)), t the time since the last strain amplitude e_l larger than
+        e0; empty if the history of the test is unknown.
 
     Notes:
-        The solution of lambda' = (lambda_inf(e0) - lambda)/tau for the intact share lambda of the network, where the
-    amplitude is held at e0 and was held at e_l long enough before.
+        Solution of lambda' = (lambda_inf(e0) - lambda)/tau for the intact share lambda of the network at the constant
+        amplitude e0, after equilibrium at e_l.
 
     >>> from bushfit.effects.contract import Circumstances
     >>> model = paper.with_effect("filler_recovery", {"filler_recovery.share": 0.2})

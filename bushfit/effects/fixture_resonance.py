@@ -12,7 +12,7 @@ _UNDER = 1.0 - 1e-9
 
 
 def fixture(p: Values, omega: Array) -> Array:
-    """-M omega^2 wr^2/(wr^2 - omega^2 + 2 i zeta omega wr), wr = 2 pi frequency [N/m].
+    """Dynamic stiffness of the fixture [N/m]: -M omega^2 wr^2/(wr^2 - omega^2 + 2 i zeta omega wr), wr = 2 pi f.
 
     >>> mode = {"mass": 0.1, "frequency": 300.0, "damping": 0.0}
     >>> fixture(mode, 2.0 * np.pi * np.array([100.0, 200.0])).real.round()
@@ -26,11 +26,13 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a resonant fixture between bushing and load cell.
 
     Args:
-        p: values of mass [kg], frequency [Hz], damping [1].
-        below, omega, amplitude, setting: see `contract.Layer`.
+        p: parameter values by name: mass [kg], frequency [Hz], damping [1].
+        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N/m or N m/rad].
+        Complex stiffness above the layer [N/m or N m/rad], (..., n).
 
     Notes:
         K - M omega^2 wr^2/(wr^2 - omega^2 + 2 i zeta omega wr); does not act in torsion.
@@ -42,16 +44,18 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a resonant fixture between bushing and load cell.
 
     Args:
-        p: values of mass [kg], frequency [Hz], damping [1].
-        below, history, setting: see `contract.Layer`.
+        p: parameter values by name: mass [kg], frequency [Hz], damping [1].
+        below: force of the bushing and the inner layers, as a function of the displacement history.
+        history: displacement over time [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N or N m].
+        Force above the layer at each sample [N or N m], (..., n).
 
     Notes:
         F + the fixture's force y: y'' + 2 zeta wr y' + wr^2 y = wr^2 M x''.
 
-        From rest the mode rings for 1/(2 pi zeta frequency) seconds before it has fallen to 37 %.
+        From rest the free vibration decays to 37 % within 1/(2 pi zeta frequency) seconds.
     """
     if history.periodic:
         return below(history) + history.response(partial(fixture, p))
@@ -61,7 +65,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
 
 
 def _mode(omega: float, damping: float, push: Array, step: float) -> Array:
-    """y'' + 2 zeta w y' + w^2 y = w^2 push from rest, exact for a push that is straight between samples.
+    """Solve y'' + 2 zeta w y' + w^2 y = w^2 push from rest, (n,) -> (n,), exact if push is linear between samples.
 
     Notes: y = w^2/Im(p) Im z with z' = p z + push and the pole p above the real axis.
     """

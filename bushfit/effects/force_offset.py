@@ -7,14 +7,16 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with an offset of the load cell.
 
     Args:
-        p: values of offset [N].
-        below, omega, amplitude, setting: see `contract.Layer`.
+        p: parameter values by name: offset [N].
+        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N/m or N m/rad].
+        Complex stiffness above the layer [N/m or N m/rad], (..., n).
 
     Notes:
-        K: a constant has no first harmonic.
+        K is unchanged, because a constant has no first harmonic.
     """
     return below(omega, amplitude)
 
@@ -23,14 +25,16 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with an offset of the load cell.
 
     Args:
-        p: values of offset [N].
-        below, history, setting: see `contract.Layer`.
+        p: parameter values by name: offset [N].
+        below: force of the bushing and the inner layers, as a function of the displacement history.
+        history: displacement over time [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N or N m].
+        Force above the layer at each sample [N or N m], (..., n).
 
     Notes:
-        F + offset; the torque cell is another one, so not in torsion.
+        F + offset; not in torsion, which has a torque cell.
 
     >>> motion = History.steady(np.array([1e-3, -1e-3]), 1.0)
     >>> force({"offset": 5.0}, lambda history: 5e5 * history.value, motion, loop)

@@ -17,17 +17,19 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a saturating force channel.
 
     Args:
-        p: values of level [N], share [1].
-        below, omega, amplitude, setting: see `contract.Layer`.
+        p: parameter values by name: level [N], share [1].
+        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N/m or N m/rad].
+        Complex stiffness above the layer [N/m or N m/rad], (..., n).
 
     Notes:
-        K - share (K N(level/(|K| X)) + what the bent waveform of the force makes of it).
+        K - share (K N(level/(|K| X)) + correction for the distorted waveform of the force).
 
-        The first term is exact for a force that is a sine (N of `dead_zone.first_harmonic`). The second is the first
-        harmonic of what one steady cycle of the force has beyond the level, less the first term from as many samples.
+        The first term is exact for a sinusoidal force (N of `dead_zone.first_harmonic`). The correction is the first
+        harmonic of the excess over the level in one steady cycle, minus the first term from the same samples.
     """
     inside = below(omega, amplitude)
     if setting.kind != "sweep" or not np.any(p["share"]):
@@ -53,14 +55,16 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a saturating force channel.
 
     Args:
-        p: values of level [N], share [1].
-        below, history, setting: see `contract.Layer`.
+        p: parameter values by name: level [N], share [1].
+        below: force of the bushing and the inner layers, as a function of the displacement history.
+        history: displacement over time [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N or N m].
+        Force above the layer at each sample [N or N m], (..., n).
 
     Notes:
-        F, less a share of what of it lies beyond +-level; the torque cell is another one, so not in torsion.
+        F minus a share of its excess over +-level; not in torsion, which has a torque cell.
 
     >>> motion = History.steady(np.array([1.0, -3.0]), 1.0)
     >>> force({"level": 2.0, "share": 1.0}, lambda history: history.value, motion, sweep)

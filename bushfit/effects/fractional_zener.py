@@ -13,7 +13,7 @@ _ECHO = 1e-8
 
 
 def _scaled(p: Values) -> Array:
-    """c over (2 pi 25 Hz)^alpha, which is tau^alpha [s^alpha]."""
+    """Relaxation time to the power alpha, tau^alpha = c/(2 pi 25 Hz)^alpha [s^alpha]."""
     return np.asarray(p["c"]) / np.power(2.0 * np.pi * REFERENCE_FREQUENCY, p["alpha"])
 
 
@@ -21,14 +21,14 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """Complex modulus of the spring in series with the springpot.
 
     Args:
-        p: values of c [1]; and m, alpha.
-        omega, strain: see `contract.Branch`.
+        p: parameter values by name: c [1], and of the base model m [Pa s^alpha], alpha [1].
+        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
-        What the spring takes off the springpot: -m/2 w z/(1 + z), w = (i omega)^alpha, z = tau^alpha w.
+        Reduction of the springpot's modulus by the spring: -m/2 w z/(1 + z), w = (i omega)^alpha, z = tau^alpha w.
 
     >>> modulus({"m": 2.0, "alpha": 0.5, "c": 1.0}, 2.0 * np.pi * np.array([1.0, 25.0]), 0.01).round(1)
     array([-0.1-0.4j, -2.6-6.3j])
@@ -40,17 +40,17 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def _circle(length: int) -> tuple[Array, Array]:
-    """ln(1 - z) on half a circle inside that of convergence, (length // 2 + 1,), and the powers of its radius."""
+    """ln(1 - z) on a half circle |z| = radius < 1, (length // 2 + 1,), and powers of the radius, (length,)."""
     radius = _ECHO ** (1.0 / length)
     turn = np.exp(-2.0j * np.pi * np.arange(length // 2 + 1) / length)
     return np.log(1.0 - radius * turn), radius ** np.arange(length)
 
 
 def _kernel(alpha: Array, scaled: Array, count: int, step: Array) -> Array:
-    """Weights of the strains that went before, as those of Eq. (3): the series of -k v^2/(1 + k v) over step^alpha in
-    powers of z, v = (1 - z)^alpha, k = tau^alpha/step^alpha; of (..., 1) each, (..., count).
+    """Weights of the past strains, (..., count), as in Eq. (3): coefficients of the power series in z of
+    -k v^2/(1 + k v)/step^alpha, with v = (1 - z)^alpha and k = tau^alpha/step^alpha.
 
-    Notes: by its values on a circle inside that of convergence (C. Lubich, Numer. Math. 52 (1988) 129).
+    Notes: from the values of the series on a circle |z| < 1 (C. Lubich, Numer. Math. 52 (1988) 129).
     """
     length = next_fast_len(2 * count, real=True)
     logarithm, powers = _circle(length)
@@ -65,11 +65,11 @@ def stress(p: Values, history: History) -> Array:
     """Stress of the spring in series with the springpot.
 
     Args:
-        p: values of c [1]; and m, alpha.
-        history: see `contract.Branch`.
+        p: parameter values by name: c [1], and of the base model m [Pa s^alpha], alpha [1].
+        history: strain over time, (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Stress at each sample [Pa], (..., n).
 
     Notes:
         s + tau^alpha D^alpha s = m D^alpha e, less the springpot's own m D^alpha e (Eqs. 1, 3).

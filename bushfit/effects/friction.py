@@ -19,9 +19,9 @@ from bushfit.effects.contract import Array, History, Values
 _SERIES_BELOW = 0.05
 #: Least x at which the logarithm is evaluated: smaller ones use the series, and must not divide by 0 meanwhile.
 _LEAST_X = 0.01
-#: Most rounds of Newton's method for a steady loop: chosen, many more than it takes.
+#: Maximum number of Newton iterations for a steady loop; chosen: many more than are needed.
 _ROUNDS = 50
-#: Change of u at which a steady loop is found, relative to its largest value 1: rounding.
+#: Change of u, which is at most 1, below which Newton's method has converged: rounding.
 _SETTLED = 1e-14
 #: T(z) = (ln(1 + z) - z + z^2/2)/z^3 as a power series in z: enough terms for all digits below _SERIES_BELOW.
 _SERIES = np.array([(-1.0) ** k / (k + 3.0) for k in range(12)])
@@ -30,7 +30,7 @@ _SERIES_SLOPE = np.array([(k + 1) * (-1.0) ** (k + 1) / (k + 4.0) for k in range
 
 
 def harmonic_shape(x: Array) -> Array:
-    """Complex first harmonic h of the steady friction loop.
+    """Complex first harmonic h of the steady friction loop, dimensionless.
 
     Args:
         x: strain amplitude over eps_half, not negative, any shape.
@@ -67,7 +67,7 @@ def harmonic_shape(x: Array) -> Array:
 
 
 def harmonic_slope(x: Array, shape: Array) -> Array:
-    """Derivative of `harmonic_shape`.
+    """Derivative of `harmonic_shape` with respect to x.
 
     Args:
         x: strain amplitude over eps_half, any shape.
@@ -98,7 +98,7 @@ def harmonic_slope(x: Array, shape: Array) -> Array:
 
 
 def _roots(x: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """s, D, p, q and z of `harmonic_shape`."""
+    """Terms s, D, p, q and z of the formulas in `harmonic_shape`."""
     twice = 2.0 * x
     s = np.sqrt(x * (x + 6.0) + 1.0)
     big = s + x + 1.0
@@ -107,9 +107,9 @@ def _roots(x: Array) -> tuple[Array, Array, Array, Array, Array]:
 
 
 def mean_stress_decay(x: Array) -> Array:
-    """Natural logarithm by which a cycle of the strain amplitude x = e0/eps_half lowers a mean stress.
+    """Decay of a mean friction stress per cycle, ln(before/after), at the relative strain amplitude x = e0/eps_half.
 
-    Notes: a stroke from one turning point to the next keeps 1 - (z/(1 + z))^2 of it, with z of `harmonic_shape`.
+    Notes: each of the two strokes multiplies the stress by 1 - (z/(1 + z))^2, with z of `harmonic_shape`.
 
     >>> mean_stress_decay(np.array([0.01, 1.0])).round(4)
     array([8.000e-04, 8.406e-01])
@@ -122,11 +122,11 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """Complex modulus of the friction branch.
 
     Args:
-        p: values of sigma_fmax [Pa], eps_half [1].
-        omega, strain: see `contract.Branch`.
+        p: parameter values by name: sigma_fmax [Pa], eps_half [1].
+        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
         (A + iB)/(2 e0) of the steady loop of strain amplitude e0.
@@ -141,11 +141,11 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
     """Derivatives of the complex modulus of the friction branch by its parameters.
 
     Args:
-        p: values of sigma_fmax [Pa], eps_half [1].
-        omega, strain: see `contract.Branch`.
+        p: parameter values by name: sigma_fmax [Pa], eps_half [1].
+        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
 
     Returns:
-        Array (..., n) by parameter.
+        Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
 
     Notes:
         d/dsigma_fmax = h/eps_half and d/deps_half = -sigma_fmax/eps_half^2 (h + x h').
@@ -159,20 +159,20 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
 
 
 def _stroke(start: Any, sign: Any, distance: Any) -> tuple[Any, Any, Any]:
-    """Eq. (5) from u_s = `start` over the distance d: u, and v and v + d of the module's notes."""
+    """Relative stress u at the distance d from the turning point u_s = `start` (Eq. 5), and v and v + d."""
     room = 1.0 - sign * start
     reach = room + distance
     return start + sign * distance * room / reach, room, reach
 
 
 def _stroke_slopes(sign: Any, distance: Any, room: Any, reach: Any) -> tuple[Any, Any]:
-    """du/du_s and du/dd of a stroke."""
+    """Derivatives of u by the start value u_s and by the distance d of a stroke."""
     return 1.0 - (distance / reach) ** 2, sign * (room / reach) ** 2
 
 
 def _strokes(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tuple[Any, Any, Any]]:
-    """u where each piece of a motion begins and the last one ends, its derivative by ln eps_half where the first u is
-    held, and its derivative by the first u."""
+    """Relative stress u at the k + 1 turning points of k strokes, from a start value; each with du/d(ln eps_half) for a
+    fixed start value, and the derivative by the start value."""
     path = [(u, 0.0 * u, 1.0 + 0.0 * u)]
     for sense, distance in zip(senses, distances, strict=True):
         start, slope, memory = path[-1]
@@ -183,14 +183,16 @@ def _strokes(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tu
 
 
 def _at_turns(strides: Array, periodic: bool, eps_half: Array) -> tuple[Array, Array]:
-    """u and du/dln eps_half where each piece of a motion begins, (..., k).
+    """Relative stress u and du/d(ln eps_half) at the start of each stroke of a motion, (..., k) each.
 
     Args:
-        strides: of `Turning`, (..., k); eps_half is (..., 1).
+        strides: signed length of each stroke (see `Turning`), (..., k).
+        periodic: True for a steady cycle, False for a motion from rest.
+        eps_half: friction parameter [1], (..., 1).
 
     Notes:
-        On a cycle of two pieces u = y of `harmonic_shape`. With more, Newton's method finds the u that one cycle leads
-        back to. A single motion goes in numbers, ten times as fast as in arrays of one.
+        In a cycle of two strokes |u| = y of `harmonic_shape`. With more strokes, Newton's method finds the u to which
+        one cycle returns. A single motion uses floats, ten times as fast as arrays of one element.
     """
     scaled = strides / eps_half
     if strides.shape[-1] == 1 and periodic:  # at rest
@@ -219,8 +221,8 @@ def _at_turns(strides: Array, periodic: bool, eps_half: Array) -> tuple[Array, A
 
 
 def _at_samples(eps_half: Array, history: History) -> tuple[Array, Array, Array, Array]:
-    """u and du/dln eps_half where each piece of one history or many begins, for one eps_half or many, and the sense and
-    the distance d of every sample from there."""
+    """Relative stress u and du/d(ln eps_half) at the start of each stroke, (..., k), and the sign and the relative
+    distance d of the travel from that start to each sample, (..., n)."""
     turning, eps_half = history.turning, np.atleast_1d(np.asarray(eps_half, dtype=float))
     sense, distance = np.sign(turning.travel), np.abs(turning.travel) / eps_half
     return *_at_turns(turning.strides, history.periodic, eps_half), sense, distance
@@ -230,14 +232,14 @@ def stress(p: Values, history: History) -> Array:
     """Stress of the friction branch.
 
     Args:
-        p: values of sigma_fmax [Pa], eps_half [1].
-        history: see `contract.Branch`.
+        p: parameter values by name: sigma_fmax [Pa], eps_half [1].
+        history: strain over time, (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Stress at each sample [Pa], (..., n).
 
     Notes:
-        s_f along the history (Eq. 5): from (0, 0) at rest, or on the steady loop.
+        s_f over time (Eq. 5), from (0, 0) at rest or on the steady loop.
 
     >>> stress({"sigma_fmax": 2e4, "eps_half": 0.01}, History(np.array([0.01, 0.0, 0.01]), 1.0, False, 1.0)).round()
     array([10000., -2000.,  8476.])
@@ -250,11 +252,11 @@ def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
     """Derivatives of the stress of the friction branch by its parameters.
 
     Args:
-        p: values of sigma_fmax [Pa], eps_half [1].
-        history: see `contract.Branch`.
+        p: parameter values by name: sigma_fmax [Pa], eps_half [1].
+        history: strain over time, (..., n).
 
     Returns:
-        Array (..., n) by parameter.
+        Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
 
     Notes:
         d/dsigma_fmax = u and d/deps_half = sigma_fmax du/deps_half.

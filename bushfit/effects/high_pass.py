@@ -12,7 +12,7 @@ from bushfit.effects.maxwell import relax
 
 
 def _leak(p: Values, omega: Array) -> Value:
-    """Relative loss of the force, -1/(1 + i omega T), 1/T = 2 pi corner; -1 for the mean, unless the corner is 0."""
+    """Relative change of the force by the leak: -1/(1 + i omega T), 1/T = 2 pi corner; 0 if the corner is 0."""
     rate = 2.0 * np.pi * p["corner"] + 0j
     total = rate + 1j * np.asarray(omega)
     return -rate / np.where(total == 0.0, 1.0, total)
@@ -22,14 +22,16 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a leaking charge amplifier.
 
     Args:
-        p: values of corner [Hz].
-        below, omega, amplitude, setting: see `contract.Layer`.
+        p: parameter values by name: corner [Hz].
+        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N/m or N m/rad].
+        Complex stiffness above the layer [N/m or N m/rad], (..., n).
 
     Notes:
-        K i omega T/(1 + i omega T) of a sweep.
+        K i omega T/(1 + i omega T) in sweeps, K in loops.
 
     >>> round(abs(stiffness({"corner": 1.0}, spring, 2.0 * np.pi, 1e-4, sweep)))
     353553
@@ -41,14 +43,16 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a leaking charge amplifier.
 
     Args:
-        p: values of corner [Hz].
-        below, history, setting: see `contract.Layer`.
+        p: parameter values by name: corner [Hz].
+        below: force of the bushing and the inner layers, as a function of the displacement history.
+        history: displacement over time [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N or N m].
+        Force above the layer at each sample [N or N m], (..., n).
 
     Notes:
-        y of T dy/dt + y = T dF/dt: exact in every harmonic of a steady cycle, for straight lines from rest.
+        Solution y of T dy/dt + y = T dF/dt in sweeps: exact for a steady cycle; from rest, F is linear between samples.
     """
     felt = below(history)
     if setting.kind != "sweep":

@@ -18,15 +18,14 @@ class History:
     """A displacement or strain over time, evenly sampled.
 
     Args:
-        value: samples [m, rad or 1] along the last axis; leading axes hold other motions or other parameter values.
+        value: samples [m, rad or 1], (..., n); leading axes are different motions or parameter values.
         step: time between samples [s].
-        periodic: True where the samples are whole cycles of a steady state, after which the first sample comes again;
-            False where the motion starts from rest before the first sample.
-        frequency: of the excitation [Hz]; like the step, it may differ between motions, (..., 1).
-        driver: the imposed motion, where something that gives way lies between it and this one.
-        solved: where equations over this motion were solved last, by name: good starts of the next solution, no more.
-        accuracy: how far equations over this motion may be from solved, relative to it, before a last step; answers
-            from another start differ by as little.
+        periodic: True if the samples are whole cycles of a steady state; False if the motion starts from rest before
+            the first sample.
+        frequency: frequency of the excitation [Hz]; like the step, it may differ between motions, (..., 1).
+        driver: motion imposed by the rig, if a compliance lies between it and this motion; None if they are equal.
+        solved: previous solutions of implicit equations for this motion, by name; start values for the next solution.
+        accuracy: tolerance of implicit equations for this motion, relative to its maximum.
 
     >>> cycle = History.steady(np.array([0.0, 1.0, 0.0, -1.0]), 5.0)
     >>> cycle.step, cycle.amplitude, cycle.turning.strides
@@ -46,8 +45,8 @@ class History:
         """Create the history of a steady state.
 
         Args:
-            value: samples of whole cycles, (..., n).
-            frequency: of the excitation [Hz].
+            value: samples of whole cycles [m, rad or 1], (..., n).
+            frequency: frequency of the excitation [Hz].
             cycles: number of cycles in the samples.
         """
         return cls(value, cycles / (frequency * value.shape[-1]), periodic=True, frequency=frequency)
@@ -59,26 +58,26 @@ class History:
 
     @cached_property
     def amplitude(self) -> Array:
-        """Half of the range of the values, (..., 1)."""
+        """Amplitude of the motion: half of the range of the values, (..., 1)."""
         return np.ptp(self.value, axis=-1, keepdims=True) / 2.0
 
     @cached_property
     def harmonics(self) -> Array:
-        """Angular frequencies of numpy.fft.rfft over the samples [rad/s]."""
+        """Angular frequencies of the entries of `spectrum` [rad/s]."""
         return 2.0 * np.pi * np.fft.rfftfreq(self.value.shape[-1], self.step)
 
     @cached_property
     def spectrum(self) -> Array:
-        """numpy.fft.rfft over the samples."""
+        """Fourier transform of the samples, as numpy.fft.rfft gives it."""
         return np.fft.rfft(self.value)
 
     def response(self, transfer: Callable[[Array], Array]) -> Array:
-        """Steady response of a linear system, y_h = H(h omega) x_h for every harmonic h; H(0) must be finite."""
+        """Steady response of a linear system, (..., n): y_h = H(h omega) x_h per harmonic h; H(0) must be finite."""
         return np.fft.irfft(transfer(self.harmonics) * self.spectrum, n=self.value.shape[-1])
 
     @cached_property
     def fundamental(self) -> Array:
-        """The last cycle's first harmonic X exp(i omega t), whose real part is its share of the motion, same shape."""
+        """First harmonic X exp(i omega t) of the last cycle at all samples, complex, (..., n)."""
         samples = self.value.shape[-1]
         cycle = round(1.0 / float(np.max(self.step * self.frequency)))
         turn = np.exp(2j * np.pi * np.arange(samples) / cycle)
@@ -86,7 +85,7 @@ class History:
 
     @cached_property
     def turning(self) -> Turning:
-        """The pieces of each motion between its turning points, in the order in which friction follows them."""
+        """Strokes of each motion between its turning points, in order of time; input of the friction laws."""
         count, samples = self.value.shape[-1], np.arange(self.value.shape[-1])
         if self.periodic:
             top = _single_row(np.argmax(self.value, axis=-1)[..., None])
@@ -106,7 +105,7 @@ class History:
 
     @cached_property
     def rate(self) -> Array:
-        """Time derivative of the values by central differences, same shape; a motion from rest was at 0 before."""
+        """Time derivative of the values by central differences, (..., n) [m/s, rad/s or 1/s]."""
         if self.periodic:
             ahead, behind = np.roll(self.value, -1, axis=-1), np.roll(self.value, 1, axis=-1)
             return (ahead - behind) / (2.0 * self.step)
@@ -115,55 +114,55 @@ class History:
 
     @property
     def cycles(self) -> int:
-        """Cycles of the excitation in the samples, to the nearest whole one."""
+        """Number of cycles of the excitation in the samples, rounded."""
         return round(self.value.shape[-1] * float(np.max(self.step * self.frequency)))
 
     @property
     def sense(self) -> Array:
-        """Sign of the rate, 0 at rest; that of the imposed motion, where this one is driven by it."""
+        """Sign of the rate (0 at rest), or of the driver's rate if there is a driver, (..., n)."""
         leading = self if self.driver is None else self.with_value(self.driver)
         return np.sign(leading.rate)
 
     @property
     def acceleration(self) -> Array:
-        """Second time derivative by differences; each end takes its neighbour's, so that the start gets no kick."""
+        """Second time derivative by differences, (..., n) [m/s^2 or rad/s^2]; each end copies the adjacent value."""
         inner = np.diff(self.value, n=2, axis=-1) / self.step**2
         return np.concatenate([inner[..., :1], inner, inner[..., -1:]], axis=-1)
 
     def with_value(self, value: Array, solved: dict[str, Any] | None = None) -> History:
-        """Other values at the same times; with `solved` of values near them, where there were some."""
+        """Create a history of other values at the same times; `solved` gives start values of implicit equations."""
         return replace(self, value=value, solved={} if solved is None else solved)
 
     def faster(self, factor: Any) -> History:
-        """History of the same motion, faster by a factor: a number, or (..., 1)."""
+        """Create a history of the same motion at a speed multiplied by a factor: a number, or (..., 1)."""
         return replace(self, step=self.step / factor, frequency=self.frequency * factor, solved={})
 
     def driven(self) -> History:
-        """History of the same motion, which becomes the driver of histories derived from it."""
+        """Create a history of the same motion that is the driver of all histories derived from it."""
         return replace(self, driver=self.value, solved={})
 
     def scaled(self, factor: float) -> History:
-        """All values times a factor, such as strain per displacement; computed once, as a fit asks for it often."""
+        """Create a history with all values multiplied by a factor, such as strain per displacement; cached."""
         if factor not in self._by_factor:
             self._by_factor[factor] = self.with_value(self.value * factor)
         return self._by_factor[factor]
 
     @cached_property
     def _by_factor(self) -> dict[float, History]:
-        """The scaled histories by their factor."""
+        """Cached results of `scaled` by factor."""
         return {}
 
 
 @dataclass(frozen=True, eq=False)
 class Turning:
-    """The pieces of a motion between its turning points.
+    """Strokes of a motion between its turning points.
 
-    A motion from rest begins at 0, before its first sample; a steady cycle at its top, to which it returns.
+    A motion from rest begins at 0, before its first sample; a steady cycle begins and ends at its maximum.
 
     Args:
-        strides: change of the value over each piece, (..., k); 0 beyond the last where other motions have more.
-        travel: change of the value from the turning point before each sample to it, (..., n).
-        piece: number of the piece that each sample is on, (..., n), or (n,) where all turn at the same samples.
+        strides: change of the value over each of the k strokes, (..., k); 0 for motions with fewer strokes.
+        travel: change of the value between the previous turning point and each sample, (..., n).
+        piece: index of the stroke of each sample, (..., n), or (n,) if all motions turn at the same samples.
     """
 
     strides: Array
@@ -171,18 +170,18 @@ class Turning:
     piece: Array
 
     def at_samples(self, of_pieces: Array) -> Array:
-        """Expand values of the pieces, (..., k), to the samples, (..., n)."""
+        """Expand values per stroke, (..., k), to values per sample, (..., n)."""
         return _take(of_pieces, self.piece)
 
 
 def _single_row(rows: Array) -> Array:
-    """Single row, (n,), if all rows, (..., n), are equal; otherwise all rows."""
+    """Return a single row, (n,), if all rows, (..., n), are equal; otherwise all rows."""
     first = rows.reshape(-1, rows.shape[-1])[0]
     return first if np.all(rows == first) else rows
 
 
 def _take(values: Array, indices: Array) -> Array:
-    """Values of each row, (..., n), at indices, (m,), or at a row of indices for each row, (..., m)."""
+    """Select values of each row, (..., n), at indices (m,) that are the same for all rows, or (..., m) per row."""
     if indices.ndim == 1:
         return values.take(indices, axis=-1)
     shape = np.broadcast_shapes(values.shape[:-1], indices.shape[:-1])
@@ -191,10 +190,10 @@ def _take(values: Array, indices: Array) -> Array:
 
 
 def reversals(value: Array) -> Array:
-    """Reversals of a motion.
+    """Mark the samples at which a motion reverses.
 
     Args:
-        value: samples, (..., n).
+        value: samples of the motion in any unit, (..., n).
 
     Returns:
         True at each sample, except the last, at which the motion reverses, (..., n - 1). If the motion rests before it

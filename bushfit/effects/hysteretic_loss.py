@@ -9,11 +9,11 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """Complex modulus of the constant-loss branch.
 
     Args:
-        p: values of eta [1]; and mu.
-        omega, strain: see `contract.Branch`.
+        p: parameter values by name: eta [1], and of the base model mu [Pa].
+        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
         mu^ = i eta mu.

@@ -9,14 +9,16 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a mass between bushing and load cell.
 
     Args:
-        p: values of mass [kg].
-        below, omega, amplitude, setting: see `contract.Layer`.
+        p: parameter values by name: mass [kg].
+        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N/m or N m/rad].
+        Complex stiffness above the layer [N/m or N m/rad], (..., n).
 
     Notes:
-        K - M omega^2; a mass that is moved, not turned, does not act in torsion.
+        K - M omega^2; does not act in torsion.
 
     >>> round(stiffness({"mass": 0.1}, spring, 1000.0, 1e-4, sweep))
     400000
@@ -28,14 +30,16 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a mass between bushing and load cell.
 
     Args:
-        p: values of mass [kg].
-        below, history, setting: see `contract.Layer`.
+        p: parameter values by name: mass [kg].
+        below: force of the bushing and the inner layers, as a function of the displacement history.
+        history: displacement over time [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N or N m].
+        Force above the layer at each sample [N or N m], (..., n).
 
     Notes:
-        F + M d2x/dt2; exact in every harmonic of a steady cycle, second differences from rest.
+        F + M d2x/dt2; exact in every harmonic of a steady cycle, by second differences for a motion from rest.
     """
     if history.periodic:
         return below(history) + history.response(lambda omega: -p["mass"] * omega**2)

@@ -6,7 +6,7 @@ from bushfit.effects.contract import Array, ForceBelow, History, Setting, Stiffn
 
 
 def _force(p: Values, setting: Setting) -> Value:
-    """The slip force [N], or its moment about the axis in torsion, at the outer sleeve's face [N m]."""
+    """Slip force [N], or in torsion its moment [N m] at the outer radius of the bushing."""
     arm = setting.bushing.outer_radius if setting.bushing and setting.direction.is_rotation else 1.0
     return p["force"] * arm
 
@@ -15,11 +15,13 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with dry friction at the sleeve.
 
     Args:
-        p: values of force [N].
-        below, omega, amplitude, setting: see `contract.Layer`.
+        p: parameter values by name: force [N].
+        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N/m or N m/rad].
+        Complex stiffness above the layer [N/m or N m/rad], (..., n).
 
     Notes:
         K + i 4 Fc/(pi X).
@@ -35,11 +37,13 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with dry friction at the sleeve.
 
     Args:
-        p: values of force [N].
-        below, history, setting: see `contract.Layer`.
+        p: parameter values by name: force [N].
+        below: force of the bushing and the inner layers, as a function of the displacement history.
+        history: displacement over time [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N or N m].
+        Force above the layer at each sample [N or N m], (..., n).
 
     Notes:
         F + Fc sgn(dx/dt).

@@ -6,7 +6,9 @@ from bushfit.effects.contract import REFERENCE_STRAIN, Condition, Value, Values,
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """m (1 + d e0/0.01)^(-alpha): the rate counts per intrinsic time z, dz/dt = 1 + d e0/0.01 [Pa s^alpha].
+    """Springpot coefficient m (1 + d e0/0.01)^(-alpha) [Pa s^alpha] at the strain amplitudes e0 of the condition.
+
+    Notes: the rate is relative to an intrinsic time z with dz/dt = 1 + d e0/0.01.
 
     >>> model = paper.with_effect("intrinsic_time", {"intrinsic_time.d": 1.0})
     >>> [round(model.values_at("axial", 25.0, x)["m"]) for x in (1e-4, 1e-3)]

@@ -11,11 +11,11 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """Complex modulus of the Kraus branch.
 
     Args:
-        p: values of delta [Pa], r [1], e_c [1], n [1].
-        omega, strain: see `contract.Branch`.
+        p: parameter values by name: delta [Pa], r [1], e_c [1], n [1].
+        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
         delta (1 + 2 i r x^n)/(1 + x^2n), x = e0/e_c.
@@ -28,7 +28,14 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def in_place_of(p: Values) -> list[dict[str, float]]:
-    """Start values from those of the friction branch: equal modulus at rest, and half of it at the same strain."""
+    """Derive start values from the friction branch: equal modulus at zero strain, halved at the same strain.
+
+    Args:
+        p: parameter values by name, with sigma_fmax [Pa] and eps_half [1] of the friction branch.
+
+    Returns:
+        One start: delta [Pa], r [1], e_c [1], n [1].
+    """
     at_rest = p["sigma_fmax"] / (2.0 * p["eps_half"])
     return [{"delta": at_rest, "r": 0.2, "e_c": p["eps_half"], "n": 0.6}]
 

@@ -9,11 +9,13 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a wrong clock in the loops.
 
     Args:
-        p: values of rate [1].
-        below, omega, amplitude, setting: see `contract.Layer`.
+        p: parameter values by name: rate [1].
+        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N/m or N m/rad].
+        Complex stiffness above the layer [N/m or N m/rad], (..., n).
 
     Notes:
         K at f exp(rate) in loops, K in sweeps.
@@ -29,13 +31,15 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a wrong clock in the loops.
 
     Args:
-        p: values of rate [1].
-        below, history, setting: see `contract.Layer`.
+        p: parameter values by name: rate [1].
+        below: force of the bushing and the inner layers, as a function of the displacement history.
+        history: displacement over time [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N or N m].
+        Force above the layer at each sample [N or N m], (..., n).
 
     Notes:
-        The force of the same motion exp(rate) times as fast in loops.
+        In loops, the force of the same motion at exp(rate) times the speed.
     """
     return below(history.faster(np.exp(p["rate"])) if setting.kind == "loop" else history)

@@ -9,11 +9,11 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """Complex modulus of a Maxwell arm.
 
     Args:
-        p: values of mu1 [Pa], tau [s].
-        omega, strain: see `contract.Branch`.
+        p: parameter values by name: mu1 [Pa], tau [s].
+        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
         mu^ = mu1 i omega tau / (1 + i omega tau).
@@ -29,7 +29,7 @@ def relax(rate: Value, values: Array, step: Value) -> Array:
     """Solution y of dy/dt + rate y = dx/dt from rest, exact for an x that is linear between samples.
 
     Args:
-        rate: [1/s], a number or (..., 1).
+        rate: reciprocal of the relaxation time [1/s], a number or (..., 1).
         values: samples of x, (..., n).
         step: time between samples [s].
 
@@ -51,7 +51,7 @@ def relax(rate: Value, values: Array, step: Value) -> Array:
 
 
 def recursion(ratio: complex, added: Array) -> Array:
-    """Solution y_n = ratio y_{n-1} + added_n from rest, (n,) -> (n,).
+    """Solve the recursion y_n = ratio y_{n-1} + added_n from y = 0, (n,) -> (n,).
 
     >>> recursion(0.5, np.array([1.0, 0.0, 0.0]))
     array([1.  , 0.5 , 0.25])
@@ -66,11 +66,11 @@ def stress(p: Values, history: History) -> Array:
     """Stress of a Maxwell arm.
 
     Args:
-        p: values of mu1 [Pa], tau [s].
-        history: see `contract.Branch`.
+        p: parameter values by name: mu1 [Pa], tau [s].
+        history: strain over time, (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Stress at each sample [Pa], (..., n).
 
     Notes:
         s + tau ds/dt = 2 mu1 tau de/dt.

@@ -21,30 +21,30 @@ from bushfit.reading.measurement import Complex, Loop, Sweep
 
 _Test = TypeVar("_Test", bound=Loop | Sweep)
 
-#: Shear moduli of rubbers in use [Pa], and strain amplitudes of tests [-], at least and at most; chosen: a tenth of the
-#: softest and ten times the stiffest compound, a tenth of the smallest and twice the largest test.
+#: Ranges of plausible shear moduli of rubber [Pa] and strain amplitudes of tests [-]; chosen: a tenth of the softest to
+#: ten times the stiffest compound, a tenth of the smallest to twice the largest test.
 _MODULI, _STRAINS = (2e4, 3e8), (3e-4, 5.0)
-#: Between the name of a mistake and that of the test it was made in.
+#: Separator between the name of a mistake and the name of the test, in options.
 SEPARATOR = ":"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Mistake(Effect):
-    """A mistake in the record of a test or of the bushing.
+    """A mistake in the record of a test or of the bushing, such as a wrong unit.
 
-    `sentence` is what would be so, with a slot for the files: "the amplitudes of {files} are peak-to-peak".
+    `sentence` states the mistake, with a slot for the files: "the amplitudes of {files} are peak-to-peak".
 
     Args:
-        line: what to write into the campaign, or to correct where no key does it.
-        sweep_line: the same for a sweep, where it differs.
-        kinds: tests in which it is made, sweeps unless told; none for one that is made in [bushing].
-        motion: of the tests in which it is made; None for any.
-        displacement, force, time: true value over the one stated; `displacement` of the radii, where it is made there.
-        stiffness: true complex stiffness by the one stated, (n,) each, for what the three factors cannot say; of a
-            sweep only.
-        doubt: whether a complex stiffness as stated leaves room for the mistake; None for always.
-        swaps: whether the direction is another one.
-        scales: whether it is a power of 1000, made only where no rubber could have given the test as it is stated.
+        line: line for the campaign file that corrects the mistake, or the correction of the data file.
+        sweep_line: `line` for a sweep, if it differs.
+        kinds: kinds of tests in which the mistake occurs; empty for a mistake in [bushing].
+        motion: type of motion of these tests (translation or rotation); None for any.
+        displacement, force, time: ratios of the true to the stated quantity; `displacement` also applies to radii.
+        stiffness: function from the stated to the true complex stiffness of a sweep, (n,) -> (n,) [N/m], for mistakes
+            that the three ratios cannot describe; None otherwise.
+        doubt: function that returns True if the stated complex stiffness, (n,), permits the mistake; None for always.
+        swaps: True if axial and radial are interchanged.
+        scales: True for a factor of a power of 1000, possible only if the test as stated is implausible for rubber.
     """
 
     level: Level = Level.RECORD
@@ -83,10 +83,10 @@ class Mistake(Effect):
         )
 
     def mended_cycle(self, cycle: Sweep) -> Sweep:
-        """Correct the fundamental of a loop for this mistake.
+        """Correct the first harmonic of a loop, given as a sweep of one point, for this mistake.
 
         Returns:
-            The fundamental as a sweep of one point.
+            The corrected first harmonic, as a sweep of one point.
         """
         return replace(
             cycle,
@@ -97,21 +97,22 @@ class Mistake(Effect):
         )
 
     def possible(self, test: Loop | Sweep) -> bool:
-        """Return True if the mistake is possible in a test."""
+        """Return True if the mistake can occur in this test, by its kind, motion, direction and stiffness."""
         kind, place = "loop" if isinstance(test, Loop) else "sweep", test.direction
         fits = kind in self.kinds and self.motion in (None, place.motion)
         doubtful = self.doubt is None or (isinstance(test, Sweep) and self.doubt(test.stiffness))
         return fits and doubtful and not (self.swaps and other_direction(place) is None)
 
     def explains(self, test: Loop | Sweep, modulus: float, strain: float) -> bool:
-        """Test if a recording that no rubber could give becomes plausible once this power of 1000 is corrected.
+        """Test if a recording that is implausible for rubber becomes plausible when this factor of 1000 is corrected.
 
         Args:
+            test: the test as stated.
             modulus: shear modulus that the test as stated implies [Pa].
             strain: largest strain amplitude as stated [-].
 
         Returns:
-            True if it does, and for mistakes other than a wrong power of 1000.
+            True if the recording becomes plausible, and for all mistakes other than a factor of a power of 1000.
         """
         if not self.scales:
             return True
@@ -127,7 +128,7 @@ class Mistake(Effect):
         return replace(bushing, inner_radius=inner, outer_radius=outer)
 
     def corrected(self, test: Loop | Sweep | None) -> str:
-        """Line of the campaign, or correction of the file, for a test; for the bushing if the test is None."""
+        """Line of the campaign file that corrects the mistake in a test, or in the bushing if `test` is None."""
         if test is None:
             return self.line
         swapped = other_direction(test.direction) if self.swaps else None
@@ -135,12 +136,12 @@ class Mistake(Effect):
         return f"[[{kind}]] of {file_or_name(test)}: {line.replace('{direction}', str(swapped))}"
 
     def in_words(self, test: Loop | Sweep) -> str:
-        """Sentence on the mistake in a test, with the line of the campaign that corrects it."""
+        """Sentence that states the mistake in a test, with the line of the campaign file that corrects it."""
         return f"{self.sentence.format(files=file_or_name(test))} (then, in the campaign: {self.corrected(test)})"
 
 
 def file_or_name(test: Loop | Sweep) -> str:
-    """Name of the file of a test, or of the test if it has no file.
+    """Name of the file that a test was read from, or the name of the test if it has no file.
 
     >>> file_or_name(Loop("slow", Direction.AXIAL, *np.ones((3, 9))))
     'slow'
@@ -149,7 +150,7 @@ def file_or_name(test: Loop | Sweep) -> str:
 
 
 def other_direction(place: Place) -> Direction | None:
-    """Radial for axial and axial for radial; None for other directions and specimens."""
+    """Return radial for axial and axial for radial; None for other directions and specimens."""
     if place is Direction.AXIAL:
         return Direction.RADIAL
     return Direction.AXIAL if place is Direction.RADIAL else None
@@ -161,7 +162,7 @@ def _is_of_rubber(modulus: float, strain: float) -> bool:
 
 
 def _loss(stiffness: Complex) -> float:
-    """Median loss factor."""
+    """Median loss factor of complex stiffnesses, (n,)."""
     return float(np.median(stiffness.imag / stiffness.real))
 
 
@@ -172,12 +173,12 @@ def _times_loss(factor: float, stiffness: Complex) -> Complex:
 
 
 def _sine(stiffness: Complex) -> Complex:
-    """Stiffness of equal magnitude, with the stated loss factor as the sine of the loss angle."""
+    """Stiffness of equal magnitude, if the stated loss factor is the sine of the loss angle, not its tangent."""
     sine = np.clip(stiffness.imag / stiffness.real, -1.0, 1.0)
     return np.asarray(np.abs(stiffness) * (np.sqrt(1.0 - sine**2) + 1j * sine))
 
 
-#: Laws by their names in the table: true stiffness from the stated one, condition for a mistake, or motion.
+#: Functions and motions by their names in mistakes.toml: true stiffness from stated stiffness, condition, or motion.
 _LAWS: dict[str, Any] = {
     # the phase is 90 deg less
     "complement": lambda k: 1j * np.conj(k),
@@ -186,9 +187,9 @@ _LAWS: dict[str, Any] = {
     "hundredth_of_loss": partial(_times_loss, 0.01),
     "hundredfold_loss": partial(_times_loss, 100.0),
     "sine": _sine,
-    # K' where |K| was stated
+    # K' was given as |K|
     "magnitude": lambda k: k * np.abs(k) / k.real,
-    # |K| where K' was stated, beside the right K''
+    # |K| was given as K', with the correct K''
     "storage": lambda k: np.sqrt(np.maximum(k.real**2 - k.imag**2, 0.0)) + 1j * k.imag,
     # chosen: the least damping of filled rubbers have twice that
     "little_loss": lambda k: 0.0 < _loss(k) < 0.02,
@@ -200,7 +201,7 @@ _LAWS: dict[str, Any] = {
 
 
 def _mistake(name: str, entry: dict[str, Any]) -> Mistake:
-    """Mistake of an entry of mistakes.toml."""
+    """Build the mistake of a table in mistakes.toml."""
     laws = {key: _LAWS[entry.pop(key)] for key in ("stiffness", "doubt", "motion") if key in entry}
     kinds, units = tuple(entry.pop("kinds", ["sweep"])), entry.pop("units", {}).items()
     lines = [f'units = {{ {key} = "{unit}" }}, and the same in the header if that states a unit' for key, unit in units]
@@ -214,20 +215,20 @@ MISTAKES: dict[str, Mistake] = {name: _mistake(name, entry) for name, entry in _
 
 
 def labelled(name: str, test: str | None) -> str:
-    """Name of a mistake with its test, as in options: `mistake:test`, or `mistake` without a test."""
+    """Name of a mistake as in options: `mistake:test`, or `mistake` if `test` is None."""
     return name if test is None else f"{name}{SEPARATOR}{test}"
 
 
 def get_mistake(name: str) -> Mistake | None:
-    """Mistake of a name such as `peak_to_peak` or `peak_to_peak:sweep_axial`; None for other names."""
+    """Return the mistake with a name such as `peak_to_peak` or `peak_to_peak:sweep_axial`; None for other names."""
     return MISTAKES.get(name.partition(SEPARATOR)[0])
 
 
 def get_candidate(name: str) -> Effect:
-    """Effect or mistake of a name; the name of a mistake may have a test after a colon.
+    """Return the effect or mistake with the given name; the name of a mistake may end with a colon and a test.
 
     Raises:
-        ModelError: an unknown name; the message suggests the most similar one.
+        ModelError: the name is unknown; the message suggests the most similar name.
 
     >>> get_candidate("peak_to_peak:sweep_axial").sentence
     'the amplitudes of {files} are peak-to-peak'

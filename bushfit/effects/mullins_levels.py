@@ -7,9 +7,10 @@ from bushfit.effects.contract import Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """All moduli and stresses times 1 - share erf(1 - (e0/e_max)^2), e_max the largest strain amplitude so far.
+    """Moduli and stresses [Pa] times 1 - share erf(1 - (e0/e_max)^2), with e_max the largest strain amplitude so far.
 
-    Where it is not known what went before, no larger one did, and nothing changes.
+    Returns:
+        The changed values by name; empty if the history of the test is unknown.
 
     >>> from bushfit.effects.contract import Circumstances
     >>> model = paper.with_effect("mullins_levels", {"mullins_levels.share": 0.2})

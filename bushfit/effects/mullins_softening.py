@@ -9,14 +9,14 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """Complex modulus of the stiffening of the first cycles.
 
     Args:
-        p: values of share [1], cycles [1]; and mu.
-        omega, strain: see `contract.Branch`.
+        p: parameter values by name: share [1], cycles [1], and of the base model mu [Pa].
+        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
-        mu^ = 0: nothing is left of it in the steady state.
+        mu^ = 0, because the stiffening vanishes in the steady state.
     """
     return np.zeros(1)
 
@@ -25,16 +25,16 @@ def stress(p: Values, history: History) -> Array:
     """Stress of the stiffening of the first cycles.
 
     Args:
-        p: values of share [1], cycles [1]; and mu.
-        history: see `contract.Branch`.
+        p: parameter values by name: share [1], cycles [1], and of the base model mu [Pa].
+        history: strain over time, (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Stress at each sample [Pa], (..., n).
 
     Notes:
-        s = 2 mu share exp(-N/cycles) e [Pa], N = f t the cycles since the record began.
+        s = 2 mu share exp(-N/cycles) e [Pa], N = f t the number of cycles since the start.
 
-        A single steady cycle has forgotten its beginning, and gets none.
+        A single steady cycle has no such stress.
 
     >>> strain = History.steady(np.full(4, 0.01), 1.0, cycles=2)
     >>> stress({"mu": 1e6, "share": 0.05, "cycles": 1.0}, strain).round()

@@ -10,14 +10,16 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a stop on one side beyond a gap.
 
     Args:
-        p: values of gap [m], stiffness [N/m].
-        below, omega, amplitude, setting: see `contract.Layer`.
+        p: parameter values by name: gap [m], stiffness [N/m].
+        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N/m or N m/rad].
+        Complex stiffness above the layer [N/m or N m/rad], (..., n).
 
     Notes:
-        K + k N(gap/X)/2 [N/m], half of what a stop both ways does.
+        K + k N(gap/X)/2 [N/m], half the effect of a stop on both sides.
 
     >>> stiffness({"gap": 1e-3, "stiffness": 1e6}, spring, 1.0, np.array([1e-3, 2e-3, 1.0]), sweep).round()
     array([500000., 695501., 999363.])
@@ -29,13 +31,15 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a stop on one side beyond a gap.
 
     Args:
-        p: values of gap [m], stiffness [N/m].
-        below, history, setting: see `contract.Layer`.
+        p: parameter values by name: gap [m], stiffness [N/m].
+        below: force of the bushing and the inner layers, as a function of the displacement history.
+        history: displacement over time [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N or N m].
+        Force above the layer at each sample [N or N m], (..., n).
 
     Notes:
-        F + k (x - gap) above the gap: overtones, even ones too, and a mean force.
+        F + k (x - gap) for x above the gap; adds a mean force and overtones.
     """
     return below(history) + p["stiffness"] * np.maximum(history.value - p["gap"], 0.0)

@@ -6,7 +6,7 @@ from bushfit.effects.contract import REFERENCE_FREQUENCY, Condition, Value, Valu
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """sigma_fmax (f/25 Hz)^n [Pa].
+    """Friction stress sigma_fmax (f/25 Hz)^n [Pa] at the frequencies f of the condition.
 
     >>> model = paper.with_effect("rate_dependent_friction", {"rate_dependent_friction.n": 0.05})
     >>> [round(model.values_at("axial", f, 1e-3)["sigma_fmax"]) for f in (25.0, 155.0)]

@@ -6,16 +6,15 @@ from scipy.fft import next_fast_len
 from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Values
 from bushfit.errors import ModelError
 
-#: The secants end when the logarithm of the amplitude is off by less than this, before a last step along the secant.
+#: Tolerance of the secant method in the logarithm of the amplitude, before one last step.
 _NEAR = 1e-8
-#: Most rounds of an iteration: chosen, many more than a rig takes that is stiffer than the bushing.
+#: Maximum number of iterations; chosen: many more than a rig stiffer than the bushing needs.
 _ROUNDS = 60
-#: Share of the least that was missing so far, below which a round brought the motion nearer.
+#: Ratio of an iteration's error to the smallest error so far, below which the iteration is an improvement.
 _NEARER = 0.9
-#: Rounds in a row that bring it no nearer, after which it stays as it is; chosen: a slow approach needs twelve.
+#: Successive iterations without improvement after which the iteration ends; chosen: slow convergence needs twelve.
 _IDLE = 20
-#: Differences between the last rounds from which the next is foreseen; chosen: three take a third of the rounds, more
-#: no less.
+#: Number of past differences in Anderson mixing; chosen: three reduce the iterations to a third, more do not help.
 _REMEMBERED = 3
 
 
@@ -23,16 +22,18 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a compliance in series.
 
     Args:
-        p: values of compliance [m/N].
-        below, omega, amplitude, setting: see `contract.Layer`.
+        p: parameter values by name: compliance [m/N].
+        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N/m or N m/rad].
+        Complex stiffness above the layer [N/m or N m/rad], (..., n).
 
     Notes:
         K/(1 + c K) [N/m] with K at the amplitude X e^v that reaches the bushing; does not act in torsion.
 
-        v + ln|1 + c K(X e^v)| = 0, by secants. Near the solution the last secant also gives K there, unasked.
+        v + ln|1 + c K(X e^v)| = 0 by the secant method; the last secant also extrapolates K to the solution.
 
     >>> spring = lambda omega, amplitude: np.full(1, 1e6 + 0j)
     >>> stiffness({"compliance": 1e-6}, spring, np.ones(1), np.full(1, 1e-4), sweep).round()
@@ -66,22 +67,24 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a compliance in series.
 
     Args:
-        p: values of compliance [m/N].
-        below, history, setting: see `contract.Layer`.
+        p: parameter values by name: compliance [m/N].
+        below: force of the bushing and the inner layers, as a function of the displacement history.
+        history: displacement over time [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N or N m].
+        Force above the layer at each sample [N or N m], (..., n).
 
     Notes:
         Force F [N] of the motion x - c F that reaches the bushing.
 
-        Solved for the whole history at once. Each round asks what answers the motion x - c F, and adds what that force
-        is more than F, times 1/(1 + c K), harmonic by harmonic. K is measured once with a pulse: a poor K costs rounds,
-        not accuracy. So K and F of the last model that was asked about this motion are where the next one starts. What
-        gives way beneath starts each round from its solution of the round before. Friction below that turns sharply
-        would make it many rounds: so those before tell the next. Where a round does not bring F nearer, the next steps
-        are halved, and doubled again where one does. Dry friction below turns its sense with the imposed motion: that
-        it sticks for a moment is neglected.
+        Solved for the whole history at once. Each iteration computes the force for the motion x - c F and adds its
+        difference from F, times 1/(1 + c K), harmonic by harmonic. K is measured once with a pulse; an inaccurate K
+        costs iterations, not accuracy. K and F of the previous solution for this motion are the start of the next
+        solution; compliances in inner layers start from their solution of the previous iteration. Anderson mixing
+        reduces the iterations that inner friction needs. If an iteration does not reduce the error,
+        the next steps are halved; if it does, they are doubled up to the full step. The direction of inner dry friction
+        is that of the imposed motion: momentary sticking is neglected.
     """
     compliance = p["compliance"]
     if not np.any(compliance):
@@ -132,7 +135,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
 
 
 def _differences_resolved(reached: Array, missing: Array) -> bool:
-    """Return True if forces of several models on one motion are accurate enough for their differences.
+    """Return True if forces of several models for one motion are accurate enough for their differences.
 
     The differences, from which a fit computes derivatives, must be accurate to a thousandth or to rounding.
     """
@@ -156,8 +159,7 @@ class _AndersonMixing:
         self._before: tuple[Array, Array] | None = None
 
     def step(self, reached: Array, change: Array) -> Array:
-        """The change that a round asks for, (..., n), less the combination of the last differences that takes most off
-        it, with what that moves."""
+        """Next change of the force, from the force and the proposed change of this iteration, (..., n) [N] each."""
         before, self._before = self._before, (reached, change)
         if before is None:
             return change
@@ -175,9 +177,8 @@ class _AndersonMixing:
 def _pulse_stiffness(below: ForceBelow, history: History, length: int) -> Array:
     """Complex stiffness [N/m] at each harmonic of `length` samples: force over displacement of a single pulse.
 
-    The pulse, some samples after the start, is as high as the amplitude of the motion, or 1 nm where that stands still,
-    as within a play. Its force counts from the one before it, to which friction does not let it return; the real part
-    is never negative.
+    The pulse, some samples after the start, has the amplitude of the motion, but at least 1 nm. The force is relative
+    to the initial force; the real part of the result is never negative.
     """
     pulse = np.zeros(history.value.shape)
     pulse[..., 4:5] = np.maximum(history.amplitude, 1e-9)

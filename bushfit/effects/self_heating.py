@@ -6,7 +6,7 @@ from bushfit.effects.contract import Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """All moduli and stresses divided by 1 + beta P, P = pi f X^2 K'' of the unheated bushing [W].
+    """Moduli and stresses [Pa] divided by 1 + beta P, with the loss P = pi f X^2 K'' [W] of the unheated bushing.
 
     In torsion X is the rotation [rad] and K'' the loss stiffness [N m/rad].
 

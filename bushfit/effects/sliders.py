@@ -1,24 +1,24 @@
 """Sliders: springs that slip one after the other, in place of the friction branch.
 
 Notes:
-    Each takes the stress s at most, and slips at a strain e_y of its own. There are any number of them, as many in one
-    part of a decade of e_y as in another, so that nothing jumps where one more slips: a mean over them is an integral
-    over ln e_y from e_s/exp(spread) to e_s exp(spread).
+    Each slider has the same largest stress s and its own slip strain e_y. The slip strains are distributed uniformly in
+    ln e_y from e_s/exp(spread) to e_s exp(spread), so that the response is smooth; means over the sliders are integrals
+    over ln e_y.
 """
 
 import numpy as np
 
 from bushfit.effects.contract import Array, History, Value, Values
 
-#: Sliders that stand for all of them along other motions than a steady one to and fro; chosen: over a decade of slip
-#: strains their steps are 1e-4 of the modulus.
+#: Number of sliders in motions other than a steady cycle with two turning points; chosen: over a decade of slip strains
+#: the error is 1e-4 of the modulus.
 _COUNT = 100
-#: Where each slips, from -1 to 1 of the spread in the logarithm of strain.
+#: Logarithm of the slip strain of each slider relative to e_s, in units of the spread (-1 to 1).
 _PLACES = (2.0 * np.arange(_COUNT) + 1.0) / _COUNT - 1.0
 
 
 def _ends(p: Values) -> tuple[Array, Array]:
-    """Least and largest strain at which a slider slips."""
+    """Smallest and largest slip strain of the sliders [1]."""
     middle, factor = np.atleast_1d(p["e_s"]), np.exp(np.asarray(p["spread"]))
     return middle / factor, middle * factor
 
@@ -27,11 +27,11 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """Complex modulus of the springs with sliders.
 
     Args:
-        p: values of sigma [Pa], e_s [1], spread [1].
-        omega, strain: see `contract.Branch`.
+        p: parameter values by name: sigma [Pa], e_s [1], spread [1].
+        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
         (A + iB)/(2 e0) [Pa] of the steady loop of strain amplitude e0.
@@ -58,7 +58,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def _loaded(strain: Array, low: Value, high: Value) -> Array:
-    """Mean of min(strain/e_y, 1): the stress of all sliders over the largest, loaded from rest."""
+    """Mean of min(strain/e_y, 1) over the sliders: stress on first loading, relative to its maximum."""
     slipped = np.clip(strain, low, high)
     return (np.log(slipped / low) + strain * (1.0 / slipped - 1.0 / high)) / np.log(high / low)
 
@@ -67,17 +67,17 @@ def stress(p: Values, history: History) -> Array:
     """Stress of the springs with sliders.
 
     Args:
-        p: values of sigma [Pa], e_s [1], spread [1].
-        history: see `contract.Branch`.
+        p: parameter values by name: sigma [Pa], e_s [1], spread [1].
+        history: strain over time, (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Stress at each sample [Pa], (..., n).
 
     Notes:
-        Sum of the sliders' stresses, elastic up to their slip strain and constant beyond, from rest or steady.
+        Mean of the sliders' stresses, which are elastic up to the slip strain and constant beyond.
 
-        On a steady motion to and fro each branch of the loop is the first loading at twice its size (G. Masing, Proc.
-        2nd Int. Congr. Appl. Mech., 1926). Along any other motion some sliders stand for all, each followed by itself.
+        In a steady cycle with two turning points, each half of the loop is the first loading at twice its size (G.
+        Masing, Proc. 2nd Int. Congr. Appl. Mech., 1926). For other motions 100 sliders represent the distribution.
     """
     turning = history.turning
     if history.periodic and turning.strides.shape[-1] == 2:  # to and fro
@@ -90,19 +90,18 @@ def stress(p: Values, history: History) -> Array:
 
 
 def parallel_elements(history: History, yield_strain: Array, weights: Array) -> Array:
-    """Weighted sum of the stresses of Jenkins elements, each over its largest.
+    """Weighted sum of the stresses of Jenkins elements (spring and slider in series), relative to their yield stress.
 
     Args:
         history: strain over time, (..., n).
         yield_strain: strain at which each element yields, (..., 1, elements).
-        weights: of the elements, same shape.
+        weights: weights of the elements, same shape as yield_strain.
 
     Returns:
         Sum over the elements of weight times a stress between -1 and 1, (..., n).
 
     Notes:
-        Along a piece between two turning points the sum is linear in the travel between the points at which an element
-        yields.
+        Between two turning points the sum is piecewise linear in the travel, with a knot where an element yields.
     """
     turning = history.turning
     strides, travel = turning.strides[..., None], np.abs(turning.travel)
@@ -141,9 +140,15 @@ def parallel_elements(history: History, yield_strain: Array, weights: Array) -> 
 
 
 def in_place_of(p: Values) -> list[dict[str, float]]:
-    """Start values from those of the friction branch: a wide range of slip strains, and a narrow one.
+    """Derive two start values from the friction branch: a wide and a narrow range of slip strains.
 
-    A range that ends outside the tested strains has a minimum of its own.
+    Two, because the fit has a second local minimum in which the range extends beyond the tested strains.
+
+    Args:
+        p: parameter values by name, with sigma_fmax [Pa] and eps_half [1] of the friction branch.
+
+    Returns:
+        One dictionary of sigma [Pa], e_s [1] and spread [1] for each start.
     """
     return [
         {"sigma": p["sigma_fmax"], "e_s": 2.0 * p["eps_half"], "spread": 1.5},

@@ -18,11 +18,11 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """Complex modulus of the springpot.
 
     Args:
-        p: values of m [Pa*s^alpha], alpha [1].
-        omega, strain: see `contract.Branch`.
+        p: parameter values by name: m [Pa*s^alpha], alpha [1].
+        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
         mu^ = m/2 (i omega)^alpha.
@@ -37,11 +37,11 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
     """Derivatives of the complex modulus of the springpot by its parameters.
 
     Args:
-        p: values of m [Pa*s^alpha], alpha [1].
-        omega, strain: see `contract.Branch`.
+        p: parameter values by name: m [Pa*s^alpha], alpha [1].
+        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
 
     Returns:
-        Array (..., n) by parameter.
+        Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
 
     Notes:
         d/dm = (i omega)^alpha / 2 and d/dalpha = m/2 (i omega)^alpha ln(i omega).
@@ -52,7 +52,7 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
 
 
 def grunwald_letnikov_weights(alpha: Value, count: int) -> Array:
-    """w_0 = 1, w_j = w_{j-1} (j - 1 - alpha)/j (Eq. 3): the first `count` weights.
+    """Weights of a fractional difference: w_0 = 1, w_j = w_{j-1} (j - 1 - alpha)/j (Eq. 3), (count,).
 
     >>> grunwald_letnikov_weights(0.5, 4)
     array([ 1.    , -0.5   , -0.125 , -0.0625])
@@ -65,12 +65,12 @@ def fractional_derivative(alpha: Value, values: Array, step: float) -> Array:
     """Fractional derivative by the Gruenwald-Letnikov sum with full memory, from rest before the first sample.
 
     Args:
-        alpha: order.
+        alpha: order of the derivative.
         values: samples, (..., n).
         step: time between samples [s].
 
     Returns:
-        D^alpha of the values, (..., n).
+        D^alpha of the values, (..., n) [unit of the values per s^alpha].
 
     Notes:
         Eq. 3. First order in the step: (1 - exp(-i omega step))^alpha replaces (i omega step)^alpha.
@@ -88,11 +88,11 @@ def stress(p: Values, history: History) -> Array:
     """Stress of the springpot.
 
     Args:
-        p: values of m [Pa*s^alpha], alpha [1].
-        history: see `contract.Branch`.
+        p: parameter values by name: m [Pa*s^alpha], alpha [1].
+        history: strain over time, (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Stress at each sample [Pa], (..., n).
 
     Notes:
         s_v = m D^alpha e (Eqs. 1, 3).
@@ -106,14 +106,14 @@ def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
     """Derivatives of the stress of the springpot by its parameters.
 
     Args:
-        p: values of m [Pa*s^alpha], alpha [1].
-        history: see `contract.Branch`.
+        p: parameter values by name: m [Pa*s^alpha], alpha [1].
+        history: strain over time, (..., n).
 
     Returns:
-        Array (..., n) by parameter.
+        Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
 
     Notes:
-        By m and by alpha: harmonic by harmonic on a steady cycle, by differences of the order from rest.
+        For a steady cycle harmonic by harmonic; from rest, the derivative by alpha is a finite difference.
     """
     if not history.periodic:
         alpha, step = p["alpha"], history.step

@@ -1,6 +1,6 @@
 """Stiffness factor: one direction of the bushing, or one specimen, is off the others by one factor.
 
-The law of all that scales the response of one place; `transducer_gain` and `preload_stiffening` have it, too.
+`transducer_gain` and `preload_stiffening` have the same equation.
 
 >>> stiffness({"factor": 0.9}, spring, 1.0, 1e-4, sweep)
 450000.0

@@ -4,14 +4,16 @@ from bushfit.effects.contract import Array, ForceBelow, History, Setting, Stiffn
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:
-    """Complex stiffness with another strain than that of the formula.
+    """Complex stiffness if the strain is `scale` times the strain of the formula.
 
     Args:
-        p: values of scale [1].
-        below, omega, amplitude, setting: see `contract.Layer`.
+        p: parameter values by name: scale [1].
+        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N/m or N m/rad].
+        Complex stiffness above the layer [N/m or N m/rad], (..., n).
 
     Notes:
         K at the amplitude scale X.
@@ -23,16 +25,18 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
 
 def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> Array:
-    """Force with another strain than that of the formula.
+    """Force if the strain is `scale` times the strain of the formula.
 
     Args:
-        p: values of scale [1].
-        below, history, setting: see `contract.Layer`.
+        p: parameter values by name: scale [1].
+        below: force of the bushing and the inner layers, as a function of the displacement history.
+        history: displacement over time [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N or N m].
+        Force above the layer at each sample [N or N m], (..., n).
 
     Notes:
-        F of scale times the motion, over scale: the stiffness is as it was, at another strain.
+        F(scale x)/scale: the stiffness formula is unchanged, but the strain amplitude is scaled.
     """
     return below(history.with_value(p["scale"] * history.value)) / p["scale"]

@@ -9,11 +9,11 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """Complex modulus of the cubic elastic term.
 
     Args:
-        p: values of c3 [1]; and mu.
-        omega, strain: see `contract.Branch`.
+        p: parameter values by name: c3 [1], and of the base model mu [Pa].
+        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
         mu^ = 3/4 c3 mu e0^2: the first harmonic of cos^3 is 3/4.
@@ -28,11 +28,11 @@ def stress(p: Values, history: History) -> Array:
     """Stress of the cubic elastic term.
 
     Args:
-        p: values of c3 [1]; and mu.
-        history: see `contract.Branch`.
+        p: parameter values by name: c3 [1], and of the base model mu [Pa].
+        history: strain over time, (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Stress at each sample [Pa], (..., n).
 
     Notes:
         s = 2 mu c3 e^3.

@@ -12,11 +12,11 @@ _C1, _C2 = 17.44, 51.6
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """Moduli and stresses at the temperature of the test.
+    """Moduli and stresses [Pa] at the temperature of the test.
 
     Returns:
         mu times T/T0, and all other moduli and stresses times exp(-softening dT), with dT = T - T0 and T0 = 23 degC;
-        nothing if the temperature is unknown.
+        empty if the temperature is unknown.
     """
     temperature = condition.setting.under.temperature
     if temperature is None:
@@ -28,7 +28,9 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
 
 
 def shift_factor(p: Values, under: Circumstances) -> Value:
-    """The shift factor a_T: a motion at w in rubber at T is one at w a_T in rubber at 23 degC; 1 where T is unknown.
+    """Time-temperature shift factor a_T; 1 if the temperature is unknown.
+
+    Rubber at the temperature T and angular frequency w responds as at 23 degC and w a_T.
 
     >>> shift_factor({"shift": 0.03}, Circumstances(temperature=np.array([286.15, 296.15, 306.15]))).round(3)
     array([1.366, 1.   , 0.749])
@@ -37,12 +39,16 @@ def shift_factor(p: Values, under: Circumstances) -> Value:
 
 
 def log_shift(shift: Value, temperature: Array) -> Array:
-    """ln a_T = -shift dT c2/(c2 + dT), shift its slope at 23 degC [1/K]: the law of Williams, Landel and Ferry.
+    """Logarithm of the shift factor by the law of Williams, Landel and Ferry: ln a_T = -shift dT c2/(c2 + dT).
+
+    Args:
+        shift: decrease of ln a_T per kelvin at T0 = 23 degC [1/K].
+        temperature: temperature of the rubber [K].
 
     Notes:
-        With their constants at the glass transition Tg the slope tells how far that lies below: c2 = 51.6 K + T0 - Tg
-        and shift = ln 10 * 17.44 * 51.6 K/c2^2. At c2 = T0 it is Arrhenius' law, the limit far above Tg, of all
-        smaller shifts. Below Tg the law ends; there ln a_T goes on in proportion to dT.
+        The universal constants at the glass transition Tg relate c2 to the shift: c2 = 51.6 K + T0 - Tg and
+        shift = ln 10 * 17.44 * 51.6 K/c2^2. Smaller shifts than that of c2 = T0, Arrhenius' law, use c2 = T0.
+        Below Tg, ln a_T is extrapolated in proportion to dT.
     """
     slope = np.maximum(np.asarray(shift, dtype=float), np.log(10.0) * _C1 * _C2 / REFERENCE**2)
     c2, warmer = np.sqrt(np.log(10.0) * _C1 * _C2 / slope), temperature - REFERENCE

@@ -41,7 +41,7 @@ Row = tuple[Number, ...]
 
 @dataclass(frozen=True)
 class Patch:
-    """A correction at m nodes, shared by some directions.
+    """Relative correction of the stiffness at m nodes, for one or more directions or specimens.
 
     Args:
         directions: names of the directions and specimens.
@@ -81,7 +81,7 @@ class Patch:
 
 @dataclass(frozen=True)
 class Unnamed:
-    """A smooth correction, relative to the stiffness.
+    """Smooth correction over frequency and strain, relative to the stiffness.
 
     Args:
         size: standard deviation of the Gaussian process.
@@ -103,7 +103,7 @@ class Unnamed:
 
     @cached_property
     def _at_nodes(self) -> tuple[Array, Array]:
-        """Squared magnitudes of the correction at all nodes, and of its standard deviation, (m,) each."""
+        """Squared magnitudes of the correction and of its standard deviation at all nodes, (m,) each."""
         values = [np.square((patch.in_phase, patch.in_quadrature)).sum(axis=0) for patch in self.patches]
         errors = [np.square((p.in_phase_error, p.in_quadrature_error)).sum(axis=0) for p in self.patches]
         return np.concatenate(values), np.concatenate(errors)
@@ -170,10 +170,12 @@ def response(values: Values, below: StiffnessBelow, omega: Array, amplitude: Arr
 
     Args:
         values: not used; the data of the correction are in the setting.
-        below, omega, amplitude, setting: see `contract.Layer`.
+        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        K (1 + c), (..., n) [N/m or N m/rad].
+        Corrected complex stiffness K (1 + c), (..., n) [N/m or N m/rad].
     """
     return below(omega, amplitude) * (1.0 + _correction(setting, omega, amplitude))
 
@@ -183,10 +185,12 @@ def first_harmonic(values: Values, below: ForceBelow, displacement: History, set
 
     Args:
         values: not used; the data of the correction are in the setting.
-        below, displacement, setting: see `contract.Layer`.
+        below: force of the bushing and the inner layers, as a function of the displacement history.
+        displacement: displacement over time [m or rad], (..., n).
+        setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        (..., n) [N or N m].
+        Corrected force at each sample, (..., n) [N or N m].
 
     >>> from dataclasses import replace
     >>> patch = Patch(("axial",), (5.0,), (0.01,), (0.1,), (0.0,), (0.0,), (0.0,))

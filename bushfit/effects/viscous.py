@@ -9,11 +9,11 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """Complex modulus of the dashpot.
 
     Args:
-        p: values of eta [Pa*s].
-        omega, strain: see `contract.Branch`.
+        p: parameter values by name: eta [Pa*s].
+        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
         mu^ = i omega eta.
@@ -28,11 +28,11 @@ def stress(p: Values, history: History) -> Array:
     """Stress of the dashpot.
 
     Args:
-        p: values of eta [Pa*s].
-        history: see `contract.Branch`.
+        p: parameter values by name: eta [Pa*s].
+        history: strain over time, (..., n).
 
     Returns:
-        (..., n) [Pa].
+        Stress at each sample [Pa], (..., n).
 
     Notes:
         s = 2 eta de/dt; exact in every harmonic of a steady cycle, central differences from rest.
