@@ -74,7 +74,7 @@ def stress(p: Values, history: History) -> Array:
         Stress [Pa], (..., n).
 
     Notes:
-        In a steady cycle with two turning points, each half of the loop is the first-loading curve at twice its size (G.
+        In a steady cycle with two turning points, each half of the loop is the first loading at twice its size (G.
         Masing, Proc. 2nd Int. Congr. Appl. Mech., 1926). For other motions 120 elements represent the distribution.
     """
     e_s, spread = np.atleast_1d(p["e_s"]), np.asarray(p["spread"])
