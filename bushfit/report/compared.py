@@ -20,25 +20,26 @@ from bushfit.report.tables import columns_of, required, words
 from bushfit.units import display_unit, number, split_header
 from bushfit.validation import validate_tables
 
-#: Digits of a parameter's value, and decimals of a difference at most.
+#: Significant digits of the value of a parameter; largest number of decimals of a difference.
 _DIGITS, _MOST_DECIMALS = 4, 6
-#: Width from which on an interval is open: its numbers have an exponent.
+#: Width of an interval from which the numbers are written with an exponent: the interval is practically unbounded.
 _OPEN = 1e7
-#: Smallest probability that is written as a number.
+#: Smallest probability that is written as a number; smaller ones are written as "< 0.001".
 _LEAST_PROBABILITY = 1e-3
-#: Heads of `SideBySide.family_cells`.
+#: Column headers of the rows of `SideBySide.family_cells`.
 FAMILY_HEADS = ("family", "parameters", "NRMSE", "χ²", "probability", "held out", "first, held out", "parts")
 
 
 def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
-    """Stiffness and loss factor of two results over operating points of a place, and their differences.
+    """Table of stiffness and loss factor of two results at the same operating points, with the differences.
 
     Args:
-        comparison: comparison that the contrast belongs to; it widens the bands so that all points hold at once.
-        contrast: contrast of one place.
+        comparison: comparison of the two results, which widens the 95 % bands to be valid at all points together.
+        contrast: stiffness and loss factor of both results at the points of one direction or specimen.
 
     Returns:
-        A row per point: values, differences, the ends of their 95 % bands, and whether differences are significant.
+        A row per operating point: frequency, amplitude, then values and differences with the ends of their 95 % bands
+        ("..., low" and "..., high"), and "yes" or "no" for a significant difference ("..., sure").
     """
     (_, length), _, (_, factor) = contrast.place.display
     amplitude, name, _ = columns_of(contrast.place)
@@ -65,17 +66,17 @@ def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
 
 @dataclass(frozen=True, eq=False)
 class SideBySide:
-    """A comparison, made from its validated document."""
+    """Comparison of two or more results, or of model families, read from a validated `compare.json`."""
 
     document: ComparisonFile
 
     @classmethod
     def from_document(cls, document: Mapping[str, Any], file: Path | None = None) -> SideBySide:
-        """Validate a document.
+        """Validate the content of a `compare.json`.
 
         Args:
             document: content of compare.json.
-            file: that it was read from, for error messages.
+            file: file that the document was read from, for error messages.
 
         Returns:
             The comparison.
@@ -99,21 +100,22 @@ class SideBySide:
 
     @cached_property
     def names(self) -> dict[str, str]:
-        """Name of each result by its label; its source where names repeat."""
+        """Name of each result by its label (A, B, ...); the source file or folder if two results have the same name."""
         compared = self.document["compared"]
         repeated = len({entry["name"] for entry in compared}) < len(compared)
         return {entry["label"]: entry["source"] if repeated else entry["name"] for entry in compared}
 
     @property
     def places(self) -> list[str]:
-        """Directions and specimens that are compared."""
+        """Names of the directions and specimens at which the results are compared."""
         return [*self.document["pairs"][0]["places"]]
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """Tables by name: `parameters`, `differences` and, of families, `families`.
+        """Build the tables of the comparison for spreadsheets.
 
         Returns:
-            Tables by name, a row per parameter, point or family.
+            Tables by name: `parameters` (a row per parameter and pair of results), `differences` (a row per operating
+            point and pair) and, if model families were compared, `families` (a row per family).
         """
         pairs = self.document["pairs"]
         parameters = [
@@ -159,10 +161,10 @@ class SideBySide:
         return tables | ({"families": pd.DataFrame(families)} if families else {})
 
     def family_cells(self) -> Iterator[list[str]]:
-        """Rows of texts on the families, with the columns `FAMILY_HEADS`.
+        """Rows of the table of model families, as formatted texts.
 
         Returns:
-            An iterator over rows, a text per column.
+            An iterator over the families: a text for each of the columns `FAMILY_HEADS`.
         """
         for family, entry in zip(self.document["families"] or (), self.document["compared"], strict=False):
             parts = len(family["parts"])
@@ -177,13 +179,16 @@ class SideBySide:
             ]
 
     def differences_at(self, place: str) -> dict[str, pd.DataFrame]:
-        """Rows of the table of differences at a place, by the label of the second result.
+        """Tables of the differences from the reference at one direction or specimen.
+
+        Args:
+            place: name of the direction or specimen.
 
         Returns:
-            Table of each second result by its label, a row per operating point.
+            Table of each result but the reference, by its label; a row per operating point.
 
         Raises:
-            ModelError: a place that some results lack, or columns of different length.
+            ModelError: a direction or specimen that a pair does not have, or columns of different lengths.
         """
         tables = {}
         for pair in self.document["pairs"]:
@@ -205,13 +210,13 @@ class SideBySide:
 
 
 class ContrastHeaders(NamedTuple):
-    """Headers of the table of differences at a place.
+    """Column headers, with units, of a table of differences from `SideBySide.differences_at`.
 
     Args:
-        amplitude: along the grid.
-        stiffness: of each result, after "reference " or "other ".
-        relative: difference of the stiffness.
-        loss: difference of the loss factor.
+        amplitude: header of the amplitude.
+        stiffness: header of the stiffness or modulus; in the table it follows "reference " or "other ".
+        relative: header of the relative difference of the stiffness or modulus.
+        loss: header of the difference of the loss factor.
     """
 
     amplitude: str
@@ -221,10 +226,10 @@ class ContrastHeaders(NamedTuple):
 
     @classmethod
     def from_table(cls, table: pd.DataFrame) -> ContrastHeaders:
-        """Headers of a table, whose quantity may be a stiffness or a modulus.
+        """Find the headers in a table; the quantity may be a stiffness or a modulus, in any unit.
 
         Returns:
-            Headers of the columns that the table has.
+            Headers of the columns of the table.
 
         Raises:
             ModelError: a column is missing.
@@ -242,10 +247,11 @@ class ContrastHeaders(NamedTuple):
 
 
 def parameter_cells(row: ParameterContrast) -> list[str]:
-    """Texts on a parameter of two results.
+    """Format the comparison of one parameter as the cells of a table row.
 
     Returns:
-        Name, both values, difference, its 95 % interval, its probability by chance, and unit.
+        Seven texts: name, value of the reference, value of the other result, difference, 95 % interval of the
+        difference (or the reason why it was not tested), probability by chance, and display unit of the values.
     """
     unit, factor = display_unit(row.unit, 1.0, row.reference)
     values = [number(value * factor, _DIGITS) for value in (row.reference, row.other)]
@@ -258,7 +264,7 @@ def parameter_cells(row: ParameterContrast) -> list[str]:
 
 
 def signed(value: float, width: float) -> str:
-    """A difference with its sign and as many decimals as two digits of the width of its interval need."""
+    """Format a difference with its sign, to two significant digits of the `width` of its interval (same unit)."""
     if width >= _OPEN:
         return number(value, 2, "+")
     decimals = max(1 - math.floor(math.log10(width)), 0) if width > 0.0 else _DIGITS
@@ -267,5 +273,5 @@ def signed(value: float, width: float) -> str:
 
 
 def chance(p: float) -> str:
-    """A probability as text."""
+    """Format a probability with two significant digits, or as "< 0.001"."""
     return f"< {_LEAST_PROBABILITY:g}" if p < _LEAST_PROBABILITY else number(p, 2)

@@ -7,26 +7,26 @@ from typing import NamedTuple
 from bushfit.model.result import Result
 from bushfit.units import display_unit, format_aligned
 
-#: A value below its least possible value times this is shown as resting there: logarithms tell no more apart.
+#: Ratio of a value to its lower bound up to which the value is treated as being at the bound.
 _AT_LEAST = 1.01
-#: Digits of a value whose standard error is not known.
+#: Significant digits of a value whose standard error is not known.
 _PLAIN_DIGITS = 4
-#: Fewest and most digits of a value, however small or large its standard error.
+#: Smallest and largest number of significant digits of a value, whatever its standard error is.
 _FEWEST_DIGITS = 2
 _MOST_DIGITS = 6
 
 
 class ParameterRow(NamedTuple):
-    """One parameter as texts.
+    """One parameter of a model, as the texts of a table row.
 
     Args:
-        name: of the parameter.
-        state: "held", "at min" or "at max"; empty otherwise.
-        value: in the unit.
-        error: standard error; empty where it is not known.
-        interval: ends of the 95 % interval; empty where it is not known.
-        unit: common unit.
-        meaning: of the parameter.
+        name: name of the parameter.
+        state: "held" (fixed in the fit), "at min" or "at max" (at a bound); empty otherwise.
+        value: value in `unit`.
+        error: standard error in `unit`; empty if it is not known.
+        interval: 95 % interval in `unit`, such as "1.02 to 1.10" or "1.02 to open"; empty if it is not known.
+        unit: display unit that value, error and interval share.
+        meaning: description of the parameter.
     """
 
     name: str
@@ -39,33 +39,33 @@ class ParameterRow(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Name with the state in brackets."""
+        """Name of the parameter, followed by its state in brackets if it has one."""
         return f"{self.name} ({self.state})" if self.state else self.name
 
 
 def interval_kind(result: Result) -> str:
-    """Kind of the intervals of a result, as a heading."""
+    """Column heading of the intervals of a result: by profile likelihood or from the standard errors."""
     return "95 % by profile" if result.profile else "95 % interval"
 
 
 def parameter_rows(result: Result) -> Iterator[ParameterRow]:
-    """Rows of the parameters of a result with standard errors and 95 % intervals, by profile if there are any.
+    """Format the parameters of a result with their standard errors and 95 % intervals.
 
     Args:
-        result: fitted or given model.
+        result: fitted or given model; intervals by profile likelihood are used where the result has them.
 
     Returns:
-        An iterator over rows, one per parameter.
+        An iterator over rows of texts, one per parameter.
     """
     for name, parameter in result.model.parameters.items():
         value, stderr = result.model.values[name], result.covariance.stderr(name)
         interval = result.profile.get(name) or result.interval(name)
-        if parameter.log and value <= _AT_LEAST * parameter.bounds[0]:  # a slope there tells nothing of its error
+        if parameter.log and value <= _AT_LEAST * parameter.bounds[0]:  # no standard error at a bound
             stderr = interval = None
         elif interval == parameter.bounds:
             interval = None
         digits, (unit, factor) = _PLAIN_DIGITS, display_unit(parameter.unit, 1.0, value)
-        if stderr and value:  # two of the standard error
+        if stderr and value:  # two significant digits of the standard error
             carried = math.floor(math.log10(abs(value))) - math.floor(math.log10(stderr)) + 2
             digits = min(max(carried, _FEWEST_DIGITS), _MOST_DIGITS)
         finite_ends = [end * factor for end in interval or () if end is not None]

@@ -8,7 +8,7 @@ from bushfit.reduction.resonance import Resonance
 from bushfit.reduction.result import Reduction
 from bushfit.report.tables import amplitude_column, response_columns
 
-#: Columns of a reduced sweep on the origin of each point, and the attributes of a step.
+#: Headers of the columns on the quality and origin of each point, and the attribute of a step that fills each.
 _OF_STEPS = {
     "frequency found [Hz]": "frequency",
     "displacement distortion [-]": "displacement_distortion",
@@ -22,13 +22,14 @@ _OF_STEPS = {
 
 
 def reduced_table(reduction: Reduction) -> pd.DataFrame:
-    """Raw histories reduced to a sweep: columns of a sweep file, then columns on the quality of each point.
+    """Table of raw time histories reduced to operating points; it can be read again as a sweep file.
 
     Args:
-        reduction: reduced histories of one direction.
+        reduction: operating points of the histories of one direction.
 
     Returns:
-        A row per operating point, sorted by amplitude, repeat and frequency.
+        A row per operating point, sorted by amplitude, repeat and frequency: the columns of a sweep file, then standard
+        errors, distortion, and the history and time interval that the point was computed from.
     """
     place, steps = reduction.direction, pd.DataFrame([vars(step) for step in reduction.steps])
     (length, length_factor), _, (stiffness, _) = place.display
@@ -51,18 +52,18 @@ def reduced_table(reduction: Reduction) -> pd.DataFrame:
 
 
 def resonance_table(resonance: Resonance) -> pd.DataFrame:
-    """A resonance test reduced to a sweep: columns of a sweep file, then columns on the origin of each point.
+    """Table of a resonance test reduced to stiffness over frequency; it can be read again as a sweep file.
 
     Args:
-        resonance: resonance test reduced to stiffness over frequency.
+        resonance: reduced resonance test.
 
     Returns:
-        A row per frequency.
+        A row per frequency: the columns of a sweep file, then relative error, transmissibility and averaged rows.
     """
     return pd.DataFrame(
         {
             "frequency [Hz]": resonance.frequency,
-            **amplitude_column(Direction.AXIAL, resonance.amplitude),  # which translation it is makes no difference
+            **amplitude_column(Direction.AXIAL, resonance.amplitude),  # axial or radial: the units are the same
             **response_columns(Direction.AXIAL, resonance.stiffness),
             "relative error [-]": resonance.relative_error,
             "transmissibility [-]": np.abs(resonance.transmissibility),

@@ -30,25 +30,25 @@ if TYPE_CHECKING:
 
     from bushfit.geometry import Place
 
-#: Formats of a picture.
+#: File formats of a figure.
 Picture = Literal["png", "svg", "pdf"]
 #: Kinds of result file in the order in which they are written: numbers first, so that a failing picture loses none.
 Kind = Literal["json", "raw", "table", "page", "figure"]
 _KINDS: tuple[Kind, ...] = ("json", "raw", "table", "page", "figure")
 #: Record of the files that bushfit wrote into a folder: lines of SHA-256 and name, as of the program sha256sum.
 _RECORD = ".bushfit.sha256"
-#: Control characters that a JSON document must not hold; the ends of its lines are allowed.
+#: Control characters, other than line ends, that are escaped in a JSON document.
 _STEERING = re.compile(rf"(?!\n){CONTROL.pattern}")
 
 
 @dataclass(frozen=True, eq=False)
 class ResultFile:
-    """One file of a result.
+    """One file of a result, whose content is computed when it is first needed.
 
     Args:
-        name: name of the file without its ending; of a raw file with it.
+        name: file name without its extension; a raw file has its extension.
         kind: "json", "table", "figure", "page" (HTML) or "raw".
-        make: function that makes the content: a mapping, a pandas table, a chart, a text, or bytes.
+        make: function that makes the content: a mapping, a pandas table, a chart, HTML text or bytes, by kind.
     """
 
     name: str
@@ -57,35 +57,35 @@ class ResultFile:
 
     @cached_property
     def content(self) -> Any:
-        """Content, made once however many files and pages show it."""
+        """Content of the file before encoding; it is computed once."""
         return self.make()
 
 
 def json_file(name: str, document: Mapping[str, Any]) -> ResultFile:
-    """JSON file with a document."""
+    """Result file for a JSON document."""
     return ResultFile(name, "json", lambda: document)
 
 
 def table_file(name: str, make: Callable[[], pd.DataFrame]) -> ResultFile:
-    """Table, made once however often it is asked for."""
+    """Result file for a table; `make` is called at most once."""
     return ResultFile(name, "table", cache(make))
 
 
 def figure_file(name: str, make: Callable[[], Figure]) -> ResultFile:
-    """Figure."""
+    """Result file for a figure."""
     return ResultFile(name, "figure", make)
 
 
 def raw_file(name: str, content: bytes) -> ResultFile:
-    """File whose name has its ending and whose content is given."""
+    """Result file with given bytes; `name` has its extension."""
     return ResultFile(name, "raw", lambda: content)
 
 
 def page_file(name: str, page: Callable[[Sequence[ResultFile]], str], files: Sequence[ResultFile]) -> ResultFile:
-    """HTML page that shows other result files.
+    """Result file for an HTML page that shows other result files.
 
     Args:
-        name: name of the file without its ending.
+        name: file name without its extension.
         page: function that makes the HTML from result files.
         files: result files with documents, tables and figures.
     """
@@ -93,12 +93,12 @@ def page_file(name: str, page: Callable[[Sequence[ResultFile]], str], files: Seq
 
 
 def contents(files: Iterable[ResultFile], kind: Kind) -> dict[str, Any]:
-    """Contents of the result files of a kind by their names."""
+    """Contents of the result files of one kind, by file name without extension."""
     return {file.name: file.content for file in files if file.kind == kind}
 
 
 def place_names(places: Iterable[Place]) -> list[str]:
-    """File names, without an ending, of the results of directions and specimens; safe on every system, and unique."""
+    """Unique file names, without extension, for the results of directions and specimens; valid on every system."""
     names: list[str] = []
     for place in places:
         name = folder_name(str(place))
@@ -108,10 +108,10 @@ def place_names(places: Iterable[Place]) -> list[str]:
 
 @dataclass(frozen=True)
 class Formats:
-    """Formats of result files, and the kinds to leave out.
+    """File formats of tables and figures, and the kinds of result file to omit.
 
     Args:
-        tables, pictures, pages: whether files of the kind are written.
+        tables, pictures, pages: True to write files of this kind.
         table_form: "csv", "decimal-comma" (CSV for German Excel) or "xlsx".
         picture_forms: one or more of "png", "svg" and "pdf".
     """
@@ -123,14 +123,14 @@ class Formats:
     picture_forms: tuple[Picture, ...] = ("png",)
 
     def table(self, name: str) -> str:
-        """Name of the file of a table."""
+        """File name, with extension, of the table `name`."""
         return f"{name}.{ending(self.table_form)}"
 
     def names(self, file: ResultFile) -> list[str]:
-        """Names of the files that a result file becomes: one for each picture format; none if its kind is left out.
+        """Names of the files on disk that a result file is written to.
 
         Returns:
-            File names with endings.
+            File names with extensions: one for each picture format of a figure; none if the kind is omitted.
         """
         return {
             "json": [f"{file.name}.json"],
@@ -141,10 +141,10 @@ class Formats:
         }[file.kind]
 
     def encode(self, file: ResultFile) -> dict[str, bytes]:
-        """Bytes of the files that a result file becomes, by their names; empty if the kind is left out.
+        """Encode a result file as the bytes of its files on disk.
 
         Returns:
-            Content by file name.
+            Bytes by file name with extension; empty if the kind is omitted.
 
         Raises:
             OutputError: a table that is too large for its format.
@@ -165,12 +165,12 @@ class Formats:
 
 
 def encode_all(files: Iterable[ResultFile], formats: Formats) -> dict[str, bytes]:
-    """Bytes of all files of a result, by their names."""
+    """Encode all files of a result: bytes by file name with extension."""
     return {name: content for file in files for name, content in formats.encode(file).items()}
 
 
 def to_json(document: Mapping[str, Any]) -> bytes:
-    """Bytes of a JSON file, in which no character steers a terminal."""
+    """Encode a document as JSON in UTF-8, with control characters escaped so that it is safe to print in a terminal."""
     text = json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False)
     return (_STEERING.sub(lambda sign: f"\\u{ord(sign[0]):04x}", text) + "\n").encode()
 
@@ -190,12 +190,12 @@ def write_results(
     Args:
         folder: results folder, made if it does not exist.
         files: files of the result.
-        formats: formats to write, and kinds to leave out.
-        overwrite: whether to replace files of an earlier result.
+        formats: formats to write, and kinds to omit; None for the defaults of `Formats`.
+        overwrite: True to replace files of an earlier result.
         inputs: files that the run has read; they are not replaced.
 
     Returns:
-        Names of the files written, in their order.
+        Names of the files written, in the order of writing.
 
     Raises:
         OutputError: the folder cannot be written, or holds a file that must not be replaced.
@@ -211,7 +211,7 @@ def write_results(
 
 
 def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """Write files into a folder, each under a temporary name that is then moved over the file of an earlier result.
+    """Write files, given as bytes by name, into a folder; each is complete or keeps its earlier content.
 
     Raises:
         OutputError: the folder cannot be written.
@@ -225,7 +225,7 @@ def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
                     stream.write(content)
                     stream.flush()
                     os.fsync(stream.fileno())
-                with (folder / _RECORD).open("ab") as record:  # before the move: a killed command leaves no stranger
+                with (folder / _RECORD).open("ab") as record:  # before the move: the record lists every file
                     record.write(f"{hashlib.sha256(content).hexdigest()}  {name}\n".encode())
                 part.replace(folder / name)
             finally:
@@ -237,17 +237,17 @@ def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
 
 
 def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
-    """Check that files of these names may be written into a folder; nothing is written.
+    """Check that files with the given names may be written into a folder, without writing anything.
 
     Args:
         folder: results folder, which need not exist.
-        names: names of the files.
-        overwrite: whether files of an earlier result may be replaced.
+        names: names of the files to write.
+        overwrite: True if files of an earlier result may be replaced.
         inputs: files that the run reads.
 
     Raises:
-        OutputError: the folder is a file or allows no writing; or a name is that of a folder, of an input, of a file
-            that bushfit did not write, or, unless `overwrite`, of an earlier result.
+        OutputError: the folder is a file or not writable; or one of the names belongs to a folder, an input, a file
+            that bushfit did not write or, unless `overwrite` is True, a file of an earlier result.
     """
     elsewhere = "name another folder with -o/--output"
     try:
@@ -291,7 +291,7 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
 
 
 def _digest(file: Path) -> str:
-    """SHA-256 of a plain file; empty for a link or what is no file."""
+    """SHA-256 of a regular file, hexadecimal; empty for a symbolic link or anything that is not a file."""
     return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() and not file.is_symlink() else ""
 
 

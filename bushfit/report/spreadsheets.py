@@ -12,23 +12,23 @@ from bushfit.report.results import place_names
 from bushfit.report.tables import prediction_table, wide_table
 from bushfit.version import __version__
 
-#: Tables that belong to no place; they come last.
+#: Tables that belong to no direction or specimen; they come last.
 _OF_ALL = ("parameters", "provenance")
 
 
 def csv(order: Order) -> Exported:
-    """A file for each table."""
+    """Export a model as CSV files, one for each table."""
     written = {name: to_csv(table, decimal_comma=order.decimal_comma) for name, table in _tables(order).items()}
     return Exported({f"{name.replace(' ', '_')}.csv": file for name, file in written.items()}, (NO_LOOPS,))
 
 
 def xlsx(order: Order) -> Exported:
-    """One workbook, a sheet for each table."""
+    """Export a model as an Excel workbook, `bushing.xlsx`, with a sheet for each table."""
     return Exported({"bushing.xlsx": to_xlsx(_tables(order))}, (NO_LOOPS,))
 
 
 def _tables(order: Order) -> dict[str, pd.DataFrame]:
-    """Tables by name: two for each place, parameters, and provenance."""
+    """Tables of an export by name: long and wide predictions of each direction or specimen, parameters, provenance."""
     tables = {
         "parameters": parameters_table(order.result),
         "provenance": pd.DataFrame(_provenance_rows(order), columns=["what", "value"]),
@@ -43,13 +43,13 @@ def _tables(order: Order) -> dict[str, pd.DataFrame]:
 
 
 def parameters_table(result: Result) -> pd.DataFrame:
-    """Every parameter in SI, with its standard error and 95 % interval where it has one.
+    """Table of all parameters of a model in SI units.
 
     Args:
         result: fitted or given model.
 
     Returns:
-        A row per parameter.
+        A row per parameter: value, unit, standard error and 95 % interval (empty if not known), fitted, and meaning.
     """
     model, rows = result.model, []
     for name, value in model.values.items():  # noqa: PD011  # no frame
@@ -70,7 +70,7 @@ def parameters_table(result: Result) -> pd.DataFrame:
 
 
 def _provenance_rows(order: Order) -> Iterator[tuple[str, str]]:
-    """Rows of the table of provenance: names and values, with the warnings."""
+    """Rows (name, value) on the origin of an export: dimensions, effects, model file, tests, version and warnings."""
     result, bushing = order.result, order.result.model.bushing
     yield "bushing", result.name
     if bushing:

@@ -20,21 +20,21 @@ from bushfit.prediction.stiffness import PredictedResonance, Prediction
 from bushfit.reading.measurement import loss_factor
 from bushfit.units import CELSIUS
 
-#: Headers of what was measured and of the model beside it, in the tables of loops and sweeps.
+#: Headers of the measured and modelled responses and of the outlier flag in the tables of loops and sweeps.
 _MEASURED = re.compile(
     r"outlier$|(strain amplitude|(model )?"
     r"(displacement|rotation|strain|force|moment|stress|stiffness|modulus|loss factor)) \["
 )
 #: Separator of the warnings of a bushing in the table of a batch.
 BETWEEN = " | "
-#: Units of amplitudes, by SI, as people read them.
+#: Display unit of amplitudes and its factor from SI, by SI unit: mm for m, % for strain.
 DISPLAYS = {motion.displacement_unit: motion.display.displacement for motion in (TRANSLATION, ROTATION, STRAINING)}
-#: End of headers and name of lines that assume an unresolved effect to belong to the rig.
+#: Suffix of headers and labels of predictions that assume an unresolved effect to belong to the test rig.
 IF_RIGS = "if it is the rig's"
 
 
 def words(place: Place) -> tuple[str, str, str]:
-    """Names of amplitude, force and stiffness in the headers of a place, or of strain, stress and modulus."""
+    """Words for amplitude, force and stiffness in table headers, or for strain amplitude, stress and modulus."""
     if place.motion is not STRAINING:
         return "amplitude", "force", "stiffness"
     strain, stress, modulus = STRAINING.words
@@ -42,45 +42,46 @@ def words(place: Place) -> tuple[str, str, str]:
 
 
 def columns_of(place: Place) -> tuple[str, str, str]:
-    """Headers of amplitude, |K| and the force in the tables of a place."""
+    """Column headers, with units, of amplitude, stiffness magnitude and force for a direction or specimen."""
     (length, _), (force, _), (stiffness, _) = place.display
     motion_name, resisting, resisted = words(place)
     return f"{motion_name} [{length}]", f"{resisted} [{stiffness}]", f"{resisting} [{force}]"
 
 
 def moved_of(place: Place) -> str:
-    """Header of displacement, rotation or strain in the tables of a place."""
+    """Column header, with unit, of displacement, rotation or strain for a direction or specimen."""
     motion_name = "strain" if place.motion is STRAINING else "displacement"
     return f"{motion_name} [{place.display.displacement.name}]"
 
 
 def amplitude_column(place: Place, amplitude: Array) -> dict[str, Array]:
-    """Column of amplitudes at a place, by its header; `amplitude` in SI."""
+    """Table column of amplitudes, as {header: values in display units}; `amplitude` is in SI (m, rad or 1), (n,)."""
     return {columns_of(place)[0]: amplitude * place.display.displacement.factor}
 
 
 def response_columns(place: Place, stiffness: Array, before: str = "") -> dict[str, Array]:
-    """Columns of |K| and loss factor of complex stiffnesses [SI] at a place, whose headers begin with `before`.
+    """Table columns of stiffness magnitude (display unit) and loss factor, by their headers.
 
     Args:
         place: direction or specimen.
         stiffness: complex stiffnesses [SI], (n,).
-        before: beginning of both headers.
+        before: prefix of both headers, such as "model ".
     """
     magnitude = np.abs(stiffness) * place.display.stiffness.factor
     return {f"{before}{columns_of(place)[1]}": magnitude, f"{before}loss factor [-]": loss_factor(stiffness)}
 
 
 def prediction_table(prediction: Prediction, display: Display | None = None) -> pd.DataFrame:
-    """Predicted stiffness and loss over operating points, with the ends of the 95 % bands.
+    """Table of predicted stiffness and loss, with the ends of the 95 % bands; a row per operating point.
 
     Args:
-        prediction: of one place.
-        display: units; those of the place if None.
+        prediction: prediction for one direction or specimen.
+        display: units of the table; None for the display units of the direction or specimen.
 
     Returns:
-        A row per point: frequency, amplitude, stiffness, loss factor, storage and loss stiffness; low and high of the
-        last four; the four if an unresolved effect belongs to the rig; and the measured stiffness and loss factor.
+        Columns: frequency, amplitude, stiffness, loss factor, storage and loss stiffness; "low" and "high" ends of the
+        last four; the four again under the assumption that an unresolved effect belongs to the rig, if there is one;
+        and measured stiffness and loss factor, if they are known.
     """
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     motion_name, _, resisted = words(prediction.direction)
@@ -107,15 +108,15 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
 
 
 def wide_table(prediction: Prediction, display: Display | None = None) -> pd.DataFrame:
-    """Predicted stiffness and loss factor with frequency down and amplitude across.
+    """Table of predicted stiffness and loss factor in wide form: a row per frequency, a column per amplitude.
 
     Args:
-        prediction: of one place.
-        display: units; those of the place if None.
+        prediction: prediction for one direction or specimen.
+        display: units of the table; None for the display units of the direction or specimen.
 
     Returns:
-        A row per frequency: a column of stiffness for each amplitude, then of loss factor; empty where the grid has no
-        point.
+        Frequency, then a stiffness column for each amplitude, then a loss factor column for each; cells are empty where
+        the prediction has no operating point.
     """
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     resisted = words(prediction.direction)[2]
@@ -129,13 +130,14 @@ def wide_table(prediction: Prediction, display: Display | None = None) -> pd.Dat
 
 
 def shaken_table(resonance: PredictedResonance) -> pd.DataFrame:
-    """Transmissibility, deformation and stiffness of a mass on a mount over frequency, a row per frequency.
+    """Table of the predicted resonance of a mass on a mount whose base is shaken.
 
     Args:
-        resonance: predicted response of the mass.
+        resonance: predicted response of the mass over frequency.
 
     Returns:
-        A row per frequency; further columns if an unresolved effect belongs to the rig.
+        A row per frequency: transmissibility, phase, deformation amplitude, stiffness and loss factor; the same again
+        under the assumption that an unresolved effect belongs to the rig, if there is one.
     """
     table = pd.DataFrame(
         {
@@ -153,15 +155,16 @@ def shaken_table(resonance: PredictedResonance) -> pd.DataFrame:
 
 
 def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> pd.DataFrame:
-    """Maxwell arms, a row per arm, with the parallel spring first.
+    """Table of Maxwell arms (spring and dashpot in series) that replace effects of a model, parallel spring first.
 
     Args:
-        model: whose effects the arms replace.
-        arms: of each effect.
+        model: model whose effects the arms replace.
+        arms: Maxwell arms of each replaced effect.
         places: directions and specimens whose stiffness is listed.
 
     Returns:
-        Relaxation time, shear modulus and stiffness at each place.
+        A row per arm: name of the replaced effect, relaxation time [s], shear modulus [MPa], and stiffness of the arm
+        in each direction or specimen.
     """
     names, moduli, times = zip(*arm_rows(model, arms), strict=True)
     modulus = np.array(moduli)
@@ -173,16 +176,16 @@ def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> p
 
 
 def loops_table(model: Model, data_sets: Sequence[MeasuredLoop]) -> pd.DataFrame:
-    """Measured and modelled force of every loop: a row per recorded row, or per bin of phase where a loop is long.
+    """Table of the measured and modelled force of hysteresis loops, with their residuals.
 
-    The residual is measured minus model, in units of the noise of one row. An outlier was left out of the fit.
+    The residual is measured minus model, in units of the noise of one row. Outliers were excluded from the fit.
 
     Args:
         model: model to compare with the tests.
         data_sets: measured loops.
 
     Returns:
-        A row per recorded row or bin of phase.
+        A row per recorded row; of a long loop, a row per bin of phase.
     """
     tables = []
     for data_set in data_sets:
@@ -210,9 +213,9 @@ def loops_table(model: Model, data_sets: Sequence[MeasuredLoop]) -> pd.DataFrame
 
 
 def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFrame:
-    """Measured and modelled dynamic stiffness of every sweep, sorted by amplitude, repeat and frequency.
+    """Table of the measured and modelled dynamic stiffness of sweeps, with their residuals.
 
-    Residuals are measured minus model, in units of noise. Temperature, part and stated error are columns only where a
+    Residuals are measured minus model, in units of noise. Temperature, part and stated error are columns only if a
     test states them.
 
     Args:
@@ -220,7 +223,7 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
         data_sets: measured sweeps.
 
     Returns:
-        A row per measured point.
+        A row per measured point, sorted by fixed quantity (amplitude or frequency), repeat and stepped quantity.
     """
     tables = []
     for data_set in data_sets:
@@ -249,7 +252,7 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
 
 
 def _condition_columns(data_set: MeasuredSweep) -> dict[str, Any]:
-    """Columns with what a sweep steps through and with the conditions that its test states."""
+    """Columns of the stepped quantity of a sweep, and of temperature, part and stated error if its test has them."""
     sweep, conditions = data_set.sweep, data_set.source.conditions if data_set.source else {}
     columns: dict[str, Any] = {"stepped": sweep.stepped or "neither"}
     if sweep.temperature is not None:
@@ -262,16 +265,16 @@ def _condition_columns(data_set: MeasuredSweep) -> dict[str, Any]:
 
 
 def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """Measured minus model before and after a diagnosis, in units of noise and in percent.
+    """Table of the gap, measured minus model, before and after the effects that a diagnosis adds to the model.
 
-    A row is a sweep point or a row of a loop, where it was recorded, also if the record was mistaken. Percent are of
-    |K| or of half the range of a loop's force. The table also has the response of the model to use.
+    The gap is in units of noise and in percent: of |K| for sweeps, of half the force range for loops. Frequency and
+    amplitude are those recorded, even if the diagnosis corrects a mistake in the record.
 
     Args:
         diagnosis: finished diagnosis with the models before and after.
 
     Returns:
-        A row per point of a sweep or row of a loop.
+        A row per point of a sweep or row of a loop, with the measured response and that of the final model.
     """
     before, after = diagnosis.before, diagnosis.after
     tables = []
@@ -292,10 +295,10 @@ def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
 
 
 def master_curve_table(shifted_sweeps: Sequence[Shifted]) -> pd.DataFrame:
-    """Points of sweeps at several temperatures, as measured and shifted to 23 degC, a row per point.
+    """Table of sweeps at several temperatures, as measured and shifted to 23 degC (time-temperature superposition).
 
     Returns:
-        Measured and reduced frequency, stiffness and loss factor of each point.
+        A row per point: temperature, amplitude, and frequency, stiffness and loss factor, both measured and reduced.
     """
     tables = []
     for shifted in shifted_sweeps:
@@ -308,10 +311,10 @@ def master_curve_table(shifted_sweeps: Sequence[Shifted]) -> pd.DataFrame:
 
 
 def shift_factors_table(shifted_sweeps: Sequence[Shifted]) -> pd.DataFrame:
-    """log10 of the shift factor of each sweep, by the fitted law and fitted alone, with 95 % intervals.
+    """Table of the temperature shift factors log10 a_T of sweeps, with 95 % intervals.
 
     Returns:
-        A row per sweep.
+        A row per sweep: temperature, shift factor by the law fitted to all sweeps, and that fitted to the sweep alone.
     """
     columns: dict[str, Any] = {
         "sweep": [shifted.sweep.name for shifted in shifted_sweeps],
@@ -325,10 +328,10 @@ def shift_factors_table(shifted_sweeps: Sequence[Shifted]) -> pd.DataFrame:
 
 
 def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """Every effect of the library: score, gain in chi-square, probability, parameters, and the reason of the result.
+    """Table of all effects that a diagnosis tried as explanations of the gap.
 
     Returns:
-        A row per effect.
+        A row per effect: level, score, gain in chi-square, probability, fitted parameters, and reason for the result.
     """
     rows = [
         {
@@ -346,18 +349,18 @@ def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
 
 
 def shortened(name: str, letters: int) -> str:
-    """Name of at most so many letters, without its middle if it is too long, and with control characters escaped."""
+    """Shorten a name to at most `letters` characters by an ellipsis in its middle; control characters are escaped."""
     name = printable(name)
     return name if len(name) <= letters else f"{name[: (letters - 1) // 2]}…{name[-(letters // 2) :]}"
 
 
 def spread(count: int, maximum: int) -> Array:
-    """Indices of at most so many of `count` elements, evenly from the first to the last, (min(count, most),)."""
+    """Indices of at most `maximum` of `count` elements, evenly from the first to the last, (min(count, maximum),)."""
     return np.linspace(0, count - 1, min(maximum, count)).round().astype(int)
 
 
 def numbers(rows: pd.DataFrame, *headers: str) -> Array:
-    """Columns of a table as numbers, (k, n).
+    """Columns of a table with the k given headers as an array of floats, (k, n).
 
     Raises:
         ModelError: a column is missing.
@@ -366,7 +369,7 @@ def numbers(rows: pd.DataFrame, *headers: str) -> Array:
 
 
 def required(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
-    """The table, checked for these columns.
+    """Check that a table has columns with the given headers, and return the table.
 
     Raises:
         ModelError: a column is missing.
