@@ -13,24 +13,24 @@ from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, repeats_of,
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.reading.measurement import Sweep
 
-#: Points of a run from which it counts as long; chosen for time: stepped sines have tens, a swept sine thousands.
+#: Number of points above which a run is long; chosen for time: stepped sines have tens, a swept sine thousands.
 _LONG = 400
 #: Bands of a long run; chosen: a smooth stiffness changes by less than noise within one.
 _BANDS = 100
-#: Lines of a sweep, levels mostly, that are looked at; chosen for time: each is searched without.
+#: Maximum number of lines (mostly amplitude levels) of a sweep that are used; chosen for time: each is a suspect.
 _MOST_LINES = 40
-#: Rows of all loops together that are looked at; chosen for memory: hundreds of shapes of effects change each.
+#: Maximum number of rows of all loops together; chosen for memory: hundreds of shapes of effects change each.
 _MOST_ROWS = 50_000
 
 
 class _Means(NamedTuple):
-    """Part of a sweep that is diagnosed.
+    """Reduced sweep that is diagnosed in place of a long one.
 
     Args:
-        sweep: the means, or the selected points.
-        under: circumstances of the points, which include the effect of rows that are left out.
-        shares: for each line in means, the mean ratio of the variance of a mean to that of a row.
-        words: sentence on how the part was made.
+        sweep: means over narrow bands, or the selected points.
+        under: circumstances of these points, such as temperature; they include the effect of rows that are left out.
+        shares: variance of a mean relative to the variance of a row, averaged over each line that was reduced to means.
+        words: sentence on how the sweep was reduced.
     """
 
     sweep: Sweep
@@ -43,8 +43,8 @@ def condensed(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, ...]
     """Reduce a campaign to the points that are diagnosed.
 
     Long runs of sweeps become means over narrow bands. If a sweep has very many lines, or the loops very many rows, a
-    selection is diagnosed. Rows without weight are in no mean. The noise from point to point of a line in means is
-    estimated again; errors that runs share stay.
+    selection is diagnosed. Rows without weight are left out. The point-to-point noise of a line that is reduced to
+    means is estimated again; errors that runs share are unchanged.
 
     Args:
         data: the campaign.
@@ -79,7 +79,7 @@ def condensed(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, ...]
 
 
 def _some(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
-    """Select loops up to a number of rows, at least one of each direction.
+    """Select loops with at most `_MOST_ROWS` rows in total, and at least one loop of each direction.
 
     Different loops are selected before repeats. If they are too many, the selection is evenly spread over direction,
     amplitude and frequency.
@@ -105,7 +105,7 @@ def _some(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
 
 
 def _noise(before: SweepNoise, condensations: Sequence[_Means], rig: RigSettings) -> SweepNoise:
-    """The noise of the sweeps of a rig with some of them in means; a stated one falls with the rows of each."""
+    """Noise of the sweeps of a rig after some were reduced to means; a stated noise falls with the rows per mean."""
     if not condensations:
         return before
     anew, random = sweep_noise([means.sweep for means in condensations], rig), dict(before.random)
@@ -123,7 +123,7 @@ def _noise(before: SweepNoise, condensations: Sequence[_Means], rig: RigSettings
 
 
 def _condensed_sweep(data_set: MeasuredSweep) -> _Means | None:
-    """Part of a sweep that is diagnosed; None if that is the whole sweep."""
+    """Reduce a sweep with long runs or very many lines; None if the whole sweep is diagnosed."""
     sweep, rows, words = data_set.sweep, data_set.order[data_set.weights > 0.0], ""
     lines = np.unique(sweep.held[rows])
     if lines.size > _MOST_LINES:
@@ -156,13 +156,13 @@ def _condensed_sweep(data_set: MeasuredSweep) -> _Means | None:
 
 @dataclass(frozen=True, eq=False)
 class _Groups:
-    """Rows of a sweep that are averaged together, in the order of measurement.
+    """Groups of sweep rows that are averaged together; groups are in the order of measurement.
 
     Args:
-        rows: indices of the rows of the sweep, (n,).
-        place: index of the group of each row, (n,).
-        lead: index of one row of each group, (g,).
-        counts: number of rows of each group, (g,).
+        rows: indices of the grouped rows in the sweep, (n,).
+        place: index of the group that each row belongs to, (n,).
+        lead: index in the sweep of one row of each group, (g,).
+        counts: number of rows in each group, (g,).
     """
 
     rows: Array
@@ -172,24 +172,24 @@ class _Groups:
 
     @classmethod
     def from_keys(cls, rows: Array, keys: Array) -> "_Groups":
-        """Group the rows with equal columns of `keys`, (k, n)."""
+        """Group the rows, (n,), whose columns of `keys`, (k, n), are equal."""
         _, first, place, counts = np.unique(keys, axis=1, return_index=True, return_inverse=True, return_counts=True)
         turn = np.argsort(np.bincount(place, rows) / counts, kind="stable")
         return cls(rows, np.argsort(turn)[place], rows[first[turn]], counts[turn])
 
     def mean(self, values: Array | float | None) -> Array | float | None:
-        """Mean of each group, (g,); a number, or None, applies to all rows and is returned unchanged."""
+        """Mean of values by sweep row over each group, (g,); a scalar or None is returned unchanged."""
         return self._mean(values) if isinstance(values, np.ndarray) else values
 
     def _mean(self, values: Array) -> Array:
         return np.bincount(self.place, values[self.rows]) / self.counts
 
     def _middle(self, values: Array) -> Array:
-        """Geometric mean of each group, (g,); the value itself for groups of one row."""
+        """Geometric mean of values by sweep row over each group, (g,); the value itself for groups of one row."""
         return np.where(self.counts > 1, np.exp(self._mean(np.log(values))), values[self.lead])
 
     def sweep(self, sweep: Sweep) -> Sweep:
-        """The sweep of the means."""
+        """Sweep with one mean point per group; the stepped axis and |K| are averaged geometrically."""
         phase, error = np.angle(sweep.stiffness), sweep.relative_error
         return replace(
             sweep,

@@ -23,21 +23,21 @@ from bushfit.fitting.problem import FitResult
 from bushfit.model.covariance import Z95
 from bushfit.units import number
 
-#: Evaluations of the model at most in the refit that the power law stands beside: it has to end.
+#: Maximum number of model evaluations in the refit that the power law is added to: this refit must converge.
 _EVALUATIONS = 400
 
 
 @dataclass(frozen=True, eq=False)
 class GapDescription:
-    """Gap without a name.
+    """Description of a gap between model and tests that no known effect explains.
 
     Args:
-        after: the model with its correction, and the tests in the form that the correction can predict.
-        fitted: fit of the parameters with the correction as an error of the model.
-        holdout: hold-out of whole runs inside the range, without and with the correction; for information only.
-        power_law: nearest power law; None if the tests show none.
-        sentence: size of the gap and its form.
-        evidence: range in which the correction is valid.
+        after: model with its smooth correction, and the tests with loops replaced by their first harmonic.
+        fitted: fit of the parameters with the correction treated as a random error of the model.
+        holdout: errors of predicted runs inside the tested range, without and with the correction; for information.
+        power_law: nearest power law of frequency and amplitude; None if the tests show no power law.
+        sentence: text on the size and the form of the gap.
+        evidence: text on the range of tests in which the correction is valid.
     """
 
     after: Evidence
@@ -49,7 +49,7 @@ class GapDescription:
 
     @property
     def description(self) -> Description | None:
-        """Power law of the gap; None if the gap does not follow one."""
+        """Entry of diagnosis.json for the power law of the gap; None if the gap does not follow a power law."""
         law = self.power_law
         if law is None or not law.is_likely or not any(law.determined):
             return None
@@ -61,7 +61,7 @@ def describe(
 ) -> GapDescription | None:
     """Describe the gap of a fitted model by a smooth correction and the nearest power law.
 
-    The law of the gap in time is unknown: loops are represented by their first harmonic.
+    The form of the gap within a cycle is unknown, so loops are represented by their first harmonic.
 
     Args:
         evidence: the fitted model and the tests.
@@ -71,7 +71,8 @@ def describe(
         bounds: limits of parameters inside their general limits.
 
     Returns:
-        The description; None if the correction does not raise the likelihood, or if its error is larger than the gap.
+        The description; None if the correction does not raise the likelihood, if its error is larger than the gap, if
+        the model has a correction already, or if the first harmonics cannot be fitted.
     """
     if NAME in evidence.model.effects:
         return None
@@ -93,8 +94,10 @@ def describe(
 
 
 def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
-    """Predict whole runs inside the range from the others, without the correction and with it: every third frequency
-    of each sweep, the middle level, the last repeat."""
+    """Predict parts of the sweeps inside the tested range from the other parts, without and with the correction.
+
+    The parts are every third frequency (or other step), the middle level and the last repeat of the sweeps.
+    """
     solution, tests = before.solution, before.data_sets
     chosen: dict[str, dict[MeasuredTest, Array]] = {}
     for sweep in split_by_kind(tests)[1]:
@@ -121,7 +124,7 @@ def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
 
 
 def _form(correction: Unnamed, law: PowerLaw | None) -> str:
-    """Sentence on the size and the form of the gap."""
+    """Text on the size of the gap, its uncertainty and its form, from the correction and the nearest power law."""
     largest, band = (number(100.0 * share, 2) for share in (correction.largest, Z95 * correction.uncertainty))
     if law is None or not any(law.determined):
         form = "its form is unknown"
@@ -134,7 +137,7 @@ def _form(correction: Unnamed, law: PowerLaw | None) -> str:
 
 
 def _validity(correction: Unnamed, whole: Evidence) -> str:
-    """Sentence on the range in which the correction is valid, and on the misfit that stays in the worst loop."""
+    """Text on the tested range in which the correction is valid, and on the remaining misfit of the worst loop."""
 
     def span(values: Sequence[float], factor: float = 1.0) -> str:
         return " to ".join(number(factor * end, 2) for end in (min(values), max(values)))

@@ -1,6 +1,6 @@
 """Keys of diagnosis.json, in the schema bushfit/diagnosis/3.
 
-The JSON Schema is made of these types, and the type checker compares them with `diagnosis.record`.
+The JSON Schema is generated from these types, and the type checker compares them with `diagnosis.record`.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ Verdict = Literal["consistent", "named", "ambiguous", "described", "partly", "un
 
 
 class SizeEntry(TypedDict):
-    """A parameter of an effect, with its uncertainty where it is part of the model to use."""
+    """Value of one parameter of an effect, with its uncertainty if the model to use has this parameter."""
 
     value: Annotated[float, Doc("in the unit.")]
     stderr: Annotated[float | None, Doc("standard error, in the unit; null where the parameter was not fitted.")]
@@ -27,7 +27,7 @@ class SizeEntry(TypedDict):
 
 
 class EffectEntry(TypedDict):
-    """An effect or a mistake in the record that was added, or that leads a set of look-alikes."""
+    """Effect or mistake in the record that was added, or the first of a set that the tests cannot distinguish."""
 
     name: Annotated[str, Doc("of the effect or mistake.")]
     level: Annotated[
@@ -47,7 +47,7 @@ class EffectEntry(TypedDict):
     alternatives: Annotated[list[str], Doc("explanations that these tests cannot distinguish from it.")]
 
 
-#: The keys have a unit that is no name in Python, so that this type is made by a call.
+#: Some keys contain a unit that is not a valid Python name, so this type is created by a call.
 WhereEntry = TypedDict(
     "WhereEntry",
     {
@@ -70,7 +70,7 @@ WhereEntry.__doc__ = "One region in which model and measurement disagree."
 
 
 class BeforeAfter(TypedDict):
-    """Root mean square residual in units of noise: 1 is the floor."""
+    """Root mean square residual in units of noise, before and after the additions; 1 is noise alone."""
 
     before: Annotated[float | None, Doc("of the model at the start.")]
     after: Annotated[
@@ -80,7 +80,7 @@ class BeforeAfter(TypedDict):
 
 
 class GapEntry(TypedDict):
-    """How far model and tests lie apart, in units of noise."""
+    """Misfit between model and tests, in units of noise."""
 
     calibration: Annotated[BeforeAfter, Doc("on the data that were fitted.")]
     heldout: Annotated[
@@ -92,14 +92,14 @@ class GapEntry(TypedDict):
 
 
 class OddsEntry(TypedDict):
-    """One explanation of a gap."""
+    """One explanation of a gap, with its probability."""
 
     words: Annotated[str, Doc("what it is.")]
     probability: Annotated[float, Doc("if anything is missing.")]
 
 
 class UsableEntry(TypedDict):
-    """Expected error of model.json at the worst of all places: 95 % of the points are nearer."""
+    """Expected error of model.json for the worst direction or specimen: 95 % of its points have smaller errors."""
 
     stiffness: Annotated[float, Doc("relative difference of |K|.")]
     loss_factor: Annotated[float, Doc("difference of the loss factor.")]
@@ -109,7 +109,9 @@ class UsableEntry(TypedDict):
 
 @dataclass(frozen=True)
 class Description:
-    """Power law of a gap without a name, A e^(i phi) f^p X^q beside the model; value and ends of the interval of each.
+    """Power law A e^(i phi) f^p X^q nearest to a gap without a name, added to the model's stiffness.
+
+    Each quantity is a value with the ends of its 95 % interval.
 
     Args:
         phase_deg: phi [deg].
@@ -124,7 +126,7 @@ class Description:
 
 
 class DiagnosisFile(TypedDict):
-    """Content of diagnosis.json."""
+    """Content of diagnosis.json, the result of a diagnosis."""
 
     schema: Annotated[Literal["bushfit/diagnosis/3"], Doc("of this file.")]
     verdict: Annotated[

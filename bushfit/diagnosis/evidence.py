@@ -19,9 +19,9 @@ from bushfit.fitting.procedures import cautions
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 
-#: Evaluations of the model in one fit at most; a model that fits badly is then taken as it is.
+#: Maximum number of model evaluations in one fit; a model that fits badly is used unconverged.
 EVALUATIONS = 40
-#: What is said of a correction.
+#: Warning for a model with a smooth correction.
 _CORRECTED = (
     "a smooth correction of the model closes a gap without a name: the parameters were fitted with it "
     "and absorb the part of the gap that is smooth over more than a decade; their intervals are then invalid"
@@ -33,9 +33,9 @@ class Evidence:
     """Fit of a model to all tests of a campaign, with the tests.
 
     Args:
-        solution: the fit, its residuals in units of noise.
-        data_sets: the tests.
-        joint: the same fit with residuals whitened by an error that the tests have in common, if it was made so.
+        solution: fit with residuals in units of noise.
+        data_sets: tests that the model was fitted to.
+        joint: same fit with residuals whitened by errors that all tests share; None if it was fitted without them.
     """
 
     solution: FitResult
@@ -44,20 +44,22 @@ class Evidence:
 
     @property
     def model(self) -> Model:
+        """Fitted model."""
         return self.solution.model
 
     @property
     def residual(self) -> Array:
-        """Whitened residuals, model less measured, (n,)."""
+        """Whitened residuals, model minus measurement in units of noise, (n,)."""
         return self.solution.residual
 
     @property
     def estimate(self) -> FitResult:
-        """The fit, to all tests with the weights of their noise."""
+        """Fit whose problem contains the tests as listed in `data_sets`, weighted by their noise."""
         return replace(self.solution, problem=replace(self.solution.problem, tests=self.data_sets))
 
     @property
     def chi_square(self) -> float:
+        """Sum of squared residuals, in units of noise."""
         return self.solution.chi_square
 
     @property
@@ -67,7 +69,7 @@ class Evidence:
 
     @property
     def reduced(self) -> float:
-        """Reduced chi-square; 1 where only noise is left."""
+        """Chi-square per degree of freedom; 1 if the residuals are noise alone."""
         counted = sum(data_set.counted for data_set in self.data_sets)
         return self.chi_square / max(counted - self.parameters, 1)
 
@@ -85,13 +87,13 @@ class Evidence:
 
     @cached_property
     def place(self) -> Mapping[MeasuredTest, slice]:
-        """Slice of the residuals of each data set."""
+        """Slice of each test's rows in the residual vector."""
         ends = np.cumsum([data_set.size for data_set in self.data_sets]).tolist()
         return {data_set: slice(end - data_set.size, end) for end, data_set in zip(ends, self.data_sets, strict=True)}
 
 
 def fit(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds) -> Evidence:
-    """Fit the parameters of a model, from its values.
+    """Fit the parameters of a model to tests, starting from the model's values.
 
     Args:
         model: the model at its starting values.
@@ -119,14 +121,15 @@ def result_of(
     corrected: FitResult | None = None,
     rig: RigSettings = UNSTATED,
 ) -> Result:
-    """Build the result of a fit with its uncertainty; a parameter at a bound is treated as fixed.
+    """Build the result of a fit, with its uncertainty; a parameter at a bound is treated as fixed.
 
     Args:
         evidence: the fitted model and the tests.
         bounds: limits of parameters inside their general limits.
-        resolved: effects with a twin in the rig whose level is known; all others are unresolved.
-        lacking: whether the model lacks something, so that a smooth error of the model is estimated.
-        corrected: fit beside a correction, if the model has one.
+        resolved: names of effects known to belong to the bushing and not to the rig; the model's other effects with a
+            twin in the rig are reported as unresolved.
+        lacking: True if the model lacks something, so that a smooth error of the model is estimated.
+        corrected: fit together with a smooth correction of the model; None if the model has no correction.
         rig: stated class of the rig.
 
     Returns:

@@ -6,20 +6,21 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 
-#: Change of |K| by a unit of an amount, below which the tests do not see it.
+#: Relative change of |K| by a unit amount, below which the tests do not show the column.
 _UNSEEN = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Columns with a Gaussian prior, whose amounts are relative to |K|.
+    """Residual columns of one possible explanation of a gap, with a zero-mean Gaussian prior on their amounts.
 
     Args:
-        columns: whitened residuals of a unit of each amount, (c, n).
-        unit: share of |K| that a unit changes, (c,); of columns that move together complex at some points, (c, p).
-        together: True if the amounts are independent and of one size; else one column is chosen, each as likely.
-        sense: +1 where only positive amounts make sense, of columns of which one is chosen.
-        among: the rows that the columns have, and the number of all rows, where they have not all of them.
+        columns: change of the whitened residuals per unit amount of each column, (c, n).
+        unit: relative change of |K| per unit amount, (c,); complex at p operating points, (c, p), if `together`.
+        together: True if all columns act at once with independent amounts of one prior size; False if exactly one
+            column acts, each with equal probability.
+        sense: +1 if only positive amounts are possible, for groups in which one column acts; else 0.
+        among: slice of the residual rows that `columns` covers, and the number of all rows; None if all are covered.
     """
 
     columns: Array
@@ -30,7 +31,7 @@ class Group:
 
     @property
     def whole(self) -> Array:
-        """The columns over all rows, (c, n)."""
+        """Columns over all residual rows, zero outside the covered slice, (c, n)."""
         if self.among is None:
             return self.columns
         rows, count = self.among
@@ -40,7 +41,7 @@ class Group:
 
     @property
     def scaled(self) -> Array:
-        """The columns over all rows, each of a unit of relative change where one of them is chosen, (c, n)."""
+        """Columns over all residual rows, (c, n); scaled to a 100 % change of |K| each if exactly one column acts."""
         if self.together:
             return self.whole
         visible = self.unit > _UNSEEN
@@ -52,10 +53,12 @@ class GroupEvidence:
     """Evidence of the tests for a group of columns.
 
     Args:
-        log_evidence: of the tests with the group, over all sizes and nodes.
-        size: relative change of |K| by the group, root mean square over its posterior.
-        likeliest: the size at which the tests are likeliest.
-        beside: the same beside a deviation of the compound; None without.
+        log_evidence: natural log of the marginal likelihood of the tests with the group, averaged over the sizes of the
+            group's amounts and of the rig's errors.
+        size: relative change of |K| by the group, root mean square over the posterior.
+        likeliest: most probable prior standard deviation of the amounts, relative to |K|, one of `priors.SIZES`.
+        beside: evidence for the group together with a deviation of the rubber compound from the model's laws; None if
+            no such deviation is considered.
     """
 
     log_evidence: float
@@ -65,7 +68,7 @@ class GroupEvidence:
 
     @property
     def total(self) -> float:
-        """Log evidence, with a deviation of the compound and without."""
+        """Natural log of the evidence, summed over the cases with and without a deviation of the compound."""
         if self.beside is None:
             return self.log_evidence
         return float(np.logaddexp(self.log_evidence, self.beside.log_evidence))

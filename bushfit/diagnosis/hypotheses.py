@@ -23,26 +23,26 @@ from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.rig_class import ASSUMED, of_class
 
-#: Logarithm of odds below which a node of the sizes of the rig's errors does not count; chosen for time, as e^-8 of an
-#: answer changes none.
+#: Natural log of the odds below the best at which a node (sizes of the rig's errors) is left out; chosen for time: nodes
+#: of relative weight e^-8 change no verdict.
 _NEAR = 8.0
 
 
 @dataclass(frozen=True, eq=False)
 class DiagnosisRequest:
-    """Request for a search.
+    """Input of a search for explanations of the gap between model and tests.
 
     Args:
-        data: the tests.
-        base: the starting model, fitted to them.
-        fit_mended: fits the starting model to tests with a corrected record.
-        without: effects and mistakes not to consider.
+        data: campaign with the prepared tests.
+        base: starting model, fitted to the tests.
+        fit_mended: function that fits the starting model to a campaign with a corrected record.
+        without: names of effects and mistakes not to consider.
         max_effects: maximum number of added effects.
-        tolerance: relative change of |K| that counts as nothing.
-        start: starting values read off the data, for a model whose parameters the gap has bent too far.
-        meetings: frequencies at which several outliers lie.
-        fixed: parameters that are not fitted.
-        bounds: limits of the others inside their general limits.
+        tolerance: relative change of |K| up to which an explanation is neglected.
+        start: starting values read from the data, by parameter, for a fit that the gap has distorted.
+        meetings: frequencies at which several outliers were left out.
+        fixed: names of parameters that are not fitted.
+        bounds: limits of the fitted parameters inside their general limits.
     """
 
     data: PreparedCampaign
@@ -59,19 +59,19 @@ class DiagnosisRequest:
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """A set of explanations with its posterior.
+    """Set of explanations of the gap, with its posterior probability.
 
     Args:
         effects: names of the effects, in the order in which they were added.
-        claim: mistake in a record, or None.
-        places: faulty places of the tests.
-        unnamed: the process without a name; "" without.
-        levels: True if errors of levels are larger than the class of the rig allows.
-        log_posterior: natural log of prior times evidence.
-        change: relative change of |K| by all of them.
-        last_change: relative change by the last explanation where it was counted linearly; else 0.
-        state: the state that this is, with its effects refitted, or to which the last explanation was added linearly.
-        bent: True if the compound deviates from the model's laws beside all of this.
+        claim: mistake in the record; None without a mistake.
+        places: faulty parts of the tests: frequencies, levels, repeats or loops.
+        unnamed: name of the smooth curve or compound deviation that stands for an unknown effect; "" without one.
+        levels: True if errors of amplitude levels are larger than the class of the rig allows.
+        log_posterior: natural log of prior times evidence, not normalised.
+        change: largest relative change of |K| by any of the explanations.
+        last_change: relative change of |K| by the last explanation if its evidence is linear; 0 if it was refitted.
+        state: fitted state that has exactly these explanations, or to which the last was added by a linear model.
+        bent: True if the compound deviates from the model's laws in addition.
     """
 
     effects: tuple[str, ...]
@@ -87,31 +87,31 @@ class Hypothesis:
 
     @property
     def key(self) -> frozenset[Hashable]:
-        """Identity of the set of explanations; empty if it has none."""
+        """Names that identify the set of explanations; empty if nothing is missing."""
         marks = [self.unnamed, "levels" if self.levels else "", self.claim and self.claim.key]
         return frozenset((*self.effects, *(place.name for place in self.places), *filter(None, marks)))
 
     @property
     def refitted(self) -> bool:
-        """True if all of its effects were refitted, and none was counted linearly only."""
+        """True if all effects were refitted, so that no evidence rests on a linear model alone."""
         return self.effects == self.state.effects
 
     @property
     def chance(self) -> float:
-        """Probability of tests that agree less with the hypothesis than these."""
+        """Probability that tests would have a larger misfit than these if the hypothesis were true."""
         return self.state.linear.chance(bent=self.bent)
 
 
 @dataclass(frozen=True, eq=False)
 class Tests:
-    """Tests as they are recorded, or with a corrected record, and the starting model fitted to them.
+    """Tests as recorded, or with one mistake in the record corrected, and the starting model fitted to these tests.
 
     Args:
-        base: the fit.
+        base: fit of the starting model.
         rig: stated class of the rig.
-        log_prior: natural log of their prior probability with nothing else missing.
-        claim: the mistake that is corrected, or None.
-        change: relative change of what the record says; 0 for the tests as they are.
+        log_prior: natural log of the prior probability that these are the right records and nothing is missing.
+        claim: mistake that is corrected; None for the tests as recorded.
+        change: relative change of the recorded quantities by the correction; 0 for the tests as recorded.
     """
 
     base: Evidence
@@ -122,22 +122,22 @@ class Tests:
 
     @cached_property
     def bare(self) -> Evidence:
-        """The fit with residuals in units of the scatter from point to point."""
+        """Fit with residuals in units of the scatter from point to point, without errors that points share."""
         return scattering_alone(self.base)
 
     @cached_property
     def errors(self) -> RigErrors:
-        """Errors of the rig, in residuals of `bare`."""
+        """Errors of the rig as columns of the residuals of `bare`."""
         return rig_errors(self.bare, self.rig)
 
     @cached_property
     def compound(self) -> Group | None:
-        """The compound's own deviation from the model's laws, in residuals of `bare`."""
+        """Deviation of the compound from the model's laws, as columns of the residuals of `bare`; None without points."""
         return compound(self.bare)
 
     @cached_property
     def compound_in_fits(self) -> Group | None:
-        """The compound's own deviation in residuals as they are fitted."""
+        """Deviation of the compound from the model's laws, as columns of the residuals of `base`, used in refits."""
         return compound(self.base)
 
     @cached_property
@@ -145,31 +145,33 @@ class Tests:
         return {place.name: place for place in faulty_places(self.base)}
 
     def in_fits(self, place: FaultyPlace) -> FaultyPlace:
-        """A faulty place in residuals as they are fitted."""
+        """Convert a faulty place from columns of the residuals of `bare` to those of `base`, used in refits."""
         fitted = self._places_in_fits[place.name]
         return fitted if len(fitted.columns) == len(place.columns) else fitted.point_by_point()
 
     @cached_property
     def explanations(self) -> list[Explanation]:
-        """Explanations that do not depend on the model: faulty places and smooth curves."""
+        """Explanations that do not depend on the model's effects: faulty parts of the tests, and smooth curves."""
         return [*faulty_places(self.bare), *unnamed(self.bare)]
 
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A model with refitted effects and free places, around which every further explanation is weighed linearly.
+    """Node of the search: a fitted model with added effects and faulty places, the base of a linear model.
+
+    The evidence for each further explanation is computed by linearising the residuals around this fit.
 
     Args:
-        tests: the tests.
-        request: the request for the search.
-        evidence: fit of the model with the effects.
-        log_prior: natural log of the prior probability.
+        tests: tests with their record, as read or corrected.
+        request: input of the search.
+        evidence: fit of the model with the added effects.
+        log_prior: natural log of the prior probability of the set of explanations.
         effects: names of the effects that were added.
-        places: faulty places whose points move freely.
-        precision: prior precision of coordinates of effects, by name; infinite for one at an end of its range.
-        log_density: natural log of their prior density, with the factor of Laplace's method.
-        amounts: size of each place's amounts, relative to |K|.
-        change: relative change of |K| by the effects and places.
+        places: faulty parts of the tests, whose points may deviate together.
+        precision: prior precision by fitting coordinate of the effects; infinite for a shape at an end of its range.
+        log_density: natural log of the prior density of these coordinates, with the factor of Laplace's method.
+        amounts: prior standard deviation of each faulty place's deviation, relative to |K|.
+        change: largest relative change of |K| by the effects and places.
     """
 
     tests: Tests
@@ -185,23 +187,23 @@ class State:
 
     @classmethod
     def of_tests(cls, tests: Tests, request: DiagnosisRequest) -> State:
-        """The state of tests with nothing added."""
+        """Create the initial state of a search: the starting model with nothing added."""
         return cls(tests, request, tests.base, tests.log_prior, change=tests.change)
 
     @property
     def key(self) -> frozenset[Hashable]:
-        """Identity of the state."""
+        """Names that identify the set of effects, faulty places and corrected mistake."""
         claim = self.tests.claim
         return frozenset((*self.effects, *(place.name for place in self.places), *([claim.key] if claim else [])))
 
     @cached_property
     def bare(self) -> Evidence:
-        """The fit with residuals in units of the scatter from point to point."""
+        """Fit with residuals in units of the scatter from point to point, without errors that points share."""
         return self.tests.bare if self.evidence is self.tests.base else scattering_alone(self.evidence)
 
     @cached_property
     def linear(self) -> LinearModel:
-        """The linear model with nothing more, at every size of the rig's errors."""
+        """Residuals linearised around the fit, without further explanations, at all sizes of the rig's errors."""
         tests, solution = self.tests, self.bare.solution
         precision = np.array([self.precision.get(name, 0.0) for name in solution.coordinates.names])
         moves = np.isfinite(precision)
@@ -212,25 +214,26 @@ class State:
 
     @cached_property
     def log_posterior(self) -> float:
-        """Natural log of prior times evidence, with a deviation of the compound and without."""
+        """Natural log of prior times evidence, summed over the cases with and without a deviation of the compound."""
         total = float(np.logaddexp(self.linear.log_evidence, self.linear.log_evidence_bent))
         return self.log_prior + self.log_density + total
 
     @cached_property
     def likeliest_deviation(self) -> float:
-        """Likeliest size of a deviation of the compound, relative to |K|; 0 where none is likelier."""
+        """Likeliest size of the compound's deviation, relative to |K|; 0 if no deviation is more probable."""
         linear = self.linear
         return linear.deviation[1] if linear.log_evidence_bent > linear.log_evidence else 0.0
 
     def free_columns(self, deviation: float) -> Array | None:
-        """Residuals beside which effects are refitted, at one standard deviation: those of the faulty places, without
-        which an effect would have to follow them, and of the compound.
+        """Residuals that faulty places and the compound may cause, left free while further effects are refitted.
+
+        Without these columns an effect would be fitted to the faults.
 
         Args:
-            deviation: size of the compound's deviation, relative to |K|.
+            deviation: standard deviation of the compound's deviation, relative to |K|; 0 for no deviation.
 
         Returns:
-            Columns (c, n); None without a place and a deviation.
+            Change of the whitened residuals per standard deviation, (c, n); None without faulty places and deviation.
         """
         columns = [x * self.tests.in_fits(place).columns for place, x in zip(self.places, self.amounts, strict=True)]
         compound = self.tests.compound_in_fits if deviation else None
@@ -239,37 +242,37 @@ class State:
 
     @cached_property
     def proposals(self) -> list[Proposal]:
-        """Effects of the library that the model lacks, the highest score first."""
+        """Effects of the library that the model lacks, ranked by expected decrease of chi-square."""
         return proposals(self.bare, (*self.request.without, *self.effects), self.request.fixed)
 
     @cached_property
     def weighed(self) -> list[tuple[Explanation, GroupEvidence]]:
-        """Every explanation that can be counted linearly, with its evidence."""
+        """Every explanation that has residual columns, with its evidence in the linear model."""
         explanations = [e for e in (*self.proposals, *self.tests.explanations) if e.group is not None]
         return list(zip(explanations, self.weigh(explanations), strict=True))
 
     def weigh(self, explanations: Sequence[Explanation]) -> list[GroupEvidence]:
-        """Evidence for explanations that have columns, at the sizes of the rig's errors that matter."""
+        """Compute the evidence for explanations that have residual columns, averaged over the likely rig errors."""
         at_nodes = replace(self.linear, chosen_nodes=self._likely_nodes)
         return at_nodes.group_evidence_of([e.group for e in explanations if e.group is not None])
 
     @cached_property
     def _likely_nodes(self) -> Array:
-        """Nodes that nothing more, a deviation of the compound, or something smooth makes likely."""
+        """Indices of the rig-error nodes that are likely without further explanation, or with a smooth deviation."""
         smooth = [e.group for e in self.tests.explanations if e.group and e.kind == "unnamed"]
         curves = replace(self.linear, groups=smooth, compound=None)
         return np.union1d(self.linear.likely(_NEAR), curves.likely(_NEAR))
 
     def extended(self, explanation: Explanation, evidence: GroupEvidence, log_odds: float) -> list[Hypothesis]:
-        """Hypotheses that extend this state by one explanation, with its evidence counted linearly.
+        """Extend this state by one explanation, whose evidence comes from the linear model.
 
         Args:
-            explanation: the explanation.
-            evidence: evidence of its columns.
-            log_odds: natural log of its prior odds.
+            explanation: the added explanation.
+            evidence: evidence for the columns of the explanation.
+            log_odds: natural log of the explanation's prior odds.
 
         Returns:
-            The extended hypothesis, and the same beside a deviation of the compound.
+            The extended hypothesis and, if considered, the same with a deviation of the compound.
         """
         plain = self.hypotheses[0]
         if explanation.kind == "effect":
@@ -301,8 +304,8 @@ class State:
 
     @cached_property
     def hypotheses(self) -> list[Hypothesis]:
-        """This state with nothing more; with errors of levels beyond the class of the rig; and with a deviation of the
-        compound."""
+        """Hypotheses without a further explanation: plain, with level errors beyond the class of the rig, and with a
+        deviation of the compound."""
         linear, tests = self.linear, self.tests
         log_prior = self.log_prior + self.log_density
         plain = Hypothesis(

@@ -10,26 +10,27 @@ from bushfit.diagnosis.priors import LARGEST, SIZES
 from bushfit.effects import get_effect, qualified_name
 from bushfit.fitting.design import probes
 
-#: Sizes over which the prior of an amount is averaged, and the least relative error that they resolve.
+#: Number of sizes over which the prior of an amount is averaged, and the smallest relative error that they resolve.
 _FINE, _SHARPEST = 1000, 0.01
 
 
 def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dict[str, float], float]:
-    """Prior of the parameters of a refitted effect, for Laplace's method.
+    """Compute the prior density of the parameters of a refitted effect, for the evidence by Laplace's method.
 
     Args:
-        name: of the effect.
+        name: name of the effect.
         evidence: fit with the effect.
         before: fit without the effect.
 
     Returns:
-        Log prior density of the effect's coordinates with the factor of Laplace's method; prior precision of each
-        coordinate; and largest relative change of |K| by the effect.
+        Natural log of the prior density of the effect's fitting coordinates, with the factor (2 pi)^(k/2) of Laplace's
+        method; prior precision (inverse variance) by coordinate name; and largest relative change of |K| by the effect.
 
     Notes:
-        The change by an amount is log-uniform from the smallest size. A shape is uniform over the range that the tests
-        could show; at an end of it the fall of the likelihood away from the end sets the effective width. For an effect
-        that replaces a branch each parameter beyond the two of the branch is uniform over a factor of 20.
+        The relative change of |K| by the effect's amount is log-uniform from the smallest size of `priors.SIZES`. A
+        shape parameter is uniform over the range that the tests could show; for a shape at an end of this range, the
+        slope of the likelihood sets the effective width. For an effect that replaces a branch, each parameter beyond
+        the two of the branch is uniform over a factor of 20.
     """
     solution = evidence.joint or evidence.solution
     effect, names = get_effect(name), solution.coordinates.names
@@ -72,11 +73,14 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
 
 
 def _of_amount(size: float, error: float) -> float:
-    """Log of the mean prior density of an amount, per relative change, over its likelihood.
+    """Natural log of the prior density of an effect's amount, averaged over the amount's Gaussian likelihood.
 
     Args:
         size: relative change of |K| by the fitted amount.
-        error: standard error of the amount, relative to it.
+        error: standard error of the amount, relative to the amount.
+
+    Returns:
+        Log density per relative change of the amount.
     """
     times = np.geomspace(SIZES[0], LARGEST, _FINE) / max(size, 1e-12)
     error = max(error, _SHARPEST)

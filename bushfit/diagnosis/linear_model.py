@@ -25,24 +25,27 @@ from bushfit.diagnosis.priors import SIZES
 from bushfit.diagnosis.rig_errors import RigErrors
 from bushfit.effects.contract import Array
 
-#: Share of a parameter's information that is added to it, so that what the tests leave open can be inverted.
+#: Share of a parameter's information that is added to it, so that the matrix of undetermined parameters has an inverse.
 _ROUNDING = 1e-9
-#: Numbers that errors of the rig at all nodes together, or columns of groups, may take at once: 32 MB.
+#: Largest array of products, over nodes or groups, that is computed at once: 4 million numbers, 32 MB.
 _AT_ONCE = 4_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """Everything linear about one fitted model and its tests.
+    """Linearised residuals of one fitted model, from which the evidence for missing explanations follows.
+
+    A node is one combination of sizes of the rig's errors and of the compound's deviation from the model's laws. All
+    log evidences are natural logs of the marginal likelihood, averaged over nodes and up to a common constant.
 
     Args:
-        residual: whitened by the points' own scatter alone, (n,).
-        jacobian: by the parameters and what else moves freely, (k, n).
-        precision: prior precision of each of these; 0 where the prior is flat, (k,).
-        rig: errors of the rig.
-        groups: what may be missing.
-        chosen_nodes: indices of the rig's nodes that count; all where it is None.
-        compound: the compound's own deviation at unit size, a part of every hypothesis; None without.
+        residual: residuals in units of the scatter from point to point, (n,).
+        jacobian: derivatives of the residuals by the parameters and by the deviations of faulty places, (k, n).
+        precision: prior precision of each row of the Jacobian, 0 for a flat prior, (k,).
+        rig: errors of the rig, with the nodes.
+        groups: candidate explanations, each a group of residual columns.
+        chosen_nodes: indices of the nodes to average over; None for all.
+        compound: columns of the compound's deviation at unit size, part of every hypothesis; None without a deviation.
     """
 
     residual: Array
@@ -55,7 +58,7 @@ class LinearModel:
 
     @cached_property
     def nodes(self) -> Array:
-        """Indices of the rig's nodes that count; without a compound those without a deviation."""
+        """Indices of the nodes to average over; only nodes without a deviation if `compound` is None."""
         chosen = np.arange(len(self.rig.nodes)) if self.chosen_nodes is None else self.chosen_nodes
         return np.array([n for n in chosen.tolist() if self.compound or not self.rig.nodes[n].compound], dtype=int)
 
@@ -71,10 +74,10 @@ class LinearModel:
 
     @cached_property
     def _blocks(self) -> list[tuple[Array, Array]]:
-        """Rows of the groups whose amounts have one size, by the number of rows in a block.
+        """Blocks of rows in the stacked matrix of products that share one amount size, sorted by block width.
 
         Returns:
-            For each width the index of the group, (blocks,), and the rows, (blocks, width).
+            For each width: index of the group of each block, (blocks,), and the row numbers, (blocks, width).
         """
         first = 1 + len(self.jacobian) + (len(self.compound.columns) if self.compound else 0)
         ends = first + np.cumsum([0, *(len(group.columns) for group in self.groups)])
@@ -87,7 +90,7 @@ class LinearModel:
 
     @cached_property
     def _at_nodes(self) -> "_AtNodes":
-        """Evidence without a group at each node, and products of the groups; some nodes at a time to limit memory."""
+        """Evidence without any group, and inner products of the groups, at each node; in parts to limit memory."""
         rig = self.rig
         deviation = self.compound.whole if self.compound else np.zeros((0, self.residual.size))
         rows = np.concatenate([self.residual[None], self.jacobian, deviation, *(group.scaled for group in self.groups)])
@@ -134,15 +137,15 @@ class LinearModel:
     def _projected(
         self, chosen: Array, index: Array, gram: Array, grams: Sequence[Array], log_det: Array, by_noise: Array
     ) -> "_AtNodes":
-        """Products beside the parameters and the compound's deviation, at some of the nodes.
+        """Inner products with the parameters and the compound's deviation projected out, at some of the nodes.
 
         Args:
-            chosen: indices among `nodes`, (m,).
-            index: combination of the rig's errors at each of them, (m,).
-            gram: products of residual, derivatives and the compound with all rows, at each combination.
-            grams: products within the blocks of groups, at each combination.
-            log_det: natural log of the determinant of the covariance of noise and rig, at each combination.
-            by_noise: products of the derivatives with themselves by noise alone, (k,).
+            chosen: positions of the m nodes in `nodes`, (m,).
+            index: index of the combination of rig errors at each node, (m,).
+            gram: inner products of residual, Jacobian and compound with all rows, for each combination.
+            grams: inner products within the blocks of groups, for each combination, one array per block width.
+            log_det: natural log of the determinant of the covariance of noise and rig errors, for each combination.
+            by_noise: squared norms of the rows of the Jacobian, whitened by noise alone, (k,).
         """
         flat, has_prior = slice(1, 1 + len(self.jacobian)), self.precision > 0.0
         scale = np.sqrt(np.maximum(by_noise + self.precision, np.finfo(float).tiny))
@@ -176,7 +179,7 @@ class LinearModel:
 
     @cached_property
     def _gains(self) -> list[tuple[Array, Array]]:
-        """For each group the gain in log evidence, and the squared relative change, by node, block and size."""
+        """Gain in log evidence and squared relative change of |K| for each group, (nodes, blocks, sizes) each."""
         gains: list[list[tuple[Array, Array]]] = [[] for _ in self.groups]
         at_nodes = self._at_nodes
         for (numbers, _), projections, gram in zip(self._blocks, at_nodes.projections, at_nodes.grams, strict=True):
@@ -189,7 +192,7 @@ class LinearModel:
 
     @cached_property
     def group_evidence(self) -> list[GroupEvidence]:
-        """Evidence for each group, with the rig's errors within its class."""
+        """Evidence for each group in `groups`, with level errors of the rig within its class."""
         bent = self._deviation > 0.0
         return [
             self._over_nodes(gains, self._plain, self._over_nodes(gains, bent) if bent.any() else None)
@@ -199,7 +202,7 @@ class LinearModel:
     def _over_nodes(
         self, gains: tuple[Array, Array], chosen: Array, beside: GroupEvidence | None = None
     ) -> GroupEvidence:
-        """Evidence for a group over some nodes."""
+        """Evidence for a group, averaged over the nodes in the mask `chosen`; `beside` is passed on."""
         log_evidence = (self._at_nodes.base[:, None, None] + gains[0])[chosen]
         if not log_evidence.size:
             return GroupEvidence(-np.inf, 0.0, float(SIZES[0]), beside)
@@ -210,7 +213,11 @@ class LinearModel:
         return GroupEvidence(total - float(np.log(log_evidence[0].size)), size, likeliest, beside)
 
     def group_evidence_of(self, groups: Sequence[Group]) -> list[GroupEvidence]:
-        """Evidence for other groups, computed in parts to limit the memory."""
+        """Compute the evidence for groups other than `self.groups`, in parts to limit memory.
+
+        Returns:
+            One evidence per group, in the same order.
+        """
         part = np.cumsum([len(group.columns) for group in groups]) * self.residual.size // _AT_ONCE
         ends = [0, *(np.flatnonzero(np.diff(part)) + 1).tolist(), len(groups)]
         return [
@@ -220,26 +227,27 @@ class LinearModel:
         ]
 
     def _log_evidence_over(self, chosen: Array) -> float:
+        """Natural log of the evidence without a group, summed over the nodes in a mask; -inf for an empty mask."""
         return float(logsumexp(self._at_nodes.base[chosen])) if chosen.any() else -np.inf
 
     @property
     def log_evidence(self) -> float:
-        """Log evidence of the tests if nothing is missing and the rig's errors are within its class."""
+        """Log evidence of the tests if nothing is missing and level errors are within the class of the rig."""
         return self._log_evidence_over(self._plain)
 
     @property
     def log_evidence_bent(self) -> float:
-        """Log evidence of the tests with a deviation of the compound."""
+        """Log evidence of the tests if the compound deviates from the model's laws and nothing else is missing."""
         return self._log_evidence_over(self._deviation > 0.0)
 
     @property
     def log_evidence_wide(self) -> float:
-        """Log evidence of the tests with level errors beyond the rig's class."""
+        """Log evidence of the tests if level errors exceed the class of the rig and nothing else is missing."""
         return self._log_evidence_over(~self._plain & (self._deviation == 0.0))
 
     @property
     def deviation(self) -> tuple[float, float]:
-        """Relative change by a deviation of the compound, estimated from the tests, and its most probable size."""
+        """Posterior relative change of |K| by the compound's deviation (root mean square), and its likeliest size."""
         bent = self._deviation > 0.0
         share = np.exp(self._at_nodes.base[bent] - self.log_evidence_bent)
         sizes = self._deviation[bent]
@@ -247,14 +255,14 @@ class LinearModel:
         return float(np.sqrt(share @ self._at_nodes.changes[bent])), float(likeliest)
 
     def likely(self, far: float) -> Array:
-        """Nodes of the rig's errors at which a further group of columns may contribute.
+        """Select the nodes that matter to the evidence for further groups of columns, to save time.
 
         Args:
             far: difference in log evidence from the best node, beyond which a node is left out.
 
         Returns:
-            Indices of the nodes that are near the best without a further group, or with one of the groups. Without a
-            deviation of the compound, nodes that such a deviation makes likely are included.
+            Indices of the nodes within `far` of the best node, without a group or with one of `groups`. Nodes without a
+            deviation of the compound are included if a node with the same rig errors and a deviation is near the best.
         """
         plain, index = self._plain, self.rig.combinations[1][self.nodes]
         base = np.where(plain | (self._deviation > 0.0), self._at_nodes.base, -np.inf)
@@ -266,23 +274,25 @@ class LinearModel:
         return self.nodes[near | (plain & led)]
 
     def chance(self, *, bent: bool = False) -> float:
-        """Probability that tests of this model and rig leave more than these do, over the nodes as likely as they are;
-        `bent` beside a deviation of the compound.
+        """Probability that tests of a complete model would have a larger misfit r^T P r than these tests.
 
-        Notes: a posterior predictive check on r^T P r (Gelman, Meng and Stern, 1996).
+        Args:
+            bent: True to average over nodes with a deviation of the compound; False for nodes without one.
+
+        Notes: a posterior predictive check, averaged over nodes by probability (Gelman, Meng and Stern, 1996).
         """
         base = np.where(self._deviation > 0.0 if bent else self._plain, self._at_nodes.base, -np.inf)
         freedom = max(self.residual.size - int(np.count_nonzero(self.precision == 0.0)), 1)
         return float(np.exp(base - logsumexp(base)) @ chdtrc(freedom, self._at_nodes.misfit))
 
     def amounts(self, number: int) -> tuple[Array, Array]:
-        """Posterior of the amounts of a group whose columns move together.
+        """Posterior mean and covariance of the amounts of a group whose g columns act together.
 
         Args:
-            number: index of the group.
+            number: index of the group in `groups`.
 
         Returns:
-            Mean, (g,), and covariance, (g, g), over all sizes and the nodes within the class of the rig.
+            Mean, (g,), and covariance, (g, g), averaged over all sizes and the nodes within the class of the rig.
         """
         kind, place = next(
             (kind, int(np.flatnonzero(numbers == number)[0]))
@@ -305,14 +315,14 @@ class LinearModel:
 
 @dataclass(frozen=True, eq=False)
 class _AtNodes:
-    """Products at each node, beside the parameters and the compound's deviation.
+    """Evidence and inner products at each node, with parameters and the compound's deviation projected out (P).
 
     Args:
-        base: log evidence without a group, (nodes,).
-        misfit: r^T P r, (nodes,).
-        changes: square of the largest relative change by the compound's deviation, (nodes,).
-        projections: U^T P r of the blocks of each width, (nodes, blocks, width) each.
-        grams: U^T P U of the blocks of each width, (nodes, blocks, width, width) each.
+        base: log of node weight times evidence without a group, (nodes,).
+        misfit: r^T P r of the residuals r, (nodes,).
+        changes: square of the largest relative change of |K| by the compound's deviation, (nodes,).
+        projections: U^T P r of the group columns U, one array (nodes, blocks, width) per block width.
+        grams: U^T P U of the group columns U, one array (nodes, blocks, width, width) per block width.
     """
 
     base: Array
@@ -323,7 +333,7 @@ class _AtNodes:
 
 
 def _columns(rows: Array, chosen: Array) -> Array:
-    """Some columns of all rows, (n,) bool; without a copy where they stand side by side."""
+    """Select the columns in a mask, (n,) bool, from a matrix; a view without a copy if they are adjacent."""
     places = np.flatnonzero(chosen)
     if places.size and places[-1] - places[0] + 1 == places.size:
         return rows[:, places[0] : places[-1] + 1]
@@ -331,7 +341,7 @@ def _columns(rows: Array, chosen: Array) -> Array:
 
 
 def _block_products(part: Array, block_rows: Array) -> Array:
-    """Inner products within each block, (m, g) -> (m, g, g); most have nothing in loops, or in sweeps."""
+    """Inner products of the rows within each block, (m, g) -> (m, g, g); blocks of zero rows are skipped for speed."""
     filled = np.any(np.any(part, axis=1)[block_rows], axis=1)
     products, rows = np.zeros((*block_rows.shape, block_rows.shape[1])), part[block_rows[filled]]
     products[filled] = rows @ rows.swapaxes(-1, -2)
@@ -339,16 +349,16 @@ def _block_products(part: Array, block_rows: Array) -> Array:
 
 
 def _block_gains(gram: Array, projections: Array, units: Sequence[Array], senses: Array) -> tuple[Array, Array]:
-    """Gains in log evidence and squared relative changes by blocks of columns that move together.
+    """Gains in log evidence and squared relative changes of |K| for blocks of columns that act together.
 
     Args:
-        gram: products within the blocks, (nodes, blocks, width, width).
-        projections: products with the residual, (nodes, blocks, width).
-        units: share of |K| that a unit of each amount changes at some points, (width, p) for each block.
-        senses: +1 for each block of one column that only a positive amount makes sense of, (blocks,).
+        gram: inner products U^T P U within the blocks, (nodes, blocks, width, width).
+        projections: inner products U^T P r with the residuals, (nodes, blocks, width).
+        units: relative change of |K| per unit amount at p operating points, (width, p) for each block.
+        senses: +1 for a block of one column whose amount must be positive, else 0, (blocks,).
 
     Returns:
-        Gains and squared changes, (blocks, nodes, sizes) each.
+        Gains and squared changes for each of `priors.SIZES`, (blocks, nodes, sizes) each.
     """
     single = gram.shape[-1] == 1
     values, vectors = (gram[..., 0], np.ones_like(gram)) if single else np.linalg.eigh(gram)

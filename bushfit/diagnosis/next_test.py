@@ -19,29 +19,32 @@ from bushfit.model.model import Model
 
 #: Relative noise of one point of a test that was not made yet: that of a good servo-hydraulic rig.
 _NOISE = 5e-3
-#: Probability of an explanation, relative to the likeliest, below which it counts as this probable.
+#: Smallest probability of an explanation, relative to the likeliest; smaller ones are raised to it.
 _LEAST_ODDS = 1e-6
 #: Information below which a test separates nothing [nats].
 _LEAST_INFORMATION = 1e-6
 #: Amplitude of a rotation if none was tested [rad]; chosen.
 _ROTATION = 0.02
-#: Stiffness of what is mounted in place of the bushing, over that of the bushing; a dummy as stiff as a model allows.
+#: Stiffness of the part mounted in place of the bushing (nothing, reference spring, steel dummy), relative to the
+#: bushing; and largest shear modulus that a model allows [Pa].
 _EMPTY, _SPRING, _DUMMY = 1e-9, 1.0, 300.0
 _LARGEST_MODULUS = 9e8
 
 
 @dataclass(frozen=True)
 class NextTest:
-    """A test that a laboratory can make.
+    """Candidate for the next test, of the bushing or of the fixture without the bushing.
 
     Args:
-        sentence: the test as an instruction.
-        hours: on the rig, with the change of the set-up.
-        place: direction or specimen; None for the place of the last test.
-        frequencies: [Hz], or multiples of the highest one tested if `beyond`; None for those tested.
-        beyond: whether the frequencies are multiples.
-        amplitudes: multiples of the largest amplitude tested, or if negative of the smallest; None for those tested.
-        mounted: stiffness mounted in place of the bushing, over that of the bushing; None for the bushing itself.
+        sentence: instruction to the laboratory.
+        hours: time on the rig, with the change of the set-up [h].
+        place: direction or specimen; None for the direction or specimen of the last test.
+        frequencies: frequencies [Hz], or multiples of the highest frequency tested if `beyond`; None for all
+            frequencies tested.
+        beyond: True if `frequencies` are multiples.
+        amplitudes: multiples of the largest amplitude tested, or if negative of the smallest; None for all amplitudes
+            tested.
+        mounted: stiffness of the part mounted in place of the bushing, relative to the bushing; None for the bushing.
     """
 
     sentence: str
@@ -75,16 +78,16 @@ def deciding_test(
     data_sets: Sequence[MeasuredTest],
     rig: RigSettings = UNSTATED,
 ) -> str:
-    """The test that is expected to separate the explanations best per hour, as an instruction.
+    """Select the test that is expected to separate rival explanations best per hour on the rig.
 
     Args:
-        models: that explain the tests so far.
+        models: one fitted model for each explanation of the tests so far.
         odds: probability of each model.
         data_sets: the tests so far.
-        rig: its limits.
+        rig: limits of force, displacement, velocity and frequency of the rig.
 
     Returns:
-        An instruction, or an empty text if no test separates the models.
+        Instruction to the laboratory; "" if no test separates the models.
     """
     if len(models) < 2:
         return ""
@@ -104,7 +107,7 @@ def deciding_test(
 
 
 def _candidates(data_sets: Sequence[MeasuredTest]) -> Iterator[NextTest]:
-    """Tests of the fixtures of all places tested, and tests of the bushing in directions that were not swept."""
+    """Candidate tests: each fixture of the tests so far, and the bushing in directions that were not swept."""
     places = dict.fromkeys(data_set.direction for data_set in data_sets)
     for place, test in product(places, FIXTURE_TESTS):
         yield replace(test, place=place, sentence=test.sentence.format(place=place))
@@ -116,7 +119,7 @@ def within_limits(model: Model, rig: RigSettings, place: Place, frequency: Array
     """Check operating points against the limits of a rig.
 
     Args:
-        model: predicts the force.
+        model: model that predicts the force.
         rig: limits of force, displacement, velocity and frequency; a limit that is not stated does not apply.
         place: direction or specimen.
         frequency: [Hz], (n,).
@@ -137,11 +140,14 @@ def within_limits(model: Model, rig: RigSettings, place: Place, frequency: Array
 
 
 def entropy_left(odds: Sequence[float] | Array, distances: Array) -> Array:
-    """Largest entropy over several explanations that tests leave [nats], (...).
+    """Upper limit of the entropy over rival explanations that remains after further tests.
 
     Args:
-        odds: probability of each explanation before the tests, in any unit, (r,).
-        distances: chi-square between what any two explanations predict, (..., r, r).
+        odds: probability of each of r explanations before the tests, not necessarily normalised, (r,).
+        distances: chi-square between the predictions of each pair of explanations, (..., r, r).
+
+    Returns:
+        Entropy [nats] for each test, (...).
 
     Notes:
         For mixtures of normal distributions the tests reduce the entropy by -sum_i p_i ln sum_j p_j exp(-d_ij/8) at
@@ -154,10 +160,10 @@ def entropy_left(odds: Sequence[float] | Array, distances: Array) -> Array:
 
 
 def _distances(test: NextTest, models: Sequence[Model], place: Place, frequency: Array, amplitude: Array) -> Array:
-    """Chi-square between the responses of any two models to a test, (models, models).
+    """Chi-square between the responses of each pair of models to a test, (models, models).
 
-    The empty fixture is compared by its stiffness and the steel dummy by its compliance, both relative to the bushing:
-    beside these the stiffness of the empty fixture and the compliance of the dummy are zero.
+    The empty fixture is compared by its stiffness and the steel dummy by its compliance, both relative to the bushing,
+    because either is nearly zero and its logarithm has no meaning.
     """
     if test.mounted is None:
         responses = [np.log(model.stiffness(place, frequency, amplitude)) for model in models]
@@ -176,14 +182,14 @@ def _distances(test: NextTest, models: Sequence[Model], place: Place, frequency:
 
 
 def _fixture(model: Model, place: Place, stiffness: float) -> Model:
-    """A model of a spring of this stiffness [SI] in the rig of a model."""
+    """Model of an elastic spring of a stiffness [N/m or N m/rad] with the rig effects of another model."""
     rig = [effect.name for effect in model.records if effect.level is Level.INSTRUMENT]
     values = {**model.values, "mu": min(stiffness / model.stiffness_per_modulus(place), _LARGEST_MODULUS)}
     return Model.with_defaults(model.bushing, ("elastic", *rig), values)
 
 
 def _points(test: NextTest, data_sets: Sequence[MeasuredTest]) -> tuple[Array, Array, Place]:
-    """Frequencies [Hz], amplitudes [m or rad, or strain] and place of a test."""
+    """Operating points of a test: frequencies [Hz], amplitudes [m or rad, or strain], and direction or specimen."""
     place = test.place or data_sets[-1].direction
     same_place = [data_set for data_set in data_sets if data_set.direction == place] or list(data_sets)
     amplitudes = np.unique(np.concatenate([data_set.amplitude for data_set in same_place]))

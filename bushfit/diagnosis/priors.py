@@ -1,4 +1,4 @@
-"""Every constant that moves a verdict: odds beforehand, sizes, errors of rigs, and when a word is said."""
+"""Constants that move a verdict: prior probabilities, sizes of effects and rig errors, and limits of each verdict."""
 
 import numpy as np
 
