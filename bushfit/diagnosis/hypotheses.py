@@ -23,8 +23,8 @@ from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.rig_class import ASSUMED, of_class
 
-#: Natural log of the odds below the best at which a node (sizes of the rig's errors) is left out; chosen for time: nodes
-#: of relative weight e^-8 change no verdict.
+#: Natural log of the odds below the best at which a node (sizes of the rig's errors) is left out; chosen for time: a
+#: node of relative weight e^-8 changes no verdict.
 _NEAR = 8.0
 
 
@@ -132,7 +132,7 @@ class Tests:
 
     @cached_property
     def compound(self) -> Group | None:
-        """Deviation of the compound from the model's laws, as columns of the residuals of `bare`; None without points."""
+        """Compound deviation from the model's laws, as columns of the residuals of `bare`; None without tests."""
         return compound(self.bare)
 
     @cached_property
