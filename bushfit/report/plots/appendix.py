@@ -18,26 +18,26 @@ from bushfit.report.plots.prediction import refined
 from bushfit.report.tables import columns_of, spread
 from bushfit.units import format_range
 
-#: Most amplitudes that are drawn.
+#: Largest number of amplitudes that are drawn.
 _MOST_LEVELS = 6
 #: Side of a cell of the matrix of ellipses [cm], and half the side of the frame of an ellipse as a share of it.
 _CELL, _HALF_CELL = 2.3, 0.4
-#: Correlation from which a pair is marked: only its combination is known well.
+#: Correlation from which a pair of parameters is marked: the tests determine only its combination well.
 _STRONG = 0.9
 
 
 @style.in_own_style
 def complex_figure(result: Result, prediction: Prediction, table: pd.DataFrame | None, title: str) -> style.Chart:
-    """Storage and loss stiffness over frequency, and loss over storage stiffness (Cole-Cole), per amplitude.
+    """Figure of storage and loss stiffness over frequency, and of loss over storage stiffness (Cole-Cole).
 
     Args:
-        result: the model.
-        prediction: of one place, at two frequencies or more.
-        table: sweeps, as `tables.sweeps_table` makes it; those that step the frequency are laid over; None without.
-        title: of the figure.
+        result: fitted or given model.
+        prediction: prediction for one direction or specimen, at two or more frequencies.
+        table: sweeps from `tables.sweeps_table`; frequency sweeps are drawn as points; None for no points.
+        title: title of the figure.
 
     Returns:
-        Figure with three panels.
+        Figure with three panels; a line with its 95 % band per amplitude, at most six.
     """
     place, fine = prediction.direction, refined(result, prediction)
     amplitude_header, stiffness_header, _ = columns_of(place)
@@ -82,17 +82,17 @@ def complex_figure(result: Result, prediction: Prediction, table: pd.DataFrame |
 
 @style.in_own_style
 def ellipses_figure(result: Result, title: str) -> style.Chart | None:
-    """95 % confidence ellipses of all pairs of the paper's parameters.
+    """Figure of the 95 % confidence ellipses of all pairs of the five parameters of the paper's model.
 
-    A positive parameter is fitted by its logarithm, in which the region is an ellipse. Axes are in standard errors of
-    these coordinates, with the ends of the 95 % intervals as ticks.
+    A positive parameter is fitted by its logarithm, and the confidence region is an ellipse in these coordinates. Axes
+    are in standard errors of the coordinates, with the ends of the 95 % intervals as ticks.
 
     Args:
         result: fitted model.
         title: title of the figure.
 
     Returns:
-        Matrix of ellipses in one panel; None for fewer than two parameters with an error.
+        Matrix of ellipses in one panel; None if fewer than two parameters have a standard error.
 
     Notes:
         The radius is sqrt(2 F), F the 95 % quantile of Fisher's distribution with 2 and the fit's degrees of freedom.

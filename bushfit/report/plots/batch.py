@@ -15,25 +15,25 @@ from bushfit.report.plots import style
 from bushfit.report.tables import shortened
 from bushfit.units import number
 
-#: Colours of limits and of what is out of them, and of what is within the limits.
+#: Colours of limits and of values outside the limits, and of values within the limits.
 _OUT, _GOOD = "#c1272d", "#31688e"
-#: Up to this many bushings are drawn as single points; beyond, as a cloud with its histogram.
+#: Largest number of bushings drawn as single points; more are drawn as a cloud with a histogram.
 _CLOUD = 200
-#: Most bushings whose names stand along x, and most letters of these: more do not fit along a panel.
+#: Largest number of bushings whose names are ticks along x, and of letters of a name: more do not fit.
 _MOST_ALONG, _MOST_LETTERS_ALONG = 40, 32
-#: Most bushings that a panel names, and most letters of these, which then are half as wide as the panel.
+#: Largest number of bushings that a panel names, and of letters of a name: half the width of the panel.
 _MOST_NAMED, _MOST_LETTERS = 4, 24
 #: Width of a letter in a panel, as a share of the panel's, and height of a line [point].
 _LETTER, _LINE = 0.021, 8.5
-#: Values further out than this many robust standard deviations are drawn at the edge.
+#: Distance from the median, in robust standard deviations, from which a value is drawn at the edge of the panel.
 _FURTHEST = 12.0
-#: Panels side by side, and most panels of a picture: it is then a metre high.
+#: Columns of panels, and largest number of panels of a figure, which is then one metre high.
 _COLUMNS, _MOST_PANELS = 2, 40
 #: Width of a line [point].
 _STROKE = 1.3
-#: Curves of single parts in one picture at most.
+#: Largest number of curves of single parts in a figure.
 _MOST_CURVES = 6
-#: Header of a point of a measured curve.
+#: Header of a column with one point of the measured stiffness curves.
 _POINT = re.compile(
     r"measured stiffness (?P<place>.+) (?P<frequency>\S+) Hz (?P<amplitude>\S+) (?P<length>\S+) \[(?P<unit>.+)\]"
 )
@@ -41,14 +41,14 @@ _POINT = re.compile(
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One quantity of a batch.
+    """One quantity of all bushings of a batch, for a panel of `batch_figure`.
 
     Args:
-        title: what it is, with its unit.
-        values: value of each bushing, NaN where it is not known, (n,).
-        allowed: the lowest and the highest allowed value; empty where there is no limit.
-        missed: indices of the bushings that miss it.
-        intervals: ends of the 95 % intervals, (2, n), where they are known.
+        title: name of the quantity, with its unit.
+        values: value of each bushing in that unit, NaN if it is not known, (n,).
+        allowed: lowest and highest allowed value, infinite if there is no limit on that side; empty without limits.
+        missed: indices of the bushings that are outside the limits.
+        intervals: low and high ends of the 95 % intervals, (2, n); None if they are not known.
     """
 
     title: str
@@ -58,7 +58,7 @@ class Panel:
     intervals: Array | None = None
 
     def reach(self) -> tuple[float, float]:
-        """Lowest and highest value to show: all values but those far out, the limits, and a usual 95 % interval.
+        """Range of the y axis: all values that are not far from the median, the limits, and a typical 95 % interval.
 
         Returns:
             Lower and upper end, in the unit of the panel.
@@ -75,15 +75,15 @@ class Panel:
 
 @style.in_own_style
 def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> style.Chart:
-    """Two columns of panels, the bushings along x in the manifest's order; of more than forty quantities the first.
+    """Figure of the scatter of a batch: one panel per quantity, with a point per bushing in the order of the manifest.
 
     Args:
-        panels: quantities of the batch.
+        panels: quantities of the batch; the first forty are drawn.
         title: name of the batch.
-        names: names of the bushings, (n,); they are ticks along x where they are few.
+        names: names of the bushings, (n,); up to forty names are ticks along x.
 
     Returns:
-        Figure with a panel per quantity.
+        Figure with two columns of panels.
     """
     drawn = panels[:_MOST_PANELS]
     tick_names = [shortened(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
@@ -117,7 +117,7 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> s
 
 
 def _draw_panel(axes: Axes, panel: Panel) -> None:
-    """Draw one quantity over all bushings, with its median, its limits, and the bushings that miss them in red."""
+    """Draw one quantity of all bushings, with its median, its limits, and bushings outside the limits in red."""
     index = np.flatnonzero(np.isfinite(panel.values))
     values, (low, high) = panel.values[index], panel.reach()
     clipped, bad, cloud = np.clip(values, low, high), np.isin(index, list(panel.missed)), values.size > _CLOUD
@@ -144,7 +144,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     axes.yaxis.get_offset_text().set_fontsize(style.SMALL)
     count = f": {len(panel.missed)} out" if panel.missed else ""
     axes.set_title(panel.title + count, fontsize=style.SMALL, loc="left", color=_OUT if count else style.INK, pad=3)
-    if cloud:  # how many bushings lie where, at the right edge
+    if cloud:  # histogram of the values at the right edge
         counts, edges = np.histogram(clipped, bins=60, range=axes.get_ylim())
         side = axes.inset_axes((1.005, 0.0, 0.13, 1.0), sharey=axes)
         side.barh(edges[:-1], counts, height=np.diff(edges), align="edge", color=_GOOD, alpha=0.5, lw=0)
@@ -152,9 +152,9 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
 
 
 def _name_outliers(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
-    """Name the bushings that miss a limit or lie beyond the panel, furthest out first, so that no name covers another.
+    """Name at most four bushings that are outside the limits or the panel, without overlap of the names.
 
-    What lies beyond the panel bears the value that it does not show.
+    The name of a bushing outside the panel is followed by its value.
     """
     low, high = panel.reach()
     middle = float(np.nanmedian(panel.values))
@@ -191,12 +191,12 @@ def _name_outliers(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
 
 @style.in_own_style
 def curves_figure(headers: Sequence[str], usual: Array, singles: Mapping[str, Array]) -> style.Chart:
-    """Measured stiffness curves of a batch: median and range of the usual parts, and single parts.
+    """Figure of the measured stiffness curves of a batch: median and range of the usual parts, and unusual parts.
 
     Args:
-        headers: columns of the points, such as "measured stiffness axial 25 Hz 0.1 mm [N/mm]", (k,).
-        usual: stiffness of the parts that are not drawn singly, in the unit of the headers, (n, k).
-        singles: stiffness of the parts drawn singly, by name, (k,) each; six are drawn.
+        headers: column headers of the points, such as "measured stiffness axial 25 Hz 0.1 mm [N/mm]", (k,).
+        usual: stiffness magnitude of the usual parts, in the unit of the headers, (n, k).
+        singles: stiffness magnitude of unusual parts by name, (k,) each; the first six are drawn as single curves.
 
     Returns:
         Figure with one panel.

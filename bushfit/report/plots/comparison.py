@@ -10,7 +10,7 @@ from bushfit.units import display_unit, format_range, split_header
 
 #: Width of a line [point].
 _STROKE = 1.3
-#: Markers on a line, or fewer: they distinguish lines in grey print.
+#: Approximate number of markers on a line; markers distinguish lines in grey print.
 _MARKS = 5
 #: Smallest span of an axis of relative differences [%] and of differences of the loss factor.
 _LEAST_PERCENT, _LEAST_LOSS = 1.0, 0.005
@@ -18,15 +18,15 @@ _LEAST_PERCENT, _LEAST_LOSS = 1.0, 0.005
 
 @style.in_own_style
 def comparison_figure(comparison: SideBySide) -> style.Chart:
-    """All results at every place they are compared at: two rows of panels a place, the differences below the values.
+    """Figure of stiffness and loss factor of all compared results, and of their differences from the first result.
 
-    Drawn over frequency at the smallest and the largest amplitude, or over amplitude where there is one frequency.
+    Curves are over frequency at the smallest and largest amplitude, or over amplitude if there is only one frequency.
 
     Args:
         comparison: validated comparison.
 
     Returns:
-        Figure with four panels per place.
+        Figure with four panels per direction or specimen: values above, differences below.
     """
     first, *other_labels = comparison.names
     figure = style.Chart(f"{', '.join(other_labels)} against {first}", 2 * len(comparison.places) * style.ROW)
@@ -64,7 +64,7 @@ def comparison_figure(comparison: SideBySide) -> style.Chart:
                     value, low, high = (scale * end[level == drawn_level] for end in band)
                     line = axes.plot(x[level == drawn_level], value, color=look.color, ls=dashes, lw=_STROKE)[0]
                     line.set(marker=look.marker, markevery=max(value.size // _MARKS, 1), **style.POINT)
-                    # bands of several results lie on each other
+                    # transparent: bands of several results overlap
                     axes.fill_between(x[level == drawn_level], low, high, color=look.color, alpha=0.18, lw=0)
             style.label_axes(axes, x_header, y_label, numbers(tables[other_labels[0]], x_header)[0])
             if least_span:

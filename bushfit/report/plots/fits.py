@@ -28,32 +28,30 @@ from bushfit.units import display_unit, format_range
 
 #: Height of a panel of residuals [cm].
 _STRIP = 2.6
-#: Points of a model's line.
+#: Number of points of a line of the model.
 _FINE = 30
 #: Curves of more points than this are drawn with small dots.
 _MANY_POINTS = 60
-#: Points of a panel from which on curves are thinned, and points that a curve keeps at least.
+#: Number of points of a panel above which curves are thinned, and smallest number of points of a thinned curve.
 _PANEL_POINTS, _CURVE_POINTS = 480, 24
-#: Most rows of a loop that are drawn.
+#: Largest number of rows of a loop that are drawn.
 _MOST_ROWS = 240
-#: Relative error that a file states of a point, from which the point is not drawn: such points hide the others.
+#: Stated relative error above which a point is not drawn, because its scatter would hide other points.
 _WORST_DRAWN = 0.05
 _OUTLIERS = "Crosses: outliers, drawn at the edge if they are beyond it."
 
 
 @style.in_own_style
 def sweeps_figure(result: Result, table: pd.DataFrame, title: str) -> style.Chart:
-    """Stiffness magnitude and loss factor of sweeps, measured and modelled, with the residuals below.
-
-    A row of panels per place and stepped quantity. The model includes the effects of the rig, as the tests do.
+    """Figure of stiffness magnitude and loss factor of sweeps, measured and modelled, with the residuals below.
 
     Args:
-        result: the model beside the tests.
-        table: as `tables.sweeps_table` makes it.
-        title: of the figure.
+        result: fitted model, with the effects of the rig that the tests include.
+        table: table of sweeps from `tables.sweeps_table`.
+        title: title of the figure.
 
     Returns:
-        Figure with four panels per place and stepped quantity.
+        Figure with four panels per direction or specimen and stepped quantity (frequency or amplitude).
     """
     groups = [group.thinned() for group in sweep_groups(table, result)]
     figure = style.Chart(title, (style.ROW + _STRIP) * len(groups))
@@ -77,12 +75,12 @@ def sweeps_figure(result: Result, table: pd.DataFrame, title: str) -> style.Char
 
 
 def draw_curves(pair: Sequence[Axes], group: SweepGroup, result: Result) -> None:
-    """Draw magnitude (left) and loss factor (right) of a group of sweeps: points as measured, lines of the model.
+    """Draw stiffness magnitude (left) and loss factor (right) of sweeps: measured points and lines of the model.
 
     Args:
-        pair: two panels.
-        group: of sweeps; a curve per level.
-        result: the model with the effects of the rig.
+        pair: left and right panel.
+        group: sweeps of one direction or specimen, with a curve per level of the fixed quantity.
+        result: fitted model, with the effects of the rig.
     """
     stiffness, x_header = columns_of(group.place)[1], group.x_header
     factor, labels = stiffness_scale(group.place, max(curve.rows[stiffness].max() for curve in group.curves))
@@ -101,11 +99,14 @@ def draw_curves(pair: Sequence[Axes], group: SweepGroup, result: Result) -> None
 
 
 def stiffness_scale(place: Place, largest: float) -> tuple[float, tuple[str, str]]:
-    """Factor from the units of the tables to those of a figure, and labels for stiffness and loss factor.
+    """Choose the stiffness unit of a figure, and make the labels of its stiffness and loss factor axes.
 
     Args:
-        place: of the tests.
-        largest: stiffness or modulus to draw, in the unit of the tables.
+        place: direction or specimen of the tests.
+        largest: largest stiffness or modulus to draw, in the unit of the tables.
+
+    Returns:
+        Factor from the unit of the tables to that of the figure, and the two labels with units.
     """
     name, factor = place.display.stiffness
     unit, to_figure = display_unit(name, factor, largest / factor)
@@ -115,7 +116,7 @@ def stiffness_scale(place: Place, largest: float) -> tuple[float, tuple[str, str
 
 
 def drawn_points(rows: pd.DataFrame) -> pd.DataFrame:
-    """Rows of a table of sweeps without outliers and without points of large stated error."""
+    """Rows of a table of sweeps to draw: without outliers and without points whose stated error is above 5 %."""
     keep = rows["outlier"] == "no"
     if "stated error [-]" in rows:
         keep &= ~(rows["stated error [-]"] > _WORST_DRAWN)
@@ -125,15 +126,15 @@ def drawn_points(rows: pd.DataFrame) -> pd.DataFrame:
 def draw_points(
     axes: Axes, rows: pd.DataFrame, x_header: str, header: str, scale: float, look: style.Style, curves: int
 ) -> None:
-    """Draw means of the repeats of a column with bars from the smallest to the largest.
+    """Draw the measured points of one level: means of repeats, with bars from the smallest to the largest value.
 
     Args:
         axes: panel.
-        rows: of one level.
-        x_header, header: columns along x and y.
-        scale: factor from the column to the panel.
-        look: of the level.
-        curves: number of levels in the panel, which share its points.
+        rows: rows of a table of sweeps at one level.
+        x_header, header: headers of the columns along x and y.
+        scale: factor from the unit of the y column to that of the panel.
+        look: colour and marker of the level.
+        curves: number of levels in the panel; the more there are, the more points are omitted.
     """
     x, index = np.unique(rows[x_header].to_numpy(), return_inverse=True)
     values = scale * rows[header].to_numpy()[np.argsort(index, kind="stable")]
@@ -148,12 +149,12 @@ def draw_points(
 
 
 def _thinning(count: int, curves: int) -> int:
-    """Step from one drawn point of a curve to the next, so that a panel of so many curves stays readable."""
+    """Step between the drawn points of a curve of `count` points, for a readable panel of `curves` curves."""
     return max(1, -(-count // max(_CURVE_POINTS, _PANEL_POINTS // curves)))
 
 
 def points_note(table: pd.DataFrame) -> str:
-    """Sentence that explains the measured points of a table of sweeps."""
+    """Explain the measured points of a figure of sweeps: means of repeats or single points, and hidden points."""
     point = [name for name in table if name in ("sweep", "stepped", "frequency [Hz]") or "amplitude [" in str(name)]
     repeated = bool(table.duplicated(point).any())
     bars = "mean of the repeats, with bars from the smallest to the largest" if repeated else "as measured"
@@ -163,7 +164,7 @@ def points_note(table: pd.DataFrame) -> str:
 
 
 def _model_line(group: SweepGroup, curve: Curve, header: str, result: Result) -> tuple[Array, Array]:
-    """The model along a curve: on a fine grid, or at the measured points where it depends on more than the level."""
+    """Points (x, y) of the model line of a curve: on a fine grid, or at the measured points if conditions vary."""
     if not group.shares_levels or result.model.knows_circumstances:
         x, values = means(curve.rows, group.x_header, f"model {header}")
         return x, values
@@ -178,7 +179,7 @@ def _model_line(group: SweepGroup, curve: Curve, header: str, result: Result) ->
 
 
 def _draw_residuals(strips: Sequence[Axes], group: SweepGroup) -> None:
-    """Draw residuals of stiffness (left) and loss (right) below the panels of a group of sweeps."""
+    """Draw the residuals of stiffness (left) and loss (right) of a group of sweeps, in units of noise."""
     looks, rows = style.styles(len(group.curves), group.palette), pd.concat([curve.rows for curve in group.curves])
     x, outliers = rows[group.x_header].to_numpy(), rows[rows["outlier"] == "yes"]
     for strip, part in zip(strips, ("stiffness", "loss"), strict=True):
@@ -196,17 +197,17 @@ def _draw_residuals(strips: Sequence[Axes], group: SweepGroup) -> None:
 
 @style.in_own_style
 def loops_figure(result: Result, table: pd.DataFrame, title: str) -> style.Chart:
-    """Force over displacement of loops, measured and modelled, and residuals over the phase of the cycle.
+    """Figure of force over displacement of loops, measured and modelled, and of residuals over the phase of the cycle.
 
-    A row of panels per place. Of each loop at most 240 rows of the first and the last two cycles are drawn.
+    At most 240 rows of the first two and last two cycles of each loop are drawn.
 
     Args:
-        result: the model beside the tests; it includes the effects of the rig.
-        table: as `tables.loops_table` makes it.
-        title: of the figure.
+        result: fitted model, with the effects of the rig.
+        table: table of loops from `tables.loops_table`.
+        title: title of the figure.
 
     Returns:
-        Figure with two panels per place.
+        Figure with two panels per direction or specimen.
     """
     places = list(loops_of(table, result))
     figure = style.Chart(title, 1.25 * style.ROW * len(places))  # a hysteresis loop wants a square
@@ -236,7 +237,7 @@ def loops_figure(result: Result, table: pd.DataFrame, title: str) -> style.Chart
 
 
 def _draw_forces(axes: Axes, place: Place, loops: dict[str, pd.DataFrame], looks: Sequence[style.Style]) -> None:
-    """Draw force over displacement of the loops of a place, with lines of the model and crosses at outliers."""
+    """Draw force over displacement of the loops of a direction, with lines of the model and crosses at outliers."""
     motion, force = moved_of(place), columns_of(place)[2]
     name, factor = place.display.force
     unit, to_figure = display_unit(name, factor, max(loop[force].abs().max() for loop in loops.values()) / factor)
@@ -257,7 +258,7 @@ def _draw_forces(axes: Axes, place: Place, loops: dict[str, pd.DataFrame], looks
 
 
 def loop_labels(place: Place, loops: dict[str, pd.DataFrame]) -> list[str]:
-    """Label of each loop by amplitude and frequency, with the name of the test where these repeat.
+    """Legend labels of loops: amplitude and frequency, and also the name of the test if labels would repeat.
 
     Args:
         place: direction or specimen of the loops.
@@ -277,7 +278,7 @@ def loop_labels(place: Place, loops: dict[str, pd.DataFrame]) -> list[str]:
 
 
 def _drawn_rows(loop: pd.DataFrame) -> Array:
-    """Numbers of the rows of the first and the last two cycles, thinned evenly."""
+    """Indices of at most about 240 rows of the first two and last two cycles of a loop, evenly spaced."""
     turns = (loop["time [s]"] * loop["frequency [Hz]"]).to_numpy()
     rows = np.flatnonzero((turns < turns[0] + 2.0) | (turns > turns[-1] - 2.0))
     return rows[:: max(1, -(-rows.size // _MOST_ROWS))]

@@ -20,35 +20,35 @@ from bushfit.report.plots import style
 from bushfit.report.plots.fits import loop_labels
 from bushfit.report.plots.measured import SECTOR, Curve, SweepGroup, loops_of, means, sector_means, sweep_groups
 
-#: Height of a row of a map; least and largest height of a map; height of the scale of colours, of loops [cm].
+#: Heights [cm]: row of a map; smallest and largest map; colour bar; panel of loops.
 _LEVEL, _LEAST_MAP, _LARGEST_MAP, _SCALE, _LOOPS = 0.6, 1.9, 4.2, 0.5, 4.4
-#: Most rows of a map, each then 1.7 mm high, and most cells of a row, each then 1 mm wide.
+#: Largest number of rows of a map (each then 1.7 mm high) and of cells of a row (each then 1 mm wide).
 _MOST_ROWS, _MOST_COLUMNS = 24, 60
 #: Percentages at which the colour changes.
 _EDGES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 #: Share of the points that may be beyond the end of the scale, so that outliers do not stretch it.
 _BEYOND = 0.02
-#: Cells this far below the model bear a bar [%]: red and blue are one grey in a print without colours.
+#: Distance below the model [%] from which a cell has a bar: red and blue look the same in grey print.
 _BARRED = 1.0
-#: How the name of a row is placed left of its ticks.
+#: Text properties of the name of a row, left of its ticks.
 _ROW_NAME: dict[str, Any] = {"rotation": 0, "ha": "right", "va": "center", "ma": "center"}
 
 
 @style.in_own_style
 def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any], title: str) -> style.Chart:
-    """Measured minus model of all tests, before and after what was added: one column where nothing changes.
+    """Figure of the gap, measured minus model in percent, of all tests before and after a diagnosis.
 
-    Sweeps are maps over the stepped quantity (across) and the level (upwards); loops are curves over the phase of the
-    cycle. All maps share one scale of colours, the loops of a place one axis.
+    Sweeps are colour maps over the stepped quantity (across) and the fixed level (upwards); loops are curves over the
+    phase of the cycle. All maps share one colour scale, and all loops of one direction or specimen share one y axis.
 
     Args:
-        table: as `tables.gap_table` makes it.
-        result: the model to use, whose specimens give places by their names.
-        diagnosis: the document of diagnosis.json.
-        title: of the figure.
+        table: table of the gap from `tables.gap_table`.
+        result: final model, which gives the specimens by their names.
+        diagnosis: content of diagnosis.json.
+        title: title of the figure.
 
     Returns:
-        Figure with a row of panels per map and per place with loops.
+        Figure with two columns, before and after, or one column if the diagnosis changes nothing.
     """
     sides = column_titles(table, diagnosis)
     sweeps = table[table["kind"] == "sweep"]
@@ -93,14 +93,14 @@ def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any]
 
 
 def column_titles(table: pd.DataFrame, diagnosis: Mapping[str, Any]) -> dict[str, str]:
-    """Title of each column of the figure: "before" and, if it differs, "after".
+    """Titles of the columns of the figure, with the root mean square gap in units of noise.
 
     Args:
-        table: as `tables.gap_table` makes it.
-        diagnosis: the document of diagnosis.json.
+        table: table of the gap from `tables.gap_table`.
+        diagnosis: content of diagnosis.json.
 
     Returns:
-        Titles by `before` and, where anything differs, `after`.
+        Titles by the keys "before" and, if the diagnosis changes anything, "after".
     """
     changed = any(
         not np.allclose(table[name], table[str(name).replace("before", "after")], equal_nan=True)
@@ -119,7 +119,7 @@ def column_titles(table: pd.DataFrame, diagnosis: Mapping[str, Any]) -> dict[str
 
 
 def map_rows(group: SweepGroup) -> list[Curve]:
-    """Rows of a map: the curves of a group, or neighbouring curves together where there are too many."""
+    """Rows of the colour map of a group of sweeps: its curves, with neighbours merged if there are more than 24."""
     curves = group.curves
     if len(curves) <= _MOST_ROWS:
         return list(curves)
@@ -129,16 +129,16 @@ def map_rows(group: SweepGroup) -> list[Curve]:
 
 
 def color_scale(sweeps: pd.DataFrame, sides: Sequence[str]) -> tuple[Array, ScalarMappable]:
-    """Percentages at which the colour changes, and the colours: blue below the model, red above, grey between.
+    """Colour scale of the gap of sweeps: blue below the model, red above, grey between.
 
-    The scale ends where 2 % of the points are beyond it.
+    The end of the scale is chosen so that at most 2 % of the points are beyond it, up to 50 %.
 
     Args:
-        sweeps: sweeps of the table of the gap.
-        sides: columns of the figure.
+        sweeps: rows of the sweeps in the table of the gap.
+        sides: columns of the figure, "before" and "after".
 
     Returns:
-        Edges [%], rising, and the colours between and beyond them.
+        Percentages at which the colour changes, ascending, and the colours between and beyond them.
     """
     values = np.abs(sweeps[[f"{part} {side} [%]" for part in ("storage", "loss") for side in sides]].to_numpy())
     needed = int(np.searchsorted(_EDGES, np.nanquantile(values, 1.0 - _BEYOND))) + 1
@@ -151,14 +151,14 @@ def color_scale(sweeps: pd.DataFrame, sides: Sequence[str]) -> tuple[Array, Scal
 
 
 def draw_map(axes: Axes, group: SweepGroup, rows: Sequence[Curve], header: str, colors: ScalarMappable) -> None:
-    """Draw a row of cells per level, each as wide as the step.
+    """Draw the gap of a group of sweeps as a colour map: a row per level, a cell per step.
 
     Args:
         axes: panel.
         group: group of sweeps, which gives the quantity across.
-        rows: rows of the map, the lowest first.
-        header: column of measured minus model [%].
-        colors: scale of colours.
+        rows: rows of the map from `map_rows`, the lowest level first.
+        header: header of the column to draw, measured minus model [%].
+        colors: colour scale from `color_scale`.
     """
     x_values = np.unique(np.concatenate([row.rows[group.x_header] for row in rows]))
     steps, ratios = np.diff(x_values), np.diff(np.log(x_values))
@@ -188,9 +188,9 @@ def draw_map(axes: Axes, group: SweepGroup, rows: Sequence[Curve], header: str, 
 
 
 def cell_edges(values: Array, *, logarithmic: bool) -> tuple[Array, Array]:
-    """Lower and upper edge of the cell of each value, (n,) each: half way to its neighbours.
+    """Lower and upper edges of the map cells of ascending values, (n,) each: half way to the neighbours.
 
-    Where one neighbour is much further away than the other, a point was left out and the nearer one decides.
+    If one neighbour is much further away than the other, a point is missing and the nearer neighbour sets both edges.
     """
     x = np.log(values) if logarithmic else values
     steps = np.diff(x) if x.size > 1 else np.array([0.2 if logarithmic else 0.2 * x[0]])
@@ -201,7 +201,7 @@ def cell_edges(values: Array, *, logarithmic: bool) -> tuple[Array, Array]:
 
 
 def _label_maps(panels: Sequence[Axes], group: SweepGroup, rows: Sequence[Curve], part: str) -> None:
-    """Name the levels left of a row of maps, and the quantity across below the maps of the loss."""
+    """Label a row of maps: levels at the left, and the quantity across below the maps of the loss part."""
     names = [style.file_name(row.name, 24) for row in rows]
     ticks = np.arange(0, len(names), math.ceil(len(names) / 10))
     for axes in panels:
@@ -213,7 +213,7 @@ def _label_maps(panels: Sequence[Axes], group: SweepGroup, rows: Sequence[Curve]
 
 
 def _draw_scale(axes: Axes, edges: Array, colors: ScalarMappable) -> None:
-    """Draw the scale of colours that all maps share in a panel of its own."""
+    """Draw the colour bar that all maps share in its own panel."""
     axes.set_axis_off()
     bar = axes.figure.colorbar(colors, cax=axes.inset_axes((0.12, 0.0, 0.76, 0.7)), orientation="horizontal")
     bar.ax.set_xticks(edges, [f"{edge:g}" for edge in edges], **style.WORDS)
@@ -228,7 +228,7 @@ def _draw_scale(axes: Axes, edges: Array, colors: ScalarMappable) -> None:
 
 
 def _draw_loops(panels: Sequence[Axes], place: Place, loops: dict[str, pd.DataFrame], sides: Sequence[str]) -> None:
-    """Draw the loops of a place over the phase of the cycle, before and after on one scale."""
+    """Draw the gap [%] of the loops of a direction over the phase of the cycle, before and after on one y scale."""
     looks = style.styles(len(loops), "loop")
     for axes, side in zip(panels, sides, strict=True):
         style.label_axes(axes, "phase after upper turn [deg]", "")

@@ -24,24 +24,24 @@ from bushfit.units import display_unit, format_range
 _COLOR = "#3b528b"
 #: Most rows of a loop that are drawn over the displacement.
 _MOST_ROWS = 6000
-#: Bins of time in which a long record is drawn: more than a figure has pixels.
+#: Number of time bins of a long record in a figure: more than its width in pixels.
 _TIME_BINS = 1500
-#: Largest common scale over the range of a panel: the panel then fills a third of it.
+#: Largest ratio of a common axis range to the range of a panel: each panel fills a third of its axis or more.
 _ALIKE = 3
 #: Height of a history, and of the panels of noise and distortion [cm].
 _STRIP, _NOISE_ROW = 2.7, 4.2
-#: Most histories that are drawn on one page.
+#: Largest number of histories that are drawn in one figure.
 _MOST_HISTORIES = 4
 
 
 @style.in_own_style
 def inspection_figure(files: Sequence[Inspection], first: int = 0, count: int = 5) -> style.Chart:
-    """Test files as recorded, a row of panels per file: loops over displacement and time, sweeps over frequency.
+    """Figure of test files as recorded: loops over displacement and time, histories over time, sweeps over their steps.
 
     Args:
-        files: all files that were inspected.
-        first: number of the first file to draw.
-        count: of files to draw.
+        files: all inspected files.
+        first: index of the first file to draw.
+        count: number of files to draw.
 
     Returns:
         Figure with a row of panels per file.
@@ -70,7 +70,7 @@ def inspection_figure(files: Sequence[Inspection], first: int = 0, count: int = 
 
 
 def _scale_alike(panels: Sequence[Axes]) -> None:
-    """Give panels of one direction and quantity common scales if all stay readable in them."""
+    """Set common axis limits for panels of the same direction and quantity, if each panel fills a third of them."""
     groups: dict[tuple[object, ...], list[Axes]] = {}
     for axes in panels:
         groups.setdefault((axes.get_label(), axes.get_xlabel(), axes.get_ylabel()), []).append(axes)
@@ -83,7 +83,7 @@ def _scale_alike(panels: Sequence[Axes]) -> None:
 
 
 def _draw_history(figure: Figure, cell: SubplotSpec, history: Loop, loop: Axes | None) -> Axes:
-    """Draw both channels over time and, of a loop, force over displacement in a panel; return the first panel."""
+    """Draw displacement and force over time, and the hysteresis loop in `loop` if given; return the leftmost panel."""
     (length, to_length), unit_force, _ = history.direction.display
     force, to_force = display_unit(*unit_force, float(np.abs(history.force).max()))
     names = history.direction.motion.words
@@ -109,13 +109,13 @@ def _draw_history(figure: Figure, cell: SubplotSpec, history: Loop, loop: Axes |
 
 
 def time_ranges(time: Array, values: Array) -> tuple[Array, Array, Array]:
-    """Start of each of 1500 bins of time that holds rows, and the smallest and largest value in it, (k,) each."""
+    """Start time, smallest and largest value of each of 1500 equal time bins that contain rows, (k,) each."""
     first = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], _TIME_BINS + 1)[:-1]))
     return time[first], np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
 
 
 def _draw_sweep(pair: Sequence[Axes], sweep: Sweep) -> Axes:
-    """Draw stiffness and loss factor over what the sweep steps through; return the first panel."""
+    """Draw stiffness and loss factor over the stepped quantity of a sweep; return the left panel."""
     place, length = sweep.direction, sweep.direction.display.displacement
     magnitude = place.display.stiffness.factor * np.abs(sweep.stiffness)
     factor, labels = stiffness_scale(place, float(magnitude.max()))
@@ -140,12 +140,12 @@ def _draw_sweep(pair: Sequence[Axes], sweep: Sweep) -> Axes:
 
 @style.in_own_style
 def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str) -> style.Chart:
-    """Histories with the cycles used, stiffness and loss factor over frequency, and noise and harmonic distortion.
+    """Figure of raw time histories and the operating points that they were reduced to, with noise and distortion.
 
     Args:
         reduction: operating points of all histories.
-        histories: as recorded; the first four are drawn.
-        title: of the figure.
+        histories: histories as recorded; the first four are drawn, with the cycles in use in colour.
+        title: title of the figure.
 
     Returns:
         Figure with a strip per history above four panels.
@@ -175,7 +175,7 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
 
 
 def _draw_strip(axes: Axes, history: Loop, reduction: Reduction, looks: dict[float, style.Style]) -> None:
-    """Draw displacement over time, the cycles used in the colour of their level."""
+    """Draw displacement over time, with the cycles in use in the colour of their amplitude."""
     unit, factor = reduction.direction.display.displacement
     time, low, high = time_ranges(history.time, factor * history.displacement)
     axes.fill_between(time, low, high, color="#c8c8c8", lw=0.4, step="post")
@@ -195,7 +195,7 @@ def _draw_points(
     steps: pd.DataFrame,
     looks: dict[float, style.Style],
 ) -> None:
-    """Draw stiffness and loss factor over frequency with bars of twice the standard error, and noise and distortion."""
+    """Draw stiffness and loss factor with bars of two standard errors in `pair`, noise and distortion in `quality`."""
     unit, length = reduction.direction.display.displacement
     to_table = reduction.direction.display.stiffness.factor
     factor, labels = stiffness_scale(reduction.direction, to_table * float(steps["stiffness"].abs().max()))
@@ -226,7 +226,7 @@ def _draw_points(
 
 @style.in_own_style
 def resonance_figure(resonance: Resonance, title: str) -> style.Chart:
-    """Transmissibility, amplitude reached, stiffness and loss factor of a resonance test over the frequency.
+    """Figure of a resonance test: transmissibility, amplitude reached, stiffness and loss factor over frequency.
 
     Args:
         resonance: resonance test reduced to stiffness over frequency.

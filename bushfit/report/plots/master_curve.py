@@ -14,25 +14,25 @@ from bushfit.report.plots import style
 from bushfit.report.tables import words
 from bushfit.units import CELSIUS, display_unit, number
 
-#: Points of a line.
+#: Number of points of a line.
 _FINE = 200
-#: Ratio of amplitudes that count as one level.
+#: Largest ratio of amplitudes that are treated as one level.
 _NEAR = 1.3
-#: Factor by which the picture goes beyond the band, to show how arms end.
+#: Factor by which the frequency axis exceeds the band of the Maxwell arms, to show their behaviour outside.
 _BEYOND = 4.0
 
 
 @style.in_own_style
 def master_curve_figure(model: Model, shifted_sweeps: Sequence[Shifted], title: str) -> style.Chart:
-    """Stiffness and loss factor over reduced frequency, a row of panels per place.
+    """Figure of the master curve: stiffness and loss factor over reduced frequency at 23 degC, measured and modelled.
 
     Args:
-        model: fitted model.
+        model: fitted model with an effect of temperature.
         shifted_sweeps: sweeps shifted to 23 degC.
         title: title of the figure.
 
     Returns:
-        Figure with two panels per place.
+        Figure with two panels per direction or specimen, at the amplitude with most points.
     """
     places = list(dict.fromkeys(shifted.sweep.direction for shifted in shifted_sweeps))
     degrees = sorted({_degree(shifted) for shifted in shifted_sweeps})
@@ -42,7 +42,7 @@ def master_curve_figure(model: Model, shifted_sweeps: Sequence[Shifted], title: 
         of_place = [shifted for shifted in shifted_sweeps if shifted.sweep.direction is place]
         reached = np.sort(np.concatenate([shifted.sweep.amplitude for shifted in of_place]))
         near = np.searchsorted(reached, _NEAR * reached) - np.arange(reached.size)
-        level = float(np.median(reached[near.argmax() :][: near.max()]))  # near it most points lie
+        level = float(np.median(reached[near.argmax() :][: near.max()]))  # the level with most points
         length_unit, length = place.display.displacement
         levels.append(f"{place} {number(level * length, 3)} {length_unit}")
         unit, factor = display_unit(
@@ -70,10 +70,10 @@ def master_curve_figure(model: Model, shifted_sweeps: Sequence[Shifted], title: 
 
 @style.in_own_style
 def shift_factors_figure(result: Result, shifted_sweeps: Sequence[Shifted], title: str) -> style.Chart:
-    """Shift factors over temperature by the law and of each sweep alone, and their difference.
+    """Figure of the temperature shift factors: the fitted law, each sweep by itself, and their differences.
 
     Args:
-        result: fitted result with the error of the law.
+        result: fitted result, which gives the law and its standard error.
         shifted_sweeps: sweeps shifted to 23 degC.
         title: title of the figure.
 
@@ -101,17 +101,17 @@ def shift_factors_figure(result: Result, shifted_sweeps: Sequence[Shifted], titl
 
 
 def _degree(shifted: Shifted) -> float:
-    """Temperature of a sweep, rounded [degC]."""
+    """Mean temperature of a sweep, rounded to 1 degC."""
     return float(np.round(shifted.temperature - CELSIUS))
 
 
 @style.in_own_style
 def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> style.Chart:
-    """Storage and loss modulus of each part and of its Maxwell arms, and the relative error within the band.
+    """Figure of the moduli of effects and of the Maxwell arms that replace them, with the relative error of the arms.
 
     Args:
         model: model whose effects the arms replace.
-        arms: arms of each effect.
+        arms: Maxwell arms of each replaced effect, with the frequency band of their fit.
         title: title of the figure.
 
     Returns:

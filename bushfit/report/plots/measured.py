@@ -19,17 +19,17 @@ from bushfit.units import format_range, number
 Axis = Literal["frequency", "amplitude"]
 #: Width of a sector of a loop's cycle over which residuals are averaged [deg].
 SECTOR = 10.0
-#: Most curves of a group, and most loops of a place, that are drawn.
+#: Largest numbers of curves of a group, and of loops of a direction or specimen, that are drawn.
 MOST_CURVES, MOST_LOOPS = 24, 8
 
 
 class Curve(NamedTuple):
-    """Points of sweeps that share what they hold.
+    """Points of sweeps at one level of the fixed quantity (amplitude or frequency): one curve of a figure.
 
     Args:
-        name: held amplitude or frequency with its unit, or the name of the test where nothing is held.
-        level: held value in the units of the table; nan where nothing is held.
-        rows: of the table, sorted by what is stepped.
+        name: legend label, the fixed amplitude or frequency with its unit, or the name of the test if neither is fixed.
+        level: fixed amplitude or frequency in the unit of the table; NaN if neither is fixed.
+        rows: rows of the table, sorted by the stepped quantity.
     """
 
     name: str
@@ -38,14 +38,14 @@ class Curve(NamedTuple):
 
 
 class SweepGroup(NamedTuple):
-    """Sweeps of one place that step through the same quantity.
+    """Sweeps of one direction or specimen that step through the same quantity: one panel of a figure.
 
     Args:
         place: direction or specimen.
-        axis: quantity along x.
-        palette: colour scale of the curves, named after what distinguishes them: "amplitude", "frequency",
-            "temperature" or "loop".
-        curves: one per level, rising.
+        axis: stepped quantity, drawn along x.
+        palette: colour scale, named after the quantity that distinguishes the curves: "amplitude", "frequency",
+            "temperature" or, for parts and free sweeps, "loop".
+        curves: a curve per level, ascending.
     """
 
     place: Place
@@ -55,34 +55,34 @@ class SweepGroup(NamedTuple):
 
     @property
     def x_header(self) -> str:
-        """Header of the column along x."""
+        """Header of the table column that is drawn along x."""
         return header_of(self.place, self.axis)
 
     @property
     def shares_levels(self) -> bool:
-        """True if the curves differ by their level alone: no temperatures, parts or free sweeps."""
+        """True if the curves differ only in the level of the fixed quantity, not in temperature, part or test."""
         return self.palette in ("amplitude", "frequency")
 
     def thinned(self) -> SweepGroup:
-        """At most 24 of the curves, evenly from the first to the last."""
+        """Copy of the group with at most 24 of its curves, evenly from the first to the last."""
         return self._replace(curves=[self.curves[index] for index in spread(len(self.curves), MOST_CURVES)])
 
 
 def header_of(place: Place, axis: Axis) -> str:
-    """Header of the column of frequencies, or of amplitudes at a place."""
+    """Header of the table column of the quantity `axis`, frequency or amplitude, for a direction or specimen."""
     return "frequency [Hz]" if axis == "frequency" else columns_of(place)[0]
 
 
 def sweep_groups(table: pd.DataFrame, result: Result) -> list[SweepGroup]:
-    """Sweeps of a table grouped by place and by what they step through.
+    """Group the sweeps of a table by direction or specimen and by stepped quantity, for the panels of a figure.
 
     Args:
-        table: as `tables.sweeps_table` or the sweeps of `tables.gap_table` make it.
-        result: model whose specimens give places by their names.
+        table: table from `tables.sweeps_table`, or the sweeps of the table from `tables.gap_table`.
+        result: model, which gives the specimens by their names.
 
     Returns:
-        Groups in the order of the table. Curves are distinguished by their level, and by part and temperature where
-        these differ.
+        Groups in the order of the table. The curves of a group differ in level, and in part or temperature if tests
+        differ in these.
     """
     groups, order = [], [*dict.fromkeys(table["direction"])]
     for (name, stepped), rows in table.rename(columns={"sweep": "test"}).groupby(["direction", "stepped"], sort=False):
@@ -109,23 +109,29 @@ def sweep_groups(table: pd.DataFrame, result: Result) -> list[SweepGroup]:
 
 
 def means(rows: pd.DataFrame, x_header: str, *headers: str) -> tuple[Array, ...]:
-    """Distinct values of a column, (k,), and the means over its repeats of other columns, (k,) each.
+    """Average columns of a table over all rows with the same x value.
 
     Args:
         rows: rows of a table.
-        x_header: column whose distinct values group the rows.
-        headers: columns to average.
+        x_header: header of the column of x values.
+        headers: headers of the columns to average.
+
+    Returns:
+        Distinct x values, ascending, (k,), and the means of each column, (k,) each.
     """
     averages = rows.groupby(x_header)[list(headers)].mean()
     return averages.index.to_numpy(dtype=float), *averages.to_numpy(dtype=float).T
 
 
 def loops_of(table: pd.DataFrame, result: Result) -> Iterator[tuple[Place, dict[str, pd.DataFrame]]]:
-    """Loops by name of each place, at most eight, evenly from the first to the last.
+    """Split a table into the loops of each direction or specimen, for the panels of a figure.
 
     Args:
-        table: as `tables.loops_table` or the loops of `tables.gap_table` make it.
-        result: model whose specimens give places by their names.
+        table: table from `tables.loops_table`, or the loops of the table from `tables.gap_table`.
+        result: model, which gives the specimens by their names.
+
+    Yields:
+        Direction or specimen, and the rows of at most eight of its loops by the name of the test.
     """
     for name, of_place in table.rename(columns={"loop": "test"}).groupby("direction", sort=False):
         loops = [(str(test), loop) for test, loop in of_place.groupby("test", sort=False)]
@@ -133,15 +139,16 @@ def loops_of(table: pd.DataFrame, result: Result) -> Iterator[tuple[Place, dict[
 
 
 def sector_means(loop: pd.DataFrame, place: Place, header: str) -> tuple[Array, Array]:
-    """Means of a column of a loop over sectors of the cycle.
+    """Average a column of a loop over sectors of 10 degrees of the cycle.
 
     Args:
         loop: rows of one loop.
         place: direction or specimen of the loop.
-        header: column to average.
+        header: header of the column to average.
 
     Returns:
-        Middle of each sector that holds rows, as a phase after the upper turn [deg], and the mean in it, (k,) each.
+        Phase of the middle of each sector that contains rows, after the upper turn of the motion [deg], and the mean of
+        the column in each sector, (k,) each.
     """
     sectors, index = np.unique(
         np.floor(phase_after_turn(loop, place) / SECTOR) % round(360.0 / SECTOR), return_inverse=True
@@ -150,7 +157,7 @@ def sector_means(loop: pd.DataFrame, place: Place, header: str) -> tuple[Array, 
 
 
 def phase_after_turn(loop: pd.DataFrame, place: Place) -> Array:
-    """Phase of each row of a loop after the upper turn of the motion [deg], (n,)."""
+    """Phase of each row of a loop [deg], (n,), from 0 at the largest displacement (the upper turn) up to 360."""
     turns = (loop["time [s]"] * loop["frequency [Hz]"]).to_numpy()
     motion = loop[moved_of(place)].to_numpy()
     first_harmonic = np.mean((motion - motion.mean()) * np.exp(-2j * np.pi * turns))

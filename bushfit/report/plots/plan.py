@@ -14,19 +14,19 @@ from bushfit.units import number
 
 #: Colours of the plan, of the standard programme and of present knowledge, distinct in grey print.
 _COLORS = {"planned": "#1b6ca8", "standard programme": "#d98324", "before": style.GREY}
-#: Diameter of the marker of one run [point]; that of n runs grows with the root of n, so that its area counts them.
+#: Marker diameter of a single run [point]; the area of a marker is proportional to the number of runs.
 _ONE_RUN = 2.8
 
 
 @style.in_own_style
 def plan_figure(plan: Plan) -> style.Chart:
-    """Operating points of the plan (left) and the standard programme (right) by direction, and the errors of both.
+    """Figure of the operating points of planned tests and of the standard programme, with the expected errors of both.
 
     Args:
-        plan: plan, standard programme and present knowledge.
+        plan: planned tests, standard programme, and present knowledge of the parameters.
 
     Returns:
-        Figure with a row of panels per direction and one of errors.
+        Figure with a row of panels per direction (left: planned, right: standard programme) and a row of errors.
     """
     programmes = {"planned": plan.planned, "standard programme": plan.standard}
     tests = [test for programme in programmes.values() for test in programme.tests]
@@ -69,7 +69,7 @@ def plan_figure(plan: Plan) -> style.Chart:
 
 
 def _draw_errors(parameters: Axes, stiffness: Axes, plan: Plan, programmes: dict[str, Programme]) -> None:
-    """Draw errors of the parameters, and the error of the stiffness at each wanted point from the smallest up."""
+    """Draw the standard errors [%] of the parameters, and of the stiffness at the wanted points in ascending order."""
     errors = {name: programme.errors for name, programme in programmes.items()} | {"before": plan.knowledge.errors}
     rows = np.arange(len(plan.knowledge.names))
     for (name, values), marker in zip(errors.items(), "os^", strict=True):

@@ -18,14 +18,14 @@ from bushfit.report.plots.measured import Axis, header_of, sweep_groups
 from bushfit.report.tables import IF_RIGS, columns_of, spread
 from bushfit.units import display_unit, format_range
 
-#: Points of a model's line.
+#: Number of points of a line of the model.
 _FINE = 30
-#: Most levels drawn over a quantity: six amplitudes over frequency, four frequencies over amplitude; more bands cover
-#: each other.
+#: Largest number of levels drawn over each quantity: six amplitudes over frequency, four frequencies over amplitude.
+#: More bands would overlap.
 _MOST_LEVELS: dict[Axis, int] = {"frequency": 6, "amplitude": 4}
-#: Width of a model's line, of one with the rig's effects, and of a double line and its white core [point].
+#: Line widths [point]: model, model with the effects of the rig, double line, and white core of the double line.
 _LINE, _THIN, _DOUBLE, _CORE = 1.3, 0.6, 2.4, 0.7
-#: A measured point belongs to a predicted level if its own or its nominal level is as near as this, relative.
+#: Largest relative distance of a measured or nominal level from the predicted level that it belongs to.
 _SAME = 0.01
 
 
@@ -38,21 +38,21 @@ def prediction_figure(
     note: str = "",
     temperature: float | None = None,
 ) -> style.Chart:
-    """Stiffness magnitude and loss factor over frequency per amplitude, and over amplitude per frequency.
+    """Figure of predicted stiffness magnitude and loss factor over frequency and over amplitude, with measured points.
 
-    Up to six amplitudes and four frequencies are drawn, those that were tested first. Sweeps that held nothing have a
-    row of panels of their own, with the model at their points.
+    Up to six amplitudes and four frequencies are drawn, preferably levels that were measured. Sweeps in which neither
+    amplitude nor frequency is fixed have a separate row of panels, with the model at their points.
 
     Args:
-        result: the model.
-        prediction: of one place.
-        table: sweeps to lay over, as `tables.sweeps_table` makes it; None without.
-        title: of the figure.
-        note: sentences below the figure.
-        temperature: of the prediction [K]; None for the reference temperature.
+        result: fitted or given model.
+        prediction: prediction for one direction or specimen.
+        table: measured sweeps from `tables.sweeps_table` to draw as points; None for no points.
+        title: title of the figure.
+        note: further sentences below the figure.
+        temperature: temperature of the prediction [K]; None for the reference temperature.
 
     Returns:
-        Figure with one or two rows of panels, and one per group of free sweeps.
+        Figure with one or two rows of panels, and one more for each group of such sweeps.
     """
     place, fine = prediction.direction, refined(result, prediction, temperature)
     rig = refined(result, prediction, temperature, rig=True) if rig_effects(result) else None
@@ -91,13 +91,16 @@ def prediction_figure(
 def refined(
     result: Result, prediction: Prediction, temperature: float | None = None, *, rig: bool = False
 ) -> Prediction:
-    """The prediction on its own grid refined for smooth lines.
+    """Repeat a prediction on a finer grid of frequencies and amplitudes, for smooth lines.
 
     Args:
         result: fitted or given model.
-        prediction: prediction of one place on its grid.
-        temperature: of the prediction [K]; None for the reference temperature.
+        prediction: prediction for one direction or specimen.
+        temperature: temperature of the prediction [K]; None for the reference temperature.
         rig: True to include the effects of the rig, as in the tests.
+
+    Returns:
+        Prediction on the finer grid, which contains the frequencies and amplitudes of the given one.
     """
     grid = [
         values if values.size < 2 else np.union1d(values, np.geomspace(values[0], values[-1], _FINE))
@@ -114,18 +117,18 @@ def draw_prediction(
     axis: Axis,
     levels: Array,
 ) -> bool:
-    """Draw stiffness magnitude (left) and loss factor (right), a line with its band and its points per level.
+    """Draw predicted stiffness magnitude (left) and loss factor (right): a line, band and measured points per level.
 
     Args:
-        pair: two panels.
-        prediction: on a fine grid.
-        rig: the same with the effects of the rig; None if the model has none.
-        table: sweeps of the same place; None without.
+        pair: left and right panel.
+        prediction: prediction on a fine grid.
+        rig: the same prediction with the effects of the rig; None if the model has no such effects.
+        table: measured sweeps of the same direction or specimen; None for no points.
         axis: quantity along x.
-        levels: amplitudes [m, rad or 1] or frequencies [Hz] that were predicted, rising, (k,).
+        levels: levels of the other quantity, amplitudes [m, rad or 1] or frequencies [Hz], ascending, (k,).
 
     Returns:
-        True if there are points at the levels drawn.
+        True if measured points were drawn.
     """
     place = prediction.direction
     fixed: Axis = "amplitude" if axis == "frequency" else "frequency"
@@ -175,15 +178,15 @@ def draw_prediction(
 
 
 def points_near(table: pd.DataFrame | None, header: str, levels: Array) -> list[pd.DataFrame]:
-    """Measured rows at each level, by the value of their column or by the nominal level it belongs to.
+    """Find the measured points at each predicted level, within 1 % of the measured or nominal level of the point.
 
     Args:
-        table: sweeps of one place; None without.
-        header: column of the levels.
-        levels: levels in the units of the table, (k,).
+        table: sweeps of one direction or specimen; None for no points.
+        header: header of the column of the levels.
+        levels: predicted levels in the unit of that column, (k,).
 
     Returns:
-        Rows of each level, empty where nothing was measured, (k,).
+        Rows of the table for each level, empty if the level was not measured, (k,).
     """
     if table is None:
         return [pd.DataFrame({"outlier": []})] * levels.size

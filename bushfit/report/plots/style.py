@@ -37,23 +37,23 @@ ROW = 5.4
 _FRAME, LINE = 2.0, 0.42
 #: Sizes of the labels of axes, and of ticks, legends and explanations [point]: the smallest that still reads in print.
 TEXT, SMALL = 8.5, 7.5
-#: How a measured point is drawn, and where there are thousands.
+#: Marker options of a measured point, and of one of thousands of points.
 POINT: dict[str, Any] = {"ms": 4.2, "mec": "white", "mew": 0.4}
 DOT: dict[str, Any] = {"ms": 2.4, "mew": 0}
-#: Colours of text and of lines that stand for no level, of what explains, of shaded bands, and of outliers.
+#: Colours: text and neutral lines, explanations, shaded bands, and outliers.
 INK, GREY, SHADE, RED = "#1a1a1a", "#595959", "#ebebeb", "#c1121f"
-#: How names of axes and smaller words are written.
+#: Font options of axis names and of smaller text.
 NAMES: dict[str, Any] = {"fontsize": TEXT, "color": INK}
 WORDS: dict[str, Any] = {"fontsize": SMALL, "color": INK}
 #: Resolution of a picture [dots per inch]: sharp in a report, and small enough to be mailed.
 _DPI = 150
 #: Effort of compressing a PNG: more takes longer and saves little.
 _COMPRESSION = 3
-#: Metadata that would hold date and version, by format.
+#: Metadata keys, by format, that are omitted: they would contain date and version.
 _UNSAID = {"png": ["Software"], "svg": ["Creator", "Date"], "pdf": ["Creator", "Producer", "CreationDate"]}
-#: Most lines that a legend names: more do not fit beside a panel.
+#: Largest number of lines in a legend: more do not fit beside a panel.
 MOST_NAMED = 8
-#: Colour scale of each kind of level, with its ends: no colour means two things.
+#: Colour map of each kind of level, and the part of the map in use: each colour has one meaning.
 _SCALES = {
     "amplitude": ("viridis", 0.0, 0.8),
     "frequency": ("inferno", 0.1, 0.76),
@@ -63,14 +63,14 @@ _SCALES = {
 #: Markers and dashes of levels, one after the other: eight and five, so that both together repeat after forty levels.
 _MARKERS = "os^Dv<p>"
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1.2, 1.2)), (0, (9, 2)))
-#: Intervals between the ticks of an axis at most.
+#: Largest number of intervals between the ticks of an axis.
 _MOST_TICKS = 6
-#: An axis that spans more than this ratio is logarithmic: chosen, a decade and a half.
+#: Ratio of largest to smallest value above which an axis is logarithmic (about a decade and a half; a choice).
 _LOG_RATIO = 40.0
 #: Letters in a line of the title and of the explanation, as many as the width of a figure holds, and of the name of a
 #: panel at its left, as many as its height holds.
 _TITLE_LETTERS, _NOTE_LETTERS, _LABEL_LETTERS = 64, 112, 27
-#: Letters of the warnings below a figure at most: about five lines.
+#: Largest number of letters of the warnings below a figure: about five lines.
 _MOST_LETTERS = 600
 #: Fonts for names beyond Latin, Greek and Cyrillic, if they are installed.
 _WIDER_FONTS = {"Noto Sans CJK SC", "Noto Sans CJK JP", "WenQuanYi Zen Hei", "Microsoft YaHei", "SimHei", "PingFang SC"}
@@ -112,7 +112,7 @@ def _own_settings(**settings: Any) -> Iterator[None]:
 
 
 def in_own_style(make: Callable[_P, _Drawn]) -> Callable[_P, _Drawn]:
-    """Decorator of a function that makes a figure: the user's matplotlibrc has no influence on it."""
+    """Decorate a function that makes a figure, so that the user's matplotlibrc has no influence on the figure."""
 
     @wraps(make)
     def styled(*args: _P.args, **kwargs: _P.kwargs) -> _Drawn:
@@ -126,12 +126,12 @@ class Chart(Figure):
     """Figure as wide as a page, with a title above its panels and an explanation below them.
 
     Args:
-        title: any text.
+        title: title of the figure.
         height: height of the panels with their labels [cm].
 
     Attributes:
-        heading, footer: texts above and below the panels.
-        caption: explanation without the note, in one line.
+        heading, footer: matplotlib texts above and below the panels.
+        caption: explanation without the note, in one line, for use in a page.
     """
 
     def __init__(self, title: str, height: float) -> None:
@@ -140,14 +140,14 @@ class Chart(Figure):
         super().__init__(figsize=(_WIDTH / 2.54, self._height / 2.54), dpi=_DPI, facecolor="white")
 
     def explain(self, *sentences: str, note: str = "") -> Self:
-        """Write title and explanation, and lay the panels out, once for all formats.
+        """Add title and explanation to the figure, and compute the layout of its panels.
 
         Args:
-            sentences: explanation of lines, shades and points.
-            note: further sentences, which a page shows elsewhere.
+            sentences: explanation of lines, shaded bands and points; empty ones are omitted.
+            note: further sentences below the figure that are not part of `caption`.
 
         Returns:
-            The figure, ready to be drawn.
+            The figure itself, ready to be written in any format.
         """
         self.caption = printable(" ".join(filter(None, sentences)), lines=True)
         lines = textwrap.wrap(f"{self.caption} {printable(note, lines=True)}", _NOTE_LETTERS)
@@ -162,19 +162,19 @@ class Chart(Figure):
 
 
 class Style(NamedTuple):
-    """How one level is drawn."""
+    """Colour, line style and marker of one level (an amplitude, frequency, temperature or loop) in a figure."""
 
     color: Any
     dashes: Any
     marker: str
 
     def handle(self, marked: bool) -> Line2D:
-        """Line for a legend, with the marker or without."""
+        """Line for a legend; `marked` adds the marker."""
         return Line2D([], [], color=self.color, ls=self.dashes, lw=1.3, marker=self.marker * marked, **POINT)
 
 
 def styles(count: int, palette: str) -> list[Style]:
-    """Styles of so many levels, by colour alone where a colour bar names them.
+    """Line styles for `count` levels; they differ only in colour if the levels are too many for a legend.
 
     Args:
         count: number of levels.
@@ -189,7 +189,7 @@ def styles(count: int, palette: str) -> list[Style]:
 
 
 def fonts() -> list[str]:
-    """Fonts for text that may hold any letters."""
+    """Font families for user text in any script: the default font, then installed fonts for further scripts."""
     return ["DejaVu Sans", *sorted({font.name for font in fontManager.ttflist} & _WIDER_FONTS)]
 
 
@@ -198,8 +198,8 @@ def label_axes(axes: Axes, x_label: str, y_label: str, x: Array | None = None) -
 
     Args:
         axes: panel.
-        x_label, y_label: with units.
-        x: values along x; None for a linear axis.
+        x_label, y_label: labels of the axes, with units.
+        x: values along x, which decide between a linear and a logarithmic axis, (n,); None for linear.
     """
     axes.set_xlabel(x_label)
     label_left(axes, y_label)
@@ -213,18 +213,18 @@ def label_axes(axes: Axes, x_label: str, y_label: str, x: Array | None = None) -
 
 
 def label_left(axes: Axes, label: str, **options: Any) -> None:
-    """Write the label left of a panel, in several lines if one is longer than the panel is high."""
+    """Set the label of the y axis of a panel, wrapped to the height of the panel; `options` are text properties."""
     whole = re.sub(r"\[.*?\]", lambda unit: unit[0].replace(" ", "\u00a0"), printable(label, lines=True))
     lines = [part for line in whole.splitlines() for part in textwrap.wrap(line, _LABEL_LETTERS)]
     axes.set_ylabel("\n".join(lines), family=fonts(), parse_math=False, **options)
 
 
 def logarithmic(axes: Axes, values: Array, axis_name: Literal["x", "y"] = "x") -> None:
-    """Make an axis logarithmic, with plain numbers.
+    """Make an axis logarithmic, with ticks as plain numbers such as 0.1, 1 and 10.
 
     Args:
         axes: panel.
-        values: values that the axis shows.
+        values: positive values along the axis, whose range determines the ticks, (n,).
         axis_name: "x" or "y".
     """
     axis = {"x": axes.xaxis, "y": axes.yaxis}[axis_name]
@@ -236,25 +236,25 @@ def logarithmic(axes: Axes, values: Array, axis_name: Literal["x", "y"] = "x") -
 
 
 def widen_span(axes: Axes, minimum: float) -> None:
-    """Widen a y axis to at least this span [its unit], so that rounding errors do not fill the panel."""
+    """Widen the limits of a y axis to a span of at least `minimum`, so that rounding errors do not fill the panel."""
     low, high = axes.get_ylim()
     if high - low < minimum:
         axes.set_ylim((low + high - minimum) / 2.0, (low + high + minimum) / 2.0)
 
 
 def noise_band(axes: Axes) -> None:
-    """Shade the band in which 95 % of the residuals should be."""
+    """Shade the band of 95 % of standard normal residuals, from -1.96 to 1.96, in a panel of residuals / noise."""
     axes.axhspan(-Z95, Z95, color=SHADE, lw=0, zorder=0)
     axes.axhline(0.0, color=GREY, lw=0.6, zorder=1)
     widen_span(axes, 7.0)
 
 
 def mark_outliers(axes: Axes, x: Array, y: Array) -> None:
-    """Draw crosses at outliers, (n,) each in the units of the panel, at its edge if they are beyond it.
+    """Draw crosses at outliers; those outside the limits of the panel are drawn at its edge.
 
     Args:
         axes: panel.
-        x, y: outliers in the units of the panel, (n,) each.
+        x, y: coordinates of the outliers in the units of the panel, (n,) each.
     """
     low, high = axes.get_ylim()
     if x.size:
@@ -273,7 +273,7 @@ def legend(
 
     Args:
         axes: panel.
-        handles, labels: of the lines; of more than eight, eight are named, and the number of the others.
+        handles, labels: lines and their labels; of more than eight, eight are named and the others are counted.
         title: title of the legend.
         extra_lines: further lines by their labels.
     """
@@ -291,13 +291,13 @@ def name_levels(
     marked: Sequence[bool] = (),
     extra_lines: Mapping[str, Line2D | tuple[Line2D, ...]] | None = None,
 ) -> None:
-    """Name the levels of a panel by a legend, or of more than eight by a colour bar.
+    """Add a legend of the levels right of a panel, or a colour bar for more than eight levels.
 
     Args:
         axes: panel.
-        levels: amplitudes, frequencies or temperatures as texts, rising, (k,).
-        quantity: "amplitude", "frequency" or "temperature": title and colour scale.
-        marked: whether each level has points, (k,); empty if all have.
+        levels: amplitudes, frequencies or temperatures as texts, in ascending order, (k,).
+        quantity: "amplitude", "frequency" or "temperature": title, and name of the colour scale.
+        marked: True for each level that has measured points, (k,); empty if all have.
         extra_lines: further lines by their labels.
     """
     looks = styles(len(levels), quantity)
@@ -318,12 +318,12 @@ def name_levels(
 
 
 def file_name(name: str, letters: int = 20) -> str:
-    """The name of a file as text of a figure, shortened, in which dollars start no formula."""
+    """Shorten a file name to `letters` characters for use in a figure, with dollar signs escaped for matplotlib."""
     return shortened(name, letters).replace("$", r"\$")
 
 
 def first_sentences(sentences: Sequence[str]) -> str:
-    """The first sentences, as many as leave room for the panels, and the number of the others."""
+    """Join the first warnings, up to about 600 letters, into the note below a figure; the others are counted."""
     ends = np.cumsum([len(sentence) for sentence in sentences])
     count = max(int(np.searchsorted(ends, _MOST_LETTERS)), 1)
     more = len(sentences) - count
@@ -332,19 +332,19 @@ def first_sentences(sentences: Sequence[str]) -> str:
 
 
 def to_image(figure: Figure, form: str = "png", *, outlines: bool = True) -> bytes:
-    """The figure as PNG, SVG or PDF: the same bytes for the same figure, without date and version.
+    """Encode a figure as PNG, SVG or PDF, reproducibly: without date and version.
 
     Args:
         figure: figure to draw.
         form: "png", "svg" or "pdf".
         outlines: True to draw the texts of an SVG as outlines, which look the same everywhere; False to keep
-            texts, which are shorter.
+            them as text, which is shorter.
 
     Returns:
-        Content of the file.
+        Content of the image file.
     """
     buffer = io.BytesIO()
-    figure.set_dpi(_DPI)  # SVG and PDF leave that of their units behind
+    figure.set_dpi(_DPI)  # SVG and PDF change the resolution of the figure
     with _own_settings(**{"svg.fonttype": "path" if outlines else "none"}):
         canvas = get_registered_canvas_class(form)(figure)
         options = {"pil_kwargs": {"compress_level": _COMPRESSION}} if form == "png" else {}
