@@ -36,22 +36,22 @@ from bushfit.units import number
 
 #: Number of constants of a symmetric 6 x 6 matrix, and of values per data line.
 _CONSTANTS, _A_LINE = 21, 8
-#: Parameter that is the long-term modulus [Pa].
+#: Name of the parameter for the long-term shear modulus [Pa].
 _LONG_TERM = "mu"
-#: Specimen whose modulus is that of the material, over engineering shear strain.
+#: Specimen whose stiffness is the shear modulus of the material, over engineering shear strain.
 _COMPOUND = Specimen("compound", "modulus")
 
 _FORM = Form(lambda f, k: (k.real, k.imag / (2.0 * np.pi * f)), lambda f, a, b: a + 2j * np.pi * f * b)
 
 
 def export(order: Order) -> Exported:
-    """Write a connector behavior per amplitude, and the compound at the strains of the first direction.
+    """Write an Abaqus connector behavior for each amplitude, and a material at the strains of the first direction.
 
     Args:
         order: model, predictions and settings.
 
     Returns:
-        Content of bushing.inp, and the losses of the format.
+        File bushing.inp, and the losses of the format.
     """
     units = order.units or MM_T_S_N
     losses = tuple(table_losses(order, _FORM))
@@ -65,7 +65,7 @@ def export(order: Order) -> Exported:
 
 
 def _behavior(units: UnitSystem, rank: int, level: AmplitudeLevel) -> Iterator[str]:
-    """Yield the lines of elasticity and damping of one amplitude."""
+    """Yield the lines of the connector behavior (elasticity and damping) of one amplitude."""
     yield f"*CONNECTOR BEHAVIOR, NAME=BUSHING_{rank}"
     frequency = level[0].frequency * units.frequency.factor
     diagonals = np.zeros((2, 6, frequency.size))
@@ -81,7 +81,7 @@ def _behavior(units: UnitSystem, rank: int, level: AmplitudeLevel) -> Iterator[s
 
 
 def _materials(order: Order, units: UnitSystem) -> Iterator[str]:
-    """Yield the lines of the compound at the strain of each amplitude of the first direction."""
+    """Yield the lines of a material for the strain at each amplitude of the first direction."""
     model, first = order.result.model.without(EffectLevel.INSTRUMENT), exported_directions(order)[0]
     long_term = model.values[_LONG_TERM]
     for rank, table in enumerate(stiffness_tables(first), start=1):

@@ -52,14 +52,14 @@ _KINDS: dict[Kind, str] = {
 
 
 class _Element(NamedTuple):
-    """Bushing element of one direction.
+    """Approximation of the bushing in one direction by an Adams element with a static curve and a single damping.
 
     Args:
-        tables: exact stiffness, by amplitude.
-        displacement, force: points of the curve [m and N, or rad and N m], (n,).
+        tables: exact stiffness over frequency, one table for each amplitude.
+        displacement, force: points of the static curve [m and N, or rad and N m], (n,) each.
         reference: table of the middle amplitude.
         frequency: middle frequency [Hz], at which the damping is exact.
-        exact: complex stiffness of the reference table at this frequency [N/m or N m/rad].
+        exact: complex stiffness at the middle frequency and amplitude [N/m or N m/rad].
     """
 
     tables: Sequence[StiffnessTable]
@@ -70,11 +70,11 @@ class _Element(NamedTuple):
     exact: complex
 
     def damping(self, kind: Kind) -> float:
-        """Damper constant [N s/m or N m s/rad], or loss angle [rad]."""
+        """Damping coefficient [N s/m or N m s/rad] for Adams Car, or loss angle [rad] for Adams Car Ride."""
         return float(self.exact.imag / (2.0 * np.pi * self.frequency) if kind == "car" else np.angle(self.exact))
 
     def loss(self, kind: Kind) -> str:
-        """Sentence on the error of one curve and one damping over the grid."""
+        """Sentence on the errors of |K| and loss factor over the grid due to a single curve and a single damping."""
         damping, written, exact = self.damping(kind), [], []
         for table in self.tables:
             storage = np.interp(table.amplitude, self.displacement, self.force) / table.amplitude
@@ -113,7 +113,7 @@ def export(order: Order) -> Exported:
 
 
 def _element(tables: Sequence[StiffnessTable]) -> _Element:
-    """Element with a curve through the storage force at each amplitude.
+    """Make the element of one direction, with a curve through the storage force at each amplitude.
 
     A single amplitude is extrapolated linearly, because splines need five points.
     """
@@ -129,7 +129,7 @@ def _element(tables: Sequence[StiffnessTable]) -> _Element:
 
 
 def _property_file(order: Order, elements: Sequence[_Element], kind: Kind, losses: Sequence[str]) -> Iterator[str]:
-    """Yield the lines of a property file."""
+    """Yield the lines of a property file for Adams Car or Adams Car Ride."""
     amplitudes = describe_amplitudes([element.reference for element in elements])
     about = f"damping at {number(elements[0].frequency, 4)} Hz, {amplitudes}; curves at the lowest frequency"
     yield from comment_lines("$", [*heading(order, ", ".join(_UNITS.values()), losses), _KINDS[kind], about])
@@ -151,6 +151,6 @@ def _property_file(order: Order, elements: Sequence[_Element], kind: Kind, losse
 
 
 def _block(name: str, attributes: Mapping[str, str]) -> Iterator[str]:
-    """Yield the lines of a block with its attributes."""
+    """Yield the lines of a block: its name in brackets, then its attributes."""
     yield f"[{name}]"
     yield from (f" {key} = {value}" for key, value in attributes.items())

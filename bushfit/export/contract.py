@@ -29,7 +29,7 @@ Dialect = Literal["nastran", "optistruct"]
 
 @dataclass(frozen=True)
 class UnitSystem:
-    """Consistent units of length, mass, time and force, each with the factor from SI."""
+    """Consistent units of length, mass, time and force of a solver, each with the factor from SI."""
 
     length: Unit
     mass: Unit
@@ -38,13 +38,13 @@ class UnitSystem:
 
     @classmethod
     def parse(cls, text: str) -> UnitSystem:
-        """System of a text such as "mm t s N", with the units in any order.
+        """Parse a unit system such as "mm t s N", with the units in any order.
 
         Returns:
             The system, each unit with its factor from SI.
 
         Raises:
-            UnitError: a missing, doubled or unknown unit, or units that are not consistent.
+            UnitError: a unit is missing, repeated or unknown, or force is not mass times acceleration.
         """
         refuse = partial(UnitError, found=f'"{text}"', expected='a length, a mass, a time and a force: "mm t s N"')
         units: dict[str, Unit] = {}
@@ -72,16 +72,16 @@ class UnitSystem:
 
     @property
     def frequency(self) -> Unit:
-        """Unit of frequency."""
+        """Unit of frequency, the inverse of the unit of time, with its factor from Hz."""
         return Unit("Hz" if self.time.name == "s" else f"1/{self.time.name}", 1.0 / self.time.factor)
 
     @property
     def stress(self) -> Unit:
-        """Unit of stresses and moduli."""
+        """Unit of stresses and moduli, with its factor from Pa."""
         return Unit(f"{self.force.name}/{self.length.name}^2", self.force.factor / self.length.factor**2)
 
     def display(self, motion: Motion) -> Display:
-        """Units of displacement, force and stiffness of a kind of motion; angles are in rad.
+        """Units of displacement, force and stiffness for a kind of motion in this system; angles are in rad.
 
         Returns:
             Units with their factors from SI.
@@ -95,24 +95,24 @@ class UnitSystem:
         return Display(length, force, Unit(f"{force.name}/{length.name}", force.factor / length.factor))
 
 
-#: The system of most decks for bushings.
+#: The unit system of most decks for bushings.
 MM_T_S_N = UnitSystem(Unit("mm", 1e3), Unit("t", 1e-3), Unit("s", 1.0), Unit("N", 1.0))
 
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """A model and the settings of its export.
+    """Input of every export format: a fitted model, its predictions, and the settings of the export.
 
     Args:
         result: fitted model.
         source: model file with its SHA-256.
         predictions: dynamic stiffness over the grid of frequencies and amplitudes, one per direction or specimen.
-        accuracy: largest relative error of the modulus of Maxwell arms in place of a springpot.
+        accuracy: largest relative error of the modulus of Maxwell arms that replace a springpot.
         units: unit system of the files; None for the default: mm, t, s and N in decks, display units in tables.
-        dialect: of the format `nastran`.
+        dialect: solver of the format `nastran`.
         decimal_comma: True for semicolons and decimal commas in the format `csv`.
-        temperature: of the rubber [K]; None for the reference temperature of the model.
-        day: date of writing in decks; None omits it.
+        temperature: temperature of the rubber [K]; None for the reference temperature of the model.
+        day: date to write into decks; None for no date.
     """
 
     result: Result
@@ -126,7 +126,7 @@ class Order:
     day: str | None = None
 
     def remarks(self, losses: Iterable[str]) -> Iterator[tuple[str, str]]:
-        """Notes for the head of a file.
+        """Generate the notes for the head of an exported file.
 
         Args:
             losses: properties of the model that the format cannot represent.
@@ -172,8 +172,8 @@ class Exported:
 
     Args:
         files: content by file name.
-        losses: properties that the format cannot represent, each with the error that this causes.
-        arms: Maxwell arms in the files.
+        losses: sentences on properties that the format cannot represent, with the error that this causes.
+        arms: groups of Maxwell arms in the files; empty if the format has none.
     """
 
     files: Mapping[str, bytes]

@@ -23,18 +23,18 @@ _WIDTH = 80
 _UNPRINTABLE = re.compile(r"[^\x20-\x7e]")
 #: Degrees of freedom of a direction, with the axis of the bushing along z: 1 to 3 are x, y, z; 6 is rotation about z.
 DOFS = {Direction.AXIAL: (3,), Direction.RADIAL: (1, 2), Direction.TORSION: (6,)}
-#: Loss of every law over frequency.
+#: Sentence on the loss of every format with stiffness over frequency.
 NO_LOOPS = "no law in time: loops, overtones and transients need another format (fmu)"
 
 
 class StiffnessTable(NamedTuple):
-    """Stiffness of a direction over frequency at one amplitude.
+    """Stiffness of one direction over frequency at one amplitude.
 
     Args:
-        direction: of the bushing.
-        amplitude: zero-to-peak [m or rad].
-        frequency: [Hz], (n,).
-        stiffness: complex [N/m or N m/rad], (n,).
+        direction: direction of the bushing.
+        amplitude: zero-to-peak amplitude [m or rad].
+        frequency: frequencies [Hz], (n,).
+        stiffness: complex stiffness at each frequency [N/m or N m/rad], (n,).
     """
 
     direction: Direction
@@ -43,12 +43,12 @@ class StiffnessTable(NamedTuple):
     stiffness: Array
 
 
-#: Tables of all directions in one property of a solver.
+#: Tables of all directions at one amplitude each, for one property of a solver.
 AmplitudeLevel = tuple[StiffnessTable, ...]
 
 
 def exported_directions(order: Order) -> list[Prediction]:
-    """Predictions of the directions of the bushing, without specimens.
+    """Select the predictions for directions of the bushing, without specimens.
 
     Returns:
         One prediction per direction, all on one list of frequencies [Hz].
@@ -71,7 +71,7 @@ def exported_directions(order: Order) -> list[Prediction]:
 
 
 def stiffness_tables(prediction: Prediction) -> list[StiffnessTable]:
-    """Tables of one direction in order of amplitude."""
+    """Split the prediction of one direction into a table for each amplitude, in increasing order."""
     direction = Direction(str(prediction.direction))
     stiffness = prediction.storage_stiffness.value + 1j * prediction.loss_stiffness.value
     rows = [(amplitude, prediction.amplitude == amplitude) for amplitude in np.unique(prediction.amplitude)]
@@ -81,7 +81,7 @@ def stiffness_tables(prediction: Prediction) -> list[StiffnessTable]:
 
 
 def amplitude_levels(order: Order) -> list[AmplitudeLevel]:
-    """Tables of all directions by rank of the amplitude.
+    """Combine the tables of all directions by rank: the smallest amplitude of each, the second smallest, and so on.
 
     A direction with fewer amplitudes than others repeats its largest.
     """
@@ -91,16 +91,16 @@ def amplitude_levels(order: Order) -> list[AmplitudeLevel]:
 
 
 def by_dof(level: AmplitudeLevel) -> Iterator[tuple[int, StiffnessTable]]:
-    """Yield the degrees of freedom of a level, numbered from 1, with their tables."""
+    """Yield each degree of freedom of a level, 1 to 6, with its table, in increasing order."""
     yield from sorted(((dof, table) for table in level for dof in DOFS[table.direction]), key=lambda pair: pair[0])
 
 
 class Form(NamedTuple):
-    """Form of a complex stiffness as two real tables.
+    """Conversion between a complex stiffness and the two real tables of a solver, such as stiffness and damping.
 
     Args:
-        parts: (frequency, stiffness) -> the two tables, (n,) each.
-        joined: (frequency, first table, second table) -> stiffness.
+        parts: function of frequency [Hz] and complex stiffness that returns the two tables, (n,) each.
+        joined: inverse function, of frequency, first and second table, that returns the complex stiffness, (n,).
     """
 
     parts: Callable[[Array, Array], tuple[Array, Array]]
@@ -114,15 +114,15 @@ class Form(NamedTuple):
 
 
 def middle(rows: Sequence[StiffnessTable]) -> StiffnessTable:
-    """Table of the middle amplitude; of two, the lower."""
+    """Return the table of the middle amplitude of an ordered sequence; the lower one for an even number of tables."""
     return rows[(len(rows) - 1) // 2]
 
 
 def comment_lines(mark: str, lines: Iterable[str]) -> list[str]:
-    """Wrap comments in ASCII.
+    """Wrap comments to lines of 80 ASCII characters.
 
     Args:
-        mark: start of a comment line.
+        mark: comment sign at the start of each line.
         lines: comments; characters outside printable ASCII become escape sequences.
 
     Returns:
@@ -136,7 +136,7 @@ def comment_lines(mark: str, lines: Iterable[str]) -> list[str]:
 
 
 def heading(order: Order, units: str, losses: Iterable[str]) -> list[str]:
-    """Comments at the head of a deck: bushing, model and its hash, units, axes, losses and warnings.
+    """List the comments at the head of a deck: bushing, model and its hash, units, axes, losses and warnings.
 
     Args:
         order: model and settings.
@@ -169,16 +169,16 @@ def deck_lines(
     name: str,
     level_lines: Callable[[int, AmplitudeLevel], Iterable[str]],
 ) -> list[str]:
-    """Lines of a deck: its heading, then a comment and the lines of each level.
+    """Write the lines of a deck: its heading, then a comment and the lines of each amplitude level.
 
     Args:
         order: model and settings.
-        mark: start of a comment line.
-        units: of the deck.
-        losses: properties that the deck cannot represent.
-        usage: comment on how a solver uses the deck.
-        name: prefix of the names of the levels.
-        level_lines: (rank of the level from 1, level) -> its lines.
+        mark: comment sign at the start of a comment line.
+        units: unit system of the deck.
+        losses: sentences on properties that the deck cannot represent.
+        usage: comment on the use of the deck in the solver.
+        name: prefix of the names of the levels, before their rank.
+        level_lines: function of the rank of a level, from 1, and the level that returns its lines.
     """
     about = f"{units}; frequency in {units.frequency.name}, rotation in rad"
     lines = comment_lines(mark, [*heading(order, about, losses), usage])
@@ -188,13 +188,13 @@ def deck_lines(
 
 
 def describe_amplitudes(level: Iterable[StiffnessTable]) -> str:
-    """Amplitudes of a level: "axial at 0.2 mm, torsion at 1 deg"."""
+    """Format the amplitudes of a level: "axial at 0.2 mm, torsion at 1 deg"."""
     rows = [(table.direction, table.amplitude, *table.direction.display.displacement) for table in level]
     return ", ".join(f"{place} at {number(amplitude * factor, 6)} {unit}" for place, amplitude, unit, factor in rows)
 
 
 def format_real(value: float, digits: int = 5) -> str:
-    """Format a number with the significant digits; zero becomes "0."."""
+    """Format a number in exponential notation with `digits` significant digits; zero becomes "0."."""
     return f"{value:.{digits - 1}E}" if value else "0."
 
 
@@ -204,14 +204,14 @@ def encode_deck(lines: Iterable[str]) -> bytes:
 
 
 def table_losses(order: Order, form: Form) -> Iterator[str]:
-    """Sentences on the losses of linear tables over frequency with one set per amplitude, with their errors.
+    """Generate sentences on the losses of a deck with linear tables over frequency, one set for each amplitude.
 
     Args:
         order: model, predictions and settings.
-        form: quantities that the tables interpolate.
+        form: conversion of the complex stiffness to the quantities that the solver interpolates.
 
     Returns:
-        Sentences, those of each direction first.
+        Iterator over sentences with the errors of |K|; sentences on a single direction come first.
     """
     model = order.result.model.without(EffectLevel.INSTRUMENT)
     for prediction in exported_directions(order):
@@ -240,10 +240,10 @@ def table_losses(order: Order, form: Form) -> Iterator[str]:
 
 
 def common_losses(order: Order) -> Iterator[str]:
-    """Sentences on the losses of every deck: time, coupling and motions that the model does not contain.
+    """Generate sentences on the losses of every deck: time domain, coupling, and motions that the model lacks.
 
     Returns:
-        Sentences.
+        Iterator over sentences.
     """
     yield NO_LOOPS
     yield "each direction acts by itself: coupling between directions is not included"
@@ -255,7 +255,7 @@ def common_losses(order: Order) -> Iterator[str]:
 
 
 def band_losses(prediction: Prediction) -> Iterator[str]:
-    """Sentences on the 95 % band, and on the alternative reading if an effect may belong to the rig."""
+    """Generate sentences on the omitted 95 % band, and on the prediction if an unresolved effect belongs to the rig."""
     place, band = prediction.direction, prediction.stiffness
     if (width := float(np.max((band.high - band.low) / (2.0 * band.value)))) > 0.0:
         yield f"{place}: the 95 % band, up to {number(100.0 * width, 2)} % of |K| either way"

@@ -62,7 +62,7 @@ def export(order: Order) -> Exported:
         The FMU, its losses and the Maxwell arms in it.
 
     Raises:
-        ModelError: an effect without a law in time.
+        ModelError: an effect has no law in the time domain.
         OutputError: the compiler is missing or failed.
     """
     model = time_model(order)
@@ -136,10 +136,10 @@ def compile_library(sources: Mapping[str, bytes], name: str) -> tuple[str, bytes
 
 
 def model_header(model: TimeModel, guid: str) -> str:
-    """C header with the sizes of the lists and the GUID of the FMU.
+    """Write the C header of an FMU, with the lengths of the lists and the GUID.
 
     Returns:
-        C source text of the header.
+        Content of model.h.
     """
     sizes = {
         "VALUES": _OFFSET + len(model.values),
@@ -153,7 +153,7 @@ def model_header(model: TimeModel, guid: str) -> str:
 
 
 def model_source(model: TimeModel) -> str:
-    """C source with the values, directions and Maxwell arms of a model.
+    """Write the C source with the values, directions and Maxwell arms of a model.
 
     Returns:
         Content of model.c.
@@ -181,16 +181,16 @@ def model_source(model: TimeModel) -> str:
 
 
 def model_description(order: Order, model: TimeModel, name: str, guid: str) -> bytes:
-    """Content of modelDescription.xml.
+    """Write modelDescription.xml, the description of the variables of an FMU.
 
     Args:
         order: model, predictions and settings.
-        model: the model as lists.
-        name: model identifier.
-        guid: identifier that ties the description to the library.
+        model: time-domain model with the values of the FMU.
+        name: model identifier, which is the name of the library.
+        guid: identifier that has to be equal in the description and the library.
 
     Returns:
-        The XML in UTF-8.
+        Content of the XML file in UTF-8.
     """
     about = f"Rubber bushing, displacement in and force out, of {order.source.file} (SHA-256 {order.source.sha256})"
     about = "; ".join([about, *map(": ".join, order.remarks(model.losses))])
@@ -235,11 +235,11 @@ def model_description(order: Order, model: TimeModel, name: str, guid: str) -> b
 
 
 def add_variables(variables: ET.Element, model: TimeModel, displays: Mapping[str, Unit]) -> None:
-    """Add the scalar variables of a model: displacements and forces of its places, then its values.
+    """Add the scalar variables of an FMU to its description: displacement and force of each place, then the values.
 
     Args:
-        variables: element to add them to.
-        model: the model as lists.
+        variables: XML element `ModelVariables`.
+        model: time-domain model.
         displays: display units by SI unit.
     """
 

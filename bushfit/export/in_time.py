@@ -1,4 +1,4 @@
-"""A model as lists of values, directions and Maxwell arms, as the C sources of an FMU read them."""
+"""A model in the time domain: lists of values, directions and Maxwell arms, as the C sources of an FMU read them."""
 
 import tomllib
 from collections.abc import Mapping
@@ -28,15 +28,15 @@ UNIT_FIELDS = {"eps_half[0]", "eps_half[1]", "e_s", "spread", "median", "deviati
 
 @dataclass(frozen=True)
 class FmuValue:
-    """A number of the model in SI.
+    """Scalar variable of an FMU: a parameter of the model, or a constant of the bushing's shape.
 
     Args:
         name: name in the FMU.
         unit: SI unit.
-        value: start value.
-        bounds: least and largest value that can be set.
+        value: start value, in `unit`.
+        bounds: smallest and largest value that can be set, in `unit`.
         meaning: description of the parameter.
-        settable: True if an importer can set it.
+        settable: True if the program that runs the FMU can set the value; False for a constant.
     """
 
     name: str
@@ -49,17 +49,20 @@ class FmuValue:
 
 @dataclass(frozen=True, eq=False)
 class TimeModel:
-    """A model as lists.
+    """Time-domain model as flat lists, from which the C sources of an FMU are generated.
+
+    Maxwell arms (spring and damper in series) replace the viscoelastic effects of the model.
 
     Args:
-        places: directions and specimens.
+        places: directions and specimens, each with one input and one output of the FMU.
         values: constants first, then values that can be set.
-        fields: name of the value of each C field, per place; missing fields are neutral.
-        levers: lever of the slip force at each place: 1, or a radius [m].
-        parts: parameter that the moduli of each group of arms are proportional to.
-        arm_rows: index of the part, modulus over the parameter of the part, and relaxation time [s] of each arm.
-        losses: effects that are left out or held constant, with the error.
-        arms: the arms by the effects that they replace, with their error.
+        fields: name of the value for each field of the C structure `Direction`, for each place; missing fields have
+            their neutral value.
+        levers: lever arm of the slip force at each place: outer radius [m] for torsion, otherwise 1.
+        parts: name of the parameter to which the moduli of each group of arms are proportional.
+        arm_rows: for each arm, index of its group in `parts`, modulus over that parameter, and relaxation time [s].
+        losses: sentences on effects that are omitted or constant, with the error that this causes.
+        arms: groups of arms with the effects that they replace, and their error.
     """
 
     places: tuple[Place, ...]
@@ -73,13 +76,13 @@ class TimeModel:
 
 
 def time_model(order: Order) -> TimeModel:
-    """Convert the model of an order to lists.
+    """Convert the fitted model of an export order to a time-domain model for an FMU, without effects of the rig.
 
     Returns:
-        Values, fields and lever of each direction, Maxwell arms in time, and the losses.
+        Values, fields and lever arm of each direction, Maxwell arms, and the losses.
 
     Raises:
-        ModelError: an effect without a law in time or without a law in the C sources, or no arms within the accuracy.
+        ModelError: an effect has no law in the time domain or none in the C sources, or no arms reach the accuracy.
     """
     model, under = order.result.model.without(Level.INSTRUMENT), order.under
     omitted = [effect.name for effect in model.records if effect.name == UNNAMED or effect.settles]
@@ -121,21 +124,21 @@ def time_model(order: Order) -> TimeModel:
 
 
 def fields_of(effect: Effect) -> list[str]:
-    """C fields that the parameters of an effect set, in their order; none if the C sources lack its law."""
+    """Names of the C fields for the parameters of an effect, in their order; empty if the C sources lack its law."""
     kind = f"{effect.name.partition('.')[0]}." if place_suffix(effect.name) else effect.name
     return FIELDS.get(kind, [])
 
 
 def middle_point(prediction: Prediction) -> tuple[float, float]:
-    """Geometric middle of the frequencies [Hz] and of the amplitudes [m, rad or 1] of a prediction."""
+    """Geometric middle of the frequency range [Hz] and of the amplitude range [m, rad or 1] of a prediction."""
     frequency, amplitude = (float(np.sqrt(x.min() * x.max())) for x in (prediction.frequency, prediction.amplitude))
     return frequency, amplitude
 
 
 def _values(order: Order, model: Model, arms: tuple[Arms, ...]) -> tuple[tuple[FmuValue, ...], list[dict[str, str]]]:
-    """Values of the FMU, and the names of the values of each place by parameter.
+    """List the values of the FMU, and for each place the name of the value for each parameter.
 
-    A parameter that modifiers make different between places becomes one value per place, `<parameter>.<place>`.
+    If modifiers change a parameter differently in different places, each place has a value `<parameter>.<place>`.
     """
     places = order.places
     local_values = [
@@ -171,7 +174,7 @@ def _values(order: Order, model: Model, arms: tuple[Arms, ...]) -> tuple[tuple[F
 
 
 def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Arms, ...]) -> dict[str, str]:
-    """Name of the value of each C field at a place."""
+    """Name of the value for each C field in one direction or specimen."""
     layers = model.layers(model.setting(place))
     fields = {key: names[key] for key in ("unit_strain", "stiffness_per_modulus")}
     fields |= {f"size[{index}]": names[part.size] for index, part in enumerate(arms)}
@@ -184,7 +187,7 @@ def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Ar
 
 
 def _steady_losses(model: Model, omitted: list[str], prediction: Prediction, under: Circumstances) -> list[str]:
-    """Sentence on the error in steady stiffness at a place from fixed modifiers and omitted effects."""
+    """Write a sentence on the error of the steady stiffness due to constant modifiers and omitted effects; or none."""
     fixed = [effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.shift_factor]
     if not (fixed or omitted):
         return []

@@ -20,7 +20,7 @@ from bushfit.export.deck import AmplitudeLevel, Form, by_dof, deck_lines, encode
 _TABLES = 100
 
 
-#: Names of the two tables, their form, and the name of the file, by dialect.
+#: Names of the two tables, conversion of the complex stiffness to the two tables, and name of the file, by dialect.
 _DIALECTS = {
     "nastran": (
         ("K", "GE"),
@@ -36,13 +36,13 @@ _DIALECTS = {
 
 
 def export(order: Order) -> Exported:
-    """Write the bulk data of the bushing, without elements.
+    """Write the properties of the bushing as bulk data of Nastran or OptiStruct, without elements.
 
     Args:
         order: model, predictions and settings.
 
     Returns:
-        Content of the deck, and the losses of the format.
+        File with the deck, and the losses of the format.
     """
     (names, form, file), units = _DIALECTS[order.dialect], order.units or MM_T_S_N
     losses = tuple(table_losses(order, form))
@@ -55,7 +55,7 @@ def export(order: Order) -> Exported:
 
 
 def _property(names: Sequence[str], form: Form, units: UnitSystem, pid: int, level: AmplitudeLevel) -> Iterator[str]:
-    """Yield the lines of PBUSH, PBUSHT and the tables of one amplitude."""
+    """Yield the lines of PBUSH, PBUSHT and the tables of one amplitude, for the property number `pid`."""
     rows = [(dof, *form.in_units(table, units)) for dof, table in by_dof(level)]
     several = level[0].frequency.size > 1
     nominal, numbers = [dict[int, str](), dict[int, str]()], [dict[int, str](), dict[int, str]()]
@@ -74,7 +74,7 @@ def _property(names: Sequence[str], form: Form, units: UnitSystem, pid: int, lev
 
 
 def _by_dof(names: Sequence[str], rows: Sequence[dict[int, str]]) -> list[str]:
-    """Fields of a property after its number: a name and six values per part, one part per line."""
+    """List the fields of a property after its number: for each table, a name and values of six degrees of freedom."""
     fields: list[str] = []
     for name, row in zip(names, rows, strict=True):
         fields += [*([""] if fields else []), name, *(row.get(dof, "") for dof in range(1, 7))]

@@ -13,7 +13,7 @@ from bushfit.geometry.shape import NO_CORRECTION, Correction, radial_correction
 
 #: Radial formulas of a bushing: those of the paper, or corrected by finite elements.
 Shape = Literal["paper", "calibrated"]
-#: Tests of a specimen: strain and modulus, or displacement and force of blocks in shear.
+#: Kind of test of a specimen: strain and modulus, or displacement and force of blocks in shear.
 SpecimenKind = Literal["modulus", "shear"]
 #: Kind of strain in the files of a modulus test.
 StatedStrain = Literal["engineering", "tensor", "tension"]
@@ -25,7 +25,7 @@ _LONGEST = 100.0
 
 
 class Unit(NamedTuple):
-    """A display unit with its factor from SI."""
+    """Unit of a quantity with its factor from SI: a value in this unit is the SI value times `factor`."""
 
     name: str
     factor: float
@@ -41,12 +41,12 @@ class Display(NamedTuple):
 
 @dataclass(frozen=True)
 class Motion:
-    """A kind of motion.
+    """Kind of motion in a test (translation, rotation or strain), with the names and units of its quantities.
 
     Args:
-        words: names of displacement, force and stiffness.
+        words: names of displacement, force and stiffness, such as "rotation", "moment" and "stiffness".
         displacement_unit, force_unit, stiffness_unit: SI units.
-        display: display units.
+        display: display units of displacement, force and stiffness.
     """
 
     words: tuple[str, str, str]
@@ -70,7 +70,7 @@ ROTATION = Motion(
     stiffness_unit="N*m/rad",
     display=Display(Unit("deg", math.degrees(1.0)), Unit("N m", 1.0), Unit("N m/rad", 1.0)),
 )
-#: Of a test of the material alone, whatever the shape of the specimen.
+#: Motion of a material test, in terms of strain and stress, whatever the shape of the specimen.
 STRAINING = Motion(
     words=("strain", "stress", "modulus"),
     displacement_unit="1",
@@ -81,16 +81,16 @@ STRAINING = Motion(
 
 
 class _Tested:
-    """Common properties of directions and specimens."""
+    """Base class of the two kinds of test objects: a direction of the bushing, or a specimen of its compound."""
 
     @property
     def motion(self) -> Motion:
-        """Kind of motion of its tests."""
+        """Kind of motion in a test of this direction or specimen."""
         raise NotImplementedError
 
     @property
     def is_rotation(self) -> bool:
-        """True for rotation [rad] and moment [N m] instead of displacement [m] and force [N]."""
+        """True if tests have rotation [rad] and moment [N m] instead of displacement [m] and force [N]."""
         return self.motion is ROTATION
 
     @property
@@ -108,23 +108,23 @@ class Direction(_Tested, StrEnum):
 
     @property
     def motion(self) -> Motion:
-        """Translation or rotation."""
+        """Kind of motion of this direction: translation or rotation."""
         return _DEFINITIONS[self].motion
 
 
 @dataclass(frozen=True)
 class Bushing:
-    """A rubber tube bonded to two sleeves.
+    """Geometry of a bushing: a rubber tube bonded to two rigid sleeves.
 
     Args:
         name: label of the bushing.
-        inner_radius, outer_radius: a and b, of the sleeves [m].
-        length: L, mean length of the rubber [m].
-        shape: whether the radial formulas are the paper's, or corrected by finite elements.
+        inner_radius, outer_radius: radii a and b of the rubber tube [m].
+        length: mean length L of the rubber [m].
+        shape: "paper" for the paper's radial formulas, "calibrated" to correct them by finite elements.
 
     Raises:
-        ModelError: a radius or length that is not positive and finite, or a >= b; a calibrated shape that no finite
-            elements were computed for.
+        ModelError: a radius or length is not positive and finite, a >= b, or the shape is "calibrated" outside the
+            range of the finite elements.
 
     >>> tube = Bushing("CMP 15 961", 0.010, 0.018, 0.034)
     >>> round(tube.unit_strain(Direction.RADIAL) / tube.unit_strain(Direction.AXIAL), 2)
@@ -166,7 +166,7 @@ class Bushing:
 
     @property
     def proportions(self) -> tuple[float, float]:
-        """Inner over outer radius, and length over outer radius."""
+        """Ratios of inner to outer radius and of length to outer radius."""
         return self.inner_radius / self.outer_radius, self.length / self.outer_radius
 
     @cached_property
@@ -175,40 +175,42 @@ class Bushing:
         return radial_correction(*self.proportions)
 
     def unit_strain(self, direction: Direction) -> float:
-        """Equivalent strain per unit displacement [1/m], or per unit rotation [1/rad]."""
+        """Equivalent strain of the rubber per displacement [1/m], or per rotation [1/rad] in torsion."""
         strain = _DEFINITIONS[direction].unit_strain(self.inner_radius, self.outer_radius)
         return strain * self._corrected(direction).strain
 
     def stiffness_per_modulus(self, direction: Direction) -> float:
-        """Stiffness per unit equivalent shear modulus: [m], or [m^3/rad] of a rotation."""
+        """Stiffness of the bushing per equivalent shear modulus of the rubber: [m], or [m^3/rad] in torsion."""
         sizes = self.inner_radius, self.outer_radius, self.length
         return _DEFINITIONS[direction].stiffness_per_modulus(*sizes) * self._corrected(direction).stiffness
 
     def _corrected(self, direction: Direction) -> Correction:
-        """Correction that is applied to the formulas of a direction."""
+        """Correction factors of the formulas of a direction; 1 unless the direction is radial and calibrated."""
         calibrated = direction is Direction.RADIAL and self.shape == "calibrated"
         return self.correction if calibrated and self.correction else NO_CORRECTION
 
 
 @dataclass(frozen=True)
 class Specimen(_Tested):
-    """A body of the compound that is tested in one way only: a coupon, or a mount in plain shear.
+    """Specimen of the rubber compound that is tested instead of a bushing: a coupon, or a mount in simple shear.
 
     Args:
-        kind: "modulus" where tests give strain and modulus, "shear" where they give displacement and force of rubber
+        name: name of the specimen.
+        kind: "modulus" if tests measure strain and modulus; "shear" if they measure displacement and force of rubber
             blocks in shear.
-        strain: of a modulus test, what its files state: engineering shear strain gamma = 2 e, the tensor's shear e (it
-            is read as gamma), or the strain of a bar in tension, with Young's modulus.
-        area, thickness: of one block in shear [m^2, m].
-        elements: blocks in parallel.
+        strain: strain in the files of a modulus test: "engineering" for the shear strain gamma = 2 e, "tensor" for the
+            tensor's shear component e (the files' strains are doubled), or "tension" for the strain of a bar in
+            tension, with Young's modulus.
+        area, thickness: area [m^2] and thickness [m] of one block in shear; None for a modulus test.
+        elements: number of blocks in parallel.
 
     Raises:
-        ModelError: a shear specimen without a positive area and thickness.
+        ModelError: a shear specimen lacks a positive area or thickness, or a modulus test has one.
 
     Notes:
-        The model's equivalent strain e is the tensor's shear, with stress 2 mu e. A block in shear has e/d = 1/(2
-        thickness) and K/G = elements area/thickness. A bar of an incompressible rubber in tension has E = 3 G and, by
-        equal energy, e = sqrt(3)/2 of its strain.
+        The model's equivalent strain e is the shear component of the strain tensor, with stress 2 mu e. A block in
+        shear has e/d = 1/(2 thickness) and K/G = elements area/thickness. A bar of an incompressible rubber in tension
+        has E = 3 G and, by equal energy, e = sqrt(3)/2 times its strain.
     """
 
     name: str
@@ -234,7 +236,7 @@ class Specimen(_Tested):
 
     @property
     def motion(self) -> Motion:
-        """Displacement and force of a block, or strain and stress of the material."""
+        """Kind of motion: translation of a block in shear, or strain of the material."""
         return TRANSLATION if self.kind == "shear" else STRAINING
 
 
@@ -243,10 +245,10 @@ Place = Direction | Specimen
 
 
 def get_place(name: str, specimens: Iterable[Specimen]) -> Place:
-    """Specimen or direction of a name.
+    """Return the direction or specimen with the given name.
 
     Raises:
-        ModelError: an unknown name.
+        ModelError: no direction or specimen has this name.
 
     >>> get_place("mount", [Specimen("mount", "shear", area=1e-3, thickness=0.01)]).motion.words
     ('displacement', 'force', 'stiffness')
@@ -259,10 +261,10 @@ def get_place(name: str, specimens: Iterable[Specimen]) -> Place:
 
 
 def unit_strain(bushing: Bushing | None, place: Place) -> float:
-    """Equivalent strain per unit displacement [1/m], rotation [1/rad] or strain [1] of a direction or specimen.
+    """Equivalent strain of the rubber per displacement [1/m], rotation [1/rad] or stated strain [1].
 
     Raises:
-        ModelError: a direction without a bushing.
+        ModelError: the place is a direction, but there is no bushing.
 
     >>> unit_strain(None, Specimen("coupon", "modulus"))
     0.5
@@ -275,10 +277,10 @@ def unit_strain(bushing: Bushing | None, place: Place) -> float:
 
 
 def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
-    """Stiffness per unit equivalent shear modulus: [m], [m^3/rad] of a rotation, [1] of a modulus.
+    """Stiffness of a direction or specimen per equivalent shear modulus: [m], [m^3/rad] in torsion, [1] for a modulus.
 
     Raises:
-        ModelError: a direction without a bushing.
+        ModelError: the place is a direction, but there is no bushing.
 
     >>> stiffness_per_modulus(None, Specimen("mount", "shear", area=1e-3, thickness=0.01, elements=2))
     0.2
@@ -291,7 +293,7 @@ def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
 
 
 def strain_factor_of_files(place: Place) -> float:
-    """Displacement or strain per unit in a test file: 2 for shear strain of the tensor, 1 otherwise.
+    """Factor from the strain or displacement in a test file to bushfit's: 2 for a tensor's shear strain, 1 otherwise.
 
     >>> strain_factor_of_files(Specimen("coupon", "modulus", "tensor")), strain_factor_of_files(Direction.AXIAL)
     (2.0, 1.0)
@@ -311,7 +313,7 @@ def _present(bushing: Bushing | None, place: Direction) -> Bushing:
 
 
 class _Definition(NamedTuple):
-    """Kind of motion and formulas of a tube for a direction, as functions of its radii and length."""
+    """Kind of motion of a direction, and formulas for its unit strain and stiffness as functions of sizes [m]."""
 
     motion: Motion
     unit_strain: Callable[[float, float], float]

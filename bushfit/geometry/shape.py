@@ -1,7 +1,7 @@
 """Correction of the paper's radial formulas by finite elements, as smooth functions of the shape of a tube.
 
-The tube is bonded to rigid sleeves, its ends are free. `tests/reference/finite_tube.py` solves it and prints the
-coefficients in shape.toml: of polynomials of Chebyshev's in the two `coordinates` of a shape.
+The tube is bonded to rigid sleeves; its ends are free. `tests/reference/finite_tube.py` computes the stiffness of tubes
+and prints the content of shape.toml: coefficients of Chebyshev polynomials in the two `coordinates` of a shape.
 """
 
 import math
@@ -12,15 +12,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial.chebyshev import chebval2d
 
-#: Inner over outer radius for which the tube was solved.
+#: Range of inner over outer radius of the computed tubes.
 RADIUS_RATIO_RANGE = (0.15, 0.92)
-#: Length over outer radius for which the tube was solved.
+#: Range of length over outer radius of the computed tubes.
 SLENDERNESS_RANGE = (0.1, 60.0)
 #: Bulk modulus of a filled rubber [Pa]: that of natural rubber, within a fifth.
 BULK_MODULUS = 2e9
-#: Shear over bulk modulus of the rubber that was solved; it counts as incompressible, as in the paper.
+#: Shear over bulk modulus in the finite elements, which is practically incompressible, as in the paper.
 INCOMPRESSIBLE = 5e-5
-#: How far a coordinate may lie beyond 1: 1.5 mm over 10 mm is not quite 0.15 in binary.
+#: Tolerance of the coordinates beyond 1: 1.5 mm over 10 mm is not quite 0.15 in binary.
 _ROUNDING = 1e-8
 
 #: The coefficients of ln(stiffness over that of Eqs. 11 and 12), of ln(strain over that of Eq. 8) and of ln(softening).
@@ -31,13 +31,13 @@ _COEFFICIENTS = {
 
 
 class Correction(NamedTuple):
-    """Correction of the radial formulas for one shape by finite elements.
+    """Correction factors of the radial formulas for one shape of a tube, from finite elements.
 
     Args:
-        stiffness: radial stiffness over that of Eqs. 11 and 12.
-        strain: strain that friction sees over that of Eq. 8: at it, the friction branch gives what its integral over
-            the uneven field gives, for strain amplitudes from 0.3 to 3 eps_half.
-        softening: relative rise of the compliance per shear modulus over bulk modulus.
+        stiffness: radial stiffness over the stiffness of Eqs. 11 and 12.
+        strain: equivalent strain over the strain of Eq. 8. At this strain the friction branch equals its average over
+            the uneven strain field, for strain amplitudes from 0.3 to 3 eps_half.
+        softening: relative increase of the radial compliance, divided by shear modulus over bulk modulus.
     """
 
     stiffness: float
@@ -54,12 +54,12 @@ class Correction(NamedTuple):
         return 1.0 - 1.0 / (1.0 + self.softening * (mu / BULK_MODULUS - INCOMPRESSIBLE))
 
 
-#: No correction: the paper's formulas as they are.
+#: Factors that leave the paper's formulas unchanged.
 NO_CORRECTION = Correction(1.0, 1.0, 0.0)
 
 
 def coordinates(radius_ratio: float, slenderness: float) -> tuple[float, float]:
-    """Coordinates ln((b - a)/a) and ln(L/b) of a shape, scaled to -1 to 1 over the computed range.
+    """Coordinates ln((b - a)/a) and ln(L/b) of a shape, scaled to -1 to 1 over the range of the finite elements.
 
     Args:
         radius_ratio: a/b, inner over outer radius.
@@ -72,14 +72,14 @@ def coordinates(radius_ratio: float, slenderness: float) -> tuple[float, float]:
 
 
 def radial_correction(radius_ratio: float, slenderness: float) -> Correction | None:
-    """Correction of the radial formulas for a shape.
+    """Compute the correction factors of the radial formulas for a shape of the tube.
 
     Args:
         radius_ratio: a/b, inner over outer radius.
         slenderness: L/b, length over outer radius.
 
     Returns:
-        The correction, or None outside the computed shapes.
+        Correction factors; None outside the range of the finite elements.
 
     Notes:
         Within 1 % of finite elements in stiffness, and 3 % in strain.

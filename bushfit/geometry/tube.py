@@ -11,9 +11,9 @@ from scipy.special import ive, kve
 
 from bushfit.errors import ModelError
 
-#: Inner over outer radius for which the radial formula was checked against 60-digit arithmetic.
+#: Range of inner over outer radius in which the radial formula was checked against 60-digit arithmetic.
 RADIUS_RATIO_RANGE = (0.1, 0.97)
-#: Length over outer radius for which the radial formula was checked against 60-digit arithmetic.
+#: Range of length over outer radius in which the radial formula was checked against 60-digit arithmetic.
 SLENDERNESS_RANGE = (0.05, 100.0)
 #: Relative tolerance of the two ranges, for rounding: 1.8 mm / 18 mm is not exactly 0.1.
 _ROUNDING = 1e-9
@@ -22,7 +22,7 @@ _LARGEST_Q_OF_SERIES = 0.5
 
 
 def axial_strain(a: float, b: float) -> float:
-    """Axial strain per displacement [1/m], e/d = 1 / sqrt(2 (b^2 - a^2) ln(b/a)) (Eq. 7), of radii a < b [m].
+    """Equivalent axial strain per displacement [1/m], e/d = 1 / sqrt(2 (b^2 - a^2) ln(b/a)) (Eq. 7), radii a < b [m].
 
     >>> round(axial_strain(0.010, 0.018), 2)
     61.62
@@ -31,7 +31,7 @@ def axial_strain(a: float, b: float) -> float:
 
 
 def axial_stiffness(a: float, b: float, length: float) -> float:
-    """Axial stiffness, k/mu = 2 pi L / ln(b/a) (Eq. 10).
+    """Compute the axial stiffness per shear modulus, k/mu = 2 pi L / ln(b/a) (Eq. 10).
 
     Args:
         a, b: inner and outer radius [m].
@@ -48,11 +48,11 @@ def axial_stiffness(a: float, b: float, length: float) -> float:
 
 @lru_cache(maxsize=256)  # a fit asks for those of one bushing thousands of times
 def radial_strain(a: float, b: float) -> float:
-    """Radial strain per displacement [1/m] of radii a < b [m] (Eq. 8).
+    """Equivalent radial strain per displacement [1/m] for radii a < b [m] (Eq. 8).
 
-    Notes: e/d = sqrt((a^2 + b^2) / ((b^4 - a^4) ln(b/a) - (a^2 - b^2)^2)). With q = (b^2 - a^2)/(b^2 + a^2) this is
-    1 / sqrt((b^2 - a^2) (ln(b/a) - q)). Where ln(b/a) and q cancel, the difference is summed as q^3/3 + q^5/5 + ...,
-    because ln(b/a) = atanh(q).
+    Notes: e/d = sqrt((a^2 + b^2) / ((b^4 - a^4) ln(b/a) - (a^2 - b^2)^2)). With q = (b^2 - a^2)/(b^2 + a^2), this
+    equals 1 / sqrt((b^2 - a^2) (ln(b/a) - q)). If ln(b/a) and q cancel, the difference is summed as
+    q^3/3 + q^5/5 + ..., because ln(b/a) = atanh(q).
 
     >>> round(radial_strain(0.010, 0.018), 1)
     274.0
@@ -65,7 +65,7 @@ def radial_strain(a: float, b: float) -> float:
 
 @lru_cache(maxsize=256)
 def radial_stiffness(a: float, b: float, length: float) -> float:
-    """Radial stiffness (Eqs. 11 and 12).
+    """Compute the radial stiffness per shear modulus (Eqs. 11 and 12).
 
     Args:
         a, b: inner and outer radius [m].
@@ -75,7 +75,7 @@ def radial_stiffness(a: float, b: float, length: float) -> float:
         Stiffness per unit shear modulus [m].
 
     Raises:
-        ModelError: a shape for which the formula was not checked.
+        ModelError: the formula was not checked for this shape.
 
     Notes: k/mu = 10 pi L / (7/2 ln(b/a) - 3/2 q + D), with q = (b^2 - a^2)/(b^2 + a^2) and D of Eq. 12. Every Bessel
     product of D is written with the scaled functions, and the common factor exp(alpha (b - a)) is divided out of
@@ -110,9 +110,9 @@ def radial_stiffness(a: float, b: float, length: float) -> float:
 
 
 def torsion_strain(a: float, b: float) -> float:
-    """Torsional strain per rotation [1/rad], e/theta = a b / (b^2 - a^2), of radii a < b [m].
+    """Equivalent torsional strain per rotation [1/rad], e/theta = a b / (b^2 - a^2), for radii a < b [m].
 
-    Notes: from the energy, k theta^2/2 = V mu (2 e)^2/2.
+    Notes: follows from the energy, k theta^2/2 = V mu (2 e)^2/2.
 
     >>> round(torsion_strain(0.010, 0.018), 4)
     0.8036
@@ -121,7 +121,7 @@ def torsion_strain(a: float, b: float) -> float:
 
 
 def torsion_stiffness(a: float, b: float, length: float) -> float:
-    """Torsional stiffness, k/mu = 4 pi L a^2 b^2 / (b^2 - a^2).
+    """Compute the torsional stiffness per shear modulus, k/mu = 4 pi L a^2 b^2 / (b^2 - a^2).
 
     Args:
         a, b: inner and outer radius [m].
@@ -137,10 +137,10 @@ def torsion_stiffness(a: float, b: float, length: float) -> float:
 
 
 def _log_ratio(a: float, b: float) -> float:
-    """ln(b/a), with full precision for thin bushings too."""
+    """Compute ln(b/a) with full precision for thin bushings, too."""
     return math.log1p((b - a) / a)
 
 
 def _area(a: float, b: float) -> float:
-    """b^2 - a^2 [m^2], with full precision for thin bushings too."""
+    """Compute b^2 - a^2 [m^2] with full precision for thin bushings, too."""
     return (b - a) * (b + a)

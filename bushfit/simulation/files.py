@@ -23,7 +23,7 @@ from bushfit.simulation.measured import Simulated
 
 
 class SimulationDocument(TypedDict):
-    """A simulated campaign."""
+    """JSON document on a simulated campaign: the true model and the names of the files."""
 
     truth: Annotated[ModelFile, Field(description="True model, as in truth.json.")]
     files: Annotated[list[str], Field(description="Names of the files.")]
@@ -33,8 +33,8 @@ def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
     """Convert a simulated campaign to files.
 
     Args:
-        simulated: the campaign.
-        form: of the tables.
+        simulated: simulated campaign.
+        form: file format of the tables.
 
     Returns:
         Content by file name: tables of the tests, `campaign.toml`, and the true model in `truth.json`. Comments in
@@ -76,13 +76,13 @@ def _campaign_toml(simulated: Simulated, form: Form) -> str:
 
 
 def raw_loop_table(loop: Loop) -> pd.DataFrame:
-    """Table of a loop: time, displacement and force, or strain and stress, in display units.
+    """Convert a simulated loop to a table as from a laboratory, in display units.
 
     Args:
         loop: simulated loop.
 
     Returns:
-        Columns of time, displacement and force, or of strain and stress.
+        Columns of time [s], displacement and force, or time, strain and stress; one row per instant.
     """
     moves, resists, _ = loop.direction.motion.words
     (length, length_factor), (force, force_factor), _ = _as_stated(loop.direction)
@@ -96,15 +96,15 @@ def raw_loop_table(loop: Loop) -> pd.DataFrame:
 
 
 def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
-    """Table of a sweep: frequency, amplitude, repeat, stiffness and loss factor in display units.
+    """Convert a simulated sweep to a table as from a laboratory, in display units.
 
-    A stepped amplitude is written as reached, without its nominal level.
+    A stepped amplitude is written as reached by the rig, without its nominal level.
 
     Args:
         sweep: simulated sweep.
 
     Returns:
-        One row per point.
+        Columns of frequency [Hz], amplitude, repeat, stiffness and loss factor; one row per point.
     """
     motion = sweep.direction.motion
     amplitude, relates = "strain amplitude" if motion is STRAINING else "amplitude", motion.words[2]
@@ -125,13 +125,13 @@ def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
 
 
 def raw_resonance_table(test: ResonanceTest) -> pd.DataFrame:
-    """Table of a resonance test: frequency, accelerations of base and mass, and their phase.
+    """Convert a simulated resonance test to a table as from a laboratory.
 
     Args:
         test: simulated resonance test.
 
     Returns:
-        Columns of frequency [Hz], base and mass acceleration [m/s^2], and phase [deg].
+        Columns of frequency [Hz], base and mass acceleration [m/s^2], and phase of the mass [deg].
     """
     return pd.DataFrame(
         {
@@ -144,7 +144,7 @@ def raw_resonance_table(test: ResonanceTest) -> pd.DataFrame:
 
 
 def _as_stated(place: Place) -> Display:
-    """Units of displacement, force and stiffness in the files of a place; a tensor strain is gamma/2."""
+    """Units of displacement, force and stiffness in the files of a direction or specimen; tensor strain is gamma/2."""
     (unit, factor), force, stiffness = place.display
     ratio = strain_factor_of_files(place)
     return Display(Unit(unit, factor / ratio), force, stiffness)

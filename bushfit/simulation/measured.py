@@ -30,13 +30,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """A simulated campaign.
+    """Simulated tests of a campaign with the true model behind them.
 
     Args:
-        truth: true model.
+        truth: true model, with effects of the rig.
         plan: settings of the simulation.
-        loops, sweeps: simulated tests.
-        resonances: mass [kg] and record of each resonance test.
+        loops, sweeps: simulated tests with noise.
+        resonances: mass [kg] and record of each simulated resonance test.
         specimens: tested specimens.
     """
 
@@ -49,12 +49,12 @@ class Simulated:
 
     @property
     def result(self) -> Result:
-        """True model as a result."""
+        """True model in the form of a fitted result, without uncertainty."""
         note = "simulated: the values a rig simulation was given, not a fit"
         return Result(self.truth, warnings=(note,), specimens=self.specimens)
 
     def campaign(self) -> Campaign:
-        """Campaign with the tests; resonance tests are reduced to sweeps."""
+        """Convert the simulated tests to a campaign that can be fitted; resonance tests are reduced to sweeps."""
         reduced = tuple(reduce_resonance(test, mass).sweep for mass, test in self.resonances)
         bushing, name = self.truth.bushing, self.result.name
         loops = tuple(part for loop in self.loops for part in programme(loop))
@@ -62,21 +62,22 @@ class Simulated:
 
 
 def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
-    """Simulate the tests of a plan on the virtual rig.
+    """Simulate the tests of a campaign on the virtual rig, with noise.
 
     Args:
-        truth: model, including effects of the rig.
-        plan: settings; without tests, the tests of the paper are simulated. Equal seeds give equal data.
+        truth: true model, including effects of the rig.
+        plan: settings [simulate] with tests and noise; without tests, the tests of the paper are simulated. Equal seeds
+            give equal data.
     """
     return measure(undisturbed(truth, plan), plan)
 
 
 def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
-    """Add the noise and repeats of a plan to undisturbed tests.
+    """Add noise and repeats to tests that were simulated without errors.
 
     Args:
-        clean: tests without noise.
-        plan: settings with noise, repeats and seed.
+        clean: simulated tests without noise.
+        plan: settings [simulate] with noise, repeats and seed.
 
     Returns:
         The simulated campaign.
@@ -109,7 +110,7 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
 
 
 def _names(kind: str, tests: Sequence[SimulatedTest]) -> list[str]:
-    """Names of the tests and their files: kind and direction or specimen, with a number if names are equal."""
+    """Name the tests and their files by kind and direction or specimen, with a number to distinguish equal names."""
     stems = [f"{kind}_{folder_name(str(test.direction))}" for test in tests]
     return [stem if stems.count(stem) == 1 else f"{stem}_{place}" for place, stem in enumerate(stems, start=1)]
 
@@ -123,11 +124,12 @@ def _sweep(
     random: Generator,
     under: Circumstances,
 ) -> Sweep:
-    """All repeats of a sweep; for a stepped amplitude, with the levels that a reader determines.
+    """Add noise to all repeats of a sweep, whose exact complex stiffness is `clean`, (levels, steps).
 
     Notes:
-        Amplitudes that are not reached differ from those requested by a lognormal ratio; half of its variance is common
-        to each frequency. All repeats of a level share a gain and a phase error.
+        If the rig does not reach its amplitudes, amplitudes reached and requested have a lognormal ratio; half of its
+        variance is common to all points at a frequency. All repeats of a level share a gain and a phase error. The
+        levels of a stepped amplitude are computed from the amplitudes reached, as the reader of a file does.
     """
     repeats = test.repeats or plan.repeats
     shape = (len(test.levels), repeats, len(test.steps))
@@ -163,7 +165,7 @@ def _sweep(
 
 
 def _filtered_noise(rows: int, plan: SimulateSettings, random: Generator) -> Array:
-    """Stationary noise of unit variance, (rows,), as a first-order autoregressive process."""
+    """Draw stationary noise of unit variance, (rows,), from a first-order autoregressive process."""
     noise = random.standard_normal(rows)
     if not plan.force_correlation:
         return noise
@@ -174,7 +176,7 @@ def _filtered_noise(rows: int, plan: SimulateSettings, random: Generator) -> Arr
 
 
 def _with_noise(clean: Array, plan: SimulateSettings, random: Generator) -> Array:
-    """Runs with a gain and a phase error each, and with the noise of points, complex (runs, steps)."""
+    """Add a gain and a phase error to each run, and noise to each point, of a complex stiffness, (runs, steps)."""
     runs = (clean.shape[0], 1)
     gain = plan.gain_error * random.standard_normal(runs)
     phase = plan.phase_error * random.standard_normal(runs)

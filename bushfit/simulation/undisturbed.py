@@ -1,7 +1,7 @@
 """Tests of a known model on a rig without errors: loops, sweeps and resonance tests.
 
-The virtual rig computes them in the time domain (Eqs. 3 and 5). The closed form of the fits only converts its results
-to nearby amplitudes (see `near`).
+The virtual rig computes the tests in the time domain (Eqs. 3 and 5). The closed form of the fits is used only to
+convert the results to nearby amplitudes (see `near`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ PAPER_LOOPS = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=3),)
 PAPER_FREQUENCIES = tuple(float(f) for f in range(5, 156, 10))
 #: Amplitudes of the paper's sweeps and tables [m].
 PAPER_AMPLITUDES = (1e-4, 2e-4, 5e-4)
-#: The paper's sweeps, in two directions.
+#: Sweeps of the paper, in two directions.
 PAPER_SWEEPS = tuple(
     SimulatedSweep(direction, PAPER_AMPLITUDES, PAPER_FREQUENCIES) for direction in (Direction.AXIAL, Direction.RADIAL)
 )
@@ -36,23 +36,23 @@ PAPER_SWEEPS = tuple(
 _ROWS_PER_CYCLE, _STEPS_PER_ROW = 1000, 2
 #: Maximum number of time steps of a programme; they take seconds and a gigabyte.
 _MOST_STEPS = 10_000_000
-#: Least and largest number of cycles before a loop is recorded in its settled state.
+#: Smallest and largest number of cycles before a loop is recorded in its steady state.
 _LEAST_RUN_IN, _MOST_RUN_IN = 40, 300
-#: Cycles of a preceding motion that swells and decays, and its largest strain amplitude over eps_half. It removes the
-#: mean force from the start where friction would keep it longer than the largest run-in. Not used if parameters follow
-#: the amplitude, which is that of the whole motion.
+#: Cycles of a preceding motion whose amplitude grows and decays, and its largest strain amplitude over eps_half. The
+#: motion removes the mean force from the start if friction would keep the force longer than the largest run-in. It is
+#: not used if parameters depend on the amplitude, which is the amplitude of the whole motion.
 _SWELL_CYCLES, _SWELL_TO = 100, 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Undisturbed:
-    """Tests of a model on a rig without errors.
+    """Tests of a known model simulated on a rig without noise and random errors.
 
     Args:
-        truth: the model.
-        loops: planned loops with their records.
-        sweeps: planned sweeps with their complex stiffness [N/m or N m/rad], (levels, steps).
-        resonances: planned resonance tests with their complex transmissibility, (frequencies,).
+        truth: true model, including effects of the rig.
+        loops: settings of each loop, with its record of time, displacement and force.
+        sweeps: settings of each sweep, with its complex stiffness [N/m or N m/rad], (levels, steps).
+        resonances: settings of each resonance test, with its complex transmissibility [-], (frequencies,).
     """
 
     truth: Model
@@ -62,19 +62,20 @@ class Undisturbed:
 
 
 def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = rig.STEPS_PER_CYCLE) -> Undisturbed:
-    """Simulate the tests of a plan without errors; this is the slow part of a simulation.
+    """Simulate the tests of a campaign without noise; this is the slow part of a simulation.
 
     Args:
-        truth: model, including effects of the rig.
-        plan: settings with the tests; without tests, those of the paper.
-        steps_per_cycle: time steps per cycle of the sweeps; the error of the rig is inversely proportional.
+        truth: true model, including effects of the rig.
+        plan: settings [simulate] with the tests; without tests, the tests of the paper are simulated.
+        steps_per_cycle: time steps per cycle of the sweeps; the error of the time integration is inversely
+            proportional.
 
     Returns:
-        The tests with their results.
+        The tests with their exact results.
 
     Raises:
-        CampaignError: no tests, and no bushing for the tests of the paper.
-        ModelError: a direction without a bushing, or an effect without a law in time.
+        CampaignError: there are no tests, and no bushing for the tests of the paper.
+        ModelError: a test is in a direction but there is no bushing, or an effect has no law in the time domain.
     """
     loops, sweeps, resonances = plan.loops, plan.sweeps, plan.resonances
     if not (loops or sweeps or resonances):
@@ -98,7 +99,7 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
 
 
 def _clean_loop(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.Record:
-    """Record of a loop, or of a programme from rest, without noise, with one row per `_STEPS_PER_ROW` time steps."""
+    """Simulate the record of a steady loop, or of a programme from rest, without noise, 1000 rows per cycle."""
     if len(test.parts) > 1:
         record = _clean_programme(truth, test, under)
     else:
@@ -122,10 +123,10 @@ def _clean_loop(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.
 
 
 def _run_in(truth: Model, place: Place, amplitude: float) -> tuple[int, tuple[int, float]]:
-    """Number of cycles before the record, and cycles and amplitude factor of a swelling motion before these.
+    """Number of cycles before the record, and cycles and amplitude factor of a growing and decaying motion before them.
 
-    The mean friction stress from the start must decay to a thousandth. At a strain of a tenth of eps_half a cycle keeps
-    95 % of it, at a hundredth 99.96 %.
+    The mean friction stress from the start must decay to a thousandth. One cycle at a strain of a tenth of eps_half
+    keeps 95 % of this stress, at a hundredth 99.96 %.
     """
     if truth.settles:
         return 0, (0, 1.0)
@@ -140,7 +141,7 @@ def _run_in(truth: Model, place: Place, amplitude: float) -> tuple[int, tuple[in
 
 
 def _clean_programme(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.Record:
-    """Record of a programme from rest without noise, in the circumstances of its start."""
+    """Simulate the record of a loop programme from rest without noise, in the circumstances of its start."""
     fastest = max(frequency for frequency, _ in test.parts)
     step = 1.0 / (fastest * _ROWS_PER_CYCLE * _STEPS_PER_ROW)
     duration = sum(test.cycles / frequency + test.pause for frequency, _ in test.parts)
@@ -162,7 +163,7 @@ def _clean_programme(truth: Model, test: SimulatedLoop, under: Circumstances) ->
 
 
 def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Array:
-    """Complex stiffness of a sweep, (levels, steps)."""
+    """Simulate the complex stiffness of a sweep without noise [N/m or N m/rad], (levels, steps)."""
     points = (values.ravel() for values in test.points)
     under = Circumstances(test.temperature)
     stiffness = rig.dynamic_stiffness(truth, test.direction, *points, steps_per_cycle=steps_per_cycle, under=under)
@@ -170,11 +171,11 @@ def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Ar
 
 
 def _clean_resonance(truth: Model, test: SimulatedResonance, steps_per_cycle: int) -> Array:
-    """Complex transmissibility of a resonance test, (frequencies,).
+    """Simulate the complex transmissibility of a resonance test without noise [-], (frequencies,).
 
     Notes:
-        The closed form gives approximate amplitudes, for which the rig computes the stiffness. Effects of the
-        instrument are left out: they belong to a test machine, not to a shaker.
+        The closed form provides approximate amplitudes, for which the virtual rig computes the stiffness. Effects of
+        the instrument are excluded: they belong to a test machine, not to a shaker.
     """
     mount, frequency = truth.without(Level.INSTRUMENT), np.array(test.frequencies)
     base = test.base_acceleration / (2.0 * np.pi * frequency) ** 2
@@ -196,23 +197,23 @@ def near(
     under: Circumstances = UNKNOWN,
     target: Circumstances = UNKNOWN,
 ) -> Callable[[Array], Array]:
-    """Extrapolate the stiffness of the rig to nearby amplitudes and other circumstances.
+    """Extrapolate a stiffness computed by the virtual rig to nearby amplitudes and other circumstances.
 
     Args:
-        truth: the model.
+        truth: true model.
         place: direction or specimen.
-        frequency: [Hz], (n,).
-        amplitude: at which the stiffness is known [m or rad], (n,).
-        stiffness: complex stiffness of the rig [N/m or N m/rad], (n,).
-        under: circumstances of the known stiffness.
+        frequency: frequency of each point [Hz], (n,).
+        amplitude: zero-to-peak amplitude at which the stiffness is known [m, rad or 1], (n,).
+        stiffness: known complex stiffness [N/m or N m/rad], (n,).
+        under: circumstances (temperature and history) of the known stiffness.
         target: circumstances of the result.
 
     Returns:
         Function of the amplitude, (n,), that returns the complex stiffness, (n,).
 
     Notes:
-        The ratio of rig to closed form, within 0.1 % of 1, is kept. The error is below 1e-5 at an amplitude 2 % away,
-        and below 4e-5 at 10 %.
+        The ratio of the rig's stiffness to the closed form, within 0.1 % of 1, is constant. The error is below 1e-5 at
+        an amplitude 2 % away, and below 4e-5 at 10 %.
     """
     ratio = stiffness / truth.stiffness(place, frequency, amplitude, under=under)
     return lambda reached: ratio * truth.stiffness(place, frequency, reached, under=target)
