@@ -9,9 +9,9 @@ from scipy.special import chdtri, stdtr, stdtrit
 from bushfit.effects.contract import Array
 from bushfit.model.covariance import Z95
 
-#: Fewest parts of which a deviation is judged.
+#: Minimum number of parts from which outliers are determined.
 FEWEST = 5
-#: Probability that any part of a batch of like parts is named.
+#: Probability that any part of a batch of equal parts is reported as an outlier.
 _LEVEL = 0.05
 
 
@@ -19,11 +19,11 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
     """Find the parts that differ from the others beyond chance, with the quantities in which they differ.
 
     Args:
-        quantities: values and standard errors by name, (n,) each; NaN where not known.
+        quantities: values and standard errors of the n parts by name of the quantity, (n,) each; NaN where not known.
 
     Returns:
-        By name, (n,) each: deviation from the mean of the parts that do not differ, in their standard deviations, NaN
-        where not known; and whether the part differs.
+        Two mappings by name of the quantity, (n,) each: deviation from the mean of the parts that are no outliers, in
+        their standard deviations, NaN where not known; and True for the outliers.
 
     Notes:
         Generalised extreme studentised deviate procedure (Rosner, Technometrics 25 (1983) 165) for up to a fifth of
@@ -53,7 +53,7 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
 
 
 def _studentised(values: Array, errors: Array, usual: Array) -> Array:
-    """Deviation of each value from the mean of the usual ones without it, in their standard deviations, (n,)."""
+    """Deviation of each value from the mean of the other usual values, in their standard deviations, (n,)."""
     count, other_count = usual.sum(), usual.sum() - usual  # (n,): how many others each value is held against
     if count < FEWEST - 1:
         return np.full(values.size, np.nan)
@@ -71,7 +71,10 @@ def _studentised(values: Array, errors: Array, usual: Array) -> Array:
 
 
 def smallest_deviation(parts: int, quantities: int) -> float | None:
-    """Smallest deviation by which one of so many parts is named, in standard deviations; None of fewer than five."""
+    """Smallest deviation, in standard deviations, that makes a part an outlier; None for fewer than five parts.
+
+    The arguments are the numbers of parts and of quantities in the batch.
+    """
     if parts < FEWEST or quantities < 1:
         return None
     return float(stdtrit(parts - 2.0, 1.0 - _LEVEL / (2.0 * parts * quantities)))
@@ -83,11 +86,11 @@ def capability(
     """Compute Cp and Cpk with their 95 % intervals.
 
     Args:
-        values: of the parts, (n,), without NaN.
-        low, high: limits; either may be infinite.
+        values: values of one quantity of the parts, (n,), without NaN.
+        low, high: lower and upper limit in the unit of the values; either may be infinite.
 
     Returns:
-        Cp and Cpk, each as value, low and high; None where limits or scatter are missing.
+        Cp and Cpk, each as value and low and high end of the interval; None if a limit or scatter is missing.
 
     Notes:
         ISO 22514-2 for normal scatter, from the standard deviation of all parts, so that a process that drifts shows

@@ -58,7 +58,7 @@ class Estimate:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class RowFile:
-    """Results of one part, and the hashes by which a later run recognises that they still hold."""
+    """Results of one part, and the hashes by which a later run recognises that the results are still valid."""
 
     schema: Annotated[Literal["bushfit/row/3"], Field(description="Layout of the file.")] = ROW_SCHEMA
     status: Annotated[Literal["done", "failed"], Field(description="A failed row has an error and no results.")]

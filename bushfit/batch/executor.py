@@ -41,13 +41,13 @@ _ENVIRONMENT = {"PYTHONSAFEPATH": "1", "MALLOC_TRIM_THRESHOLD_": "134217728", "M
 
 @dataclass(frozen=True)
 class Workers:
-    """Source of executors.
+    """Worker processes of a batch, on this machine or on a cluster.
 
     Args:
-        place: where the workers are, for messages.
-        open: makes an executor; called again if the last one is broken.
-        count: number of workers; raises a BatchError if the connection to them is lost.
-        close: called at the end.
+        place: location of the workers for messages, such as "this machine" or the address of the cluster.
+        open: function that starts an executor; called again if the last executor is broken.
+        count: function that returns the number of workers; raises a BatchError if the connection to them is lost.
+        close: function that is called at the end of the batch.
     """
 
     place: str
@@ -57,7 +57,10 @@ class Workers:
 
 
 def local_workers(processes: int) -> Workers:
-    """Processes of this machine; a server that forks them starts at once.
+    """Make workers of processes on this machine, and start the server that forks the processes.
+
+    Args:
+        processes: number of worker processes.
 
     Returns:
         Workers whose executor is a process pool.
@@ -75,7 +78,7 @@ def local_workers(processes: int) -> Workers:
 
 
 def _start_worker() -> None:
-    """Leave Ctrl-C to the parent, and end with it."""
+    """Initialise a worker process: it ignores Ctrl-C, which the parent handles, and ends when the parent ends."""
 
     def follow(parent: Any) -> None:
         parent.join()
@@ -87,10 +90,10 @@ def _start_worker() -> None:
 
 
 def dask_workers(address: str) -> Workers:
-    """Workers of a Dask cluster, which see the same files; they may come and go.
+    """Connect to the workers of a Dask cluster, which must see the same files; workers may join and leave.
 
     Args:
-        address: of the scheduler, such as tcp://10.0.0.5:8786.
+        address: address of the Dask scheduler, such as tcp://10.0.0.5:8786.
 
     Returns:
         Workers whose executor sends tasks to the cluster.
@@ -128,7 +131,7 @@ def dask_workers(address: str) -> Workers:
 
 
 async def _ask_kind(address: str) -> str:
-    """Kind of Dask server that answers at an address."""
+    """Kind of the Dask server at an address, such as "Scheduler"."""
     from distributed import rpc
 
     async with rpc(address) as server:
@@ -142,17 +145,17 @@ def run_rows(
     workers: Workers,
     warn: Callable[[str], object] = lambda _: None,
 ) -> Iterator[tuple[int, Outcome]]:
-    """Do work(row) for all rows in any order.
+    """Call `work(row)` for all rows on the workers, in any order.
 
     Args:
-        rows: arguments of `work`.
-        work: must bear to be called again with the same row.
-        give_up: result of a row that the workers do not survive, from a sentence on that.
-        workers: of this machine or of a cluster.
-        warn: called with a sentence when no worker is left.
+        rows: rows of the batch.
+        work: function that evaluates a row; it may be called several times with the same row.
+        give_up: function that makes the outcome of a row whose worker dies repeatedly, from a sentence with the reason.
+        workers: workers of this machine or of a cluster.
+        warn: function that is called with a sentence when no worker is available.
 
     Returns:
-        Iterator over the number and result of each row as it is finished.
+        Iterator over the finished rows: index of the row and its outcome, in the order in which they finish.
 
     Raises:
         BatchError: no worker starts, or the cluster is lost.
@@ -204,7 +207,7 @@ def run_rows(
 
 
 def _check_alive(executor: Executor) -> None:
-    """Raise a BatchError if workers fail without a row, too."""
+    """Raise a BatchError if the workers fail even on a trivial task."""
     try:
         executor.submit(os.getpid).result(NO_WORKER_SECONDS)
     except (OSError, RuntimeError, CancelledError) as error:

@@ -8,7 +8,7 @@ def junit_report(result: BatchResult) -> bytes:
     """Write a JUnit report for continuous integration.
 
     Args:
-        result: of the batch.
+        result: results of all parts of the batch.
 
     Returns:
         XML with an error for a row that failed, and a failure for a limit that is missed or not judged.

@@ -57,11 +57,11 @@ class Bounds:
     """Limits of one quantity.
 
     Args:
-        min, max: least and largest allowed value.
-        nominal: the middle of the allowed values.
-        tolerance: largest allowed deviation from nominal, as a share of it.
-        sigma: largest allowed deviation from the median of the batch, in its standard deviations.
-        at_least: number of parts that the batch must have for sigma to be judged.
+        min, max: smallest and largest allowed value.
+        nominal: middle of the allowed range; needs `tolerance`.
+        tolerance: largest allowed deviation from `nominal`, relative to `nominal`.
+        sigma: largest allowed deviation from the median of the batch, in standard deviations of the batch.
+        at_least: minimum number of parts in the batch for `sigma` to be judged.
     """
 
     min: ParameterValue | None = None
@@ -81,7 +81,7 @@ class Bounds:
 
     @property
     def fixed(self) -> tuple[float, float]:
-        """Lowest and highest allowed value apart from `sigma`; infinite without a limit."""
+        """Lowest and highest allowed value from min, max, nominal and tolerance; infinite without a limit."""
         low, high = -math.inf if self.min is None else self.min, math.inf if self.max is None else self.max
         if self.nominal is not None and self.tolerance is not None:
             half = abs(self.nominal) * self.tolerance
@@ -107,10 +107,10 @@ Stiffness = Annotated[
 
 @dataclass(frozen=True, kw_only=True)
 class AtPoint:
-    """Limits at an operating point; the last base of a table, so that the point is read before the values with units.
+    """Operating point of limits; the last base class, so that pydantic reads the point before the values with units.
 
     Args:
-        at: the operating point.
+        at: operating point, such as "axial 25 Hz 0.1 mm".
     """
 
     at: PointText
@@ -118,7 +118,7 @@ class AtPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class StiffnessBounds(Bounds, AtPoint):
-    """[[stiffness]]: limits of |K| at a point."""
+    """[[stiffness]]: limits of the dynamic stiffness |K| at an operating point."""
 
     min: Stiffness | None = None
     max: Stiffness | None = None
@@ -127,7 +127,7 @@ class StiffnessBounds(Bounds, AtPoint):
 
 @dataclass(frozen=True, kw_only=True)
 class LossFactorBounds(Bounds, AtPoint):
-    """[[loss_factor]]: limits of the loss factor at a point."""
+    """[[loss_factor]]: limits of the loss factor at an operating point."""
 
     min: Ratio | None = None
     max: Ratio | None = None
@@ -139,11 +139,11 @@ class Limits:
     """A limits file.
 
     Args:
-        parameters: by name, in the file's units of a campaign's [fit].
-        stiffness, loss_factor: at operating points.
-        nrmse, reduced_chi_square: largest allowed.
-        verdicts: of `diagnose` that are allowed; empty for all.
-        guard: if true, a conditional pass is a miss.
+        parameters: limits of parameters by name, with units as in [fit] of a campaign.
+        stiffness, loss_factor: limits at operating points.
+        nrmse, reduced_chi_square: largest allowed value of this measure of the fit.
+        verdicts: allowed verdicts of `diagnose`; empty to allow all.
+        guard: if true, a part with a conditional pass misses its limits.
     """
 
     __pydantic_config__ = ConfigDict(extra="forbid")
@@ -185,15 +185,14 @@ def read_limits(path: Path, rows: Sequence[Row]) -> Limits:
     """Read a limits file.
 
     Args:
-        path: of the file.
-        rows: of the batch that is judged by it.
+        path: TOML file with the limits.
+        rows: rows of the batch that is judged by the limits.
 
     Returns:
-        The limits.
+        The limits in SI.
 
     Raises:
-        CampaignError: keys or values that are not understood, no limit at all, or `verdicts` and a row without diagnose
-            or run.
+        CampaignError: invalid keys or values, no limit at all, or `verdicts` with a row that does not run diagnose.
     """
     limits = read_toml(path, Limits, description="a limits file")
     if not (limits.bounds or limits.verdicts):
@@ -207,14 +206,14 @@ def read_limits(path: Path, rows: Sequence[Row]) -> Limits:
 
 
 def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[str, tuple[float, float]], list[str]]:
-    """Resolve limits that are relative to the batch.
+    """Compute the allowed range of each quantity, including limits relative to the batch (`sigma`).
 
     Args:
         limits: the limits file.
-        values: of each quantity over the batch, (n,), NaN where a part has none.
+        values: values of the n parts by name of the quantity [SI], (n,), NaN for parts without a value.
 
     Returns:
-        Lowest and highest allowed value of each quantity, and notes on limits that the batch cannot be judged by.
+        Lowest and highest allowed value by name of the quantity [SI], and notes on limits that cannot be judged.
     """
     allowed, notes = dict[str, tuple[float, float]](), list[str]()
     for name, bounds in limits.bounds.items():
@@ -252,11 +251,11 @@ def judge_part(
         record: results of the part.
         limits: the limits file.
         allowed: lowest and highest allowed value by the name of the quantity, as the whole batch resolves them.
-        quantities: how each is written.
+        quantities: quantities by name, with the units for the sentences.
 
     Returns:
-        The worst result; and sentences by quantity on the limits that the part misses, and on those that it passes
-        conditionally or that were not judged.
+        The worst result of the part; sentences by quantity on the limits that it misses; and sentences by quantity on
+        the limits that it passes conditionally or that were not judged.
     """
     poor, outcomes = describe_poor_fit(record, limits), dict[str, tuple[LimitResult, str]]()
     for name in dict.fromkeys((*allowed, *record.at_bound)):
@@ -288,7 +287,7 @@ def judge_value(estimate: Estimate, low: float, high: float) -> LimitResult:
     """Compare a value and its 95 % interval, if known, with limits.
 
     Args:
-        estimate: value and interval.
+        estimate: value with its 95 % interval.
         low, high: lowest and highest allowed value in the unit of the estimate; either may be infinite.
 
     Returns:
@@ -303,17 +302,17 @@ def judge_value(estimate: Estimate, low: float, high: float) -> LimitResult:
 def limit_sentence(
     quantity: PartQuantity, estimate: Estimate, allowed: tuple[float, float], result: LimitResult, bound: str | None
 ) -> str:
-    """Write a value, its interval and the nearer limit: "alpha 0.26 (0.25 to 0.27), limit 0.252: conditional fail".
+    """Format a value, its interval and the nearer limit: "alpha 0.26 (0.25 to 0.27), limit 0.252: conditional fail".
 
     Args:
-        quantity: name and unit.
-        estimate: of the quantity [SI].
+        quantity: name and unit of the quantity.
+        estimate: value and interval of the quantity [SI].
         allowed: lowest and highest allowed value [SI].
-        result: of the comparison.
-        bound: end of its range at which the fit has the parameter; None if at neither.
+        result: result of the comparison with the limits.
+        bound: bound of the fit, "min" or "max", that the parameter reached; None if it reached neither.
 
     Returns:
-        The sentence, in the unit in which engineers write the value.
+        The sentence, in the display unit of the value.
     """
     displayed = quantity.displayed(estimate.value)
     ends = [number(end * displayed.factor, 4) for end in (estimate.low, estimate.high) if end is not None]

@@ -59,13 +59,13 @@ Candidates = Annotated[tuple[Annotated[str, converter(partial(_check_name, get_c
 
 @dataclass(frozen=True, kw_only=True)
 class RowSettings:
-    """Settings of a row; None where the row leaves a setting to the manifest, and the manifest to the default.
+    """Settings of a row or of a whole manifest; None if not stated: the manifest or the default then applies.
 
     Args:
-        commands: run alone, or any of fit, diagnose, predict [fit].
-        directions, effects: of fit, as `bushfit fit --direction --effect`.
-        adopt, without, max_effects, tolerance: of diagnose, as its options.
-        model: a model file to predict from, or for diagnose to start from.
+        commands: run alone, or any of fit, diagnose and predict; default fit.
+        directions, effects: settings of fit, as `bushfit fit --direction --effect`.
+        adopt, without, max_effects, tolerance: settings of diagnose, as its options.
+        model: model file from which predict predicts, or from which diagnose starts.
     """
 
     commands: Annotated[tuple[Command, ...], Words, Field(min_length=1)] | None = None
@@ -78,14 +78,14 @@ class RowSettings:
     model: Text | None = None
 
     def with_defaults(self, defaults: RowSettings) -> RowSettings:
-        """These settings, with those of `defaults` where they are None, and without the other keys of their table."""
+        """Copy of these settings in which None is replaced by the value in `defaults`; other keys are dropped."""
         names = [setting.name for setting in fields(RowSettings)]
         own_settings = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         return RowSettings(**{**{name: getattr(defaults, name) for name in names}, **own_settings})
 
     @property
     def diagnoses(self) -> bool:
-        """True if the row ends in a verdict of diagnose."""
+        """True if the commands of the row include a diagnosis."""
         return not {"run", "diagnose"}.isdisjoint(self.commands or ())
 
 
@@ -94,9 +94,9 @@ class Entry(RowSettings):
     """[[bushings]], or a line of a CSV manifest.
 
     Args:
-        campaign: a campaign file or a pattern of such, relative to the manifest.
-        name: of the part; that of the file unless stated.
-        subgroup: parts made together, such as a shift or a cavity: a column of the table.
+        campaign: campaign file, or a pattern of campaign files, relative to the manifest.
+        name: name of the part; default the name of the file.
+        subgroup: group of parts made together, such as a shift or a cavity; a column of the table.
     """
 
     campaign: Text
@@ -106,11 +106,11 @@ class Entry(RowSettings):
 
 @dataclass(frozen=True, kw_only=True)
 class ManifestFile(RowSettings):
-    """A TOML manifest; its settings hold for rows that state none of their own.
+    """A TOML manifest; its settings apply to rows that do not state their own.
 
     Args:
-        bushings: the rows.
-        at: operating points at which stiffness and loss factor are wanted.
+        bushings: rows of the batch.
+        at: operating points at which stiffness and loss factor are tabulated.
     """
 
     __pydantic_config__ = ConfigDict(extra="forbid")
@@ -124,12 +124,12 @@ class Row:
     """One part of a batch.
 
     Args:
-        name: of the part.
+        name: name of the part.
         folder: name of the folder of its results.
-        listed: its campaign as the manifest has it.
-        campaign: absolute path of the campaign.
-        settings: complete, with all defaults.
-        subgroup: parts it was made together with.
+        listed: campaign file as written in the manifest.
+        campaign: absolute path of the campaign file.
+        settings: complete settings, with all defaults.
+        subgroup: group of parts made together; None if not stated.
     """
 
     name: str
@@ -150,18 +150,18 @@ class Manifest:
 
 
 def read_manifest(source: str, settings: RowSettings, *more: str) -> Manifest:
-    """Read a manifest, or make one of a pattern or of campaigns listed one by one.
+    """Read a manifest, or make one from a pattern or from a list of campaign files.
 
     Args:
-        source: a TOML or CSV file, or a pattern such as "bushings/*/campaign.toml".
-        settings: of the command line; they replace those at the top of the manifest.
-        more: further campaign files, where a shell has expanded a pattern.
+        source: TOML or CSV manifest, or a pattern such as "bushings/*/campaign.toml".
+        settings: settings of the command line; they replace the settings at the top of the manifest.
+        more: further campaign files, if the shell has expanded a pattern.
 
     Returns:
-        Rows with complete settings, in order.
+        Manifest whose rows have complete settings, in order.
 
     Raises:
-        CampaignError: no such file, no match, rows that would be lost, or keys and values that are not understood.
+        CampaignError: a missing file, a pattern without a match, no rows, or invalid keys or values.
     """
     path, points = Path(source), tuple[Point, ...]()
     title, base, entries = path.stem, path.parent, list[Entry]()
@@ -194,11 +194,10 @@ def read_csv_entries(path: Path) -> list[Entry]:
     """Read the entries of a CSV manifest.
 
     Returns:
-        One entry for each line below the header, which names the keys.
+        One entry for each line below the header; the header names the keys.
 
     Raises:
-        CampaignError: columns that are unknown or repeated, a quote that swallows the lines after it, or values that
-            are not understood.
+        CampaignError: unknown or repeated columns, a quote that is not closed, or invalid values.
     """
     text = read_utf8(path, CampaignError).decode("utf-8-sig")
     delimiter = max(",;\t", key=text.lstrip().partition("\n")[0].count)
@@ -238,16 +237,16 @@ def read_csv_entries(path: Path) -> list[Entry]:
 
 
 def expand_pattern(entry: Entry, base: Path, source: str) -> list[Entry]:
-    """Replace an entry whose campaign is a pattern by one for each file that matches.
+    """Replace an entry whose campaign is a pattern by one entry for each matching file.
 
     Args:
-        entry: of the manifest.
-        base: folder from which its campaign is counted.
-        source: manifest, for errors.
+        entry: entry of the manifest.
+        base: folder that the campaign path is relative to.
+        source: manifest, for error messages.
 
     Returns:
-        Entries in the order of the files' names, those of folders that cannot be read last; the entry itself if its
-        campaign is a file.
+        Entries sorted by file name, then entries for folders that cannot be read; the entry itself if its campaign is
+        a file.
 
     Raises:
         CampaignError: no file matches, or a pattern has a name.
@@ -268,16 +267,17 @@ def expand_pattern(entry: Entry, base: Path, source: str) -> list[Entry]:
 
 
 def make_rows(entries: Sequence[Entry], base: Path, settings: RowSettings, source: str) -> list[Row]:
-    """Give each entry a name, a folder and complete settings.
+    """Make the rows of a batch: give each entry a name, a folder and complete settings.
 
-    A part is called as the entry says, else as its file; files of the same name, as their folders. A folder is the name
-    made safe for every system, and numbered if another row has the same, upper and lower case being one.
+    The name of a part is the name in the entry, else the stem of its file, or the name of the file's folder if several
+    files have one stem. The folder is the name with characters that are valid on every system, and with a number if
+    another row has the same folder regardless of case.
 
     Args:
-        entries: of the manifest, without patterns.
-        base: folder from which campaigns are counted.
-        settings: for entries that state none.
-        source: manifest, for errors.
+        entries: entries of the manifest, without patterns.
+        base: folder that campaign paths are relative to.
+        settings: settings for entries that do not state their own.
+        source: manifest, for error messages.
 
     Returns:
         Rows in the order of the entries; rows of equal settings share one object.
@@ -311,12 +311,12 @@ def make_rows(entries: Sequence[Entry], base: Path, settings: RowSettings, sourc
 
 
 def check_used(settings: RowSettings, rows: Collection[tuple[Command, ...]], source: str) -> None:
-    """Check that a command uses each setting.
+    """Check that at least one command of the rows uses each stated setting.
 
     Args:
-        settings: stated for all rows.
-        rows: commands of the rows.
-        source: manifest, for errors.
+        settings: settings that apply to all these rows.
+        rows: commands of each row.
+        source: manifest, for error messages.
 
     Raises:
         CampaignError: a setting that no command of these rows uses.
@@ -341,13 +341,13 @@ def complete_settings(row_settings: RowSettings, defaults: RowSettings, base: Pa
     """Fill in every default of a row's settings, and check them against each other.
 
     Args:
-        row_settings: settings of the row.
-        defaults: of the manifest and the command line.
-        base: folder from which the model is counted.
-        source: manifest, for errors.
+        row_settings: settings that the row states.
+        defaults: settings of the manifest and the command line.
+        base: folder that the path of the model file is relative to.
+        source: manifest, for error messages.
 
     Returns:
-        Complete settings.
+        Complete settings, with the absolute path of the model file.
 
     Raises:
         CampaignError: settings that contradict each other, or that no command of the row uses.

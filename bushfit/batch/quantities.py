@@ -19,21 +19,21 @@ from bushfit.validation import converter
 
 #: A direction or a specimen, a frequency and an amplitude, each number with its unit.
 _POINT = re.compile(r"\s*(\S.*?)[\s,]+([-+\d.eE]+\s*[A-Za-z]+)[\s,]+([-+\d.eE]+\s*[^\d\s.]+)\s*")
-#: Relative distance in frequency and in amplitude within which a measured point is the point asked for. Chosen: rigs
+#: Relative distance in frequency and in amplitude within which a measured point matches a requested one. Chosen: rigs
 #: miss their set points by less, and the stiffness of filled rubber changes by less than 1 % over it.
 _SAME_FREQUENCY, _SAME_AMPLITUDE = 0.02, 0.05
-#: Most points of a measured curve.
+#: Maximum number of points of a measured curve.
 _CURVE_POINTS = 12
 
 
 @dataclass(frozen=True)
 class Point:
-    """An operating point in a direction, or at a specimen that each campaign has to have.
+    """An operating point of a bushing or specimen: direction or specimen, frequency and amplitude.
 
     Args:
-        place: direction, or name of the specimen.
-        frequency: [Hz].
-        amplitude: zero-to-peak [m or rad], or strain.
+        place: direction of the bushing, or name of a specimen, which every campaign of the batch must contain.
+        frequency: frequency [Hz].
+        amplitude: zero-to-peak amplitude [m or rad], or strain amplitude [1].
         unit: SI unit of the amplitude.
     """
 
@@ -44,7 +44,7 @@ class Point:
 
     @property
     def motion(self) -> Motion:
-        """Translation, rotation or straining, by the unit of the amplitude."""
+        """Kind of motion (translation, rotation or straining) that has the unit of the amplitude."""
         return next(motion for motion in (TRANSLATION, ROTATION, STRAINING) if motion.displacement_unit == self.unit)
 
     def __str__(self) -> str:
@@ -53,13 +53,15 @@ class Point:
 
 
 def parse_point(text: str) -> Point:
-    """Read a text such as "axial 25 Hz 0.1 mm"; a place that resembles no direction is the name of a specimen.
+    """Parse an operating point such as "axial 25 Hz 0.1 mm".
+
+    A first word that resembles no direction is the name of a specimen.
 
     Returns:
         The point in SI units.
 
     Raises:
-        UnitError: no direction, no numbers, or units that do not fit.
+        UnitError: a mistyped direction, missing numbers, or incompatible units.
     """
     expected = 'direction, frequency and amplitude, such as "axial 25 Hz 0.1 mm" or "torsion 10 Hz 1 deg"'
     match = _POINT.fullmatch(text)
@@ -82,19 +84,19 @@ PointText = Annotated[Point, converter(lambda raw, _: parse_point(raw) if isinst
 
 @dataclass(frozen=True)
 class PartQuantity:
-    """A quantity of a part: its name, a unit, and the factor from SI to that unit."""
+    """A quantity of a part: name, display unit, and the factor that converts SI values to this unit."""
 
     name: str
     unit: str
     factor: float = 1.0
 
     def displayed(self, value: float) -> PartQuantity:
-        """The quantity in the unit in which engineers write a value of that magnitude [SI]."""
+        """The quantity with the display unit for a value of this magnitude [SI], such as MPa for 2e6 Pa."""
         return PartQuantity(self.name, *display_unit(self.unit, self.factor, value))
 
     @property
     def tabled(self) -> PartQuantity:
-        """The quantity as tables write it: a parameter in the unit of its typical value, the same in every batch."""
+        """The quantity with the unit of the batch table; a parameter has the display unit of its typical value."""
         return self.displayed(get_parameter(self.name).typical) if is_parameter(self.name) else self
 
     @property
@@ -111,13 +113,18 @@ STIFFNESS, LOSS_FACTOR = "stiffness", "loss factor"
 
 
 def point_quantity(point: Point, name: str) -> PartQuantity:
-    """Stiffness or loss factor at an operating point."""
+    """Quantity at an operating point; `name` is `STIFFNESS` or `LOSS_FACTOR`."""
     unit, factor = point.motion.display.stiffness if name == STIFFNESS else ("-", 1.0)
     return PartQuantity(f"{name} {point}", unit, factor)
 
 
 def list_quantities(names: Collection[str], points: Iterable[Point]) -> dict[str, PartQuantity]:
-    """Quantities by name: parameters among the known ones in the order of the library, quality of the fit, points."""
+    """List the quantities of a batch by name: parameters, quality of the fit, then stiffness and loss factor at points.
+
+    Args:
+        names: names of the quantities that have values; those that are parameters are listed in library order.
+        points: operating points of stiffness and loss factor.
+    """
     in_order = dict.fromkeys([*parameter_names(), *sorted(filter(is_parameter, names))])
     units = {name: get_parameter(name).unit for name in in_order if name in names}
     parameters = [PartQuantity(name, "-" if unit == "1" else unit) for name, unit in units.items()]
@@ -129,12 +136,12 @@ def measured_at(sweeps: Iterable[Sweep], point: Point, noise: float) -> dict[str
     """Find the measured stiffness and loss factor at a point.
 
     Args:
-        sweeps: of one part.
+        sweeps: sweeps of one part.
         point: operating point.
         noise: standard deviation of the real and imaginary part of one measured point, relative to |K|.
 
     Returns:
-        Mean of the repeats by the name of the quantity; empty if no sweep has the point.
+        Mean of the repeats [SI] with its interval, by name of the quantity; empty if no sweep contains the point.
     """
     for sweep in sweeps:
         near = np.abs(sweep.frequency / point.frequency - 1.0) <= _SAME_FREQUENCY
@@ -150,10 +157,13 @@ def measured_at(sweeps: Iterable[Sweep], point: Point, noise: float) -> dict[str
 
 
 def measured_curve(sweeps: Iterable[Sweep]) -> dict[str, float]:
-    """Take the stiffness curve of the first sweep that holds a level, at its middle level.
+    """Measured |K| of the first sweep with one constant and one stepped quantity, at the middle constant level.
 
     Levels and steps are rounded to three digits, so that parts have common points although a rig reaches its set points
     with some error.
+
+    Args:
+        sweeps: sweeps of one part.
 
     Returns:
         |K| [SI] by operating point, at most twelve points.

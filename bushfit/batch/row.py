@@ -38,11 +38,11 @@ class RowTask:
     """Settings that all rows of a batch share.
 
     Args:
-        output: folder of the batch.
+        output: results folder of the batch.
         points: operating points of stiffness and loss factor.
-        formats: files that each row writes.
-        resume: whether a row that was done before with the same inputs is kept.
-        version: of bushfit, which the worker has to run, too.
+        formats: formats of the files that each row writes.
+        resume: True to keep the results of a row that an earlier run evaluated with the same inputs.
+        version: version of bushfit, which the workers must run, too.
     """
 
     output: Path
@@ -52,10 +52,10 @@ class RowTask:
     version: str = __version__
 
     def __call__(self, row: Row) -> tuple[RowFile, bool]:
-        """Do a row and save its results.
+        """Evaluate a row and save its results.
 
         Returns:
-            The record, and whether it was kept from an earlier run.
+            The record, and True if it was kept from an earlier run.
 
         Raises:
             BatchError: this process runs another version of bushfit.
@@ -96,12 +96,12 @@ def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFi
     """Run the commands of a row.
 
     Args:
-        row: part, campaign and commands.
+        row: row with its campaign and commands.
         points: operating points of stiffness and loss factor.
-        formats: files to make.
+        formats: formats of the result files.
 
     Returns:
-        The record of their results, and the files by name.
+        The record of the results, and the contents of the result files by name.
 
     Raises:
         BushfitError: inputs that cannot be used.
@@ -142,15 +142,15 @@ def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFi
 def run_commands(
     campaign: Campaign, settings: RowSettings, formats: Formats
 ) -> tuple[Result, Diagnosis | None, dict[str, bytes]]:
-    """Run those of fit, diagnose and predict that the row states, each from the result before; or the whole chain.
+    """Run the commands of a row: run alone, or fit, diagnose and predict, each from the result of the one before.
 
     Args:
-        campaign: of the row.
-        settings: of the row, complete.
-        formats: files to make; the tables of a prediction always are.
+        campaign: campaign of the row.
+        settings: complete settings of the row.
+        formats: formats of the result files; the tables of a prediction are always written.
 
     Returns:
-        The last result, the diagnosis if there is one, and the files by name.
+        The last result, the diagnosis (None without diagnose), and the contents of the result files by name.
     """
     commands, with_tables = settings.commands or (), replace(formats, tables=True)
     if "run" in commands:
@@ -180,13 +180,13 @@ def run_commands(
 
 
 def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[str, Estimate], list[Sequence[str]]]:
-    """Parameters, quality of the fit, and stiffness and loss factor at the points.
+    """Estimate the parameters, the quality of the fit, and stiffness and loss factor at the points.
 
     Returns:
-        Estimates by the name of the quantity, and the warnings of the prediction at each point.
+        Estimates [SI] by name of the quantity, and the warnings of the prediction at each point.
 
     Raises:
-        BatchError: an amplitude that does not fit the place, such as an angle in the axial direction.
+        BatchError: an amplitude with a wrong unit, such as an angle in the axial direction.
     """
     estimates, warnings = dict[str, Estimate](), list[Sequence[str]]()
     for name, parameter in result.model.parameters.items():

@@ -37,12 +37,16 @@ from bushfit.validation import to_json_data
 if TYPE_CHECKING:
     from bushfit.report.plots.batch import Panel
 
-#: Files of the whole batch, in whatever form.
+#: Names of all possible files of the whole batch.
 FILES = [*(f"batch.{ending}" for ending in ("json", "csv", "xlsx", *get_args(Picture))), "index.html"]
 
 
 def check_output(plan: BatchPlan, *, force: bool) -> None:
-    """Check before the work that the results can be written and replace none that somebody wants to keep.
+    """Check before the computation that the results can be written and overwrite no earlier results unasked.
+
+    Args:
+        plan: settings of the batch.
+        force: True to allow overwriting.
 
     Raises:
         OutputError: the folder cannot be written or holds a batch, or the JUnit report cannot be written.
@@ -71,21 +75,21 @@ def run_batch(
     before_writing: Callable[[BatchResult], None],
     warn: Callable[[str], object] = lambda _: None,
 ) -> BatchResult:
-    """Do all rows, then write the files of the whole batch.
+    """Evaluate all rows, then write the files of the whole batch.
 
     Args:
-        plan: the batch.
-        workers: of this machine or of a cluster.
-        before_writing: called with the result when all files are ready; if it raises, the rows are kept, and no file of
-            the whole batch is written.
-        warn: called with a sentence when a cluster has no workers.
+        plan: settings of the batch.
+        workers: workers of this machine or of a cluster.
+        before_writing: function that is called with the result when all files are ready; if it raises, the rows are
+            kept, and no file of the whole batch is written.
+        warn: function that is called with a sentence when a cluster has no workers.
 
     Returns:
         Results of all rows.
 
     Raises:
         BatchError: the workers are lost; finished rows are kept.
-        OutputError: the results cannot be written, or another batch is at work in the folder.
+        OutputError: the results cannot be written, or another batch is running in the folder.
     """
     output, start = plan.task.output, time.perf_counter()
     try:
@@ -106,10 +110,10 @@ def run_batch(
 
 
 def clear_earlier(plan: BatchPlan) -> list[str]:
-    """Remove the results of rows of an earlier batch that are no rows of this one; a batch that resumes keeps them.
+    """Remove results of an earlier batch for parts that are not in this batch; a batch that resumes keeps them.
 
     Returns:
-        A sentence on them; empty if there are none.
+        List with a sentence on these results; empty if there are none.
     """
     current = {row.folder for row in plan.rows}
     records = (plan.task.output / store.ROWS_FOLDER).glob(f"*/{store.ROW_FILE}")
@@ -123,15 +127,15 @@ def clear_earlier(plan: BatchPlan) -> list[str]:
 
 
 def run_parts(plan: BatchPlan, workers: Workers, warn: Callable[[str], object]) -> tuple[list[RowFile], int]:
-    """Do all rows.
+    """Evaluate all rows on the workers and report the progress.
 
     Args:
-        plan: the batch.
-        workers: of this machine or of a cluster.
-        warn: called with a sentence when a cluster has no workers.
+        plan: settings of the batch.
+        workers: workers of this machine or of a cluster.
+        warn: function that is called with a sentence when a cluster has no workers.
 
     Returns:
-        Their records in the order of the manifest, and the number of those kept from an earlier run.
+        Records of the rows in the order of the manifest, and the number of records kept from an earlier run.
     """
     count, counts = len(plan.rows), Counter[str]()
     records = [RowFile(status="failed")] * count
@@ -146,13 +150,13 @@ def run_parts(plan: BatchPlan, workers: Workers, warn: Callable[[str], object]) 
 
 
 def batch_files(result: BatchResult) -> list[ResultFile]:
-    """Files of the whole batch.
+    """Result files of the whole batch, not yet written.
 
     Args:
-        result: of the batch.
+        result: results of all rows.
 
     Returns:
-        Document, table, and picture and page if they are wanted.
+        Document, table, and page and picture if the formats include them.
     """
     from bushfit.report.page.index import index_page
     from bushfit.report.plots.batch import batch_figure
@@ -165,13 +169,13 @@ def batch_files(result: BatchResult) -> list[ResultFile]:
 
 
 def make_panels(result: BatchResult) -> list[Panel]:
-    """Panels of the picture: one for each quantity that has limits or is known of at least three parts.
+    """Panels of the batch picture: one for each quantity that has limits or is known for at least three parts.
 
     Args:
-        result: of the batch.
+        result: results of all rows.
 
     Returns:
-        Panels in the order of the table, in the units in which engineers write the values.
+        Panels in the order of the table, in display units.
     """
     from bushfit.report.plots.batch import Panel
 

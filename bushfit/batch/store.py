@@ -33,12 +33,12 @@ STAGE = ".aside"
 
 
 def row_key(row: Row, points: Collection[Point], formats: Formats) -> str:
-    """Hash of all that the results of a row depend on, apart from its inputs.
+    """Hash of the settings and the version that the results of a row depend on; input files are hashed separately.
 
     Args:
-        row: with its settings.
+        row: row with its settings.
         points: operating points of stiffness and loss factor.
-        formats: files that the row writes.
+        formats: formats of the files that the row writes.
 
     Returns:
         SHA-256 of settings, points, formats and the version of bushfit.
@@ -56,12 +56,12 @@ def row_key(row: Row, points: Collection[Point], formats: Formats) -> str:
 
 
 def load_row(output: Path, row: Row, key: str) -> RowFile | None:
-    """Load the record of a row that was done before.
+    """Load the record of a row that an earlier run evaluated.
 
     Args:
-        output: folder of the batch.
-        row: part and campaign.
-        key: hash of its settings.
+        output: results folder of the batch.
+        row: row of the batch.
+        key: hash of the row's settings, from `row_key`.
 
     Returns:
         The record; None if settings or inputs have changed, or a file is damaged or missing.
@@ -81,10 +81,10 @@ def save_row(output: Path, row: Row, files: Mapping[str, bytes], record: RowFile
     """Write the files and the record of a row, and remove those of an earlier run.
 
     Args:
-        output: folder of the batch.
-        row: part and campaign.
-        files: contents by name.
-        record: of the results.
+        output: results folder of the batch.
+        row: row of the batch.
+        files: contents of the result files by name.
+        record: record of the results, written as row.json.
 
     Raises:
         OSError: the disk is full or cannot be written.
@@ -113,10 +113,10 @@ def digest(data: bytes) -> str:
 
 @contextlib.contextmanager
 def batch_folder(output: Path) -> Iterator[None]:
-    """Keep other batches out of the folder; files that a killed batch left half written are removed.
+    """Reserve the results folder for one batch, and remove unfinished files of a killed batch.
 
     Returns:
-        A context in which the folder is reserved, where the file system has locks.
+        Context in which the folder is locked, if the file system has locks.
 
     Raises:
         OutputError: another batch is running in this folder.

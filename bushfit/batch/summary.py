@@ -46,12 +46,12 @@ class BatchPlan:
     """Settings of a batch.
 
     Args:
-        title: of the batch.
-        rows: its parts.
-        task: the work on each row.
-        limits: to judge the parts by; None without.
-        junit: file of a JUnit report; None without.
-        formats: how the table and the picture of the whole are written.
+        title: title of the batch.
+        rows: rows of the batch, one for each part.
+        task: function that evaluates a row.
+        limits: limits for the parts; None without a limits file.
+        junit: path of the JUnit report; None without a report.
+        formats: formats of the files of the whole batch.
     """
 
     title: str
@@ -64,14 +64,14 @@ class BatchPlan:
 
 @dataclass(frozen=True, eq=False)
 class BatchResult:
-    """Results of all rows of a batch; n is their number.
+    """Results of all n rows of a batch.
 
     Args:
-        plan: the batch.
-        records: of the rows, in the order of the manifest.
+        plan: settings of the batch.
+        records: records of the rows, in the order of the manifest.
         kept_count: number of rows kept from an earlier run.
-        seconds: that the run took [s].
-        notes: on results of an earlier batch in the folder.
+        seconds: duration of the run [s].
+        notes: sentences on results of an earlier batch in the folder.
     """
 
     plan: BatchPlan
@@ -82,7 +82,10 @@ class BatchResult:
 
     @cached_property
     def figures(self) -> dict[str, Array]:
-        """Value, low and high end of the 95 % interval, and standard error by quantity [SI], (4, n); NaN if unknown."""
+        """Value, low and high end of the 95 % interval, and standard error by quantity [SI], (4, n); NaN if unknown.
+
+        The keys are the names of the quantities.
+        """
         figures = dict[str, Array]()
         for index, record in enumerate(self.records):
             for name, estimate in record.quantities.items():
@@ -93,7 +96,7 @@ class BatchResult:
 
     @cached_property
     def is_poor(self) -> Array:
-        """True for each part whose model misses its tests, (n,)."""
+        """True for each part whose fitted model misses its tests, (n,)."""
         return np.array([bool(describe_poor_fit(record, self.plan.limits)) for record in self.records])
 
     @cached_property
@@ -109,7 +112,10 @@ class BatchResult:
 
     @cached_property
     def curves(self) -> dict[str, Array]:
-        """Measured |K| at each point of the curve that most parts share, by column, (n,), NaN where not measured."""
+        """Measured |K| of the parts by table column, (n,), NaN where not measured.
+
+        The columns are the operating points of the measured curve that most parts share.
+        """
         shared, curves = Counter(tuple(record.curve) for record in self.records if record.curve), dict[str, Array]()
         points, sharing = max(shared.items(), key=lambda item: item[1], default=((), 0))
         for point in points if sharing >= FEWEST else ():
@@ -128,9 +134,9 @@ class BatchResult:
 
     @cached_property
     def compared(self) -> dict[str, tuple[Array, Array]]:
-        """Values and standard errors that the parts are compared by, by name, (n,) each.
+        """Values and standard errors for the comparison of the parts, by name of the quantity, (n,) each.
 
-        Left out are the quality of a fit, parameters at a bound, and what a poor fit determines.
+        Measures of the fit are left out; parameters at a bound and values of poor fits are NaN.
         """
         compared = dict[str, tuple[Array, Array]]()
         for name in (name for name in self.quantities if name in self.figures and name not in FIT_NAMES):
@@ -143,12 +149,12 @@ class BatchResult:
 
     @cached_property
     def outliers(self) -> tuple[dict[str, Array], dict[str, Array]]:
-        """Deviation of each part from the others, and whether it differs beyond chance, by name, (n,) each."""
+        """Deviations of the parts from the others in standard deviations, and True for outliers; by quantity, (n,)."""
         return find_outliers(self.compared)
 
     @cached_property
     def document(self) -> BatchFile:
-        """The results as `batch.json` has them."""
+        """Content of `batch.json`."""
         columns = {name: quantity.tabled for name, quantity in self.quantities.items() if name in self.figures}
         parts = [self.part_table(index, columns) for index in range(len(self.records))]
         counts = {name: int(np.isfinite(values).sum()) for name, (values, _) in self.compared.items()}
@@ -187,7 +193,7 @@ class BatchResult:
 
     @property
     def summary(self) -> Mapping[str, Any]:
-        """The document with the effort of this run, as `--json` prints it."""
+        """Content of `batch.json` with the computing time and the number of kept rows, as `--json` prints it."""
         whole = replace(self.document, kept=self.kept_count, seconds=round(self.seconds, 3))
         return cast("Mapping[str, Any]", to_json_data(whole, BatchFile))
 
@@ -195,11 +201,11 @@ class BatchResult:
         """Compute the scatter, limits and capability of one quantity over the parts.
 
         Args:
-            name: of the quantity.
-            column: the quantity in the unit of its column.
+            name: name of the quantity.
+            column: the quantity with the unit of its table column.
 
         Returns:
-            Entry of `batch.json`, in the unit of the column.
+            Entry of the quantity in `batch.json`, in the unit of the column.
         """
         values = self.figures[name][0] * column.factor
         is_known = np.isfinite(values)
@@ -222,11 +228,11 @@ class BatchResult:
         """Make the entry of one part in `batch.json`.
 
         Args:
-            index: number of the part.
-            columns: quantities by name, in the units of their columns.
+            index: index of the part in the batch, from 0.
+            columns: quantities by name, with the units of their table columns.
 
         Returns:
-            Result, deviations from the other parts, and values.
+            Result by the limits, deviations from the other parts, and values.
         """
         row, record, limits = self.plan.rows[index], self.records[index], self.plan.limits
         result, misses, doubtful = None, dict[str, str](), dict[str, str]()
@@ -296,12 +302,12 @@ class BatchResult:
         return warnings
 
     def table(self) -> pd.DataFrame:
-        """A row for each part, in the order of the manifest, with a unit in every header.
+        """Table of the batch: one row for each part, in the order of the manifest.
 
-        A parameter has the unit of its typical value, so that the headers of two batches agree.
+        A parameter has the display unit of its typical value, so that the headers of two batches agree.
 
         Returns:
-            Table with columns of texts, quantities, remarks, deviations and the measured curve.
+            Table with columns of texts, quantities, remarks, deviations and the measured curve; headers contain units.
         """
         import pandas as pd
 
