@@ -1,7 +1,8 @@
 """Sentences on parameters that the tests do not determine: the reason, known combinations, and the best further test.
 
-A direction is an eigenvector of the Fisher information, with parameters scaled by their size; its standard error is one
-over the root of the eigenvalue, which is a singular value of the Jacobian scaled by noise and size.
+A direction is an eigenvector of the Fisher information, with parameters scaled by their size: a combination of relative
+changes. Its standard error is one over the root of the eigenvalue. A direction is open, and so are the parameters that
+it changes, if that error is above 15 %: the tests do not determine the combination.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -18,19 +19,19 @@ from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
 from bushfit.units import format_range
 
-#: Relative standard error beyond which a direction counts as open, and a parameter as not determined.
+#: Relative standard error beyond which a direction is open, and a parameter not determined.
 _OPEN = 0.15
 #: Share of the worst error from which on a parameter is open with it, however well it is known.
 _PARTNER = 0.3
-#: Ratio of the largest frequency, or strain, to the smallest up to which they are one.
+#: Ratio of the largest frequency, or strain, to the smallest up to which the tests have only one.
 _ONE = 1.05
-#: Ratio of frequencies up to which they tell little of a slope.
+#: Ratio of the largest frequency to the smallest up to which the slope over frequency is poorly determined.
 _NARROW_BAND = 5.0
-#: Ratio of strains up to which they tell little of friction.
+#: Ratio of the largest strain to the smallest up to which friction is poorly determined.
 _NARROW_STRAIN = 2.0
 #: Relative standard error below which a combination is known.
 _KNOWN = 0.1
-#: Error of a combination over the least of its parts', up to which it is worth naming.
+#: Error of a combination over the smallest error of its parts, up to which the combination is reported.
 _BETTER = 0.34
 #: Relative step of a parameter into the complex plane: a derivative so taken is exact to rounding.
 _COMPLEX_STEP = 1e-30
@@ -39,13 +40,13 @@ _SPRINGPOT = ("m", "alpha")
 
 
 class _Combination(NamedTuple):
-    """A modulus that tests may determine without its parts.
+    """Combination of parameters, a modulus, that tests may determine even if they do not determine each parameter.
 
     Args:
-        formula: formula in the names of the model.
-        value: of the modulus [Pa], from the parameters and omega [rad/s]; analytic, so that it takes complex numbers.
-        names: its parameters.
-        open_with: it is of interest where one of these is open.
+        formula: formula in the names of the model's parameters.
+        value: function from parameter values by name, with omega [rad/s], to the modulus [Pa]; accepts complex values.
+        names: names of the parameters in the formula.
+        open_with: names of parameters; the combination is reported if one of these is not determined.
         remark: meaning of the modulus.
     """
 
@@ -86,13 +87,13 @@ def left_open(
 ) -> list[str]:
     """Warnings about parameters of a fitted model that the tests do not determine; none if all are determined.
 
-    Each group of parameters that share open directions has a sentence, with the standard errors of the covariance.
+    There is one sentence for each group of parameters that share open directions, with their standard errors.
 
     Args:
         model: fitted model.
         data_sets: tests.
-        names: fitted parameters.
-        covariance: of the fitted parameters.
+        names: names of the fitted parameters.
+        covariance: covariance of the fitted parameters.
 
     Returns:
         Sentences; empty if the tests determine every parameter.
@@ -144,7 +145,7 @@ def left_open(
 
 
 def _groups(information: FisherInformation) -> list[list[str]]:
-    """Parameters of each open direction; directions that share one are one group."""
+    """Names of the parameters of each open direction; directions with a common parameter are merged into one group."""
     errors, vectors = information.directions()
     groups: list[set[str]] = []
     for j in np.flatnonzero(errors > _OPEN):
@@ -159,7 +160,7 @@ def _groups(information: FisherInformation) -> list[list[str]]:
 
 
 def _reasons(model: Model, data_sets: Sequence[MeasuredTest], involved: Sequence[str]) -> Iterator[str]:
-    """Reasons why tests leave parameters open: conditions that the tests lack."""
+    """Reasons why tests do not determine the parameters `involved`: frequencies, amplitudes or loops are missing."""
     reach = measured_range(model, data_sets)
     (slow, fast), (small, large) = reach.frequency, reach.strain
     loops, _ = split_by_kind(data_sets)
@@ -185,7 +186,7 @@ def _reasons(model: Model, data_sets: Sequence[MeasuredTest], involved: Sequence
 def _known_combinations(
     model: Model, data_sets: Sequence[MeasuredTest], information: FisherInformation, involved: Sequence[str]
 ) -> Iterator[str]:
-    """Combinations of open parameters that are known well, with their errors."""
+    """Texts on combinations of the parameters `involved` that are known well although these are not, with errors."""
     errors = dict(zip(information.names, information.errors(), strict=True))
     enough = min(_KNOWN, _BETTER * min(float(errors[name]) for name in involved))
     slow = measured_range(model, data_sets).frequency[0]

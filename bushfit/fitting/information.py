@@ -1,7 +1,7 @@
 """Fisher information of tests on parameters, standard errors, and the further test that would help most.
 
-Each test that a lab could add is simulated as data sets with the noise of the campaign, and what it would tell is added
-to what the campaign tells.
+Each test that a lab could add is simulated with the noise of the campaign, and its Fisher information is added to that
+of the campaign.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -38,12 +38,12 @@ _HOPELESS = 10.0
 
 @dataclass(frozen=True, eq=False)
 class FisherInformation:
-    """Fisher information of tests on parameters, each relative to its size.
+    """Fisher information of tests on relative changes of parameters.
 
     Args:
-        names: of the k parameters.
+        names: names of the k parameters.
         matrix: Fisher information J J^T, (k, k), where J holds the derivatives of the whitened residuals by relative
-            change.
+            change of each parameter.
     """
 
     names: tuple[str, ...]
@@ -51,37 +51,35 @@ class FisherInformation:
 
     @classmethod
     def from_tests(cls, model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> "FisherInformation":
-        """Fisher information of tests on parameters of a model at its values.
+        """Compute the Fisher information of tests on parameters of a model.
 
         Args:
-            model: model at whose values the information is taken.
+            model: model at whose values the information is computed.
             data_sets: tests.
-            names: k parameters.
+            names: names of the k parameters.
         """
         slope = jacobian(model, data_sets, names) * relative_sizes(model, names)[:, None]
         return cls(tuple(names), slope @ slope.T)
 
     def directions(self) -> tuple[Array, Array]:
-        """Relative standard errors of the eigenvectors of the information, (k,), and these eigenvectors, (k, k) by
-        column.
-        """
+        """Relative standard errors along the eigenvectors of the information, (k,), and these as columns, (k, k)."""
         values, vectors = np.linalg.eigh(self.matrix)
         return 1.0 / np.sqrt(np.maximum(values, np.finfo(float).eps * values.max())), vectors
 
     def errors(self) -> Array:
-        """Relative standard error of each parameter, (k,)."""
+        """Relative standard error of each parameter if all k are fitted, (k,)."""
         errors, vectors = self.directions()
         return np.linalg.norm(vectors * errors, axis=1)
 
     def error(self, weights: Mapping[str, float]) -> float:
-        """Standard error of a weighted sum of relative changes."""
+        """Standard error of a weighted sum of relative changes, from the weights by parameter name."""
         errors, vectors = self.directions()
         row = np.array([weights.get(name, 0.0) for name in self.names])
         return float(np.linalg.norm(row @ vectors * errors))
 
 
 def relative_sizes(model: Model, names: Sequence[str]) -> Array:
-    """Change of each fit coordinate per relative change of its parameter, (k,)."""
+    """Change of each fit coordinate per relative change of its parameter, (k,): 1 for logarithmic coordinates."""
     pairs = [(model.parameters[name], abs(model.values[name])) for name in names]
     return np.array(
         [1.0 if parameter.log else max(value / parameter.typical, _LEAST_SIZE) for parameter, value in pairs]
@@ -89,7 +87,7 @@ def relative_sizes(model: Model, names: Sequence[str]) -> Array:
 
 
 def percent(error: float) -> str:
-    """Relative standard error as text, such as "2.5 %"."""
+    """Format a relative standard error as text, such as "2.5 %" for 0.025."""
     return f"{float(f'{100.0 * error:.2g}'):g} %" if error < _BEYOND else "beyond 1000 %"
 
 
@@ -99,7 +97,7 @@ def further_test(model: Model, data_sets: Sequence[MeasuredTest], information: F
     Args:
         model: fitted model.
         data_sets: tests of the campaign.
-        information: that these tests give.
+        information: Fisher information of these tests on the fitted parameters.
 
     Returns:
         At most one sentence.
@@ -122,10 +120,10 @@ def further_test(model: Model, data_sets: Sequence[MeasuredTest], information: F
 
 
 def _candidates(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[tuple[str, list[MeasuredTest]]]:
-    """Possible further tests, in words and with the noise of the campaign or of most rigs.
+    """Yield possible further tests: a description, and simulated tests with the noise of the campaign or of most rigs.
 
-    These are a repeat of every test, the loop of the largest strain at other amplitudes and rates, or slow loops if the
-    campaign has none, and sweeps beyond and within the frequencies and amplitudes of the campaign.
+    The tests are a repeat of every test, the loop of the largest strain at other amplitudes and rates (or slow loops if
+    the campaign has no loop), and sweeps beyond and within the frequencies and amplitudes of the campaign.
     """
     loops, sweeps = split_by_kind(data_sets)
     yield "a repeat of every test", list(data_sets)

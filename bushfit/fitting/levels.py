@@ -10,23 +10,23 @@ from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, rows_of, sp
 
 #: Relative change of the variances at which the scoring ends: far below their standard error.
 _SETTLED = 1e-3
-#: What an error must take off twice the negative logarithm of the likelihood to count; chosen on 40 simulated
-#: campaigns: of chance it took 3 at most on most, and an error of the size of a point's scatter 50.
+#: Smallest fall of -2 ln(likelihood) by level errors that is more than chance; chosen on 40 simulated campaigns: chance
+#: gave 3 at most on most of them, and an error of the size of a point's scatter gave 50.
 _MATTERS = 6.0
-#: The same where no run was repeated: what a run shares is a guess then, and a better one counts soon.
+#: The same fall if no run was repeated: the error shared by a run is a guess then, and easily improved.
 _MATTERS_UNREPEATED = 0.5
-#: Share of a level's error that the model must leave for the level to tell anything of it.
+#: Smallest share of a level's error, after projecting out the fitted parameters, from which the error is estimated.
 _LEFT = 1e-6
 
 
 class LevelErrors(NamedTuple):
-    """Error of each level, estimated from a fit.
+    """Gain and phase errors shared by all runs of a level (one held amplitude or frequency), estimated from a fit.
 
     Args:
-        error: standard deviation of gain and phase [rad].
-        freedom: degrees of freedom behind it; 0 if the error is fixed at the largest that a rig may have.
-        gain: what it takes off twice the negative logarithm of the likelihood, beside what is counted already.
-        matters: whether that is more than chance.
+        error: standard deviation of the relative gain error, and of the phase error [rad].
+        freedom: degrees of freedom behind the error; 0 if the error is fixed at the largest that a rig may have.
+        gain: fall of -2 ln(likelihood) by these errors, compared with the noise that the tests had before.
+        matters: True if the fall is larger than chance explains.
     """
 
     error: tuple[float, float]
@@ -41,16 +41,18 @@ def level_errors(
     """Estimate gain and phase errors that all repeats of a level share, by restricted maximum likelihood.
 
     Args:
-        residual: whitened residuals at the end of a fit, (n,).
-        absorbed: whitened residuals that the fit, or a fault, can make up for, (k, n).
+        data_sets: fitted tests.
+        residual: whitened residuals at the end of the fit, (n,).
+        absorbed: directions of the whitened residuals that fitted parameters, or a fault, can produce, (k, n).
+        maximum: largest standard deviation of gain and of phase [rad] that the rig may have.
 
     Returns:
-        The errors, with the gain of the likelihood that they bring.
+        Errors, with the gain of the likelihood that they bring.
 
     Notes:
-        Beside the noise counted already a level's error adds v u u^T to the covariance of the whitened residuals, u the
-        level's unit error, whitened. What the fit absorbs is projected out (Patterson and Thompson, 1971). The scoring
-        is Fisher's, in the space of the levels.
+        An error of a level adds v u u^T to the covariance of the whitened residuals, where u is the whitened unit error
+        of the level and v its variance. The directions in `absorbed` are projected out (Patterson and Thompson, 1971).
+        The likelihood is maximised by Fisher scoring, in the space of the levels.
     """
     rows, kinds, before, size = list[Array](), np.empty(0), (0.0, 0.0), sum(test.size for test in data_sets)
     for sweep, block in zip(data_sets, rows_of(data_sets), strict=True):
@@ -76,7 +78,7 @@ def level_errors(
     added, most_added = np.zeros(2), np.maximum(np.square(maximum) - counted, 0.0)
 
     def likelihood(added: Array) -> tuple[Array, Array, float]:
-        """Derivatives of the log likelihood by the added variances."""
+        """Gradient and Fisher information of ln(likelihood) by the added variances, and -2 ln(likelihood)."""
         covariance = np.eye(components.size) + np.tensordot(added, parts, 1)
         solved = np.linalg.solve(covariance, parts)
         white = np.linalg.solve(covariance, components)
@@ -103,7 +105,7 @@ def level_errors(
 
 
 def level_errors_of(sweep: MeasuredSweep) -> Array:
-    """Whitened unit error of each level of a sweep, in gain and in phase in turn, (2 levels, n)."""
+    """Change of a sweep's whitened residuals by a unit gain and phase error of each level in turn, (2 levels, n)."""
     return np.array(
         [column for held_value in np.unique(sweep.held) for column in sweep.moved_together(sweep.held == held_value)]
     )

@@ -11,19 +11,22 @@ from bushfit.fitting.repeats import unit
 from bushfit.geometry import Place
 from bushfit.reading.measurement import Stepped
 
-#: Degree, in the logarithm of what is stepped, of the Legendre polynomials that count as smooth misfit.
+#: Degree of the Legendre polynomials, in the logarithm of the stepped quantity, that represent smooth misfit.
 _SMOOTH_DEGREE = 3
 
 
 @dataclass(frozen=True, eq=False)
 class LineMisfit:
-    """Mean misfit of one line of a sweep, such as a level of amplitude, over its repeats.
+    """Mean misfit of one line of a sweep (the runs at one held amplitude or frequency) over its repeats.
 
     Args:
-        frequency: [Hz], (n,).
-        amplitude: zero-to-peak [m or rad], (n,).
-        misfit: measured over model less 1, complex, (n,).
-        noise: standard deviation of the gain and the phase of one of these means, (2,).
+        name: name of the test.
+        direction: direction or specimen of the test.
+        stepped: quantity that varies along the line, "frequency" or "amplitude"; None if neither is held.
+        frequency: frequency of each point [Hz], (n,).
+        amplitude: zero-to-peak amplitude of each point [m or rad], (n,).
+        misfit: measured stiffness over model stiffness, minus 1, complex (n,).
+        noise: standard deviation of the gain and the phase of one mean value, (2,).
     """
 
     name: str
@@ -36,7 +39,7 @@ class LineMisfit:
 
     @property
     def step(self) -> Array:
-        """Values stepped along the line, (n,)."""
+        """Values stepped along the line: frequency [Hz] or amplitude [m or rad], (n,)."""
         return self.amplitude if self.stepped == "amplitude" else self.frequency
 
     @property

@@ -1,8 +1,8 @@
 """The cycles of a loop: the steady ones, their frequency and number, and the course of the motion, in words.
 
-A motion is steady where it comes again a period later. The longest stretch that does so is kept; without a stretch that
-does not, nothing is touched, so a record may start and end anywhere in its cycle. What lies beyond a hole in the record
-is left out too, because nobody knows how many cycles went by there.
+A motion is steady where it repeats itself one period later. The longest steady stretch is kept; a record that is steady
+throughout is unchanged, so it may start and end anywhere in its cycle. Of a record with a hole (missing rows) only the
+longest part without a hole is kept, because the number of cycles in the hole is unknown.
 """
 
 from typing import NamedTuple
@@ -18,15 +18,15 @@ from bushfit.reduction.cycles import HOLE, change_after
 from bushfit.reduction.harmonics import basis, least_squares, resolved_order, spread_rows
 from bushfit.reduction.programme import ENOUGH_ROWS, SAME_MOTION, THREE_CYCLES, left_out
 
-#: Share of a period up to which a break in the steady motion, or what is left out, is too short to count.
+#: Share of a period up to which a break in the steady motion, or a part left out, is ignored.
 _BRIEF = 0.02
 #: Difference from the motion a period later, in units of its median and of its range (for motions without noise),
 #: beyond which an end is drawn in, and by how many periods at most.
 _MOST_OFF, _LEAST_OFF, _EDGE = 8.0, 5e-4, 0.5
 #: Harmonics and rows by which a frequency is refined at most; chosen: what a triangle has beyond them shifts no phase.
 _MOST_HARMONICS, _ROWS_TO_REFINE = 15, 2000
-#: Steps relative to the frequency: below which Gauss-Newton has ended (rounding), and at most (farther off it is not
-#: linear).
+#: Step of Gauss-Newton relative to the frequency at which it has converged (rounding), and largest step (beyond which
+#: the motion is not linear in the frequency).
 _SETTLED, _LARGEST_STEP = 1e-12, 0.05
 #: Distance between the ends of a record, as a share of its range, from which on it holds no whole cycle: more than
 #: any noise.
@@ -49,10 +49,10 @@ class SteadyCycles(NamedTuple):
     """Steady cycles of a loop.
 
     Args:
-        loop: without what comes before and after them; the same one where nothing does.
-        frequency: [Hz].
-        cycles: how many there are, whole and broken.
-        left_out: a sentence on what was left out, or None.
+        loop: loop without the rows before and after its steady cycles.
+        frequency: frequency of the motion [Hz].
+        cycles: number of steady cycles, including fractions.
+        left_out: sentence on the rows that were left out, or None.
     """
 
     loop: Loop
@@ -68,7 +68,7 @@ def steady_cycles(loop: Loop) -> SteadyCycles:
         The steady part, its frequency and number of cycles, and a note.
 
     Raises:
-        FitError: it does not hold a whole cycle, or it has a hole in which nobody knows how many turns were made.
+        FitError: the loop does not contain a whole cycle, or rows are missing in its steady part.
     """
     time, motion = _thinned(loop)
     part, note = _steady_part(loop, time, motion)
@@ -89,7 +89,7 @@ def steady_cycles(loop: Loop) -> SteadyCycles:
 
 
 def _thinned(loop: Loop) -> tuple[Array, Array]:
-    """Time [s] and displacement [m or rad] of rows that are enough to find the cycles, gross outliers left out."""
+    """Time [s] and displacement [m or rad] of every k-th row, enough to find the cycles, without gross outliers."""
     selection = slice(None, None, -(-loop.time.size // ENOUGH_ROWS))
     time, motion = loop.time[selection], loop.displacement[selection]
     rows = gross_rows(motion)
@@ -97,10 +97,9 @@ def _thinned(loop: Loop) -> tuple[Array, Array]:
 
 
 def _crossings(motion: Array) -> tuple[Array, Array, Array]:
-    """Motion about its middle, (n,), and the last row before and the first row after each crossing of the middle, (k,)
-    each.
+    """Motion relative to the middle of its range, (n,), and the rows just before and after each crossing, (k,) each.
 
-    Rows within a tenth of the range on either side, more than any noise, belong to the middle.
+    Rows within a tenth of the range on either side of the middle, more than any noise, are skipped.
     """
     centred = motion - (motion.max() + motion.min()) / 2.0
     marks = np.flatnonzero(np.abs(centred) > 0.1 * np.ptp(centred))
@@ -146,14 +145,15 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
 
 
 def _cut(loop: Loop, first: float, last: float) -> Loop:
-    """The rows between two times [s], both counted in."""
+    """Rows of a loop between two times [s], both included."""
     return loop.select(slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right")))
 
 
 def _period(time: Array, motion: Array) -> float | None:
-    """Median time between crossings of the middle in one direction, in the later half of the record [s].
+    """Period of a motion [s]: median time between crossings of the middle in the same direction, in the later half.
 
-    Twice a stroke where there is one cycle. What holds a hole does not count; None where nothing is left.
+    For a single cycle, twice the time between two crossings. Intervals with missing rows are ignored; None if no
+    interval remains.
     """
     after = _crossings(motion)[2]
     strokes, steps = np.diff(time[after]), np.diff(time)
@@ -166,13 +166,13 @@ def _period(time: Array, motion: Array) -> float | None:
 
 
 def _fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, float]:
-    """Frequency [Hz] and number of cycles of a loop without run-in.
+    """Frequency [Hz] and number of cycles of a loop that consists of steady cycles.
 
-    The clock [s] and the displacement [m or rad], (n,) each, are of rows that are enough to find the cycles.
+    The clock [s] and the displacement [m or rad], (n,) each, are those of the thinned rows, see `_thinned`.
 
     Notes:
-        Several cycles are counted by crossings of the middle in one sense, and their frequency is refined by
-        Gauss-Newton on the motion. A single one is known by its ends, which meet going the same way.
+        Several cycles are counted by crossings of the middle in one direction, and their frequency is refined by
+        Gauss-Newton on the motion. A single cycle is recognised by its two ends, which meet with the same slope.
     """
     (x, before, after), clock = _crossings(displacement), clock - loop.time[0]
     times = clock[before] - x[before] * (clock[after] - clock[before]) / (x[after] - x[before])
@@ -187,7 +187,10 @@ def _fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, 
 
 
 def _of_one_cycle(loop: Loop, clock: Array, x: Array, across: Array) -> tuple[float, float]:
-    """Frequency [Hz] and number of cycles of a loop that crosses its middle once each way, at times `across` [s]."""
+    """Frequency [Hz] and number of cycles of a loop that crosses its middle once each way, at times `across` [s].
+
+    The clock [s] and the motion x relative to its middle, (n,) each, are those of the thinned rows, see `_thinned`.
+    """
     rows, motion = loop.time.size, loop.displacement
     duration = float(loop.time[-1] - loop.time[0])
     closed = duration * rows / (rows - 1)
@@ -215,10 +218,10 @@ def _of_one_cycle(loop: Loop, clock: Array, x: Array, across: Array) -> tuple[fl
 
 
 def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> float | None:
-    """Period of a motion whose last rows continue its first rows; None if they do not.
+    """Period [s] of a motion whose last rows meet its first rows with the same slope; None if they do not.
 
-    Both ends are drawn as straight lines. They tell how far beyond one cycle the record goes, or how short of it it
-    stops; within their error it is just one cycle, of the period `whole` [s].
+    Straight lines through both ends determine by how much the `duration` [s] of the record differs from one cycle; if
+    the difference is within its error, the period is `whole` [s].
     """
     few, ends = max(3, int(0.02 * x.size)), []
     for rows, origin in ((slice(few), clock[0]), (slice(-few, None), clock[-1])):
@@ -236,7 +239,7 @@ def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> fl
 
 
 def _refined(clock: Array, x: Array, frequency: float, rows_per_cycle: float) -> float:
-    """Frequency [Hz] of several cycles, refined by Gauss-Newton on the harmonics of the motion."""
+    """Refine the `frequency` [Hz] of several cycles by Gauss-Newton on the harmonics of the motion x."""
     chosen = spread_rows(x.size, _ROWS_TO_REFINE)
     time, motion = clock[chosen], x[chosen]
     order = resolved_order(rows_per_cycle * chosen.size / x.size, _MOST_HARMONICS)
@@ -267,7 +270,7 @@ def _repeats(clock: Array, x: Array, period: float) -> bool:
 
 
 def waveform(coefficients: Array) -> str:
-    """Name of a waveform from its complex harmonics, mean first."""
+    """Text that names a waveform, such as "a sine", from its complex harmonics, mean first."""
     share = abs(coefficients[3]) / abs(coefficients[1]) if coefficients.size > 3 else 0.0
     if abs(share - 1.0 / 9.0) < _LIKE:
         return "a triangle"

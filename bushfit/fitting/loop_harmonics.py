@@ -1,6 +1,6 @@
 """The harmonics of a loop: its displacement cleared of noise, the noise of its force, and the outliers of both.
 
-Harmonics are fitted by least squares at the rows as they are; outliers do not bend them.
+Harmonics are fitted by least squares at the recorded rows, without outliers.
 """
 
 from collections.abc import Mapping
@@ -20,14 +20,14 @@ from bushfit.reduction.harmonics import as_complex, basis, least_squares, resolv
 GRID = 1024
 #: Rows of a loop that the harmonics are fitted to at most; longer ones are averaged into as many bins of phase.
 MOST_ROWS = 4 * GRID
-#: Rows of a loop up to which every one is held against the harmonics; of a longer loop only where those fitted to have
-#: outliers, to save time.
+#: Rows of a loop up to which every row is compared with the harmonics; rows of a longer loop are compared only if the
+#: fitted rows have outliers, to save time.
 _MOST_ROWS_CHECKED = 200_000
-#: Harmonics that are fitted at most; chosen: those of a triangle have then fallen to 3e-4 of the first.
+#: Largest number of fitted harmonics; chosen: those of a triangle have then fallen to 3e-4 of the first.
 _MOST_HARMONICS = 60
-#: Harmonics of a loop that count as smooth misfit: beyond the fifth, physics makes next to nothing.
+#: Number of harmonics that represent smooth misfit of a loop: beyond the fifth, physics contributes next to nothing.
 SMOOTH_HARMONICS = 5
-#: Harmonics of one cycle that count as slow change from cycle to cycle, which is settling or drift and no noise.
+#: Number of harmonics of one cycle that represent slow change from cycle to cycle: settling or drift, not noise.
 _SLOW_HARMONICS = 3
 #: Residual of a triangle over that of free harmonics up to which a motion counts as one.
 _TRIANGLE_RATIO = 1.02
@@ -36,7 +36,7 @@ _CORNER = 0.5
 
 
 class OutlierRows(NamedTuple):
-    """Outliers of one column: their rows, (k,), and their distances from the harmonics in units of noise, (k,)."""
+    """Outliers of one column: row indices, (k,), and distances from the harmonics in units of noise, (k,)."""
 
     rows: Array
     off: Array
@@ -49,10 +49,10 @@ class LoopHarmonics(NamedTuple):
     """Harmonics, noise and outliers of a loop.
 
     Args:
-        motion: complex harmonics of the displacement that rise above its noise, mean first.
+        motion: complex harmonics of the displacement that exceed its noise, mean first [m or rad].
         force: complex harmonics of the force, mean first [N or N m].
         force_noise: standard deviation of one row's force [N or N m].
-        outliers: of the columns displacement and force.
+        outliers: outliers of the columns "displacement" and "force", by name.
     """
 
     motion: Array
@@ -69,13 +69,13 @@ class LoopHarmonics(NamedTuple):
 def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics:
     """Determine harmonics of displacement and force, the noise of the force, and outliers of both.
 
-    The noise holds what does not repeat from cycle to cycle and what is too fast for the rubber, but not what changes
-    slowly from one cycle to the next, which is settling or drift.
+    The noise is the part of the force that does not repeat from cycle to cycle or is too fast for the rubber, without
+    slow changes from one cycle to the next, which are settling or drift.
 
     Args:
-        loop: steady cycles.
-        frequency: [Hz].
-        cycles: number of cycles, whole and broken.
+        loop: steady cycles of a loop.
+        frequency: frequency of the motion [Hz].
+        cycles: number of cycles, including fractions.
 
     Returns:
         Harmonics, noise and outliers.
@@ -108,9 +108,7 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
 
 
 def _cleared(coefficients: Array, noise: float, phase: Array, displacement: Array, inliers: Array) -> Array:
-    """Harmonics of a motion that are larger than its noise; all harmonics of a triangle if the rows agree with a
-    triangle.
-    """
+    """Complex harmonics of a motion that exceed its noise; all harmonics of a triangle if the rows agree with one."""
     order, fundamental = np.arange(1, GRID // 2, 2), coefficients[1]
     turn, triangle = 1j * fundamental / abs(fundamental), np.zeros(GRID // 2, dtype=complex)
     triangle[0] = coefficients[0]
@@ -124,10 +122,14 @@ def _cleared(coefficients: Array, noise: float, phase: Array, displacement: Arra
 
 
 def less_slow(phase: Array, residual: Array) -> tuple[Array, int]:
-    """Remove from residuals of the force what changes slowly within each cycle.
+    """Remove slow changes (mean and three harmonics of each cycle: settling, drift) from residuals of the force.
+
+    Args:
+        phase: position of each row [cycles], (n,).
+        residual: force without its harmonics, (n,).
 
     Returns:
-        Residuals, (n,), and number of fitted unknowns.
+        Remaining residuals, (n,), and number of fitted unknowns.
     """
     number = np.floor(phase).astype(np.intp)
     size, unknowns = 2 * _SLOW_HARMONICS + 1, 0
@@ -142,13 +144,13 @@ def less_slow(phase: Array, residual: Array) -> tuple[Array, int]:
 
 
 def residual_limit(solution: Array, residual: Array, rows: int) -> float:
-    """Largest distance from the harmonics of a row that is no outlier, in units of the column.
+    """Distance from the harmonics, in units of the column, beyond which a row is an outlier.
 
-    Noise takes part of it, and the corners of a triangle, which these harmonics, (2 order + 1,), round off, the rest.
+    The limit allows for the noise and for corners of a triangle, which the harmonics round off.
 
     Args:
-        solution: harmonics of the column, (2 order + 1,).
-        residual: of the fitted rows, (n,).
+        solution: harmonics of the column: mean, cosines and sines, (2 order + 1,).
+        residual: residuals of the fitted rows, (n,).
         rows: number of rows of the column.
     """
     corner = _CORNER / (solution.size // 2) * abs(as_complex(solution)[1])
@@ -156,10 +158,10 @@ def residual_limit(solution: Array, residual: Array, rows: int) -> float:
 
 
 def _fit_without_outliers(columns: Array, values: Array, solution: Array) -> tuple[Array, Array]:
-    """Fit harmonics to a column without its outliers; with a mask of the rows that are none, (n,).
+    """Fit harmonics to a column without its outliers; return them with the mask of the other rows, (n,).
 
-    Squares let so many harmonics follow a cluster of outliers, as `solution` does. So rows are weighted down by their
-    distance first; then outliers are found and left out in turn until both agree.
+    Least squares, as in `solution`, may follow a cluster of outliers. Rows are therefore first weighted down by their
+    distance; then outliers are found and left out repeatedly until the set of outliers no longer changes.
     """
     inliers, stuck = np.ones(values.size, dtype=bool), are_stuck(values)
     if _inliers(columns, values, solution, stuck).all():
@@ -205,20 +207,19 @@ def _spread(residual: Array) -> float:
 def phase_bins(
     clock: Array, force: Array, frequency: float, cycles: float, *, each_cycle: bool
 ) -> tuple[Array, Array, Array]:
-    """Average the rows of a loop in bins of phase.
+    """Average the rows of a long loop in bins of phase, each 1/1024 of a cycle wide.
 
-    A bin is a GRID-th of a cycle. The first few cycles have bins of their own, and later ones share bins in ever larger
-    groups, unless `each_cycle` has its own. The clock [s], (n,), rises from the first row.
+    Each of the first few cycles has separate bins; later cycles share bins in ever larger groups.
 
     Args:
-        clock: time of each row [s], (n,).
-        force: of each row [N or N m], (n,).
-        frequency: [Hz].
+        clock: time of each row since the first [s], ascending, (n,).
+        force: force of each row [N or N m], (n,).
+        frequency: frequency of the motion [Hz].
         cycles: number of cycles.
-        each_cycle: True for bins of its own in every cycle.
+        each_cycle: True for separate bins in every cycle.
 
     Returns:
-        Phase [cycles], force and number of rows, (k,) each.
+        Mean phase [cycles], mean force and number of rows of each bin, (k,) each.
     """
     number = np.arange(int(cycles) + 2)
     separate_cycles, growth = (
@@ -232,10 +233,10 @@ def phase_bins(
     edges = np.append(np.arange(int(cycles * GRID) + 1) / (frequency * GRID), np.inf)
 
     def sums(bins: slice) -> Array:
-        """Sums over the filled ones among some bins.
+        """Sum the rows in each bin of a range that is not empty.
 
         Returns:
-            Number of the bin, number of rows, sum of the phase within the bin, and sum of the force, (4, k).
+            Index of the bin, number of rows, sum of the phase within the bin, and sum of the force, (4, k).
         """
         start, stop = np.searchsorted(clock, edges[[bins.start, bins.stop]])
         first = np.searchsorted(clock[start:stop], edges[bins])
@@ -254,7 +255,7 @@ def phase_bins(
 
 
 def smooth_waves(phase: Array) -> Array:
-    """Constant, and cosine and sine of the first five harmonics, at phases [cycles], (n,) -> (11, n)."""
+    """Constant 1, then cosine and sine of each of the first five harmonics, at phases [cycles], (n,) -> (11, n)."""
     angle = 2.0 * np.pi * phase
     waves = [wave(order * angle) for order in range(1, SMOOTH_HARMONICS + 1) for wave in (np.cos, np.sin)]
     return np.array([np.ones_like(angle), *waves])

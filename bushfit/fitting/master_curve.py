@@ -11,7 +11,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.reading.measurement import Sweep
 
-#: Steps of a shift factor of its own at most, and the largest one [neper]: a few are enough where it is determined.
+#: Largest number of steps to a sweep's individual shift factor, and largest step [neper]: a few are enough.
 _STEPS, _LARGEST = 10, 2.0
 #: Step of ln frequency for slopes.
 _APART = 1e-3
@@ -23,16 +23,16 @@ SHIFT = "temperature.shift"
 
 @dataclass(frozen=True, eq=False)
 class Shifted:
-    """A sweep shifted to the reference temperature.
+    """A sweep shifted to the reference temperature of 23 degC.
 
     Args:
-        sweep: as it was fitted.
-        temperature: mean of its points [K].
-        shift: ln a_T by the fitted law, and its standard error; nan if it is unknown.
-        own: ln a_T that the sweep asks for by itself, moduli as fitted, and its standard error from the residuals.
-        reduced_frequency: f a_T of its points [Hz], (n,).
-        reduced_stiffness: of its points, complex [SI], as they would be at 23 degC: times what the model has there,
-            at f a_T, over what it has at theirs, (n,).
+        sweep: sweep as fitted, at its own temperature.
+        temperature: mean temperature of its points [K].
+        shift: natural log of the shift factor a_T by the fitted law, and its standard error; nan if unknown.
+        own: ln a_T that fits this sweep best, with the moduli as fitted, and its standard error from the residuals.
+        reduced_frequency: frequency times a_T of each point [Hz], (n,).
+        reduced_stiffness: measured stiffness reduced to 23 degC, complex [N/m or N m/rad], (n,): multiplied by the
+            model's stiffness at 23 degC and f a_T over the model's stiffness at the conditions of the point.
     """
 
     sweep: MeasuredSweep
@@ -44,10 +44,10 @@ class Shifted:
 
 
 def master_curve(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[Shifted, ...]:
-    """Shift sweeps at several temperatures to one, by a model with an effect of temperature.
+    """Shift sweeps at several temperatures to 23 degC, by a fitted model with an effect of temperature.
 
     Args:
-        result: the fitted model.
+        result: result of the fit.
         sweeps: sweeps; those over frequency whose temperature is known are shifted.
 
     Returns:
@@ -73,7 +73,7 @@ def can_shift(sweep: Sweep) -> bool:
 
 
 def law(result: Result, temperature: Array) -> tuple[Array, Array]:
-    """Fitted shift factors ln a_T at temperatures [K], with standard errors; nan if these are unknown.
+    """Fitted shift factors ln a_T at temperatures [K], (n,), with standard errors; nan if these are unknown.
 
     Returns:
         ln a_T and its standard error, (n,) each.
@@ -89,10 +89,10 @@ def law(result: Result, temperature: Array) -> tuple[Array, Array]:
 
 
 def _further_shift(model: Model, sweep: MeasuredSweep) -> tuple[float, float]:
-    """Further shift of a sweep's time scale beyond that of the model [neper], and its standard error.
+    """Shift of a sweep's time scale in addition to that of the model [neper], and its standard error.
 
-    Notes: Gauss-Newton steps in the one number, with equal weights, because the residuals are mostly not noise;
-    nan where the stiffness does not change with frequency.
+    Notes: Gauss-Newton with equal weights, because the residuals are mostly not noise; nan if the stiffness does not
+    change with frequency.
     """
     shift, place, under = 0.0, sweep.direction, sweep.circumstances
 

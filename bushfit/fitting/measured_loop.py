@@ -26,20 +26,22 @@ _ERROR_SIZES /= np.linalg.norm(_ERROR_SIZES)
 
 @dataclass(frozen=True, eq=False)
 class MeasuredLoop(MeasuredBase):
-    """Force over the rows of a loop.
+    """Measured loop: force at n rows, or bins of phase, driven by the measured displacement.
 
-    Rows that are left out carry no weight from the start, see `drive_of`, and stay: the others need them to keep time.
+    Rows that are left out have no weight, see `drive_of`, but are kept, because the response is computed in time.
 
     Args:
-        fundamental_only: whether all but the first harmonic of its residuals is left out, so that the loop is one
-            operating point, with two residuals: of an addition without a law in time nothing else is known.
-        gain_error: standard deviation of the gain of the whole record, by the class of its rig.
-        gain_weighs: whether it is part of the noise, as where [rig] states the class. A gain that is only assumed
-            widens the errors of what is fitted, and bends no fit to meet the shape of a loop that a model misses.
-        model_error: standard deviation of the model's error of the force, over half the force range, beside the noise;
-            it is independent from harmonic to harmonic and falls off as 1/h. 0 where noise is all that counts.
-        first_error: number of the first harmonic that has it.
-        contradiction: what an earlier test of the same points says otherwise, in words.
+        drive: loop prepared as an input of the model.
+        under: temperature and other circumstances of the loop.
+        fundamental_only: True to use only the first harmonic of the residuals, so that the loop is one operating point
+            with two residuals: for an added stiffness that is known at the loop's frequency only.
+        gain_error: standard deviation of the relative gain error of the whole record, by the class of its rig.
+        gain_weighs: True if the gain error is part of the noise that weights the residuals, as for a class stated in
+            [rig]. An assumed gain error only widens the errors of fitted parameters.
+        model_error: standard deviation of the model's error of the force, relative to half the force range, added to
+            the noise; independent between harmonics h, and beyond the fifth proportional to 1/h. 0: noise alone.
+        first_error: number of the lowest harmonic that has the model error.
+        contradiction: sentence on a disagreement with an earlier test of the same points; None without one.
     """
 
     drive: Drive
@@ -64,12 +66,12 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def temperature(self) -> float:
-        """Temperature [K]; nan if it is unknown."""
+        """Temperature [K]; nan if unknown."""
         return self.test.temperature or np.nan
 
     @property
     def frequency(self) -> Array:
-        """Frequencies of the operating points [Hz], (n,); a loop has one."""
+        """Frequencies of the operating points [Hz], (n,); a loop is a single one."""
         return np.array([self.drive.frequency])
 
     @property
@@ -79,12 +81,12 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def circumstances(self) -> Circumstances:
-        """Circumstances of the operating points."""
+        """Circumstances of the operating points, such as temperature and earlier tests."""
         return self.under
 
     @cached_property
     def measured(self) -> Array:
-        """Complex stiffness at the operating points [N/m or N m/rad], (n,)."""
+        """Measured complex stiffness at the operating points [N/m or N m/rad], (n,)."""
         return np.array([self.drive.first_harmonic()])
 
     @property
@@ -94,12 +96,12 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def counted(self) -> int:
-        """Number of residuals that carry weight; of correlated rows those that can be distinguished."""
+        """Number of residuals with weight; for correlated rows the effective number."""
         return 2 if self.fundamental_only else round(self.drive.row_noise.share * np.count_nonzero(self._counting))
 
     @property
     def independent(self) -> float:
-        """Number of independent points behind what varies slowly: fewer than `counted` where noise is correlated."""
+        """Effective number of independent points for slowly varying errors: below `counted` if noise is correlated."""
         return self.counted / (1.0 if self.fundamental_only else self.drive.row_noise.rows_as_one)
 
     @property
@@ -108,23 +110,23 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def relative_noise(self) -> float:
-        """Standard deviation of one point, relative to half the force range, or of a sweep to |K|."""
+        """Standard deviation of one point, relative to half the force range (for a sweep relative to |K|)."""
         return self.drive.noise / self.drive.half_range
 
     def weighted(self, weight: Array) -> Self:
-        """Test with the weight of each point multiplied by a share, (n,)."""
+        """Test with the weight of each point multiplied by a factor, (n,)."""
         return replace(self, drive=replace(self.drive, weight=self.drive.weight * weight))
 
     def without(self, points: Array) -> Self:
-        """Test without weight on some of its points, by number; a loop's outliers have none from the start."""
+        """Test with weight 0 at the given point indices; a loop is unchanged, because its outliers have no weight."""
         return self
 
     def with_weight(self) -> Self:
-        """The part of the test that carries weight."""
+        """Test reduced to its points with weight; a loop is unchanged."""
         return self
 
     def fundamental(self) -> Self:
-        """Test reduced to its first harmonic, for an addition without a law in time."""
+        """Test reduced to its first harmonic, for an added stiffness that is known at the test's frequency only."""
         return replace(self, fundamental_only=True)
 
     def with_noise(self, relative: float) -> Self:
@@ -132,13 +134,13 @@ class MeasuredLoop(MeasuredBase):
         return replace(self, drive=replace(self.drive, noise=relative * self.drive.half_range))
 
     def with_model_error(self, size: float) -> Self:
-        """Test with a relative model error beside its noise."""
+        """Test with a model error of the given relative standard deviation added to its noise."""
         test = replace(self, model_error=size)
         test.__dict__["_error_directions"] = self._error_directions
         return test
 
     def noise_free(self, model: Model) -> Self:
-        """Test with the response of a model in place of the measured one."""
+        """Test with the response of a model in place of the measured response."""
         force = self.force(model)
         return replace(self, drive=replace(self.drive, force=force, half_range=float(np.ptp(force)) / 2.0))
 
@@ -146,7 +148,7 @@ class MeasuredLoop(MeasuredBase):
         """Model force at the rows [N or N m], (..., n).
 
         Args:
-            model: the model.
+            model: model to evaluate.
             values: parameter values in place of the model's own; leading axes are added to the result.
 
         Returns:
@@ -161,11 +163,11 @@ class MeasuredLoop(MeasuredBase):
         return force if values is not None else self._keep("force", model, (), force)
 
     def residual(self, model: Model, values: Values | None = None) -> Array:
-        """Whitened residuals, (..., size); `values` in place of the model's own add leading axes."""
+        """Whitened residuals, model minus measured, (..., size); `values` replace the model's, with leading axes."""
         return self._whitened((self.force(model, values) - self.drive.force) * self._per_noise)
 
     def residual_with(self, added: Array, model: Model) -> Array:
-        """Whitened residuals with a stiffness of any size added, complex (n,), (size,)."""
+        """Whitened residuals, (size,), with a stiffness added to the model's, complex (n,) [N/m or N m/rad]."""
         return self.residual(model) + self.residual_change(added, model)
 
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
@@ -176,20 +178,20 @@ class MeasuredLoop(MeasuredBase):
         return self._keep("jacobian", model, tuple(names), self._whitened(self._slopes(model, names) * self._per_noise))
 
     def _slopes(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the force at the rows by parameter value, (len(names), n); the force is kept."""
+        """Derivatives of the force at the rows by parameter value, (len(names), n); caches the force too."""
         history = self.drive.history(model.settles)
         force, slopes = force_and_slopes(model, self.direction, history, names, self.under)
         self._keep("force", model, (), self.drive.at_rows(force) + (self.drive.datum or 0.0))
         return self.drive.at_rows(slopes)
 
     def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
-        """Derivatives of `residual_with` by parameter.
+        """Derivatives of `residual_with` by parameter value, (k, size).
 
         Args:
             added: stiffness added to the model's, complex (n,) [N/m or N m/rad].
             model: model at whose values the derivatives are taken.
-            names: k parameters.
-            as_share: True if the added stiffness stays the same share of the model's; False if it stays as it is.
+            names: names of the k parameters.
+            as_share: True if the added stiffness remains proportional to the model's; False if it is constant.
         """
         slopes = self.jacobian(model, names)
         if as_share:
@@ -199,13 +201,14 @@ class MeasuredLoop(MeasuredBase):
         return slopes
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
-        """Change of the whitened residuals, (..., size), by a small change of the model's stiffness at the operating
-        points, with another stiffness beside the model's; a loop changes by its first harmonic.
+        """Change of the whitened residuals, (..., size), by a small change of the model's stiffness.
+
+        The force of a loop changes in its first harmonic only.
 
         Args:
-            change: of the model's stiffness, complex (..., n) [N/m or N m/rad].
-            model: model that the change is added to.
-            added: further stiffness at the points, complex (n,) [N/m or N m/rad].
+            change: change of the stiffness at the operating points, complex (..., n) [N/m or N m/rad].
+            model: model whose stiffness changes.
+            added: stiffness added to the model's at the points, complex (n,) [N/m or N m/rad].
         """
         return np.concatenate((change.real, change.imag), axis=-1) @ self._unit_changes
 
@@ -213,7 +216,7 @@ class MeasuredLoop(MeasuredBase):
         return ((self.force(model) - self.drive.force) / self.drive.half_range)[None]
 
     def misfit(self, model: Model) -> Array:
-        """Residuals, (size,), each row of a loop in units of its noise, whatever the rows before it tell."""
+        """Residuals in units of noise, (size,); rows of a loop are scaled separately, without their correlation."""
         return (self.force(model) - self.drive.force) * self._per_noise
 
     def distance(self, model: Model) -> Array:
@@ -221,19 +224,19 @@ class MeasuredLoop(MeasuredBase):
         return np.abs(self.misfit(model))
 
     def displayed_residual(self, model: Model) -> Array:
-        """Residuals as `misfit`, and distances of points without weight, in units of noise, (size,)."""
+        """Residuals for charts, (size,): as `misfit`, but also of points without weight, in units of noise."""
         distance = (self.force(model) - self.drive.force) / self.drive.noise
         return np.where(self.weights > 0.0, self.misfit(model), distance)
 
     def outlying(self, model: Model) -> Array:
-        """Numbers of the points that are outliers: far from the model and from their neighbours alike.
+        """Indices of the outliers, (k,): points far from both the model and their neighbours.
 
-        Of a loop rows of the record, from 0, whose force stands out from its own harmonics; no model is asked.
+        For a loop: indices of the rows whose force is far from the harmonics of the force, independent of the model.
         """
         return self.drive.outliers["force"].rows
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
-        """Outliers by file and row."""
+        """Records of outliers with their file and row, from the indices of the points (a loop: all its outliers)."""
         file = str(self.source.file) if self.source else None
         before = self.drive.first_row + (self.test.part.first_row if self.test.part else 0)
         for column, (rows, distance) in self.drive.outliers.items():
@@ -241,25 +244,25 @@ class MeasuredLoop(MeasuredBase):
                 yield Outlier(self.name, file, row + before + 1, column, noise_units)
 
     def contrasts(self) -> Array:
-        """A constant force, and the cosine and sine of each harmonic, as whitened residuals, (11, n); 0 of those that
-        are left out."""
+        """Change of the whitened residuals by a force of half the force range, (11, size), in turn constant and as
+        cosine and sine of each of five harmonics; with `fundamental_only` all but the first harmonic are 0."""
         rows = self._whitened(self._waves * (self._per_noise * self.drive.half_range))
         if self.fundamental_only:
             rows[[0, *range(3, len(rows))]] = 0.0
         return rows
 
     def smooth_misfit(self, model: Model) -> float:
-        """Largest smooth misfit, relative as `relative_difference`."""
+        """Largest smooth misfit (first five harmonics), relative to half the force range, or to |K| for a sweep."""
         sizes = np.linalg.lstsq(self.contrasts().T, self.residual(model), rcond=None)[0]
         return float(np.abs(sizes @ self._waves[:, self.weights > 0.0]).max())
 
     def gain_and_offset(self) -> Array:
-        """Whitened residuals by a unit of gain, and by half the force range of offset, (2, n)."""
+        """Change of the whitened residuals by a gain error of 100 % and an offset of half the force range, (2, n)."""
         offset = np.full(self.drive.force.size, self.drive.half_range)
         return np.array([self._less_shared(self.unit_gain), self._whitened(offset * self._per_noise)])
 
     def columns(self) -> dict[str, Any]:
-        """Columns by header that name the point of each residual in a table."""
+        """Table columns by header that identify the point of each residual, such as time [s] and amplitude."""
         unit, factor = self.direction.display.displacement
         return {
             "time [s]": self.drive.phase / self.drive.frequency,
@@ -280,13 +283,12 @@ class MeasuredLoop(MeasuredBase):
         return smooth_waves(self.drive.phase)
 
     def _in_noise(self, rows: Array) -> Array:
-        """Rows in units of noise, (..., n), as the independent numbers that count; 0 for one that depends on a row left
-        out."""
+        """Rows in units of noise, (..., n), with their correlation removed; 0 if a row depends on a row left out."""
         white = self.drive.row_noise.whiten(rows) * self._counting
         return white @ self._fundamental if self.fundamental_only else white
 
     def _less_shared(self, white: Array) -> Array:
-        """Independent numbers, (..., n), whitened by the errors that all of them share as well."""
+        """Whiten uncorrelated rows, (..., n), by the error that all rows share as well: model error or gain error."""
         if self.model_error:
             directions, size = self._error_directions
             share = 1.0 - 1.0 / np.hypot(1.0, self.model_error * size)
@@ -294,35 +296,35 @@ class MeasuredLoop(MeasuredBase):
         return self._gain.whiten(white) if self._gain else white
 
     def _whitened(self, rows: Array) -> Array:
-        """Rows in units of noise, (..., n), as independent numbers without shared errors."""
+        """Whiten rows in units of noise, (..., n), by their correlation and by shared errors."""
         return self._less_shared(self._in_noise(rows))
 
     @property
     def log_size(self) -> float:
-        """Natural log of the determinant of the covariance of the independent numbers by their shared errors."""
+        """Natural log of the determinant of the covariance that shared errors give the uncorrelated rows."""
         if self.model_error:
             return float(np.sum(np.log1p(np.square(self.model_error * self._error_directions[1]))))
         return self._gain.log_size if self._gain else 0.0
 
     @cached_property
     def _fundamental(self) -> Array:
-        """Orthonormal basis of the residuals that a first harmonic makes, (n, 2)."""
+        """Orthonormal basis of the whitened rows of a first harmonic, (n, 2)."""
         waves = self.drive.row_noise.whiten(self._waves[1:3] * self._per_noise) * self._counting
         return np.linalg.qr(waves.T)[0]
 
     @cached_property
     def _unit_changes(self) -> Array:
-        """Whitened residuals by 1 and i of a change of stiffness, (2, n)."""
+        """Change of the whitened residuals by a change of the stiffness by 1 and by i [N/m or N m/rad], (2, size)."""
         wave = self.drive.coefficients[1] * np.exp(2j * np.pi * self.drive.phase)
         return self._whitened(np.array([wave.real, -wave.imag]) * self._per_noise)
 
     @cached_property
     def unit_gain(self) -> Array:
-        """Residuals by a unit of gain, as independent numbers, (n,).
+        """Change of the uncorrelated rows by a gain error of 100 %, (size,).
 
-        Notes: of the force without its noise. With it, a fit would take the noise for what the gain makes, and make
-        the model smaller than it is (Peelle's puzzle: R. Fruehwirth, D. Neudecker, H. Leeb, EPJ Web of Conferences 27
-        (2012) 00008).
+        Notes: computed from the force without its noise. With noise, a fit would attribute noise to the gain, and bias
+        the model towards small forces (Peelle's puzzle: R. Fruehwirth, D. Neudecker, H. Leeb, EPJ Web of Conferences
+        27 (2012) 00008).
         """
         waves, weighed = self._waves.T, self.weights > 0.0
         smooth = waves @ np.linalg.lstsq(waves[weighed], self.drive.force[weighed], rcond=None)[0]
@@ -330,13 +332,13 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def _gain(self) -> CommonError | None:
-        """The error of the gain, where it weighs; None without. Beside a model error it does not weigh."""
+        """Gain error as a shared error, if the gain error is part of the noise (`gain_weighs`); else None."""
         return CommonError(self.gain_error * self.unit_gain[None]) if self.gain_weighs and self.gain_error else None
 
     @cached_property
     def _error_waves(self) -> Array:
-        """One standard deviation of a model error of 100 % by harmonics, cosine and sine, as independent numbers,
-        (c, n)."""
+        """Change of the uncorrelated rows by one standard deviation of each part of a model error of 100 %, (c, n):
+        cosine and sine of each harmonic, and for a loop from rest an additional first cycle and a drift."""
         count = 1 if self.fundamental_only else _ERROR_HARMONICS
         angle = 2.0 * np.pi * self.drive.phase * np.arange(1, count + 1)[:, None]
         waves = np.stack((np.cos(angle), np.sin(angle)), axis=1) * _ERROR_SIZES[:count, None, None]
@@ -349,15 +351,15 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def _error_directions(self) -> tuple[Array, Array]:
-        """Orthonormal directions that a model error of 100 % takes, (n, c), and its sizes, (c,)."""
+        """Orthonormal directions of a model error of 100 %, (n, c), and its standard deviation along each, (c,)."""
         return CommonError(self._error_waves[2 * (self.first_error - 1) :]).principal_errors
 
     def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
         """Inner products of the residual and its derivatives, from which the size of a model error is estimated.
 
         Args:
-            model: whose residual it is.
-            names: of the parameters.
+            model: model of the residual and derivatives.
+            names: names of the parameters.
         """
         slopes = self._slopes(model, names)
         misfit = (self.force(model) - self.drive.force)[None]
@@ -366,14 +368,14 @@ class MeasuredLoop(MeasuredBase):
         return ErrorProducts(white @ white.T, white @ directions * size, np.square(size))
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
-        """Reactions of an estimator to each variance of the noise that was itself estimated.
+        """Sensitivity of parameter estimates to errors of each noise variance that was itself estimated.
 
         Args:
             influence: weight of each whitened residual in the estimates, (k, size).
 
         Returns:
-            Per variance, (k, size): the influence times the whitened derivative of the residuals' covariance by that
-            variance, times its standard error.
+            By identifier of the variance, (k, size): the influence times the whitened derivative of the residuals'
+            covariance by the variance, times the standard error of the variance.
         """
         reaction = self._less_shared(influence)
         whole = reaction @ self._fundamental.T if self.fundamental_only else reaction
@@ -386,14 +388,16 @@ class MeasuredLoop(MeasuredBase):
         return {(self.name, index): self._less_shared(part) for index, part in enumerate(parts)}
 
     def uncounted(self, influence: Array) -> Array:
-        """Covariance that an estimate has beside what its weights count: the gain, less the model error of the first
-        harmonic, which the process of the model error stands for.
+        """Covariance of estimates that the weights of the residuals do not include.
+
+        For a loop with model error: the gain error, minus the model error of the first harmonic, which the Gaussian
+        process of the model error already includes.
 
         Args:
-            influence: of each whitened residual, (k, size).
+            influence: weight of each whitened residual in the estimates, (k, size).
 
         Returns:
-            (k, k).
+            Covariance to be added, (k, k).
         """
         first = influence @ self._less_shared(self.model_error * self._error_waves[:2]).T
         gain = influence @ self._less_shared(self.gain_error * self.unit_gain)

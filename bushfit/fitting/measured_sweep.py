@@ -32,19 +32,22 @@ _DIGITS = 9
 
 @dataclass(frozen=True, eq=False)
 class MeasuredSweep(MeasuredBase):
-    """Dynamic stiffness of a sweep, as relative complex residual or as magnitude and loss factor.
+    """Measured sweep: dynamic stiffness at n points, with residuals in gain and phase.
 
-    `MeasuredLoop` documents the methods that have no explanation here.
-
-    Points stand sorted by run (what it holds, repeat), then step; a run is a block. The residual
-    ln K/K_meas has the gain error in its real and the phase error in its imaginary part.
+    `MeasuredLoop` documents the methods that have no explanation here. Points are sorted by run (held value, repeat),
+    then by step; a run is a block. The residual ln(K/K_meas) of model K has the gain error in its real and the phase
+    error in its imaginary part.
 
     Args:
-        weight: share of its weight that each point has, (n,) in `order`; all for None.
-        part: rows of the sweep that belong to it, (n,) in `order`; all for None.
-        under: what its rows were measured under, (rows,) each.
-        model_error: standard deviation of the relative error of the model at an operating point, added to
-            the noise, in phase and in quadrature; repeats share it.
+        sweep: measured data.
+        noise: noise of the campaign's sweeps.
+        residuals: definition of the residuals: "complex", or magnitude and loss factor.
+        weight: weight of each point, 0 to 1, (n,) in `order`; None for full weight.
+        part: indices of the rows of the sweep that are used, (n,) in `order`; None for all rows.
+        under: temperature and other circumstances of each row of the sweep, (rows,) each.
+        contradiction: sentence on a disagreement with an earlier test of the same points; None without one.
+        model_error: standard deviation of the relative error of the model at an operating point, added to the noise in
+            phase and in quadrature; repeats share the error.
     """
 
     sweep: Sweep
@@ -87,7 +90,7 @@ class MeasuredSweep(MeasuredBase):
 
     @property
     def temperature(self) -> Array:
-        """Temperature of each point [K], (n,); nan where it is not known."""
+        """Temperature of each point [K], (n,); nan if unknown."""
         kelvin = np.nan if self.sweep.temperature is None else self.sweep.temperature
         return np.broadcast_to(kelvin, self.sweep.frequency.size)[self.order]
 
@@ -118,7 +121,7 @@ class MeasuredSweep(MeasuredBase):
         return self.weighted(np.isin(np.arange(self.frequency.size), points, invert=True)) if points.size else self
 
     def select(self, points: Array) -> Self:
-        """The part of the sweep at some points, by a mask, (n,)."""
+        """Sweep reduced to the points of a mask, (n,)."""
         return replace(self, weight=self.weights[points], part=self.order[points])
 
     def with_weight(self) -> Self:
@@ -126,7 +129,7 @@ class MeasuredSweep(MeasuredBase):
         return self if weighed.all() else self.select(weighed)
 
     def thinned(self, maximum: int) -> Self:
-        """The part of the sweep at evenly chosen points, a number of them at most."""
+        """Sweep reduced to every k-th point, at most `maximum` points."""
         step = -(-self.order.size // maximum)
         return self if step == 1 else self.select(np.arange(self.order.size) % step == 0)
 
@@ -143,7 +146,7 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def order(self) -> Array:
-        """Row of the sweep at which each point stands, from 0, (n,): by run (what it holds, repeat), then step."""
+        """Row index in the sweep of each point, (n,): sorted by run (held value, repeat), then by step."""
         by_run = np.lexsort((self.sweep.step, self.sweep.repeat, self.sweep.held))
         return by_run if self.part is None else self.part
 
@@ -161,9 +164,7 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def held(self) -> Array:
-        """Value held by the run of each point, (n,): amplitude [m or rad] or frequency [Hz], or else the number of the
-        run.
-        """
+        """Value held constant in each point's run, (n,): amplitude [m or rad], frequency [Hz] or number of the run."""
         return self.sweep.held[self.order]
 
     @cached_property
@@ -188,14 +189,16 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def _distinct(self) -> tuple[Array, Array, Array]:
-        """Frequency and reached amplitude of the distinct operating points, and the place of each point among them."""
+        """Frequency and reached amplitude of the distinct operating points, and the index of each point's, (n,)."""
         points = self.frequency + 1j * self.sweep.amplitude_reached[self.order]
         distinct, place = np.unique(points, return_inverse=True)
         return distinct.real, distinct.imag, place
 
     def _operating_points(self, model: Model) -> tuple[Array, Array, Circumstances, Array | slice]:
-        """Frequency, reached amplitude and circumstances that a model is asked at, and the place of each point there:
-        the distinct points, or all of them where the model depends on when each was measured."""
+        """Frequency, reached amplitude and circumstances at which to evaluate a model, and the index of each point's.
+
+        These are the distinct operating points, or all points if the model depends on circumstances (temperature).
+        """
         if model.knows_circumstances:
             reached = self.sweep.amplitude_reached[self.order]
             return self.frequency, reached, self.circumstances, slice(None)
@@ -203,10 +206,10 @@ class MeasuredSweep(MeasuredBase):
         return frequency, amplitude, UNKNOWN, place
 
     def stiffness(self, model: Model, values: Values | None = None) -> Array:
-        """Model stiffness at the points, (..., n); repeats are computed once.
+        """Model stiffness at the points, complex (..., n) [N/m or N m/rad]; repeats are computed once.
 
         Args:
-            model: the model.
+            model: model to evaluate.
             values: parameter values in place of the model's own; leading axes are added to the result.
         """
         last = self._last.get("stiffness")
@@ -235,14 +238,14 @@ class MeasuredSweep(MeasuredBase):
         Args:
             added: stiffness added to the model's, complex (n,) [N/m or N m/rad].
             model: model at whose values the derivatives are taken.
-            names: k parameters.
-            as_share: True if the added stiffness stays the same share of the model's.
+            names: names of the k parameters.
+            as_share: True if the added stiffness remains proportional to the model's; False if it is constant.
         """
         grown = 1.0 + added / self.stiffness(model) if as_share else 1.0
         return self.residual_change(grown * self._slopes(model, names), model, added)
 
     def _slopes(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the stiffness at the points by parameter value, (len(names), n); the stiffness is kept."""
+        """Derivatives of the stiffness at the points by parameter value, (len(names), n); caches the stiffness too."""
         frequency, amplitude, under, place = self._operating_points(model)
         stiffness, slopes = stiffness_and_slopes(model, self.direction, frequency, amplitude, names, under=under)
         self._keep("stiffness", model, (), stiffness[place])
@@ -252,15 +255,16 @@ class MeasuredSweep(MeasuredBase):
         """Change of the whitened residuals by a small change of the model's stiffness.
 
         Args:
-            change: of the model's stiffness, complex (..., n) [N/m or N m/rad].
-            model: model that the change is added to.
-            added: further stiffness at the points, complex (n,) [N/m or N m/rad].
+            change: change of the model's stiffness, complex (..., n) [N/m or N m/rad].
+            model: model whose stiffness changes.
+            added: stiffness added to the model's at the points, complex (n,) [N/m or N m/rad].
         """
         return self.whiten(self._deviation_change(change, self.stiffness(model) + added))
 
     def deviation(self, stiffness: Array) -> Array:
-        """Residual of a stiffness at the points before whitening, (..., n): gain in the real, phase (or loss factor) in
-        the imaginary part.
+        """Residual of a stiffness at the points before whitening, complex (..., n).
+
+        The real part is the relative difference in magnitude, the imaginary part the difference in phase [rad].
         """
         if self.residuals == "complex":
             return np.log(stiffness / self.measured)
@@ -269,7 +273,7 @@ class MeasuredSweep(MeasuredBase):
         return gain + 1j * loss * self._phase_per_loss
 
     def _deviation_change(self, change: Array, stiffness: Array) -> Array:
-        """Change of the deviation, (..., n), by small changes of a stiffness at the points, (..., n) each."""
+        """Change of the deviation, complex (..., n), by a small change of a stiffness at the points, (..., n) each."""
         relative = change / stiffness
         if self.residuals == "complex":
             return relative
@@ -279,12 +283,12 @@ class MeasuredSweep(MeasuredBase):
 
     @property
     def _phase_per_loss(self) -> Array:
-        """Phase per loss factor, 1/(1 + eta^2)."""
+        """Derivative of phase by loss factor eta at each point, 1/(1 + eta^2), (n,)."""
         return (self.measured.real / np.abs(self.measured)) ** 2
 
     @cached_property
     def covariance(self) -> Whitening:
-        """Covariance of the deviations."""
+        """Covariance of the deviations (residuals before whitening)."""
         random = self.noise.scatter(self.name, self.held, self.step)
         if self.sweep.relative_error is not None and self.sweep.noise is None:
             random = np.maximum(np.tile(self.sweep.relative_error[self.order], (2, 1)), FLOOR)
@@ -293,7 +297,7 @@ class MeasuredSweep(MeasuredBase):
         return Whitening(self.block_starts, line_starts, random, self.noise, self.weights, points, self.model_error)
 
     def whiten(self, deviation: Array) -> Array:
-        """Deviations in units of noise, shared block errors taken out: complex (..., n) -> (..., 2 n)."""
+        """Whiten deviations by scatter and shared errors: complex (..., n) -> (..., 2 n), gains, then phases."""
         return self.covariance.whiten(deviation)
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
@@ -315,12 +319,14 @@ class MeasuredSweep(MeasuredBase):
         return np.stack((difference.real, difference.imag))
 
     def scaled_distance(self, deviation: Array, *, shared: bool = True) -> Array:
-        """Length of deviations, (n,), in units of the random noise, less the likeliest error that a block shares."""
+        """Magnitude of deviations in units of random noise, (n,); `shared` subtracts the common error of each block."""
         return np.hypot(*self.covariance.scaled(deviation, shared=shared))
 
     def distance(self, model: Model) -> Array:
-        """Distance of each point from the model, without the likeliest error that its block shares, in units of noise,
-        (n,); the root mean square of gain and phase."""
+        """Distance of each point from the model in units of noise, (n,): root mean square of gain and phase.
+
+        The likeliest error that the points of a block share is subtracted first.
+        """
         return self.scaled_distance(self.deviation(self.stiffness(model))) / np.sqrt(2.0)
 
     def misfit(self, model: Model) -> Array:
@@ -343,10 +349,10 @@ class MeasuredSweep(MeasuredBase):
             yield Outlier(self.name, file, row, "stiffness", noise_units)
 
     def lines(self, model: Model) -> list[LineMisfit]:
-        """Mean misfit of each line over its repeats.
+        """Mean misfit of each line (runs at one held amplitude or frequency) over its repeats.
 
         Returns:
-            One record for each value held.
+            One record for each held value.
         """
         ratio, lines = self.measured / self.stiffness(model) - 1.0, []
         for held_value in np.unique(self.held):
@@ -366,7 +372,7 @@ class MeasuredSweep(MeasuredBase):
         return max(float(np.abs(line.smooth).max()) for line in self.lines(model))
 
     def line_words(self, point: int) -> str:
-        """Text that names the line of a point."""
+        """Text that names the line to which the point with the given index belongs."""
         if self.sweep.stepped == "frequency":
             return f"the {self.direction} level {shown_amplitude(self.direction, self.amplitude[point])}"
         if self.sweep.stepped == "amplitude":
@@ -374,7 +380,7 @@ class MeasuredSweep(MeasuredBase):
         return f"run {self.repeat[point]} of {self.name}, {self.direction}"
 
     def moved_together(self, chosen: Array) -> list[Array]:
-        """Changes of the whitened residuals if some points, (n,) shares, are off by one unit of gain, and of phase."""
+        """Changes of the whitened residuals, (2 n,) each, by a common unit error of gain, and of phase, at a mask."""
         return [self.whiten(unit * chosen.astype(complex)) for unit in (1.0, 1.0j)]
 
     def columns(self) -> dict[str, Any]:

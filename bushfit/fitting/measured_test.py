@@ -13,15 +13,15 @@ from bushfit.reading.measurement import Loop, Source, Sweep
 
 
 class MeasuredBase(ABC):
-    """One measured test with its noise; `preparation.MeasuredTest` is either of its kinds, a loop or a sweep.
+    """One measured test, a loop or a sweep, with its noise.
 
     Fits, quality figures, pictures and the diagnosis use both kinds in the same way; `MeasuredLoop` documents the
-    methods. A whitened residual is model less measured in units of noise; residuals are independent with unit variance
+    methods. A whitened residual is model minus measured in units of noise; residuals are independent with unit variance
     if the model is right. A loop of n points has n residuals, a sweep 2 n: all gains, then all phases.
 
     Args:
         kind: "loop" or "sweep".
-        components: quantities that the residuals of a point belong to: force, or storage and loss.
+        components: names of the residuals of a point: "force", or "storage" and "loss".
     """
 
     kind: ClassVar[Kind]
@@ -30,16 +30,16 @@ class MeasuredBase(ABC):
     @property
     @abstractmethod
     def test(self) -> Loop | Sweep:
-        """Measurement behind the test."""
+        """Measured data as read from the file."""
 
     @property
     @abstractmethod
     def weights(self) -> Array:
-        """Share of its weight that each point has, (n,); of a long loop the rows behind it."""
+        """Weight of each point, (n,): 1 full, 0 left out; for a long loop the number of rows averaged in the point."""
 
     @abstractmethod
     def relative_difference(self, model: Model) -> Array:
-        """Model less measured of every point, relative to |K| or to half a loop's force range, (parts, n)."""
+        """Model minus measured at each point, relative to |K| or to half the force range of a loop, (parts, n)."""
 
     @property
     def parts(self) -> int:
@@ -56,20 +56,20 @@ class MeasuredBase(ABC):
 
     @property
     def source(self) -> Source | None:
-        """The file of the test, if any."""
+        """Source file of the test; None for a simulated test."""
         return self.test.source
 
     def relative(self, model: Model) -> Array:
-        """Size of the relative difference of the points that carry weight, for NRMSE, (n,)."""
+        """Magnitude of the relative difference at each point with weight, for the NRMSE, (n,)."""
         return np.linalg.norm(self.relative_difference(model)[:, self.weights > 0.0], axis=0)
 
     def change(self, one: Model, reference: Model) -> float:
-        """Largest relative difference between two models."""
+        """Largest difference between two models over the points, relative to |K| or half the force range of a loop."""
         return float(np.linalg.norm(self.relative_difference(one) - self.relative_difference(reference), axis=0).max())
 
     @cached_property
     def _last(self) -> dict[str, tuple[Model, Any, Array]]:
-        """Last response and derivatives of the response, with their model and the names of the parameters."""
+        """Cache of the last response and its derivatives by key, each with its model and parameter names."""
         return {}
 
     def _keep(self, key: str, model: Model, names: Any, values: Array) -> Array:
@@ -80,6 +80,6 @@ class MeasuredBase(ABC):
 
 
 def shown_amplitude(direction: Place, amplitude: float) -> str:
-    """An amplitude [m or rad] as engineers read it: "0.1 mm"."""
+    """Format an amplitude [m or rad] in display units, such as "0.1 mm"."""
     unit, factor = direction.display.displacement
     return f"{amplitude * factor:.4g} {unit}"
