@@ -16,13 +16,13 @@ from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, is_like_numb
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 from bushfit.reading.times import clock
 
-#: Rows that are left out and look like data, per row of data, at most; chosen: more make the meaning doubtful.
+#: Largest ratio of left-out rows that look like data to rows of data; chosen: with more, the meaning is in doubt.
 MOST_LEFT_OUT = 0.1
-#: Rows that are examined first; chosen: a long record need not be read whole.
+#: Number of first rows that are examined; chosen: a long record need not be read completely.
 _FIRST = 1000
-#: Lines that a note lists.
+#: Largest number of lines that a note lists.
 _MOST_LISTED = 4
-#: Rows with an unknown word instead of a number that are left out in any case; chosen: a mean, a deviation, a range.
+#: Rows with an unknown word instead of a number that are always left out; chosen: a mean, a deviation, a range.
 _MOST_WORDS = 3
 #: Placeholders for a missing value.
 _MISSING = frozenset(WORDS["rows_of"]["missing"])
@@ -34,17 +34,17 @@ Row = tuple[int, Sequence[str | float]]
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Header and rows of a table as in its file.
+    """Header and rows of a table as in its file, before conversion to numbers.
 
     Args:
-        file: path.
-        source: its lines.
-        layout: header, units row and delimiter.
-        stated: format as the user states it.
-        roles: recognised columns by role.
-        selected: positions of the rows that make the test, among all lines below the header; None for all.
-        needed: indices of columns that hold a number in every row of data.
-        clocks: indices of columns that hold times as texts.
+        file: path of the test file.
+        source: part of the file that contains the table.
+        layout: location of the table, with its headers, units row and delimiter.
+        stated: format of the file as the user states it.
+        roles: recognised columns, by role such as "force".
+        selected: positions of the rows of the test among all non-empty rows below the header, from 0; None for all.
+        needed: indices of columns that must contain a number; a row without one is not a row of data.
+        clocks: indices of columns that contain times as texts, such as 20:07:10.
     """
 
     file: Path
@@ -58,11 +58,11 @@ class Cells:
 
     @property
     def headers(self) -> tuple[str, ...]:
-        """Cells of the header."""
+        """Texts of the header cells."""
         return self.layout.headers
 
     def rows(self) -> Iterator[Row]:
-        """Line number and cells of each row of data; rows without data are left out.
+        """Yield the line number and the cells of each row of data; other rows, such as remarks and means, are left out.
 
         Raises:
             MeasurementError: a line or a quoted cell is far too long.
@@ -73,19 +73,19 @@ class Cells:
 
     @cached_property
     def first_row(self) -> Sequence[str | float]:
-        """Cells of the first row of data; those of an empty row if there is none."""
+        """Cells of the first row of data; empty cells if there is none."""
         return next((cells for _, cells in self.rows()), [""] * len(self.headers))
 
     @cached_property
     def first_rows(self) -> list[Sequence[str | float]]:
-        """Cells of the first thousand rows of data; those of an empty row if there are none."""
+        """Cells of each of the first thousand rows of data; one row of empty cells if there are none."""
         return [cells for _, cells in islice(self.rows(), _FIRST)] or [[""] * len(self.headers)]
 
     def all_rows(self) -> Iterator[tuple[int, Sequence[str | float], str | None]]:
-        """Yield line number, cells, and fault of each row that is filled.
+        """Yield line number, cells and fault of each non-empty row below the header, whether it is data or not.
 
         Yields:
-            As of `rows`, with None for data or else the reason of `fault`.
+            Line number, cells, and the reason why the row is not data (see `fault`); None for a row of data.
         """
         try:
             for line in self.source.lines(self.layout.lines_before_data):
@@ -98,10 +98,10 @@ class Cells:
             raise self.error("the table cannot be read", found=str(error)) from error
 
     def fault(self, cells: Sequence[str | float]) -> str | None:
-        """Return the reason why a row is no data; None for data.
+        """Return the reason why a row is not a row of data; None if it is one.
 
-        "other" is a row that is clearly none, such as a remark or a mean; "missing" one with a known placeholder
-        instead of a number; "word" one with another word; and "doubtful" one that looks like data.
+        "other": clearly not data, such as a remark or a mean; "missing": a known placeholder instead of a number;
+        "word": another word instead of a number; "doubtful": looks like data, but cannot be read.
         """
         texts = [str(cell) for cell in cells]
         first = next((text for text in texts if text), "")
@@ -125,13 +125,13 @@ class Cells:
         return None
 
     def note_left_out(self, rows: Sequence[Row] | None = None) -> Iterator[str]:
-        """Describe the rows without data, by default of the whole table.
+        """Describe the rows that are left out because they are not data; `rows` are candidates, by default all rows.
 
         Yields:
-            One sentence if there are any.
+            One sentence if there are such rows.
 
         Raises:
-            MeasurementError: so many of these rows look like data that their meaning is in doubt.
+            MeasurementError: so many of these rows look like data that the meaning of the table is in doubt.
         """
         header, left_out, in_doubt = [plain(cell) for cell in self.headers], list[Row](), list[Row]()
         digits = 0
@@ -157,13 +157,13 @@ class Cells:
     def bad_row(
         self, line: int, cells: Sequence[str | float], count: int = 1, column: Column | None = None
     ) -> MeasurementError:
-        """Return the error for a row that does not fit the header, or has a cell that is no number.
+        """Return the error for a row that does not match the header, or has a cell that is not a number.
 
         Args:
-            line: line number.
-            cells: its cells.
-            count: number of such rows.
-            column: with the bad cell; default the first needed one without a number.
+            line: line number of the row.
+            cells: cells of the row.
+            count: number of such rows in the table.
+            column: column of the bad cell; by default, the first needed column without a number.
         """
         also = f", and {count - 1} more such rows" if count > 1 else ""
         needed = [column for column in self.roles.values() if column.index in self.needed]
@@ -192,7 +192,7 @@ class Cells:
         )
 
     def holds_numbers(self, index: int) -> bool:
-        """Return True if a column begins with a number."""
+        """Return True if the first row of data has a number in the column with this index."""
         cell = self.first_row[index]
         return not isinstance(cell, str) or is_like_number(cell)
 
@@ -205,19 +205,19 @@ class Cells:
         kind: type[MeasurementError] = MeasurementError,
         **details: Any,
     ) -> MeasurementError:
-        """Return an error with its place.
+        """Return an error that names the file and the location in it.
 
         Args:
-            problem: in one clause.
-            line: line number.
-            column: column of the cell.
+            problem: description of the problem in one clause.
+            line: line number; None if the problem is not on one line.
+            column: column of the cell; None if the problem is not in one column.
             kind: class of the error.
-            details: found, expected and hint.
+            details: texts for `found`, `expected` and `hint` of the error.
         """
         return kind(problem, file=self.file, place=self.place(line, column), **details)
 
     def header_error(self, problem: str, found: str | None = None, **details: Any) -> MeasurementError:
-        """Return an error in the header; `found` is by default its cells, if the file is understood as a table."""
+        """Return an error on the header line; `found` is by default the header cells, if the file is a table at all."""
         if found is None and self.is_table:
             found = ", ".join(self.headers)
         found = found or f"{len(self.headers)} cell{'s' * (len(self.headers) != 1)}, without the name of a column"
@@ -231,7 +231,7 @@ class Cells:
         )
 
     def place(self, line: int | None, column: Column | None) -> str | None:
-        """Return the location in the file as "line 3, column "Time [s]""; None if all is unknown."""
+        """Return the location in the file, such as "line 3, column "Time [s]""; None if nothing is known."""
         source = self.source
         parts = [
             f'{word_for_part(self.file)} "{source.sheet}"' if source.sheet else None,
@@ -281,7 +281,7 @@ class Cells:
         return evidence.ways[0]
 
     def possible_numerals(self) -> tuple[Numerals, ...]:
-        """Notations of numbers that the user leaves possible."""
+        """Return the notations of numbers that agree with the decimal mark and thousands separator the user states."""
         decimal, thousands = self.stated.decimal, self.stated.thousands
         fitting = (way for way in ALL_NUMERALS if decimal in (None, way.decimal))
         notations = tuple(way for way in fitting if thousands in (None, way.thousands or "none"))
@@ -290,7 +290,7 @@ class Cells:
         return notations
 
     def number_texts(self) -> Iterator[tuple[Place, str]]:
-        """Place and text of the cells of columns with a role, without those that the file stores as numbers."""
+        """Yield location and text of each cell in columns with a role, except those that the file stores as numbers."""
         indices = {column.index for column in self.roles.values()} - self.source.numeric - self.clocks
         for line, cells in self.rows() if indices else ():
             for index in indices:

@@ -30,19 +30,19 @@ from bushfit.reading.headers import (
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.times import clock
 
-#: Likeness, from 0 to 1, of a header that is suggested for a missing one; chosen: one word of two suffices.
+#: Smallest similarity, from 0 to 1, of a header that is suggested for a missing one; chosen: one word of two suffices.
 _ALIKE = 0.4
-#: Rows that are compared first; chosen: a long record need not be read whole.
+#: Number of first rows that are compared; chosen: a long record need not be read completely.
 _FIRST = 50
-#: Share within which two columns for one amplitude agree; chosen: some are rounded to few digits.
+#: Relative difference up to which two columns for one amplitude agree; chosen: some are rounded to few digits.
 _AGREEMENT = 0.02
-#: Share within which force over displacement agrees with a stiffness; chosen: far from any other channel.
+#: Relative difference up to which force over displacement agrees with a stiffness; chosen: other channels differ more.
 _STIFFNESS_AGREEMENT = 0.1
-#: Roles of which two different columns are ignored and not refused, since other columns can replace them.
+#: Roles that are ignored, without an error, if two different columns have them: other columns can replace them.
 _REPLACEABLE = ("force_amplitude", "damping_coefficient", "damping_ratio", "relative_error", "temperature")
 #: Roles that state the loss of a sweep.
 _LOSSES = {"phase", "loss_factor", "loss_stiffness", "damping_coefficient", "damping_ratio"}
-#: Words by which a column is no measurement of the test, or marks a part of a complex number, or an amplitude.
+#: Words in a header that mark a set point or mean, a part of a complex number, or an amplitude; by these kinds.
 _QUALIFIERS = {kind: frozenset(map(plain, words)) for kind, words in WORDS["qualifiers"].items()}
 #: Role of a column without a known name, by its unit and the words in its name; in this order.
 _BY_UNIT: tuple[tuple[str, tuple[str, ...], str | None], ...] = (
@@ -67,22 +67,22 @@ def classify(
     columns: Mapping[str, str],
     stated_units: Mapping[str, str],
 ) -> tuple[dict[str, Column], tuple[str, ...], frozenset[int]]:
-    """Find the roles of columns.
+    """Find the role of each column, such as "displacement", from its header, its unit and the user's statements.
 
     Args:
-        cells: header and rows.
-        names: usual names by role.
-        motion: of what was tested.
-        vocabulary: meaning of the headers.
-        columns: header or number that the user states, by role.
-        stated_units: units that the user states, by role.
+        cells: header and rows of the table.
+        names: usual column names, by role.
+        motion: kind of motion: translation, rotation or strain.
+        vocabulary: known column names, with those that the user states.
+        columns: header or number of a column as the user states it, by role.
+        stated_units: units as the user states them, by role.
 
     Returns:
-        Columns by role, sentences on columns that were recognised by their unit, and the indices of columns that hold
-        times as texts.
+        Columns by role, sentences on columns that were recognised only by their unit, and the indices of columns that
+        contain times as texts.
 
     Raises:
-        MeasurementError: a header that does not settle which column is which.
+        MeasurementError: it is not clear from the header which column has which role.
         UnitError: two different units for one column.
     """
     roles: dict[str, Column] = {}
@@ -123,7 +123,7 @@ def _is_symbol_k(header: str) -> bool:
 
 
 def _is_fitting(column: Column, *, stated: bool) -> bool:
-    """Return True unless the unit of a column, or the lack of one, shows that its name stands for another role."""
+    """Return False if the unit of a column, or the lack of one, shows that its name means another role."""
     role, unit, name = column.role, column.unit, units.split_header(split_convention(column.header)[0])[0]
     if not stated and not fits(plain(name), role, unit):
         return False
@@ -135,7 +135,7 @@ def _is_fitting(column: Column, *, stated: bool) -> bool:
 
 
 def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, str]) -> dict[int, str]:
-    """Role by index of each column that the user states by its number.
+    """Role of each column that the user states by its number, by index; stated headers are only checked.
 
     Raises:
         NoColumnError: a stated header or number that the file does not have.
@@ -170,7 +170,7 @@ def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, 
 
 
 def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | None = None) -> Column:
-    """Column under a heading, with the unit on which header, units row and user agree."""
+    """Column for the meaning of its header, with the unit on which header, units row and user agree."""
     parsed = [parse_unit(text) for text in (heading.unit, cells.layout.units[index], stated_unit) if text]
     texts = sorted({text for text, *_ in parsed if text})
     conventions = {convention for convention in (heading.convention, *(part[1] for part in parsed)) if convention}
@@ -189,14 +189,14 @@ def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | No
 
 
 def _first_numbers(cells: Cells, columns: Sequence[Column]) -> NDArray[np.float64]:
-    """Numbers of the first rows of columns, (rows, columns), as the file has them; none if a cell is no number."""
+    """First numbers of columns, (rows, columns), in units of the file; no rows if any of the cells is not a number."""
     texts = [[str(row[column.index]).replace(",", ".") for column in columns] for row in cells.first_rows[:_FIRST]]
     are_numbers = all(units.is_number(text) for row in texts for text in row)
     return np.array(texts, dtype=float) if are_numbers else np.empty((0, len(columns)))
 
 
 def _preferred(cells: Cells, first: Column, second: Column) -> Column:
-    """The one of two columns for one role that is read: frequency in Hz before rad/s, else the first of two equal ones.
+    """Choose between two columns for one role: frequency in Hz rather than rad/s, else the first of two equal ones.
 
     Raises:
         MeasurementError: columns that differ.
@@ -240,10 +240,10 @@ def _preferred(cells: Cells, first: Column, second: Column) -> Column:
 def _add_by_unit(
     cells: Cells, roles: dict[str, Column], names: Mapping[str, Sequence[str]], motion: Motion
 ) -> list[str]:
-    """Add the columns that are recognised by their unit and the words in their name; return a sentence for each.
+    """Add columns to `roles` that are recognised by their unit and words in their name; return a sentence for each.
 
-    A column is taken if it is the only one with such a unit, without set points and means. In a sweep these are the
-    columns that belong to a stiffness.
+    A column is added if no other column has such a unit, apart from set points and means. Frequency, amplitude and
+    phase are added only to a table with a stiffness or a force amplitude.
     """
     if len(roles) + len(cells.headers) < 3:
         return []
@@ -294,9 +294,9 @@ def _add_by_unit(
 
 
 def _add_motion_as_amplitude(cells: Cells, roles: dict[str, Column], stated_units: Mapping[str, str]) -> list[str]:
-    """Add the amplitude of a sweep that is named like a displacement: with a force and a phase it can be nothing else.
+    """Add a column to `roles` that is named like a displacement as the amplitude of a sweep; return a sentence on it.
 
-    If the file has a stiffness too, it must agree with force over displacement.
+    The table must have a force amplitude; a stiffness, if there is one, must agree with force over displacement.
     """
     motions = Vocabulary({"amplitude": [*LOOP_COLUMNS["displacement"], "x", "u", "s", "w"]}, {})
     candidates = [

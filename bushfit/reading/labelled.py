@@ -13,22 +13,22 @@ from bushfit.reading.names import named_direction
 from bushfit.reading.runs import rows_alike
 from bushfit.reading.source import Text
 
-#: Rows per value in the mean of a column that assigns rows to tests; chosen: a column that counts its rows has one.
+#: Smallest mean number of rows per distinct text in a column that assigns rows to tests; chosen: a row counter has one.
 _FEWEST_ROWS = 3
-#: Bytes of a text whose columns are read with pandas; chosen: shorter ones take a moment.
+#: Smallest text whose label columns are read with pandas [bytes]; chosen: shorter ones take a moment anyway.
 _LARGE = 1 << 20
-#: Meaning of columns that assign rows to tests.
+#: Known names of columns that assign rows to tests.
 _LABELS = Vocabulary(ROW_COLUMNS, {})
 
 
 class Rows(NamedTuple):
-    """Selection of the rows of a file that make a test.
+    """Criteria that select the rows of one test in a file that may contain several tests.
 
     Args:
-        direction: in the column that states directions, if there is one.
-        specimen_number: in the column that states it, if there is one.
-        texts: text in other columns, by header.
-        shared: True if the file is listed more than once, so that a column has to select the rows.
+        direction: text that rows must have in the column of directions, if the file has one; None for any.
+        specimen_number: text that rows must have in the column of specimen numbers, if the file has one; None for any.
+        texts: texts that rows must have in other columns, by header.
+        shared: True if the campaign lists the file more than once, so that a column has to select the rows.
     """
 
     direction: str | None = None
@@ -38,7 +38,7 @@ class Rows(NamedTuple):
 
 
 class ColumnTexts(NamedTuple):
-    """Texts of a column: its different texts, and the position of the text of each row among them, (n,)."""
+    """Texts of a column, compressed: its distinct texts, and the index among them of the text of each row, (n,)."""
 
     values: Sequence[str]
     codes: NDArray[np.intp]
@@ -47,7 +47,7 @@ class ColumnTexts(NamedTuple):
         return len(self.values) > 0
 
     def per_row(self) -> list[str]:
-        """Text of each row, (n,)."""
+        """Return the text of each row, (n,)."""
         return [self.values[code] for code in self.codes.tolist()]
 
 
@@ -55,12 +55,12 @@ _NONE = ColumnTexts((), np.empty(0, dtype=np.intp))
 
 
 def same_text(text: str, reference: str) -> bool:
-    """Return True if two texts of a column are equal but for case and number signs: 17 and #17."""
+    """Return True if two texts are equal except for case and number signs, such as 17 and #17."""
     return text.strip(" #").casefold() == reference.strip(" #").casefold()
 
 
 def column_texts(cells: Cells, index: int) -> ColumnTexts:
-    """Return the texts of a column; an empty cell, such as a merged one, has the text of the cell above."""
+    """Return the texts of a column by its index; an empty or merged cell gets the text of the cell above."""
     raw = _large_texts(cells).get(index)
     if raw is None:
         column = [row[index] for _, row in cells.rows()]
@@ -79,7 +79,7 @@ def _text(cell: str | float) -> str:
 
 
 def _large_texts(cells: Cells) -> Mapping[int, ColumnTexts]:
-    """Texts of the columns without a role in a large text whose rows all are data, by index; else empty."""
+    """Texts of columns without a role, by index, if the table is a large text with rows of data only; else empty."""
     first, source = [_text(cell) for cell in cells.first_row], cells.source
     if not isinstance(source, Text) or len(source.data) < _LARGE or cells.selected is not None:
         return {}
@@ -93,7 +93,7 @@ def _large_texts(cells: Cells) -> Mapping[int, ColumnTexts]:
 
 
 def _may_separate(cells: Cells, index: int) -> bool:
-    """Return True if a column without a role has few different texts, so that it may separate tests."""
+    """Return True if a column has no role and few distinct texts, so that its texts may distinguish tests."""
     if not cells.headers[index] or index in {column.index for column in cells.roles.values()}:
         return False
     first = [_text(row[index]) for row in cells.first_rows]
@@ -101,7 +101,10 @@ def _may_separate(cells: Cells, index: int) -> bool:
 
 
 def find_labels(cells: Cells) -> Mapping[str, tuple[int, Sequence[str]]]:
-    """Return index and texts, (n,), of the columns that state direction, specimen_number and run, by these keys."""
+    """Find the columns that state the direction, specimen_number and run of each row.
+
+    Returns index and texts, (n,), of each column by these three keys; a key without a column is missing.
+    """
     labels: dict[str, tuple[int, Sequence[str]]] = {}
     for index, header in enumerate(cells.headers):
         heading = _LABELS.heading(header) if header else None
@@ -118,19 +121,19 @@ def find_labels(cells: Cells) -> Mapping[str, tuple[int, Sequence[str]]]:
 
 
 def select_rows(cells: Cells, labels: Mapping[str, tuple[int, Sequence[str]]], wanted: Rows) -> frozenset[int] | None:
-    """Select the rows of one test.
+    """Select the rows of one test in a file that may contain several tests.
 
     Args:
-        cells: of the table.
+        cells: table with all rows.
         labels: columns that assign rows to tests, see `find_labels`.
-        wanted: texts in these columns.
+        wanted: texts that the rows must have in these and other columns.
 
     Returns:
-        Positions of the rows among all lines below the header; None for all.
+        Positions of the rows among all non-empty rows below the header, from 0; None if all rows are selected.
 
     Raises:
-        MeasurementError: there is no such row or column, the rows belong to several parts, or no column selects the
-            tests of a shared file.
+        MeasurementError: there is no such row or column, the rows belong to several parts, or no column distinguishes
+            the tests of a shared file.
     """
     wanted_texts = {"direction": wanted.direction, "specimen_number": wanted.specimen_number}
     chosen = [(*labels[key], text) for key, text in wanted_texts.items() if text and key in labels]
@@ -165,14 +168,14 @@ def select_rows(cells: Cells, labels: Mapping[str, tuple[int, Sequence[str]]], w
 def note_not_understood(
     cells: Cells, labels: Mapping[str, tuple[int, Sequence[str]]], rows: NDArray[np.intp] | None, *settled: Floats
 ) -> Iterator[str]:
-    """Sentences on columns that may separate tests and have no known meaning.
+    """Write a sentence on each column that may distinguish tests but has no known meaning.
 
     Args:
-        cells: of the table.
+        cells: table with all rows.
         labels: columns that assign rows to tests, see `find_labels`.
-        rows: of a sweep, (n,); None for all.
-        settled: frequency and level of these rows, (n,). A number that depends on both is a measured one; a text that
-            depends on one is its name. The numbers of a loop are channels.
+        rows: indices of the rows that were read, (n,); None for all.
+        settled: frequency and nominal amplitude of these rows, (n,) each; none for a loop. Numbers that are constant at
+            each operating point, and texts that are constant at each frequency or amplitude, need no sentence.
 
     Yields:
         One sentence for each such column.

@@ -27,16 +27,19 @@ from bushfit.validation import (
     unknown_key,
 )
 
-#: Keys of a table that state what was tested.
+#: Keys of [[loops]] and [[sweeps]] that state which direction or specimen was tested.
 PLACE_KEYS = ("direction", "specimen")
 #: Lists of tests in [simulate].
 _LISTS = ("loops", "sweeps", "resonances")
-#: Validator that replaces the direction of a specimen by None.
+#: Validator that replaces the direction "shear" of a specimen by None.
 _SHEAR = converter(lambda raw, _: None if raw == "shear" else raw, {"enum": [*Direction, "shear"]})
 
 
 def motion_quantity(suffix: str = "") -> BeforeValidator:
-    """Return a validator of texts in m, rad or 1, by the table's direction or specimen, times a suffix such as "/s"."""
+    """Return a validator that converts texts such as "0.1 mm" to m, rad or strain, depending on what was tested.
+
+    `suffix` is appended to the unit: "/s" for a speed.
+    """
 
     def convert(raw: Any, info: ValidationInfo) -> float:
         direction = info.data.get("direction")
@@ -47,23 +50,24 @@ def motion_quantity(suffix: str = "") -> BeforeValidator:
     return converter(convert, text(f"a number with a unit of {units}, depending on the test"))
 
 
-#: Amplitude of the motion of a test.
+#: Amplitude of the motion of a test [m or rad, or strain].
 Displacement = Annotated[float, motion_quantity(), Field(gt=0)]
 
 
 def place_tested(specimen: object, direction: object, specimens: Sequence[Specimen]) -> Place:
-    """Find the direction or specimen that was tested.
+    """Find the direction of the bushing, or the specimen, that was tested, from the keys of a test.
 
     Args:
-        specimen: value of this key of a test; None if it is missing.
-        direction: value of this key; None if it is missing.
-        specimens: of the campaign.
+        specimen: value of the key "specimen" of the test; None if the key is missing.
+        direction: value of the key "direction" of the test; None if the key is missing.
+        specimens: all specimens of the campaign.
 
     Returns:
         Direction of the bushing, or specimen.
 
     Raises:
-        CampaignError: an unknown specimen, a bushing without a direction, or a specimen with one of the bushing's.
+        CampaignError: an unknown specimen, a test of the bushing without a direction, or a test of a specimen with a
+            direction of the bushing.
     """
     by_name = {specimen.name: specimen for specimen in specimens}
     if specimen is None:
@@ -86,10 +90,10 @@ def place_tested(specimen: object, direction: object, specimens: Sequence[Specim
 
 
 def with_places(tables: Any, specimens: Sequence[Specimen]) -> Any:
-    """Return parsed [simulate] with the keys direction and specimen replaced by the direction or specimen itself.
+    """Return the parsed table [simulate] with the keys direction and specimen of each test resolved to objects.
 
     Raises:
-        CampaignError: as of `place_tested`.
+        CampaignError: the keys of a test do not name a direction or specimen; see `place_tested`.
     """
 
     def with_place(test: Any, place: str) -> Any:
@@ -110,7 +114,7 @@ def with_places(tables: Any, specimens: Sequence[Specimen]) -> Any:
 
 
 def _roles(roles: Collection[str], value_name: str) -> BeforeValidator:
-    """Validator that refuses keys other than known roles of columns; `value_name` names their values in the schema."""
+    """Validator that refuses keys that are not roles of columns; `value_name` describes the values in the schema."""
     written = {"properties": {role: text(f"{value_name} of {role.replace('_', ' ')}") for role in roles}}
     closed = {"type": "object", **written, "additionalProperties": False}
 
@@ -128,14 +132,14 @@ class TestFile(FileFormat):
     """Keys that [[loops]] and [[sweeps]] have in common.
 
     Args:
-        file: path relative to the campaign file.
-        direction: of the bushing; None or "shear" for a specimen.
-        specimen: name in [[specimens]]; default the bushing.
-        noise: relative standard deviation of a point, if it is known.
-        weight: of the test in the fit, as a share of the weight by its noise.
-        temperature: [K]; selects the rows of a file with several temperatures. Direction and specimen_number select
-            rows too if a column states them.
-        rows: text, by header, that selects the rows of the test.
+        file: path of the test file, relative to the campaign file.
+        direction: direction of the bushing; None for a specimen.
+        specimen: name of the specimen in [[specimens]]; default the bushing.
+        noise: relative standard deviation of a point; None if it is not known.
+        weight: weight of the test in the fit, relative to the weight that its noise gives.
+        temperature: temperature of the test [K]; it selects the rows of a file with several temperatures. Direction and
+            specimen_number select rows too if a column states them.
+        rows: text that the rows of the test must have in further columns, by header.
         order: number of the test in the session; default its position among all [[loops]], then all [[sweeps]].
         preload, date, operator, specimen_number: texts that are copied to the results.
     """
@@ -159,9 +163,9 @@ class TestFile(FileFormat):
         """Create the provenance of the test.
 
         Args:
-            sha256: of the file.
-            temperature: [K], if it is known; reported in degC.
-            notes: sentences on the reading.
+            sha256: SHA-256 of the file in hexadecimal digits.
+            temperature: temperature of the test [K], which is reported in degC; None if it is not known.
+            notes: sentences on how the file was read.
 
         Returns:
             File, checksum, notes, and the conditions that are copied to the results.
@@ -174,7 +178,7 @@ class TestFile(FileFormat):
         return Source(Path(self.file), sha256, conditions, tuple(notes))
 
     def rows_of_test(self, *, shared: bool) -> Rows:
-        """Selection of the rows that make the test; with `shared`, a column has to separate the tests of a file."""
+        """Return the criteria that select the rows of the test; with `shared`, the file contains other tests too."""
         return Rows(self.direction, self.specimen_number, self.rows, shared)
 
 
@@ -183,12 +187,12 @@ class LoopFile(TestFile):
     """Table [[loops]]: a file and its missing information, for `loops.read_loop`.
 
     Args:
-        columns: header or number of a column, by role, if its name is unusual.
-        units: by role, if the file does not state them.
+        columns: header or number of each column with an unusual name, by role.
+        units: units that the file does not state, by role.
         force_sign: -1 if the load cell has the opposite sign.
-        rate: speed of a triangle [m/s or rad/s], for a file without time.
-        frequency: [Hz] of the waveform, for a file without time.
-        waveform: for a file without time.
+        rate: speed [m/s or rad/s, or 1/s], for a file without time.
+        frequency: frequency of the waveform [Hz], for a file without time.
+        waveform: shape of the displacement over time, for a file without time.
     """
 
     columns: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS, "header")] = field(default_factory=dict)
@@ -210,7 +214,7 @@ class LoopFile(TestFile):
             )
 
     def clock(self, displacement: Floats) -> Floats:
-        """Time of each row of a file without time [s], (n,); the default waveform is a triangle."""
+        """Rebuild the time [s], (n,), of a file without time from its displacement [m or rad], (n,), and waveform."""
         return rebuild_time(
             displacement, rate=self.rate, frequency=self.frequency, waveform=self.waveform or "triangle"
         )
@@ -221,12 +225,12 @@ class SweepFile(TestFile):
     """Table [[sweeps]]: a file and its missing information, for `sweeps.read_sweep`.
 
     Args:
-        columns: header or number of a column, by role, if its name is unusual.
-        units: by role, if the file does not state them.
+        columns: header or number of each column with an unusual name, by role.
+        units: units that the file does not state, by role.
         amplitude: convention of the amplitudes; default that of the header, else zero-to-peak.
-        at_amplitude: amplitude of all rows with its unit, "0.1 mm" or "0.15 %", for a file without a column for it.
-        at_frequency: frequency of all rows [Hz], for a file without a column for it.
-        stepped: stepped quantity, if the order of the rows does not show it.
+        at_amplitude: amplitude of all rows with its unit, "0.1 mm" or "0.15 %", for a file without an amplitude column.
+        at_frequency: frequency of all rows [Hz], for a file without a frequency column.
+        stepped: quantity that changes from point to point of a run; default detected from the order of the rows.
         force_sign: -1 if the force has the opposite sign, which turns the phase by 180 deg; default automatic.
         phase_sign: -1 if the loss has the opposite sign, as the phase of the displacement relative to the force;
             default automatic.

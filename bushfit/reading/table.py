@@ -39,21 +39,21 @@ from bushfit.reading.times import clock
 from bushfit.reading.wide import unpivot
 
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
-#: Rows that are converted at a time if pandas cannot read them; chosen: their texts fill some MiB.
+#: Rows that are converted at a time if pandas cannot read them; chosen: their texts take a few MiB.
 _CHUNK_ROWS = 1 << 16
-#: Cells that settle the decimal mark; chosen: a long record need not be read whole.
+#: Number of first cells that determine the decimal mark; chosen: a long record need not be read completely.
 _FIRST = 1000
 
 
 @dataclass(frozen=True, eq=False)
 class Table(Cells):
-    """Table of a test, with its columns by role.
+    """Table of a test whose columns have roles, such as "force", and can be read in SI.
 
     Args:
-        checksum: SHA-256 of the file, which may still be computed.
-        names: usual names of the columns by role, for any motion.
-        motion: displacement, rotation or strain.
-        notes: sentences on columns that were recognised by their unit.
+        checksum: SHA-256 of the file, which may still be running in a thread.
+        names: usual column names by role, before adaptation to the motion.
+        motion: kind of motion: translation, rotation or strain.
+        notes: sentences on columns that were recognised only by their unit.
     """
 
     checksum: Future[str]
@@ -72,24 +72,23 @@ class Table(Cells):
         motion: Motion = TRANSLATION,
         rows: Rows | None = None,
     ) -> "Table":
-        """Read a file and classify its columns.
+        """Open a test file, find its table, and classify the columns; numbers are read later, with `read`.
 
         Args:
-            file: text in any dialect, workbook or recording, which may be open already. Lines of other content may
-                stand above the header, and a row of units below it.
-            names: usual names of the columns by role: LOOP_COLUMNS, SWEEP_COLUMNS or RESONANCE_COLUMNS.
-            columns: header, or number from 1, of the column of a role, if its name is unusual.
-            stated_units: units by role that the file does not state.
-            file_format: format of the file as the user states it.
-            motion: of what was tested; a test of strain and modulus has other names.
-            rows: rows that make the test; default all.
+            file: path of a text in any dialect, a workbook or a recording, or the opened file. There may be other lines
+                above the header, and a row of units below it.
+            names: usual column names by role: LOOP_COLUMNS, SWEEP_COLUMNS or RESONANCE_COLUMNS.
+            columns: header, or number from 1, of columns with unusual names, by role.
+            stated_units: units that the file does not state, by role.
+            file_format: format of the file as the user states it; default detected.
+            motion: kind of motion; columns of a test of strain and modulus have other names.
+            rows: criteria that select the rows of the test; default all rows.
 
         Returns:
-            The table.
+            Table with its columns by role.
 
         Raises:
-            MeasurementError: no such file, no text, no header, a header that does not settle which column is which, or
-                no such rows.
+            MeasurementError: no such file, no table, no header, no such rows, or unclear roles of columns.
             UnitError: two different units for one column.
         """
         opened = file if isinstance(file, OpenedFile) else open_file(file, file_format or FileFormat())
@@ -98,7 +97,7 @@ class Table(Cells):
         vocabulary = Vocabulary(of_motion(names, motion), numbered)
 
         def lay_out(source: RowSource) -> tuple[RowSource, Layout]:
-            """Return lines and layout of the table in a part of the file."""
+            """Return source and layout of the table in a part of the file, as a long table without blocks."""
             delimiter = DELIMITERS[file_format.delimiter] if file_format.delimiter else None
             delimiter = "" if isinstance(source, Sheet) else delimiter
             layout = source.layout or find_layout(
@@ -138,28 +137,28 @@ class Table(Cells):
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the file."""
+        """SHA-256 of the file in hexadecimal digits."""
         return self.checksum.result()
 
     @cached_property
     def row_labels(self) -> Mapping[str, tuple[int, Sequence[str]]]:
-        """Columns that state direction, specimen_number and run; see `find_labels`."""
+        """Index and texts of the columns that state direction, specimen_number and run; see `find_labels`."""
         return find_labels(self)
 
     def column(self, role: str, expected: str, hint: str | None = None) -> Column:
-        """Find the column of a role, with its factor to SI; a ratio needs no unit.
+        """Return the column of a role with its factor to SI, after checking its unit; a ratio needs no unit.
 
         Args:
-            role: of the column.
-            expected: SI unit.
-            hint: what the user can do if there is no such column.
+            role: role of the column, such as "force".
+            expected: SI unit of the role, such as "N"; "1" for a ratio.
+            hint: next step to suggest if there is no such column.
 
         Returns:
-            The column.
+            Column whose `scale` converts its numbers to SI.
 
         Raises:
-            MeasurementError: no such column.
-            UnitError: no unit, an unknown one, or one of another dimension.
+            MeasurementError: there is no such column.
+            UnitError: the unit is missing, unknown, or of another dimension.
         """
         label = role.replace("_", " ")
         if role not in self.roles:
@@ -210,12 +209,12 @@ class Table(Cells):
             return replace(column, scale=units.si_factor(unit, expected))
 
     def agrees(self, role: str, expected: str) -> bool:
-        """Return True if a role has a column with a unit of the dimension of `expected`."""
+        """Return True if the table has a column for a role, and its unit has the dimension of the unit `expected`."""
         column = self.roles.get(role)
         return column is not None and column.unit is not None and units.is_compatible(column.unit, expected)
 
     def columns_key(self, role: str, unit: str) -> str:
-        """Return keys of a campaign for up to three free headers that fit the SI unit of a role, or one with "..."."""
+        """Return campaign keys for up to three unused headers with a fitting unit: 'columns = { force = "F1" }'."""
         usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS}, {})
         free = [
             (header, split_convention(units.split_header(split_convention(header)[0])[1] or in_row)[0])
@@ -227,10 +226,10 @@ class Table(Cells):
         return " or ".join(f'columns = {{ {role} = "{header}" }}' for header in fitting[:3] or ["..."])
 
     def refuse_other_motion(self, role: str, headers: Sequence[str] | None = None) -> None:
-        """Refuse headers that name a role in a test of the other kind of motion: strain, or displacement.
+        """Refuse a table of strain and modulus for a test of displacement and force, or the reverse.
 
         Raises:
-            MeasurementError: the table has such a header, or one is given.
+            MeasurementError: a header names the role in the other kind of test, or `headers` that do so are given.
         """
         other_motion = TRANSLATION if self.motion is STRAINING else STRAINING
         kinds = ["displacement and force or stiffness", "strain and modulus"]
@@ -247,20 +246,24 @@ class Table(Cells):
             raise self.header_error(problem, found=f'"{header}" for the {label}', expected=expected, hint=hint)
 
     def read(self, wanted: Mapping[str, Column], *, fewest_rows: int) -> dict[str, Floats]:
-        """Read columns; see `read_with_notes`."""
+        """Return the values of columns in SI by role, (n,) each; see `read_with_notes`."""
         return self.read_with_notes(wanted, fewest_rows=fewest_rows)[0]
 
     def read_with_notes(
         self, wanted: Mapping[str, Column], *, fewest_rows: int
     ) -> tuple[dict[str, Floats], tuple[str, ...]]:
-        """Read columns: with pandas if all rows are data of one notation, else row by row.
+        """Read columns, with pandas if all rows are data in one notation, else row by row.
+
+        Args:
+            wanted: columns by role, with their factors to SI.
+            fewest_rows: smallest number of rows that is accepted.
 
         Returns:
-            Values in SI by role, (n,) each, and sentences on rows that are left out and on columns known by their unit.
+            Values in SI by role, (n,) each, and sentences on rows left out and on columns recognised by their unit.
 
         Raises:
-            MeasurementError: numbers that can be read in two ways, too few rows, or so many rows without data that the
-                meaning of the table is in doubt.
+            MeasurementError: ambiguous numbers, too few rows, or so many rows without data that the meaning of the
+                table is in doubt.
         """
         table, left_out = self.needing(wanted), None
         values = table._by_library(wanted)
@@ -289,16 +292,16 @@ class Table(Cells):
         return values, notes
 
     def needing(self, wanted: Mapping[str, Column]) -> "Table":
-        """The table with only those rows that have a number in each of these columns."""
+        """Return the table with only those rows that have a number in each of these columns."""
         return replace(self, needed=self.needed | {column.index for column in wanted.values()})
 
     def check_positive(self, roles: Sequence[str], wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> None:
-        """Refuse values that are not positive.
+        """Refuse values that are not positive, or positive but smaller than any rig records.
 
         Args:
-            roles: that must be positive, if they are among `values`.
+            roles: roles whose values must be positive, if they are among `values`.
             wanted: columns by role.
-            values: in SI by role, (n,) each.
+            values: values in SI by role, (n,) each.
 
         Raises:
             MeasurementError: there is such a value.
@@ -313,14 +316,14 @@ class Table(Cells):
     def refuse(
         self, bad: NDArray[np.bool_], column: Column, problem: str, expected: str, hint: str | None = None
     ) -> None:
-        """Refuse rows; the error names line and cell of the first.
+        """Raise an error that names line and cell of the first bad row, if there is one.
 
         Args:
-            bad: True for each bad row, (n,).
-            column: with the bad cell.
-            problem: in one clause.
-            expected: what the cell should contain.
-            hint: the next step.
+            bad: mask of the bad rows, (n,).
+            column: column with the bad cell.
+            problem: description of the problem in one clause.
+            expected: expected content of the cell.
+            hint: next step to suggest.
 
         Raises:
             MeasurementError: there is a bad row.
@@ -331,9 +334,9 @@ class Table(Cells):
             raise self.error(problem, line=line, column=column, found=found, expected=expected, hint=hint)
 
     def _by_library(self, wanted: Mapping[str, Column]) -> dict[str, Floats] | None:
-        """Columns as pandas reads them, in SI by role; None if they have to be read row by row.
+        """Values in SI by role, (n,) each, as read by pandas; None if the table has to be read row by row.
 
-        pandas takes no thousands separators. If it reads all cells as numbers, the first cells settle the decimal mark.
+        pandas is used without thousands separators, with the decimal mark of the first cells.
         """
         indices, source = frozenset(column.index for column in wanted.values()), self.source
         if self.selected is not None or self.clocks & indices:
@@ -357,7 +360,7 @@ class Table(Cells):
         return values if fits else None  # so are numbers that are not finite
 
     def _without_faults(self) -> tuple["Table", list[Row]]:
-        """The table without lines that are no data, and these; only lines with letters or empty cells are examined."""
+        """Table without lines that are not data, and these lines; only those with letters or empty cells are checked."""
         source, layout, faulty = self.source, self.layout, list[Row]()
         if not isinstance(source, Text) or layout.numbered:
             return self, faulty
@@ -374,10 +377,10 @@ class Table(Cells):
         return (replace(self, source=Text(data, source.encoding)) if faulty else self), faulty
 
     def _row_by_row(self, wanted: Mapping[str, Column]) -> dict[str, Floats]:
-        """Columns of rows that pandas does not read, in SI by role, (n,) each.
+        """Values in SI by role, (n,) each, of a table that pandas cannot read.
 
         Raises:
-            MeasurementError: a cell with no finite number, or one beyond LARGEST_VALUE.
+            MeasurementError: a cell without a finite number, or with one above LARGEST_VALUE.
         """
         parts: dict[str, list[Floats]] = {role: [np.empty(0)] for role in wanted}
         remaining = self.rows()
