@@ -16,25 +16,25 @@ from bushfit.reading.times import DAY, are_day_numbers, spread, without_midnight
 
 #: Latest time of a record [s]; chosen: the year 5138 in seconds since 1970, or March 1973 in milliseconds.
 _LATEST_SECOND = 1e11
-#: Rows of the shortest loop; chosen: fewer do not show a shape.
+#: Smallest number of rows of a loop; chosen: fewer do not show its shape.
 _FEWEST_LOOP_ROWS = 10
 
 
 def read_loop(file: Path, direction: Place, test: LoopFile, *, name: str | None = None, shared: bool = False) -> Loop:
-    """Read a hysteresis loop.
+    """Read a hysteresis loop from a test file.
 
     Args:
-        file: a table with columns time (optional), displacement and force.
-        direction: of the bushing, or the specimen; it determines the headers and units that fit.
-        test: what the file does not state.
-        name: of the loop; default the stem of the file.
-        shared: True if the file contains other tests too, so that a column has to separate them.
+        file: path of a table with columns time (optional), displacement and force.
+        direction: direction of the bushing, or the specimen; it determines which headers and units are accepted.
+        test: table [[loops]] of the campaign, with the information that the file does not contain.
+        name: name of the loop; default the file name without its ending.
+        shared: True if the file contains other tests too, so that a column has to distinguish them.
 
     Returns:
-        The loop in SI.
+        Loop in SI.
 
     Raises:
-        MeasurementError, UnitError: a file, column, unit or value that cannot be used.
+        MeasurementError, UnitError: the file, a column, a unit or a value cannot be used.
     """
     rows = test.rows_of_test(shared=shared)
     table = Table.open(file, LOOP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
@@ -74,19 +74,19 @@ def read_loop(file: Path, direction: Place, test: LoopFile, *, name: str | None 
 
 
 def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Column]:
-    """Columns of a loop with their factors to SI.
+    """Find the columns of a loop, with their factors to SI.
 
     Args:
-        table: of the loop.
-        direction: of the bushing, or the specimen.
-        test: what the file does not state; with a rate or a frequency, the time needs no column.
+        table: table of the loop.
+        direction: direction of the bushing, or the specimen.
+        test: table [[loops]] of the campaign; if it has a rate or a frequency, the file needs no time column.
 
     Returns:
-        Columns by role.
+        Columns of displacement, force and, if present, time, by role.
 
     Raises:
         MeasurementError: a column is missing, or displacement and force are swapped.
-        UnitError: a unit that does not fit.
+        UnitError: a unit is missing or does not fit.
     """
     length, resistance = direction.motion.displacement_unit, direction.motion.force_unit
     if table.agrees("displacement", resistance) and table.agrees("force", length):
@@ -113,7 +113,7 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
 
 
 def _has_day_numbers(table: Table, time: Column) -> bool:
-    """Return True if a time without a unit holds the day numbers of a spreadsheet."""
+    """Return True if a time column without a unit contains day numbers of a spreadsheet."""
     try:
         return are_day_numbers(table.read({"time": time}, fewest_rows=1)["time"])
     except ValueError:
@@ -121,19 +121,20 @@ def _has_day_numbers(table: Table, time: Column) -> bool:
 
 
 def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """Time that increases from row to row.
+    """Correct a recorded time so that it increases from row to row.
+
+    Clock times continue after midnight, and rounded times that repeat are spread evenly.
 
     Args:
-        table: of the loop.
-        column: of the time.
-        time: as recorded [s], (n,).
+        table: table of the loop, for errors.
+        column: time column.
+        time: time as recorded [s], (n,).
 
     Returns:
-        Time [s], (n,), and a sentence if it was changed: clocks go on after midnight, and rounded times that repeat
-        are spread evenly.
+        Time [s], (n,), and a sentence if repeated times were spread.
 
     Raises:
-        MeasurementError: the time goes back or stands still, or its unit is in doubt.
+        MeasurementError: the time decreases or is constant, or its unit is in doubt.
     """
     if column.index in table.clocks:
         time = without_midnight(time)

@@ -22,27 +22,27 @@ _COLUMN_SETS = (
 )
 #: Roles that only a resonance test has.
 _SPECIFIC = {role for role in RESONANCE_COLUMNS if role not in ("frequency", "phase")}
-#: Columns whose values must be positive.
+#: Roles whose values must be positive.
 _POSITIVE = ("frequency", "base_acceleration", "mass_acceleration", "transmissibility")
-#: SI unit by the end of a role; other roles are ratios.
+#: SI unit of the roles that end with a word; other roles are ratios.
 _UNITS = {"phase": "rad", "frequency": "Hz"} | dict.fromkeys(
     ("acceleration", "base_real", "base_imaginary", "mass_real", "mass_imaginary"), "m/s^2"
 )
-#: Rows of the shortest test; chosen: a curve of five values over the frequency, and some scatter about it.
+#: Smallest number of rows of a test; chosen: enough for a curve with five parameters and an estimate of its scatter.
 FEWEST_ROWS = 12
 
 
 @dataclass(frozen=True, eq=False)
 class ResonanceTest:
-    """Test of a mass on a mount whose base is shaken by a sine of stepped frequency.
+    """Resonance test: a mass on a mount whose base is shaken by a sine of stepped frequency.
 
     Args:
-        name: of the test.
-        direction: of the bushing, or specimen.
-        source: file of the test.
-        frequency: [Hz], (n,), rising.
+        name: name of the test.
+        direction: direction of the bushing, or the specimen, that is the mount.
+        source: provenance of the test.
+        frequency: frequency [Hz], (n,), rising.
         transmissibility: complex ratio of the acceleration of the mass to that of the base [-], (n,).
-        base_acceleration: zero-to-peak [m/s^2], (n,).
+        base_acceleration: zero-to-peak acceleration of the base [m/s^2], (n,).
     """
 
     name: str
@@ -54,23 +54,23 @@ class ResonanceTest:
 
 
 def is_resonance(table: Table) -> bool:
-    """Return True if a table, opened with RESONANCE_COLUMNS, has a column that only a resonance test has."""
+    """Return True if a table, opened with RESONANCE_COLUMNS, has a column that occurs only in resonance tests."""
     return not _SPECIFIC.isdisjoint(table.roles)
 
 
 def read_resonance(table: Table, direction: Place, base_acceleration: float | None = None) -> ResonanceTest:
-    """Read a resonance test.
+    """Read a resonance test from a table.
 
     Args:
-        table: opened with RESONANCE_COLUMNS.
-        direction: of the bushing, or the specimen.
-        base_acceleration: zero-to-peak [m/s^2], for a table without a column for it.
+        table: table that was opened with RESONANCE_COLUMNS.
+        direction: direction of the bushing, or the specimen, that is the mount.
+        base_acceleration: zero-to-peak acceleration of the base [m/s^2], for a table without a column for it.
 
     Returns:
-        The test, by rising frequency.
+        Resonance test in SI, sorted by frequency.
 
     Raises:
-        MeasurementError, UnitError: a column, unit or value that cannot be used.
+        MeasurementError, UnitError: a column, a unit or a value cannot be used.
     """
     wanted = _resonance_columns(table, has_stated_base=base_acceleration is not None)
     values = table.read(wanted, fewest_rows=FEWEST_ROWS)
@@ -84,7 +84,7 @@ def read_resonance(table: Table, direction: Place, base_acceleration: float | No
 
 
 def _resonance_columns(table: Table, *, has_stated_base: bool) -> dict[str, Column]:
-    """Frequency, and the columns of the first of _COLUMN_SETS in the table, with factors to SI."""
+    """Columns of a resonance test by role, with factors to SI: frequency, and the first of _COLUMN_SETS available."""
     columns = next((columns for columns in _COLUMN_SETS if set(columns) <= set(table.roles)), None)
     if columns is None:
         alternatives = ", or ".join(" and ".join(columns) for columns in _COLUMN_SETS).replace("_", " ")

@@ -11,16 +11,16 @@ from bushfit.reading.measurement import Complex, Floats
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.table import Table
 
-#: Loss factors of a bushing [-]; chosen: noise may push one below zero, and the softest rubber is far below 5.
+#: Range of the loss factor of a bushing [-]; chosen: noise may make it negative, and every rubber is far below 5.
 _LOSS_FACTORS = (-0.5, 5.0)
 #: Loss factor that every rubber exceeds somewhere [-]; chosen: a tenth of the least damping rubber.
 LEAST_LOSS_FACTOR = 0.005
-#: Share of the points below zero from which the sign of the loss is reversed; chosen: noise may lift some, and a late
-#: channel leaves the loss at low frequencies positive.
+#: Share of points with a negative loss above which its sign is reversed; chosen: noise may make some positive, and with
+#: a delayed channel the loss at low frequencies remains positive.
 _THROUGHOUT = 0.95
-#: Share of |K| within which redundant columns agree; chosen: some are rounded to few digits.
+#: Difference up to which redundant columns agree, relative to |K|; chosen: some are rounded to few digits.
 _AGREEMENT = 0.02
-#: Ways on for quantities from which a user can compute a column, by kind.
+#: Next steps for quantities from which the user can compute a column, by kind of quantity.
 _WAYS_ON = {
     "compliance": "a complex compliance is the reciprocal of the stiffness: write K* = 1 / J*, with its real and "
     "imaginary part or its magnitude and phase, into columns of the file",
@@ -28,15 +28,15 @@ _WAYS_ON = {
     "quality": 'write the reciprocal of the quality factor as "loss factor [-]" into the file',
 }
 _DERIVED = Vocabulary(WORDS["derived"], {})
-#: Damping that can be a loss factor or a damping ratio.
+#: Names of a damping that can be a loss factor or a damping ratio.
 _DAMPING = Vocabulary({"damping": ["damping", "damp", "Dämpfung", "amortissement", "amortiguamiento", "阻尼"]}, {})
 
 
 def stiffness_pair(table: Table) -> tuple[str, str]:
-    """Return the first of PAIRS for which a table has columns.
+    """Return the roles of the first pair of columns in PAIRS that a table has; they give the complex stiffness.
 
     Raises:
-        MeasurementError: there is none, or the damping can be read in two ways.
+        MeasurementError: the table has no such pair, or its damping can be read in two ways.
     """
     for pair in PAIRS:
         if set(pair) <= set(table.roles):
@@ -54,13 +54,13 @@ def stiffness_pair(table: Table) -> tuple[str, str]:
 
 
 def hint_of_derived(table: Table) -> str | None:
-    """Next step if a table has a quantity from which the user can compute a column of a sweep; None if it has none."""
+    """Return the next step if the user can compute a column of a sweep from one of the table, such as a compliance."""
     headings = (_DERIVED.heading(header) for header in table.headers if header)
     return next((_WAYS_ON[heading.role] for heading in headings if heading), None)
 
 
 def refuse_ambiguous_damping(table: Table) -> None:
-    """Refuse a damping that can be a loss factor or a damping ratio, beside a stiffness or an amplitude of the force.
+    """Refuse a column "damping" that can be a loss factor or a damping ratio, if there is a stiffness or a force.
 
     Raises:
         MeasurementError: there is such a column.
@@ -83,16 +83,16 @@ def with_positive_loss(
     """Correct the sign of a loss that is negative throughout, and the range of a phase.
 
     Args:
-        values: in SI by role, (n,) each.
-        columns: by role.
-        test: force_sign and phase_sign as the user states them; None for an automatic choice.
+        values: values in SI by role, (n,) each.
+        columns: columns by role, for the sentences.
+        test: table [[sweeps]] of the campaign; its force_sign and phase_sign are None for an automatic correction.
 
     Returns:
-        Corrected values, and a sentence on each correction.
+        Corrected values in SI by role, and a sentence on each automatic correction.
 
     Notes:
-        A phase is wrapped to -180 to 180 deg. Beyond 90 deg the force has the other sign, which turns it by 180 deg. A
-        phase that is negative throughout is that of the displacement relative to the force.
+        A phase is wrapped to -180 to 180 deg. If its median magnitude is above 90 deg, the force has the opposite sign,
+        and the phase is turned by 180 deg. A negative phase is that of the displacement relative to the force.
     """
     corrected, notes = dict(values), []
     if (phase := corrected.get("phase")) is not None:
@@ -123,11 +123,12 @@ def with_positive_loss(
 
 
 def complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tuple[Complex, Floats]:
-    """Return the complex stiffness [N/m or N m/rad, or Pa], (n,), and the loss factor [-], (n,).
+    """Compute the complex stiffness [N/m or N m/rad, or Pa], (n,), and the loss factor [-], (n,), from two columns.
 
     Args:
-        pair: one of PAIRS.
-        values: in SI by role, (n,) each.
+        pair: roles of the two columns, one of PAIRS.
+        values: values in SI by role, (n,) each; also "amplitude" for a force amplitude, and "frequency" for a damping
+            coefficient.
 
     Notes:
         K* = K' + i K'' with K'' = 2 pi f c of a damping coefficient c, and tan delta = 2 zeta of a damping ratio zeta.
@@ -153,18 +154,18 @@ def complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tu
 def check_stiffness(
     table: Table, pair: tuple[str, str], values: Mapping[str, Floats], stiffness: Complex, loss_factor: Floats
 ) -> None:
-    """Refuse a loss that no bushing has, ratios that are stated in %, and rows in which other columns give another
-    stiffness; their loss may have the other sign.
+    """Refuse an implausible loss, a loss factor in % that must be a ratio, and redundant columns that disagree.
 
     Args:
-        table: of the sweep.
-        pair: of PAIRS that gave the stiffness.
-        values: in SI by role, (n,) each.
-        stiffness: complex [N/m or N m/rad, or Pa], (n,).
-        loss_factor: [-], (n,).
+        table: table of the sweep, for errors.
+        pair: roles of the two columns, one of PAIRS, that gave the stiffness.
+        values: values in SI by role, (n,) each, with those of redundant columns.
+        stiffness: complex stiffness [N/m or N m/rad, or Pa], (n,).
+        loss_factor: loss factor [-], (n,).
 
     Raises:
-        MeasurementError: such a loss, or such a row.
+        MeasurementError: the loss is implausible, or other columns give another stiffness; the sign of their loss is
+            not compared.
     """
     column = table.roles[pair[1]]
     if np.mean(loss_factor < -LEAST_LOSS_FACTOR) > _THROUGHOUT:

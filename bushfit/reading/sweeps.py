@@ -24,13 +24,13 @@ _POSITIVE = (
     *("frequency", "amplitude", "amplitude_reached", "stiffness", "storage_stiffness", "force_amplitude"),
     "relative_error",
 )
-#: Rows of the shortest sweep; chosen: fewer show no dependence on frequency or amplitude.
+#: Smallest number of rows of a sweep; chosen: fewer show no dependence on frequency or amplitude.
 _FEWEST_SWEEP_ROWS = 3
-#: Above every repeat number; chosen: a larger number is another quantity.
+#: Limit of repeat numbers; chosen: a larger number is another quantity.
 _MOST_REPEATS = 1_000_000
-#: Share within which a stated amplitude or frequency agrees with its column; chosen: rigs miss by less.
+#: Relative difference up to which a stated amplitude or frequency agrees with its column; chosen: rigs miss by less.
 _STATED_AGREEMENT = 0.1
-#: Range of temperatures in one test [K]; chosen: rubber warms up by as much during a test.
+#: Largest range of temperatures in one test [K]; chosen: rubber warms up by as much during a test.
 ONE_TEST = 5.0
 _HINTS = {
     "amplitude": 'or state at_amplitude = "0.1 mm" if all rows have it',
@@ -47,23 +47,24 @@ def read_sweep(
     shared: bool = False,
     at_amplitude: float | None = None,
 ) -> Sweep:
-    """Read a sweep.
+    """Read a stepped-sine sweep from a test file.
 
     Args:
-        file: long or wide table (see `wide`) with columns frequency, amplitude and one of PAIRS. Optional
+        file: path of a long or wide table (see `wide`) with columns frequency, amplitude and one of PAIRS. Optional
             columns: repeat (by default, an operating point that occurs again is a repeat), amplitude reached,
             temperature, and relative error.
-        direction: of the bushing, or the specimen.
-        test: what the file does not state. The temperature selects rows of a file with several temperatures.
-        name: of the sweep; default the stem of the file.
-        shared: True if the file contains other tests too.
-        at_amplitude: amplitude of all rows [m or rad, or strain], counted as `test.amplitude` says.
+        direction: direction of the bushing, or the specimen.
+        test: table [[sweeps]] of the campaign, with the information that the file does not contain. Its temperature
+            selects rows of a file with several temperatures.
+        name: name of the sweep; default the file name without its ending.
+        shared: True if the file contains other tests too, so that a column has to distinguish them.
+        at_amplitude: amplitude of all rows [m or rad, or strain], in the convention `test.amplitude`.
 
     Returns:
-        The sweep, with amplitudes zero-to-peak.
+        Sweep in SI, with zero-to-peak amplitudes.
 
     Raises:
-        MeasurementError, UnitError: a file, column, unit or value that cannot be used.
+        MeasurementError, UnitError: the file, a column, a unit or a value cannot be used.
     """
     rows = test.rows_of_test(shared=shared)
     table = Table.open(file, SWEEP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
@@ -125,22 +126,22 @@ def sweep_columns(
     stated: Mapping[str, float],
     convention: AmplitudeConvention | None,
 ) -> dict[str, Column]:
-    """Columns of a sweep with their factors to SI, and to zero-to-peak, in the order in which they are checked.
+    """Find the columns of a sweep, with their factors to SI and, for amplitudes, to zero-to-peak.
 
     Args:
-        table: of the sweep.
-        direction: of the bushing, or the specimen.
-        pair: of PAIRS.
-        stated: frequency or amplitude that the campaign states, which then need no column.
-        convention: of the amplitudes, if the campaign states it.
+        table: table of the sweep.
+        direction: direction of the bushing, or the specimen.
+        pair: roles of the two columns, one of PAIRS, that give the stiffness.
+        stated: frequency [Hz] or amplitude that the campaign states, by role; these roles need no column.
+        convention: convention of the amplitudes; None if the campaign does not state it.
 
     Returns:
-        Columns by role: those that are needed, those of other pairs if their units fit, and optional ones. A
-        temperature counts from the zero of its unit.
+        Columns by role: the needed ones, those of other pairs if their units fit, and optional ones. A temperature is
+        not converted to K.
 
     Raises:
-        MeasurementError: a column is missing, or it is not known how its amplitudes are counted.
-        UnitError: a unit that is missing or does not fit.
+        MeasurementError: a column is missing, or the convention of an amplitude is unknown or contradictory.
+        UnitError: a unit is missing or does not fit.
     """
     motion, roles = direction.motion, table.roles
     seconds = "Pa*s" if motion is STRAINING else motion.stiffness_unit.replace("/", "*s/", 1)
@@ -187,10 +188,12 @@ def sweep_columns(
 def _rows_at_temperature(
     table: Table, values: Mapping[str, Floats], stated: float | None
 ) -> tuple[NDArray[np.intp], float | None, Floats | float | None]:
-    """Rows at the stated temperature [K], temperature of the test, as stated or else the mean, and that of each row.
+    """Indices of the rows at the stated temperature, temperature of the test, and temperature of each of these rows.
+
+    Temperatures are in K, and None if unknown; that of the test is the stated one, or else the mean.
 
     Raises:
-        MeasurementError: rows at several temperatures, or none near the stated one.
+        MeasurementError: the file has several temperatures and none is stated, or too few rows are near the stated one.
     """
     rows = np.arange(values["frequency"].size)
     if "temperature" not in values:
@@ -225,10 +228,10 @@ def _rows_at_temperature(
 
 
 def _repeat_numbers(table: Table, values: Mapping[str, Floats]) -> NDArray[np.int64] | None:
-    """Repeat number of each row, (n,), in order of appearance if the column contains texts; None without a column.
+    """Repeat number of each row, (n,); texts are numbered in order of appearance. None without a column of repeats.
 
     Raises:
-        MeasurementError: a number that is no whole number.
+        MeasurementError: the column contains a number that is not a whole number.
     """
     if "repeat" not in table.roles:
         return None

@@ -360,7 +360,7 @@ class Table(Cells):
         return values if fits else None  # so are numbers that are not finite
 
     def _without_faults(self) -> tuple["Table", list[Row]]:
-        """Table without lines that are not data, and these lines; only those with letters or empty cells are checked."""
+        """Table without lines that are not data, and these lines; only lines with letters or empty cells are tested."""
         source, layout, faulty = self.source, self.layout, list[Row]()
         if not isinstance(source, Text) or layout.numbered:
             return self, faulty

@@ -25,15 +25,15 @@ if TYPE_CHECKING:
 
 #: Form of a file: commas and decimal points, semicolons and decimal commas, or a workbook.
 Form = Literal["csv", "decimal-comma", "xlsx"]
-#: Start of a text that a spreadsheet takes for a formula, in ASCII or full width, even after blanks.
+#: Start of a text that a spreadsheet interprets as a formula, in ASCII or full width, even after blanks.
 _FORMULA = re.compile("[\\s\"']*[=+\\-@\uff1d\uff0b\uff0d\uff20|%]|\\t")
 #: Separator of the lines of a text.
 _LINE_ENDS = re.compile("[\\r\\n]+")
 #: Characters that Excel or XML does not allow in the name of a sheet.
 _UNSAFE_IN_SHEETS = re.compile(r"[\[\]:*?/\\\x00-\x1f\ufffe\uffff]")
-#: Longest name of a sheet, in units of UTF-16.
+#: Largest length of the name of a sheet [UTF-16 units].
 _LONGEST_SHEET = 31
-#: Characters of the longest text in a cell.
+#: Largest number of characters of a text in a cell.
 _LONGEST_TEXT = 32_767
 #: Date of creation in a workbook: that of its zip archive, so that equal tables give equal bytes.
 _CREATED = datetime(1980, 1, 1, tzinfo=UTC)
@@ -41,35 +41,35 @@ _CREATED = datetime(1980, 1, 1, tzinfo=UTC)
 _ROWS_AT_ONCE = 10_000
 #: Widest column [characters].
 _WIDEST = 60
-#: Characters that some operating system does not allow in a name, and halves of surrogate pairs.
+#: Characters that an operating system does not allow in file names, and halves of surrogate pairs.
 _UNSAFE_IN_FOLDERS = re.compile(r'[\x00-\x1f\x7f\ud800-\udfff/\\:*?"<>|]+')
-#: Names that Windows keeps for devices, with any ending.
+#: Names that Windows reserves for devices, with any ending.
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 
 
 def ending(form: Form) -> str:
-    """Ending of a file, without the dot."""
+    """Return the file name ending of a form of tables, without the dot."""
     return "xlsx" if form == "xlsx" else "csv"
 
 
 def to_bytes(name: str, table: pd.DataFrame, form: Form) -> bytes:
-    """Return the bytes of the file of a table.
+    """Convert a table to the bytes of a file.
 
     Args:
-        name: of the sheet of a workbook.
-        table: to write.
-        form: of the file.
+        name: name of the sheet, if the file is a workbook.
+        table: table to convert.
+        form: form of the file.
 
     Raises:
-        OutputError: a table that is too large for a sheet.
+        OutputError: the table is too large for a sheet.
     """
     return to_xlsx({name: table}) if form == "xlsx" else to_csv(table, decimal_comma=form == "decimal-comma")
 
 
 def to_csv(table: pd.DataFrame, *, decimal_comma: bool = False) -> bytes:
-    """Return the bytes of a CSV file, in which None and NaN are empty cells.
+    """Convert a table to the bytes of a CSV file, in which None and NaN are empty cells.
 
-    `decimal_comma` selects semicolons, decimal commas and a byte order mark.
+    With `decimal_comma`, the file has semicolons, decimal commas and a byte order mark.
     """
     text, point, delimiter, encoding = io.StringIO(), ".", ",", "utf-8"
     if decimal_comma:
@@ -83,7 +83,7 @@ def to_csv(table: pd.DataFrame, *, decimal_comma: bool = False) -> bytes:
 
 
 def _texts(column: pd.Series[Any], point: str) -> list[str]:
-    """Texts of the cells of a column, (n,)."""
+    """Texts of the cells of a column, (n,), with decimal mark `point` and seven digits."""
     if column.dtype.kind == "f":  # at once: most cells are numbers, and most of the time goes into their texts
         texts = ["" if value != value else f"{value:.7g}" for value in column.tolist()]
         return texts if point == "." else [text.replace(".", point) for text in texts]
@@ -104,24 +104,24 @@ def _texts(column: pd.Series[Any], point: str) -> list[str]:
 
 @lru_cache(maxsize=4096)
 def defused(text: str) -> str:
-    """Text in one line, with an apostrophe before it if a spreadsheet would run it as a formula."""
+    """Return a text on one line, with an apostrophe before it if a spreadsheet would run it as a formula."""
     line = in_a_line(text)
     return f"'{line}" if _FORMULA.match(line) else line
 
 
 @lru_cache(maxsize=4096)
 def in_a_line(text: str) -> str:
-    """Text in one line, with escapes for control characters."""
+    """Return a text on one line, with escapes for control characters."""
     return "\t".join(map(printable, " ".join(_LINE_ENDS.split(text)).split("\t")))
 
 
 def undefused(text: str) -> str:
-    """Original of a text that `defused` returned, without its line ends."""
+    """Restore a text from the result of `defused`, except for its line ends and control characters."""
     return text[1:] if text.startswith("'") and _FORMULA.match(text[1:]) else text
 
 
 def _write(book: Workbook, name: str, table: pd.DataFrame) -> None:
-    """Write a table to a sheet, below bold headers in a frozen row, with columns as wide as their texts.
+    """Add a sheet with a table to a workbook, below bold headers in a frozen row, with columns as wide as their texts.
 
     Texts are neither formulas nor links nor numbers. None and NaN are empty cells.
 
@@ -152,10 +152,10 @@ def _write(book: Workbook, name: str, table: pd.DataFrame) -> None:
 
 
 def to_xlsx(tables: Mapping[str, pd.DataFrame]) -> bytes:
-    """Return the bytes of a workbook with a sheet for each table, under names that Excel allows.
+    """Convert tables, by title, to the bytes of a workbook; titles are changed to sheet names that Excel allows.
 
     Raises:
-        OutputError: a table that is too large for a sheet.
+        OutputError: a table is too large for a sheet.
     """
     from xlsxwriter import Workbook
 
@@ -168,12 +168,12 @@ def to_xlsx(tables: Mapping[str, pd.DataFrame]) -> bytes:
 
 
 def _text(text: str) -> str:
-    """Text of a cell, cut to the longest that a workbook allows."""
+    """Printable text of a cell, cut to the largest length that a workbook allows."""
     return printable(text, lines=True)[:_LONGEST_TEXT]
 
 
 def _sheet_name(title: str, used: set[str]) -> str:
-    """Name that Excel allows and no other sheet has, regardless of case; it is added to the used names."""
+    """Sheet name that Excel allows and that is not among the used names, to which it is added in lower case."""
 
     def cut(text: str, length: int) -> str:
         return text.encode("utf-16-le")[: 2 * length].decode("utf-16-le", "ignore")
@@ -189,6 +189,6 @@ def _sheet_name(title: str, used: set[str]) -> str:
 
 
 def folder_name(name: str) -> str:
-    """Return a name of 1 to 60 characters for a folder, as all operating systems allow it."""
+    """Convert a name to a folder name of 1 to 61 characters that all operating systems allow."""
     safe = _UNSAFE_IN_FOLDERS.sub("_", name)[:60].strip(" .") or "campaign"
     return f"_{safe}" if _DEVICES.fullmatch(safe) else safe
