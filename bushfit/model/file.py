@@ -76,10 +76,10 @@ def from_document(document: object, file: Path | None = None) -> Result:
     hint = "use a file written by bushfit fit-static, fit-dynamic, fit or diagnose"
     require_schema(content, file, "a model", SCHEMA, hint=hint)
     tables = validate_tables(content, file, ModelFile, kind=ModelError)
-    bushing = Bushing(*astuple(tables.bushing)) if tables.bushing else None
     entries, fit, covariance = tables.parameters, tables.fit, Covariance()
     values = {name: entry.value for name, entry in entries.items()}
     with error_location(file):
+        bushing = Bushing(*astuple(tables.bushing)) if tables.bushing else None
         model = Model(bushing, tables.effects, values, tables.unnamed)
         if table := tables.covariance:
             if not set(table.names) <= model.parameters.keys():

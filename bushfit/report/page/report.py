@@ -140,14 +140,14 @@ def draw_figures(record: ReportRecord) -> tuple[list[Picture], list[Picture], bo
     page, appendix = _Figures(), _Figures()
     for name, prediction in places:
         title = f"{prediction.direction}: prediction and measurement"
-        page[name, title] = partial(plots.prediction.prediction_figure, result, prediction, drawn_sweeps, "")
+        page[name, title] = partial(plots.prediction.prediction_figure, result, prediction, drawn_sweeps, result.name)
     if gap is not None and diagnosis is not None:
-        page["gap", "Measured minus model"] = partial(plots.gap.gap_figure, gap, result, diagnosis, "")
+        page["gap", "Measured minus model"] = partial(plots.gap.gap_figure, gap, result, diagnosis, result.name)
     if loops is not None:
-        page["loops", "Hysteresis loops"] = partial(plots.fits.loops_figure, result, loops, "")
+        page["loops", "Hysteresis loops"] = partial(plots.fits.loops_figure, result, loops, result.name)
     if sweeps is not None and gap is None:
         title = "Sweeps and their residuals"
-        appendix["sweeps", title] = partial(plots.fits.sweeps_figure, result, sweeps, "")
+        appendix["sweeps", title] = partial(plots.fits.sweeps_figure, result, sweeps, result.name)
     for name, prediction in places:
         if np.unique(prediction.frequency).size > 1:
             title = f"{prediction.direction}: storage and loss stiffness, Cole-Cole diagram"
