@@ -76,14 +76,15 @@ class Knowledge:
         covariance: covariance of the relative changes of the k parameters and of the b bounded ones, (k + b, k + b).
         source: origin of the knowledge, as a phrase.
         noise: measurement errors of the rig.
-        rivals: knowledge for each model that may be the right one, this model first; empty if there is no doubt.
+        rivals: knowledge for each rival model, this model first. Rival models explain the tests so far equally well,
+            each by another effect; empty if there is no doubt.
         probability: probability of this model among its rivals.
         strain: largest equivalent strain amplitude measured so far [1]; None if there are no tests.
         specimens: specimens of the compound that can be tested in place of the bushing.
         tests: tests of the campaign so far.
         bounded: names of the b parameters that the fit has at a bound; their changes are in units of typical values.
-        warnings: of the fit.
-        result: the fit itself; None of a guess.
+        warnings: warnings of the fit.
+        result: result of the fit; None for an estimate without tests.
     """
 
     model: Model

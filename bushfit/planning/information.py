@@ -51,7 +51,7 @@ class Information(NamedTuple):
         return self.products[..., : self.products.shape[-2]]
 
     def noncentralities(self) -> Array:
-        """Expected increase of chi-square by each effect or rival, after a refit of the parameters, (choices, e)."""
+        """Expected increase of chi-square by each effect or rival model after a refit, (choices, e)."""
         cross = self.products[..., self.products.shape[-2] :]
         fitted = np.linalg.solve(self.parameters, cross)
         return np.maximum(self.squares - np.sum(cross * fitted, axis=-2), 0.0)
@@ -63,7 +63,7 @@ class ModelInformation:
 
     Args:
         products: inner products of the first 2 + k columns with all columns, (tests, 2 + k, 2 + k + e). The columns
-            are unit gain error, unit phase error, k parameters, and e effects or rivals.
+            are unit gain error, unit phase error, k parameters, and e effects or rival models.
         squares: inner product of each further column with itself, (tests, e).
         level: standard deviations of the gain [1] and phase [rad] errors that all runs of a test share, (tests, 2).
         prior: information matrix of the parameters' relative changes before the tests, (k, k).

@@ -59,7 +59,7 @@ def from_result(result: Result, noise: Noise | None = None, source: str = "") ->
 
 
 def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -> Knowledge:
-    """Fit the tests of a campaign to obtain the knowledge for a plan, once more with each rival effect added.
+    """Fit the tests of a campaign to obtain the knowledge for a plan; with rivals, one fit for each rival effect.
 
     The fits treat the errors of the class of the rig as noise, whether [rig] states them or not, as in the planned
     tests. With rivals, the model also has the effects that a diagnosis found for certain, and the first effect of each

@@ -27,7 +27,7 @@ _LONGEST_MINUTES = 60.0 * 2000.0
 def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
     """Choose tests for an aim within the hours and the limits of the rig.
 
-    The plan separates rivals, or meets targets, in as few hours as possible.
+    The plan separates rival models, or meets targets, in as few hours as possible.
 
     Args:
         knowledge: knowledge before the tests.
@@ -37,7 +37,7 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
         The tests in their order with their expected results, compared with the standard programme.
 
     Raises:
-        ModelError: no test is possible, none fits into the hours, or there are no rivals to be separated.
+        ModelError: no test is possible or fits into the hours, or there are no rival models to separate.
     """
     if request.aim == "rivals" and len(knowledge.rivals) < 2:
         raise ModelError(

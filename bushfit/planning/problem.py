@@ -97,7 +97,7 @@ class PlanningProblem:
 
     @cached_property
     def weight(self) -> Array | None:
-        """Weight of the parameter covariance in the criterion, (k, k); None if the aim is to separate rivals."""
+        """Weight of the parameter covariance in the criterion, (k, k); None if the aim is to separate rival models."""
         if self.request.aim == "rivals":
             return None
         if self.request.aim == "targets":
@@ -109,14 +109,17 @@ class PlanningProblem:
         return np.diag(np.isin(names, self.request.parameters).astype(float))
 
     def rival_distances(self, counts: Array) -> Array:
-        """Expected chi-square between any two rivals, (rivals, rivals), with `counts` runs of each test, (tests,)."""
+        """Expected chi-square between any two rival models, (rivals, rivals), for `counts` runs of each test, (tests,).
+
+        Rival models explain the tests so far equally well; the planned tests shall separate them.
+        """
         return np.asarray(rival_chi_squares([model.total(counts) for model in self.models[1:]])[0])
 
     @cached_property
     def separable_rivals(self) -> Array:
-        """True for pairs of rivals that all tests together separate, (rivals, rivals); all pairs if none is separable.
+        """Mask of the pairs of rival models that all candidate tests together separate, (rivals, rivals).
 
-        Only the upper triangle is used.
+        If no pair is separable, the mask contains all pairs. Only the upper triangle is used.
         """
         rivals = len(self.knowledge.rivals)
         pairs = np.triu(np.ones((rivals, rivals), dtype=bool), 1)
@@ -126,7 +129,7 @@ class PlanningProblem:
         return separable if separable.any() else pairs
 
     def nearest_rivals(self, counts: Array) -> float:
-        """Smallest expected chi-square between separable rivals, with `counts` runs of each test, (tests,)."""
+        """Smallest expected chi-square between separable rival models, for `counts` runs of each test, (tests,)."""
         return float(self.rival_distances(counts)[self.separable_rivals].min())
 
 

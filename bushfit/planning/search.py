@@ -115,7 +115,7 @@ class PlanSearch:
         return np.bincount(np.array(runs, dtype=int), minlength=len(self.problem.tests))
 
     def reaches_aim(self, *, soundly: bool = False) -> bool:
-        """Check that the chosen tests separate the rivals with a margin of two, or meet the targets that can be met.
+        """Check that the chosen tests separate the rival models with a margin of two, or meet all reachable targets.
 
         Args:
             soundly: true to require also that the tests detect all effects as well as the standard programme, and that

@@ -1,4 +1,4 @@
-"""Warnings of a prediction: what was not fitted, what is extrapolated, what the model leaves out, and what each means.
+"""Warnings of a prediction: directions not fitted, extrapolation and omitted effects, with the meaning of each warning.
 
 Every warning of the package, wherever it is written, has its meaning for the use of the numbers in `uses.toml`.
 """

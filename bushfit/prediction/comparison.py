@@ -107,7 +107,7 @@ class Comparison:
 
     @cached_property
     def widening(self) -> float:
-        """Factor, at least 1, by which the pointwise 95 % bands of all contrasts have to be wider to hold together.
+        """Factor, at least 1, that turns the pointwise 95 % bands of all contrasts into simultaneous 95 % bands.
 
         Notes: the 95 % quantile of the largest of all standardised errors, whose correlations are known (T. Hothorn, F.
         Bretz, P. Westfall, Biometrical J. 50 (2008) 346), over the quantile of a single one. Random draws, fixed seed.

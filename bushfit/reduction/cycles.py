@@ -135,7 +135,7 @@ def resumes_in_phase(gap: float, *, step: float = 1.0) -> bool:
 
 
 def change_after(time: Floats, motion: Floats, shift: float, rows: slice) -> Floats:
-    """Compute the change of a motion over a given time, which is small for a periodic motion and its period.
+    """Compute the change of a motion over a given time, to test whether the motion is periodic with this time.
 
     Args:
         time: time of each row [s], (n,).

@@ -122,7 +122,7 @@ def cycle_harmonics(phase: Floats, values: Floats, order: int, drift: int = 0) -
 
 @dataclass(frozen=True, eq=False)
 class HarmonicFit:
-    """Drift and harmonics of displacement and force over the whole cycles of one steady sine, and their residuals.
+    """Least-squares fit of drift and harmonics to displacement and force over the whole cycles of a steady sine.
 
     Drift and overtones are fitted with the fundamental, so that neither leaks into it.
 

@@ -62,7 +62,7 @@ class SteadySpan:
 
     @property
     def cycles(self) -> float:
-        """Number of its cycles."""
+        """Number of cycles in the part, not necessarily whole."""
         return (self.end - self.begin) / self.period
 
     def is_like(self, span: "SteadySpan") -> bool:

@@ -1,4 +1,4 @@
-"""Result of a reduction of raw histories: operating points, stretches that make none, and warnings about both."""
+"""Result of a reduction of raw histories: operating points, stretches without a point, and warnings about both."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Turning points of a motion: those of noise and of a ripple on the motion are left out."""
+"""Turning points of a motion, without the turning points of noise and of a ripple on the motion."""
 
 from math import comb
 
@@ -22,7 +22,7 @@ _PAUSE = 2.5
 
 
 def reversals(values: Floats, rows: Integers) -> Integers:
-    """Select those of the given rows (increasing indices) at which the values change direction, and both ends."""
+    """Select the rows, among given increasing row indices, at which the values change direction, and both ends."""
     direction = np.sign(np.diff(values[rows]))
     inner = 1 + np.flatnonzero(direction[1:] != direction[:-1])
     return np.concatenate((rows[:1], rows[inner], rows[1:][-1:]))
@@ -64,7 +64,7 @@ def prominent_turns(values: Floats, turns: Integers, prominence: float) -> Integ
 
 
 def motion_turns(time: Floats, motion: Floats) -> tuple[Integers, float]:
-    """Find the turning points of a motion, without those of noise and of a ripple: hum, servo hunting, sensor flicker.
+    """Find the turning points of a motion, ignoring noise and ripple (hum, servo hunting, sensor flicker).
 
     Args:
         time: time of each row [s], or row numbers, (n,).

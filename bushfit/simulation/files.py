@@ -1,4 +1,4 @@
-"""Files of a simulated campaign: test tables as of a laboratory, the campaign file, and the true model."""
+"""Files of a simulated campaign: test tables like a laboratory's, the campaign file, and the true model."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def _campaign_toml(simulated: Simulated, form: Form) -> str:
 
 
 def raw_loop_table(loop: Loop) -> pd.DataFrame:
-    """Convert a simulated loop to a table as from a laboratory, in display units.
+    """Convert a simulated loop to a test table like a laboratory's, in display units.
 
     Args:
         loop: simulated loop.
@@ -96,7 +96,7 @@ def raw_loop_table(loop: Loop) -> pd.DataFrame:
 
 
 def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
-    """Convert a simulated sweep to a table as from a laboratory, in display units.
+    """Convert a simulated sweep to a test table like a laboratory's, in display units.
 
     A stepped amplitude is written as reached by the rig, without its nominal level.
 
@@ -125,7 +125,7 @@ def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
 
 
 def raw_resonance_table(test: ResonanceTest) -> pd.DataFrame:
-    """Convert a simulated resonance test to a table as from a laboratory.
+    """Convert a simulated resonance test to a test table like a laboratory's.
 
     Args:
         test: simulated resonance test.
