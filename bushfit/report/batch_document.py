@@ -8,13 +8,13 @@ from pydantic import Field
 
 #: Value of the key `schema`, which names the layout of the file.
 BATCH_SCHEMA: Literal["bushfit/batch/2"] = "bushfit/batch/2"
-#: Result of a part against its limits.
+#: Result of the comparison of a part with its limits.
 LimitResult = Literal["pass", "conditional pass", "not judged", "conditional fail", "fail"]
 
 
 @dataclass(frozen=True)
 class QuantityTable:
-    """Scatter, limits and capability of a quantity over the parts, in the unit of its column."""
+    """Scatter, limits and process capability of one quantity over the parts of a batch, in the unit of its column."""
 
     parts: Annotated[int, Field(description="Parts of which it is known, without those of a poor fit.")]
     median: Annotated[float, Field(description="Median of the parts.")]
@@ -37,7 +37,7 @@ class QuantityTable:
 
 @dataclass(frozen=True, kw_only=True)
 class PartTable:
-    """One part of a batch."""
+    """Results of one part of a batch."""
 
     name: Annotated[str, Field(description="Name of the part.")]
     folder: Annotated[str, Field(description="Folder of its results; empty if the row failed.")]
@@ -59,7 +59,7 @@ class PartTable:
 
 @dataclass(frozen=True, kw_only=True)
 class BatchFile:
-    """Results of a batch."""
+    """Results of a batch: the content of batch.json."""
 
     schema: Annotated[Literal["bushfit/batch/2"], Field(description="Layout of the file.")] = BATCH_SCHEMA
     title: Annotated[str, Field(description="Title of the batch.")]

@@ -39,7 +39,7 @@ class ComparedEntry(TypedDict):
 
 
 class JointContrast(TypedDict):
-    """Difference of all parameters of two results together, with their correlations."""
+    """Test of all parameters of two results together for a difference, with their correlations."""
 
     p: Annotated[Number, Doc("probability by chance of such differences.")]
     parameters: Annotated[int, Doc("number of parameters that count.")]
@@ -60,7 +60,7 @@ class ComparedPair(TypedDict):
 
 
 class HeldOutPart(TypedDict):
-    """A part of the tests that was held out."""
+    """Errors of two model families on a part of the tests that was held out of the fit."""
 
     part: Annotated[str, Doc("name of the part.")]
     first: Annotated[Number, Doc("root mean square of the first family on the part, in units of noise.")]
@@ -68,7 +68,7 @@ class HeldOutPart(TypedDict):
 
 
 class FamilyEntry(TypedDict):
-    """A model family on the one campaign."""
+    """Agreement of one model family with the tests of the campaign."""
 
     label: Annotated[str, Doc("as in `compared`.")]
     name: Annotated[str, Doc("effects that it adds or that replace a branch, joined by +.")]
@@ -97,7 +97,7 @@ class FamilyEntry(TypedDict):
 
 
 class ComparisonFile(TypedDict):
-    """compare.json: several results side by side, or model families on one campaign."""
+    """Content of compare.json: several results side by side, or model families on one campaign."""
 
     schema: Annotated[SchemaName, Doc("of this file.")]
     compared: Annotated[list[ComparedEntry], Doc("results, the reference first.")]

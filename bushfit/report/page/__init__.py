@@ -17,15 +17,16 @@ if TYPE_CHECKING:
 
     from bushfit.report.results import ResultFile
 
-#: Where the templates are, with the style sheet and the script that go into every page.
+#: Folder of the templates, and of the style sheet and the script that every page contains.
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
 def report_page(files: Sequence[ResultFile]) -> str:
-    """The report of a result as HTML.
+    """Make the report of a result as an HTML page.
 
     Args:
-        files: documents (model, plain fit, diagnosis), tables (sweeps, loops, gap and predicted places) and figures.
+        files: documents (model, fit without the effects of a diagnosis, diagnosis), tables (sweeps, loops, gap, and
+            predictions of directions and specimens) and figures.
 
     Raises:
         ModelError: no model among the documents, or a document or table that is not as bushfit writes it.
@@ -37,7 +38,7 @@ def report_page(files: Sequence[ResultFile]) -> str:
 
 
 def comparison_page(files: Sequence[ResultFile]) -> str:
-    """The page of a comparison as HTML, made from its document and its figure.
+    """Make the HTML page of a comparison from its document, compare.json, and its figure.
 
     Raises:
         ModelError: a document that is not as bushfit writes it.
@@ -48,11 +49,11 @@ def comparison_page(files: Sequence[ResultFile]) -> str:
 
 
 def rendered(template: str, context: dict[str, Any]) -> str:
-    """A page from a template, with a content policy that allows only its own style and script.
+    """Render a complete HTML page, with a content security policy that allows only its own style sheet and script.
 
     Args:
-        template: name of the template.
-        context: values that the template uses, by name.
+        template: file name of the template.
+        context: values of the variables of the template, by name.
 
     Returns:
         The page as HTML.
@@ -68,13 +69,13 @@ def rendered(template: str, context: dict[str, Any]) -> str:
 
 
 def filled(template: str, context: dict[str, Any]) -> str:
-    """A template filled with its context; texts are escaped."""
+    """Render a template, by its file name, with the values of its variables; texts are escaped for HTML."""
     return _environment().get_template(template).render(context)
 
 
 @cache
 def _environment() -> jinja2.Environment:
-    """Templates with the filters `number` (significant digits), `formula` and `px` (pixels)."""
+    """Template environment with the filters `number` (significant digits), `formula` and `px` (pixels)."""
     import jinja2
 
     from bushfit.report.page.formulas import formula
@@ -92,14 +93,14 @@ def _environment() -> jinja2.Environment:
 
 
 def folder_pages(folder: Path, base: str = "") -> list[ResultFile]:
-    """Pages of a results folder: `report` of a result, `compare` of a comparison, `index` of a batch.
+    """HTML pages for a results folder: report.html for a result, compare.html for a comparison, index.html for a batch.
 
     Args:
-        folder: as `bushfit run`, `diagnose`, a fit, `compare` or `batch` wrote it.
-        base: of a batch, beginning of its links, if the page is written elsewhere.
+        folder: results folder written by `bushfit run`, `diagnose`, a fit, `compare` or `batch`.
+        base: prefix of the links of a batch page that is written to another folder.
 
     Returns:
-        HTML files of the folder; their content is made when they are written.
+        Result files for the pages; their content is made when they are written.
 
     Raises:
         ModelError: a folder without results, or a file in it that is not as bushfit writes it.

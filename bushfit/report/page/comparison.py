@@ -19,16 +19,16 @@ from bushfit.report.results import ResultFile, contents, json_file
 from bushfit.report.tables import numbers
 from bushfit.units import format_aligned, format_range, number, split_header
 
-#: Results and places that the figure draws at most.
+#: Largest product of the numbers of results and of directions and specimens for which the page has a figure.
 _MOST_DRAWN = 12
-#: Frequencies and amplitudes of a place in the table of values, and rows of all places together.
+#: Largest numbers in the table of values: frequencies and amplitudes of each direction or specimen, and all rows.
 _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 24
-#: Conditions of tests that change a rubber.
+#: Test conditions that affect the properties of rubber; the page states a difference in them.
 _CONDITIONS = ("Temperature", "Preload")
 
 
 def read_comparison(folder: Path) -> list[ResultFile]:
-    """The comparison in a folder.
+    """Read and check the comparison in a folder, as the JSON result file `compare`.
 
     Raises:
         ModelError: a compare.json that is not as bushfit writes it.
@@ -40,13 +40,13 @@ def read_comparison(folder: Path) -> list[ResultFile]:
 
 
 def comparison_context(files: Sequence[ResultFile]) -> dict[str, Any]:
-    """Everything that the template of a comparison needs.
+    """Values of the variables of the template compare.html.
 
     Args:
-        files: the document of the comparison and, in a run, its figure.
+        files: document of the comparison and, if it has been made, its figure.
 
     Returns:
-        Values of the template by name.
+        Values by the names of the template variables.
     """
     comparison = SideBySide.from_document(contents(files, "json")["compare"])
     document, names, places = comparison.document, comparison.names, comparison.places
@@ -103,14 +103,15 @@ def comparison_context(files: Sequence[ResultFile]) -> dict[str, Any]:
 
 
 def difference_sizes(comparison: SideBySide, place: str) -> Iterator[dict[str, Any]]:
-    """Smallest and largest difference from the first result at a place, and the number of significant points.
+    """Summarise the differences of each result from the first one in a direction or specimen, as texts.
 
     Args:
         comparison: validated comparison.
-        place: one of its places.
+        place: name of the direction or specimen.
 
     Yields:
-        Texts of a result: `label`, `place`, `stiffness` and `loss`, and for both, with `_sure`, their significance.
+        Texts of a result by key: `label`, `place`, range of the differences of `stiffness` and `loss` factor over the
+        operating points, and the number of significant points (`stiffness_sure`, `loss_sure`).
     """
     for label, table in comparison.differences_at(place).items():
         heads = ContrastHeaders.from_table(table)
@@ -129,14 +130,14 @@ def difference_sizes(comparison: SideBySide, place: str) -> Iterator[dict[str, A
 
 
 def value_rows(comparison: SideBySide) -> Iterator[tuple[Any, ...]]:
-    """Rows of values of the first and of each other result at some points, with the intervals of their differences.
+    """Rows of the table of values: the first result and each other one at a few operating points.
 
     Args:
         comparison: validated comparison.
 
     Yields:
-        Place, label, frequency, amplitude; then of stiffness and loss factor both values, their difference with its
-        interval, and whether it is significant at all points at once.
+        Direction or specimen, label, frequency, amplitude; then for stiffness and for loss factor a tuple: both values,
+        difference, 95 % interval of the difference, and True if it is significant when all points are tested together.
     """
     places = comparison.places
     tables = [(label, place, table) for place in places for label, table in comparison.differences_at(place).items()]

@@ -14,7 +14,7 @@ _EXPONENT = re.compile(r"\^(\([^()]*\)|-?[\w./α-ω]+)")
 
 
 def formula(text: str) -> Markup:
-    """An ASCII formula or unit as HTML: "m/2 (i omega)^alpha" with ω and α as an exponent."""
+    """Convert an ASCII formula or unit to HTML: "m/2 (i omega)^alpha" becomes m/2 (i ω) with the exponent α."""
     html = str(escape(text))
     html = _SUBSCRIPT.sub(lambda match: f"{match[1]}<sub>{match[2] or match[3]}</sub>", html)
     html = _WORD.sub(lambda match: _GREEK[match[1]], html.replace("*", "·"))

@@ -22,22 +22,22 @@ from bushfit.report.tables import spread
 from bushfit.units import number, split_header
 from bushfit.validation import validate_tables
 
-#: Cells of the table of parts at most, of which a curve counts three: with these the page stays below 500 kB.
+#: Largest number of cells of the table of parts, where a curve is three cells: the page stays below 500 kB.
 _MOST_CELLS = 4000
-#: Parts that a list names at most.
+#: Largest number of parts that a list names.
 _MOST_NAMED = 20
-#: Size of the small picture of a curve [pixels], and the least height of its scale to either side, relative.
+#: Size of a sparkline [pixels], and smallest relative deviation at its upper and lower edge.
 _WIDTH, _HEIGHT, _LEAST_SCALE = 110.0, 26.0, 0.005
 _DIFFERENT, _USUAL = "#b4500c", "#1f4e9c"
 #: Order of the rows: parts that need attention first.
 _ORDER = ("error", "fail", "conditional fail", "not judged", "differs", "conditional pass", "")
-#: Columns of texts that the table of parts shows where they differ from part to part.
+#: Text columns that the table of parts contains if they differ between parts.
 _LABELS = ("campaign name", "subgroup", "verdict", "named effects", "on a bound")
 _TONES = {"pass": "good", "conditional pass": "fair", "not judged": "fair", "conditional fail": "bad", "fail": "bad"}
 
 
 def read_batch(folder: Path) -> list[ResultFile]:
-    """Read the document of a batch.
+    """Read and check the document of a batch, batch.json, as the JSON result file `batch`.
 
     Raises:
         ModelError: the document is missing, or not as bushfit writes it.
@@ -50,15 +50,15 @@ def read_batch(folder: Path) -> list[ResultFile]:
 
 
 def index_page(files: Sequence[ResultFile], folder: Path, base: str = "") -> str:
-    """The page of a batch as HTML.
+    """Make the HTML page of a batch.
 
     Args:
-        files: the document of the batch.
-        folder: results of the batch; parts link to their reports in it, or to their folders.
-        base: start of the links.
+        files: document of the batch.
+        folder: results folder of the batch; the page links each part to its report in this folder, or to its subfolder.
+        base: prefix of the links, if the page is written to another folder.
 
     Returns:
-        The page.
+        The page as HTML.
     """
     batch = validate_tables(contents(files, "json")["batch"], None, BatchFile, kind=ModelError)
     parts, curves = batch.parts, Curves.from_batch(batch)
@@ -127,7 +127,7 @@ def index_page(files: Sequence[ResultFile], folder: Path, base: str = "") -> str
 
 
 def part_status(part: PartTable) -> str:
-    """Why a part needs attention, one of `_ORDER`; empty if it does not."""
+    """Reason why a part needs attention, such as "fail" or "differs" (one of `_ORDER`); empty if there is none."""
     result = "" if part.result in ("pass", None) else str(part.result)
     if part.deviations and result in ("", "conditional pass"):
         return "differs"
@@ -136,12 +136,12 @@ def part_status(part: PartTable) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """Measured stiffness curves of the parts.
+    """Measured stiffness curves of the n parts of a batch, at k common operating points.
 
     Args:
-        headers: columns of the points, (k,).
-        values: |K| in the unit of the headers, (n, k), NaN for parts without a curve.
-        usual: parts that neither differ nor have a poor fit, (n,) bool.
+        headers: column headers of the points, with units, (k,).
+        values: stiffness magnitude in the unit of the headers, (n, k), NaN for parts without a curve.
+        usual: True for parts that do not differ from the others, have no poor fit and have a curve, (n,).
     """
 
     headers: Sequence[str]
@@ -150,7 +150,7 @@ class Curves:
 
     @classmethod
     def from_batch(cls, batch: BatchFile) -> "Curves | None":
-        """Curves of a batch; None if it has none."""
+        """Curves of the parts of a batch; None if no usual part has a curve."""
         unknown = [np.nan] * len(batch.curve_points)
         values = np.array([unknown if part.curve is None else part.curve for part in batch.parts], dtype=float)
         usual = np.array([not (part.deviations or part.poor_fit or part.curve is None) for part in batch.parts])
@@ -158,26 +158,30 @@ class Curves:
 
     @cached_property
     def relative(self) -> Array:
-        """Deviation of each curve from the median of the batch, relative, (n, k)."""
+        """Relative deviation of each curve from the median of all curves, (n, k)."""
         return np.asarray(self.values / np.nanmedian(self.values, axis=0) - 1.0)
 
     @cached_property
     def scale(self) -> float:
-        """Half the height of a small picture, relative: 1.5 times the largest deviation of a usual part."""
+        """Relative deviation at the upper and lower edge of a sparkline: 1.5 times the largest one of a usual part."""
         return max(_LEAST_SCALE, 1.5 * float(np.abs(self.relative[self.usual]).max()))
 
     def picture(self, parts: Sequence[PartTable]) -> Picture:
-        """Median and range of the usual parts, and the curves of the others."""
+        """Drawing of the median and range of the usual curves, and of the single curves of the other parts."""
         curves = zip(parts, self.values, self.usual, strict=True)
         singles = {part.name: curve for part, curve, is_usual in curves if part.curve and not is_usual}
         chart = plots.batch.curves_figure(self.headers, self.values[self.usual], singles)
         return picture(chart, "curves", chart.heading.get_text())
 
     def sparkline(self, index: int, *, differs: bool) -> Markup:
-        """Deviation of a curve from the median over the points, with the range of the usual parts.
+        """Draw the relative deviation of one curve from the median as a small SVG, with the range of the usual parts.
+
+        Args:
+            index: index of the part.
+            differs: True to draw the curve in the colour of parts that differ.
 
         Returns:
-            A small SVG; empty for a part without a curve.
+            SVG element; empty for a part without a curve.
         """
         line, usual = self.relative[index], self.relative[self.usual]
         if not np.isfinite(line).all():

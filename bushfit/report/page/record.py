@@ -26,31 +26,31 @@ from bushfit.report.results import ResultFile, contents, json_file, place_names,
 from bushfit.report.tables import columns_of, required, spread
 from bushfit.validation import validate_tables
 
-#: Documents that hold a model, the one to use first, and the plain fit beside it.
+#: Documents with a model in order of preference; document of the fit without the effects that a diagnosis added.
 MODELS, JOINT = ("model", "dynamic", "static"), "joint"
 #: Schema of diagnosis.json.
 DIAGNOSIS = "bushfit/diagnosis/3"
-#: Columns that hold texts; the others hold numbers.
+#: Headers of columns of texts; all other columns contain numbers.
 _TEXTS = ("loop", "sweep", "test", "kind", "direction", "stepped", "part", "outlier")
-#: Most levels of a grid that is made from the measured points.
+#: Largest number of frequencies, and of amplitudes, of a grid that is made from the measured points.
 _MOST_LEVELS = 10
-#: Size of a table that is read at most [bytes].
+#: Largest size of a table file that is read [bytes].
 _LARGEST = 500_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class ReportRecord:
-    """Records of a result that a report shows.
+    """Input of a report: model, diagnosis, tables, predictions and figures of a result.
 
     Args:
-        result: the model to use.
-        joint: the plain fit, where the model to use holds more.
-        campaign: as the model file has it.
-        diagnosis: the document of diagnosis.json.
-        versions: of bushfit and of the packages that the numbers rest on, by name.
-        tables: measured minus model (`gap`), measured and modelled `sweeps` and `loops`, by name, where they are known.
-        predictions: of every place that was tested or predicted, by the name of its file.
-        charts: figures of the run, by name; those that are missing are made from the tables.
+        result: final model.
+        joint: fit without the effects that a diagnosis added; None if there is none.
+        campaign: campaign, as the model file describes it; None if it is not known.
+        diagnosis: content of diagnosis.json; None without a diagnosis.
+        versions: versions of bushfit and of the numerical packages in use, by name.
+        tables: tables that are known: `gap` (measured minus model), and measured and modelled `sweeps` and `loops`.
+        predictions: predictions for all directions and specimens that were tested or predicted, by file name.
+        charts: figures made in the run, by file name; other figures are made from the tables.
     """
 
     result: Result
@@ -64,20 +64,20 @@ class ReportRecord:
 
     @property
     def tests(self) -> Sequence[TestTable]:
-        """Tests of the campaign; empty if they are not known."""
+        """Descriptions of the tests of the campaign; empty if the campaign is not known."""
         return self.campaign.tests if self.campaign else ()
 
 
 def report_record(files: Sequence[ResultFile], folder: Path | None = None) -> ReportRecord:
-    """The records of a result from its files; predictions are computed from the model.
+    """Collect the input of a report from the files of a result, and compute the predictions from the model.
 
     Args:
-        files: documents (model, plain fit, diagnosis), tables (loops, sweeps, gap, and one per predicted place, which
-            gives its grid) and figures.
-        folder: where the documents were read, for error messages.
+        files: documents (model, fit without the effects of a diagnosis, diagnosis), tables (loops, sweeps, gap, and one
+            per predicted direction or specimen, which gives the grid of the prediction) and figures.
+        folder: folder of the documents, for error messages; None for documents that were not read from files.
 
     Returns:
-        Records for `report_context`.
+        Input of `report_context`.
 
     Raises:
         ModelError: no model among the documents, or a document or table that is not as bushfit writes it.
@@ -110,7 +110,7 @@ def report_record(files: Sequence[ResultFile], folder: Path | None = None) -> Re
 
 
 def _tests(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
-    """Tables of the gap, sweeps and loops, where they are known; sweeps and loops without their own are in the gap."""
+    """Tables `gap`, `sweeps` and `loops` that are known; missing ones of sweeps and loops are taken from the gap."""
     tested = {name: tables[name] for name in ("gap", "sweeps", "loops") if name in tables}
     if "gap" in tested:
         gap = required(tested["gap"], "test", "kind", "direction")
@@ -128,7 +128,7 @@ def _tests(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
 def _predictions(
     result: Result, tables: Mapping[str, pd.DataFrame], sweeps: pd.DataFrame | None
 ) -> dict[str, Prediction]:
-    """Predictions by file name on the grids of the tables of places, or on that of the measured sweeps."""
+    """Predictions by file name, on the grid of each prediction table or, without one, of the measured sweeps."""
     places: list[Place] = [*(Direction if result.model.bushing else ()), *result.specimens]
     predictions = {}
     for name, place in zip(place_names(places), places, strict=True):
@@ -146,18 +146,18 @@ def _predictions(
 
 
 def has_model(folder: Path) -> bool:
-    """Check for a model in a folder."""
+    """Check if a results folder contains a model file."""
     return any((folder / f"{name}.json").exists() for name in MODELS)
 
 
 def read_results(folder: Path) -> list[ResultFile]:
-    """Documents and tables of a folder of results.
+    """Read the documents and tables of a results folder.
 
     Returns:
-        Result files with the documents and tables, not with figures.
+        Result files for the documents and tables; figures are not read.
 
     Raises:
-        ModelError: no folder, no results in it, or a file that is not as bushfit writes it.
+        ModelError: the folder does not exist or contains no model, or a file is not as bushfit writes it.
     """
     if not folder.is_dir():
         kind = "a file" if folder.exists() else "nothing"
@@ -180,10 +180,14 @@ def read_results(folder: Path) -> list[ResultFile]:
 
 
 def read_table(folder: Path, name: str) -> pd.DataFrame | None:
-    """A table of a folder in the form it was written in: CSV, with decimal commas or without, or a workbook.
+    """Read a table that bushfit wrote into a folder: CSV, with decimal points or commas, or an Excel workbook.
+
+    Args:
+        folder: results folder.
+        name: file name of the table, without extension.
 
     Returns:
-        Columns as numbers, or as texts for the names of tests and what they are; None without a file.
+        Table with columns of floats, and of texts for names and kinds of tests; None if there is no such file.
 
     Raises:
         ModelError: a table that is not as bushfit writes it.

@@ -28,9 +28,9 @@ from bushfit.units import CELSIUS, display_unit, format_aligned, format_range, n
 if TYPE_CHECKING:
     from bushfit.report.plots.style import Chart
 
-#: Functions that make the figures of a page, by the name of a figure of the run and the heading in the page.
+#: Functions that make the figures of a page, by file name of the figure and heading in the page.
 _Figures = dict[tuple[str, str], "Callable[[], Chart | None]"]
-#: Colour of the verdict: nothing to do, something to know, something to do.
+#: CSS class that colours each verdict; all others are "fair".
 _TONES = {"consistent": "good", "named": "good", "unexplained": "bad"}
 #: Consequence of each verdict for the use of the numbers.
 _CONSEQUENCES = {
@@ -41,7 +41,7 @@ _CONSEQUENCES = {
     "partly": "Part of the difference is not explained. Use the numbers with their bands, within the tested range.",
     "unexplained": "Do not release these numbers: the model misses the tests, and the cause is not known.",
 }
-#: Conditions of tests by their campaign keys; the first three are shown even if they are not stated.
+#: Labels of test conditions by campaign key; temperature, preload and date are listed even if they are not stated.
 _CONDITIONS = {
     "temperature_degC": "Temperature",
     "preload": "Preload",
@@ -49,29 +49,29 @@ _CONDITIONS = {
     "operator": "Operator",
     "specimen_number": "Specimen no.",
 }
-#: Conditions beside each test.
+#: Format of the conditions in the table of tests, by campaign key.
 _BESIDE_TEST = {
     "specimen_number": "part {}",
     "temperature_degC": "{} °C",
     "preload": "{} preload",
     "order": "no. {} of the session",
 }
-#: Data whose gap is reported, and their keys in diagnosis.json.
+#: Kinds of data whose gap is reported, and their keys in diagnosis.json.
 _GAPS: dict[str, Literal["heldout", "calibration"]] = {"held-out": "heldout", "fitted": "calibration"}
-#: Tests, regions and places that a page lists or draws at most: the files have all.
+#: Largest numbers of tests and regions, and of directions and specimens, in a page; the result files contain all.
 MOST, _MOST_PLACES = 12, 6
-#: Characters of all figures of a page at most: the page stays below 500 kB.
+#: Largest total size of the figures of a page [characters]: the page stays below 500 kB.
 _LARGEST_FIGURES = 440_000
 
 
 def report_context(record: ReportRecord) -> dict[str, Any]:
-    """Everything that the template of a report needs.
+    """Values of the variables of the template report.html.
 
     Args:
         record: records of the result.
 
     Returns:
-        Values of the template by name.
+        Values by the names of the template variables.
     """
     result, diagnosis, campaign, tests = record.result, record.diagnosis, record.campaign, record.tests
     bodies = [("Bushing", tube_description(result.model.bushing))] if result.model.bushing else []
@@ -122,16 +122,16 @@ def report_context(record: ReportRecord) -> dict[str, Any]:
 
 
 def draw_figures(record: ReportRecord) -> tuple[list[Picture], list[Picture], bool]:
-    """Pictures of the page and of its appendix, as many as keep the page small.
+    """Draw the figures of a report and of its appendix, as many as fit the size limit of the page.
 
-    The page shows predictions beside measurements, measured minus model, and loops. The appendix shows the residuals of
-    the sweeps if nothing else does, storage and loss stiffness, and confidence ellipses.
+    The report shows predictions with measurements, measured minus model, and loops. The appendix shows the residuals of
+    the sweeps if there is no map of measured minus model, storage and loss stiffness, and confidence ellipses.
 
     Args:
         record: records of the result.
 
     Returns:
-        Pictures of the page, pictures of the appendix, and whether some of the page were left out.
+        Figures of the report, figures of the appendix, and True if figures of the report are missing.
     """
     result, diagnosis = record.result, record.diagnosis
     sweeps, loops, gap = (record.tables.get(name) for name in ("sweeps", "loops", "gap"))
@@ -166,7 +166,7 @@ def draw_figures(record: ReportRecord) -> tuple[list[Picture], list[Picture], bo
 
 
 def sweeps_beside(sweeps: pd.DataFrame | None, result: Result) -> pd.DataFrame | None:
-    """Sweeps to draw beside a prediction: those at its temperature, 23 °C, where the model depends on temperature."""
+    """Sweeps to draw with a prediction: all, or only those at 23 °C if the model depends on temperature."""
     if sweeps is None or "temperature [degC]" not in sweeps or not result.model.knows_temperature:
         return sweeps
     degrees = sweeps.groupby("sweep" if "sweep" in sweeps else "test")["temperature [degC]"].transform("mean")
@@ -174,14 +174,14 @@ def sweeps_beside(sweeps: pd.DataFrame | None, result: Result) -> pd.DataFrame |
 
 
 def gap_texts(diagnosis: DiagnosisFile, part: Literal["heldout", "calibration"]) -> list[str]:
-    """Root mean square of measured minus model in units of noise, before and after, of held-out or fitted data."""
+    """Texts of the root mean square gap before and after a diagnosis, in units of noise, of held-out or fitted data."""
     gap = diagnosis["gap"][part]
     ends = (gap["before"], gap["after"]) if gap else (None, None)
     return ["not known" if end is None else f"{end:.2f}" for end in ends]
 
 
 def tube_description(bushing: Bushing) -> str:
-    """Dimensions of a bushing in words."""
+    """Describe the dimensions [mm] of a bushing in words."""
     sizes = 2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length
     inner, outer, length = (number(1e3 * size, 4) for size in sizes)
     formulas = "; radial formulas corrected by finite elements" if bushing.shape == "calibrated" else ""
@@ -189,7 +189,7 @@ def tube_description(bushing: Bushing) -> str:
 
 
 def specimen_description(specimen: Specimen) -> str:
-    """Dimensions of a specimen in words."""
+    """Describe the dimensions of a specimen in words."""
     if specimen.area is None or specimen.thickness is None:
         return f"modulus of the compound, {specimen.strain} strain"
     blocks = "one block" if specimen.elements == 1 else f"{specimen.elements} blocks in parallel"
@@ -199,13 +199,13 @@ def specimen_description(specimen: Specimen) -> str:
 
 
 def conditions(test_conditions: Iterable[Mapping[str, str | float]]) -> Iterator[tuple[str, str]]:
-    """Names and values of the conditions of all tests, each distinct value once.
+    """Summarise the conditions of all tests: temperature, preload, date, operator and specimen number.
 
     Args:
-        test_conditions: conditions of each test by their campaign keys.
+        test_conditions: conditions of each test by campaign key.
 
     Returns:
-        An iterator over pairs of name and value.
+        An iterator over pairs of name and text: a range of numbers, or the distinct values.
     """
     tests = list(test_conditions)
     for key, name in _CONDITIONS.items():
@@ -220,10 +220,10 @@ def conditions(test_conditions: Iterable[Mapping[str, str | float]]) -> Iterator
 
 
 def test_rows(record: ReportRecord) -> list[dict[str, str | int]]:
-    """Texts of the table of tests: range, conditions and misfit of the model of the first twelve tests.
+    """Rows of the table of tests in a report: range, conditions and model misfit of the first twelve tests.
 
     Returns:
-        Texts of each row by the names of the template.
+        Texts of each row, and its number of recorded rows, by the names that the template uses.
     """
     misfits = {misfit.test: misfit for misfit in record.result.tests if misfit.held is None}
     rows = list[dict[str, str | int]]()
@@ -249,7 +249,7 @@ def test_rows(record: ReportRecord) -> list[dict[str, str | int]]:
 
 
 def effect_sizes(effect: EffectEntry) -> Iterator[tuple[str, str, str]]:
-    """Name, value and interval of the parameters of an effect, as texts with units."""
+    """Name, value with unit and 95 % interval of each parameter of an effect, as texts."""
     for name, size in effect["parameters"].items():
         unit, factor = display_unit(size["unit"], 1.0, size["value"])
         value, *ends = format_aligned([factor * x for x in (size["value"], *(size["ci95"] or ()))], 4, minimum_digits=2)

@@ -20,19 +20,19 @@ if TYPE_CHECKING:
 _SVG, _HREF = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}href"
 _NUMBER = re.compile(r"-?\d+\.\d{2,}")
 _FONT = re.compile(r"(?P<weight>bold )?(?P<size>[\d.]+px) .*")
-#: Length of the path of a marker at most: it is small and needs two decimals.
+#: Length of the path data [characters] below which a shape is a marker, which is small and needs two decimals.
 _SMALL_SHAPE = 500
-#: Fonts as wide as the one that matplotlib lays out with.
+#: Font families as wide as the font that matplotlib uses for the layout.
 _FAMILY = "DejaVu Sans, Verdana, sans-serif"
 
 
 class Picture(NamedTuple):
-    """A chart in a page.
+    """Drawing of a chart in an HTML page, with its texts.
 
     Args:
         title: heading above the chart.
         caption: explanation below the chart.
-        svg: drawing without heading and explanation.
+        svg: SVG element with the panels, without heading and explanation.
     """
 
     title: str
@@ -41,15 +41,15 @@ class Picture(NamedTuple):
 
 
 def picture(chart: Chart, name: str, title: str) -> Picture:
-    """A chart as SVG for a page: its panels, without heading and explanation, which the page shows as text.
+    """Convert a chart to SVG for a page: only its panels, since the page shows heading and explanation as text.
 
-    Pages are shown where a content policy forbids style attributes and style sheets (Jenkins, mail), so that colours
-    and fonts are attributes of their own. Numbers have one decimal, a tenth of a point.
+    Some viewers of the page (Jenkins, mail) forbid style attributes and style sheets. Colours and fonts are therefore
+    separate SVG attributes. Numbers have one decimal, a tenth of a point.
 
     Args:
         chart: chart to draw.
-        name: that no other picture of the page has; identifiers begin with it.
-        title: heading in the page.
+        name: unique name in the page, used as the prefix of SVG identifiers.
+        title: heading of the chart in the page.
 
     Returns:
         Title, caption and drawing for the template.
@@ -81,11 +81,11 @@ def picture(chart: Chart, name: str, title: str) -> Picture:
 
 
 def panel_axes(chart: Chart) -> Iterator[list[Any]]:
-    """Panels with lines, for reading values under the pointer.
+    """Positions and axis limits of the panels, from which the script of the page shows the values under the pointer.
 
     Yields:
-        Left, top, right and bottom in the drawing [point]; left, right, lower and upper limit; whether x and y are
-        logarithmic; labels.
+        For each visible panel with lines: left, top, right and bottom in the drawing [point]; limits of x and y;
+        True or False for logarithmic x and y; labels of x and y.
     """
     width, height = 72.0 * chart.get_size_inches()
     for axes in chart.axes:
@@ -99,7 +99,7 @@ def panel_axes(chart: Chart) -> Iterator[list[Any]]:
 
 
 def _rewrite(root: ElementTree.Element, name: str) -> None:
-    """Drop metadata and style sheets, turn styles into attributes, shorten numbers, and give identifiers own names."""
+    """Simplify an SVG: no metadata or style sheets, styles as attributes, short numbers, identifiers with a prefix."""
     for parent in list(root.iter()):
         for child in list(parent):
             if child.tag in (f"{_SVG}metadata", f"{_SVG}style"):
@@ -129,12 +129,12 @@ def _rewrite(root: ElementTree.Element, name: str) -> None:
 
 
 def _rounded(decimals: int, digits: re.Match[str]) -> str:
-    """Number of an attribute with so many decimals at most."""
+    """Round a matched number to at most `decimals` decimals."""
     return f"{float(digits[0]):.{decimals}f}".rstrip("0").rstrip(".")
 
 
 def _hoist(root: ElementTree.Element) -> None:
-    """Give groups the attributes that all of their children share, and drop from markers what their shape states."""
+    """Move attributes that all children of a group share to the group, and drop those that a marker repeats."""
     shapes = {f"#{element.get('id')}": element for element in root.iter() if element.get("id")}
     for marker in root.iter(f"{_SVG}use"):
         for key in {*marker.attrib} & {*shapes[marker.get("href", "")].attrib}:
@@ -151,7 +151,7 @@ def _hoist(root: ElementTree.Element) -> None:
 
 
 def _unwrap(parent: ElementTree.Element) -> None:
-    """Put the children of groups without attributes in the place of these groups."""
+    """Replace groups without attributes by their children."""
     children = []
     for child in list(parent):
         _unwrap(child)

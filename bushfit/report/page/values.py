@@ -13,26 +13,27 @@ from bushfit.report.page.record import ReportRecord
 from bushfit.report.tables import spread
 from bushfit.units import display_unit, format_aligned, format_range, number
 
-#: Highest frequency of a static stiffness [Hz].
+#: Highest frequency at which a stiffness is reported as static [Hz].
 _STATIC = 1.0
-#: Frequencies and amplitudes of a place in the table of values, and rows of all places together.
+#: Largest numbers in the table of values: frequencies and amplitudes of each direction or specimen, and all rows.
 _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 12
 
 
 def headline(record: ReportRecord, prediction: Prediction) -> dict[str, str]:
-    """Stiffness and loss of a place at the operating point in the middle of its grid, and its static stiffness.
+    """Key values of a direction or specimen for the top of a report, as texts.
 
-    The point is the amplitude in the middle of those predicted and the frequency nearest to the geometric mean of the
-    lowest and highest. Static stiffness is that at the lowest tested frequency, where it is at most 1 Hz, at the same
-    amplitude. The interval of the dynamic stiffening counts the correlation of both.
+    The operating point is the middle one of the predicted amplitudes and the frequency nearest to the geometric mean of
+    the lowest and highest. The static stiffness is at the lowest frequency, if this is at most 1 Hz, and at the same
+    amplitude. The dynamic stiffening is the ratio of dynamic to static stiffness; its interval includes the correlation
+    of the two.
 
     Args:
         record: records of the result.
-        prediction: prediction of one place on its grid.
+        prediction: prediction for one direction or specimen.
 
     Returns:
-        Texts with units by the names of the template: operating point, dynamic stiffness and loss with their bands,
-        static stiffness, dynamic stiffening, expected error, and the tests that the prediction rests on.
+        Texts with units by template variable: operating point, dynamic stiffness and loss with their 95 % bands, static
+        stiffness, dynamic stiffening, expected error, and the tests that the prediction is based on.
     """
     result, place = record.result, prediction.direction
     (length, to_length), _, (name, factor) = place.display
@@ -74,24 +75,24 @@ def headline(record: ReportRecord, prediction: Prediction) -> dict[str, str]:
 
 
 def band_at(band: Band, index: int, scale: float = 1.0) -> list[float]:
-    """Value, low and high of a band at one operating point, times a factor.
+    """Value, low end and high end of a 95 % band at one operating point, times a factor.
 
     Args:
-        band: band of a prediction.
-        index: operating point.
-        scale: factor from SI to the unit shown.
+        band: band of a prediction [SI].
+        index: index of the operating point.
+        scale: factor from SI to the display unit.
     """
     return [scale * float(end[index]) for end in (band.value, band.low, band.high)]
 
 
 def interval(values: Sequence[float], digits: int = 4) -> str:
-    """The ends of an interval with the decimals of its value; empty where it has no width."""
+    """Format (value, low, high) as "low to high" with the decimals of the value; empty if the interval has no width."""
     _, low, high = format_aligned(values, digits, minimum_digits=2)
     return f"{low} to {high}" if values[2] > values[1] else ""
 
 
 def basis(record: ReportRecord, place: str) -> str:
-    """Sentence on the tests that the prediction of a place rests on.
+    """Describe the tests that the prediction for a direction or specimen is based on, and its agreement with others.
 
     Returns:
         The sentence, without a full stop.
@@ -113,13 +114,14 @@ def basis(record: ReportRecord, place: str) -> str:
 
 
 def value_rows(predictions: Sequence[Prediction]) -> Iterator[list[str]]:
-    """Rows of predicted values at some points of each grid.
+    """Rows of the table of predicted values in a report, at a few operating points of each prediction.
 
     Args:
-        predictions: predictions of several places.
+        predictions: predictions for several directions and specimens.
 
     Yields:
-        Place, frequency, amplitude; |K| and its band; loss angle and its band; loss factor, K' and K''.
+        Texts: direction or specimen, frequency, amplitude; |K| and its 95 % band; loss angle and its band; loss factor,
+        storage stiffness K' and loss stiffness K''.
     """
     frequencies = min(max(_ROWS // max(_AMPLITUDES * len(predictions), 1), 1), _FREQUENCIES)
     for prediction in predictions:
@@ -142,12 +144,16 @@ def value_rows(predictions: Sequence[Prediction]) -> Iterator[list[str]]:
 
 
 def grid_corners(amplitude: Array, frequency: Array, amplitudes: int, frequencies: int) -> Iterator[int]:
-    """Indices of at most so many operating points, evenly over the amplitudes and frequencies of a grid.
+    """Choose a few operating points of a grid, evenly over its amplitudes and frequencies, ends included.
 
     Args:
-        amplitude: amplitude of each point of the grid [m, rad or 1], (n,).
+        amplitude: amplitude of each point of the grid, in any unit, (n,).
         frequency: frequency of each point [Hz], (n,).
-        amplitudes, frequencies: largest number of amplitudes, and of frequencies at each.
+        amplitudes: largest number of amplitudes.
+        frequencies: largest number of frequencies at each amplitude.
+
+    Yields:
+        Indices of the chosen points.
     """
     levels = np.unique(amplitude)
     for level in levels[spread(levels.size, amplitudes)]:
