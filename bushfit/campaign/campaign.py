@@ -25,21 +25,21 @@ from bushfit.reading.sweeps import read_sweep
 from bushfit.reduction.programme import programme
 from bushfit.units import CELSIUS, parse_quantity
 
-#: Endings of test files, which `bushfit init` makes a campaign of.
+#: Endings of test files, from which `bushfit init` writes a campaign.
 TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods", *RECORDINGS)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Campaign:
-    """A bushing, specimens of its compound, their tests, and the settings of what to do with them, all in SI.
+    """A bushing, specimens of its compound, their tests, and the settings of the campaign file, all in SI.
 
     Args:
-        name: of the campaign; default the name of the bushing, or of the first specimen.
-        path: the campaign file.
-        sha256: of its bytes; empty where there is no such file.
-        logo: of [report], as a data URI; None where the file names none.
-        bushing: None where specimens alone were tested.
-        simulate, compound: None where the file has no such table.
+        name: name of the campaign; default the name of the bushing, or of the first specimen.
+        path: path of the campaign file.
+        sha256: SHA-256 of the campaign file; empty without a file.
+        logo: logo of [report] as a data URI; None without a logo.
+        bushing: the bushing; None if only specimens were tested.
+        simulate, compound: settings of the table of this name; None if the file lacks the table.
     """
 
     name: str
@@ -64,19 +64,19 @@ class Campaign:
 
 
 def load_campaign(path: str | Path) -> Campaign:
-    """Read a campaign file and the measurements that it names.
+    """Read a campaign file and the test files that it lists.
 
     Args:
         path: TOML file of the campaign.
 
     Returns:
-        Campaign in SI; a record of several loops is split, and copies of a test count once.
+        Campaign in SI; a record of several loops is split, and copies of a test are left out.
 
     Raises:
-        CampaignError: the file is missing, no TOML, or has keys or values that are not understood.
-        UnitError: a quantity without a unit, or with one that does not fit.
-        ModelError: an impossible bushing.
-        MeasurementError: a measurement that cannot be used.
+        CampaignError: the file is missing, not TOML, or has invalid keys or values.
+        UnitError: a quantity without a unit, or with an incompatible unit.
+        ModelError: impossible dimensions of the bushing.
+        MeasurementError: a test file that cannot be used.
     """
     path = Path(path)
     refuse_tests([path])
@@ -116,11 +116,11 @@ def load_campaign(path: str | Path) -> Campaign:
 
 
 def load_bushing(path: Path) -> Bushing:
-    """The bushing of a campaign file, or of a file with a [bushing] table alone; its tests are not read.
+    """Read the bushing of a campaign file, or of a file with only a [bushing] table, without reading the tests.
 
     Raises:
-        CampaignError: the file is missing, no TOML, or has no [bushing].
-        ModelError: an impossible bushing.
+        CampaignError: the file is missing, not TOML, or has no [bushing].
+        ModelError: impossible dimensions of the bushing.
     """
     table = read_toml(path, CampaignFile).bushing
     if table is None:
@@ -131,7 +131,7 @@ def load_bushing(path: Path) -> Bushing:
 
 
 def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
-    """Refuse a campaign without a body, two specimens of one name, and names of unknown directions or specimens."""
+    """Raise a CampaignError for missing bodies, repeated specimen names, and unknown directions or specimens."""
     names = [specimen.name for specimen in specimens]
     if not (content.bushing or names):
         expected = "[bushing] with its name, radii and length, or [[specimens]]"
@@ -156,10 +156,10 @@ def model_of(campaign: Campaign) -> Model:
         campaign: campaign with a [simulate] table.
 
     Returns:
-        Model with the parameters of that table.
+        Model with the parameters and effects of the [simulate] table.
 
     Raises:
-        CampaignError: no such table, or a parameter of the paper's five that has no value.
+        CampaignError: no [simulate] table, or one of the paper's five parameters without a value.
         ModelError: an unknown effect or an impossible value.
     """
     if campaign.simulate is None:
@@ -190,7 +190,7 @@ def model_of(campaign: Campaign) -> Model:
 
 
 def refuse_tests(paths: Sequence[Path]) -> None:
-    """Raise a CampaignError where test files, a folder or a model were given in place of a campaign."""
+    """Raise a CampaignError if the paths are test files, a folder or a model file instead of a campaign."""
     first = paths[0]
     try:
         tests = [path for path in paths if path.is_dir() or (path.suffix.lower() in TEST_FILES and path.exists())]
@@ -214,19 +214,19 @@ def reader_keywords(
 ) -> Iterator[dict[str, Any]]:
     """Keywords of `read_loop` or `read_sweep` for the tests of a campaign.
 
-    The name of a test is the stem of its file, or the file as the campaign lists it if two files have one stem. Tests
-    of one file have its sheet, temperature, direction, specimen number and selected rows in their names.
+    The name of a test is the stem of its file, or the path as the campaign lists it if two files have the same stem. If
+    one file contains several tests, sheet, temperature, direction, specimen number and selected rows are added.
 
     Args:
-        campaign: campaign file.
+        campaign: path of the campaign file.
         tests: [[loops]] or [[sweeps]] tables.
         specimens: specimens of the campaign.
 
     Yields:
-        Keywords of one test, in order.
+        Keyword arguments of the reader for each test, in order.
 
     Raises:
-        CampaignError: a test that is listed twice, or one of no body.
+        CampaignError: a test that is listed twice, or that states no direction or specimen.
     """
     listed_tests = set()
     places = [(os.path.normpath(campaign.parent / test.file), test.sheet, test.temperature) for test in tests]

@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 
 from bushfit.reading.measurement import Loop, Source, Sweep
 
-#: Points that agree in all digits from which on they are copies; chosen: fewer may agree by chance in rounded files.
+#: Minimum number of identical points that are copies; chosen: fewer may agree by chance in rounded files.
 _FEWEST_POINTS = 5
-#: Digits that are compared: the last ones hold what a conversion of units leaves.
+#: Number of significant digits that are compared; later digits contain rounding errors of unit conversions.
 _DIGITS = 9
 
 _Test = TypeVar("_Test", Loop, Sweep)
 
 
 def group_copies(tests: Sequence[_Test]) -> list[list[_Test]]:
-    """Group tests whose numbers are identical, in the same direction or of the same specimen.
+    """Group tests with identical data in the same direction or of the same specimen.
 
-    Two measurements never agree in all digits. Sweeps of fewer than five points may, and are never grouped.
+    Two measurements never agree in all digits; sweeps of fewer than five points may, and are never grouped.
 
     Args:
         tests: loops, or sweeps, in order.
@@ -56,13 +56,13 @@ def without_copied_tests(tests: Sequence[_Test]) -> list[_Test]:
 
 
 def without_copied_repeats(sweep: Sweep) -> Sweep:
-    """Leave out the runs of a sweep that repeat an earlier run of the same level, or frequency, in all digits.
+    """Leave out runs of a sweep that are copies of an earlier run.
 
     Args:
         sweep: sweep of a campaign.
 
     Returns:
-        The remaining rows, with a note that names the copied repeats; the sweep itself without copies.
+        Sweep of the remaining rows, with a note on the copied repeats; the same sweep if it has no copies.
     """
     runs: set[bytes] = set()
     is_copy, repeats = np.zeros(sweep.frequency.size, dtype=bool), dict[int, None]()
@@ -87,7 +87,7 @@ def without_copied_repeats(sweep: Sweep) -> Sweep:
 
 
 def _digits(sweep: Sweep, rows: NDArray[np.bool_] | slice = slice(None)) -> bytes:
-    """Frequencies, amplitudes and stiffness of some rows of a sweep, rounded, in an order of their own."""
+    """Bytes that are equal for equal data: rounded and sorted frequency, amplitude and stiffness of rows of a sweep."""
     stiffness = sweep.stiffness[rows]
     numbers = np.stack([sweep.frequency[rows], sweep.amplitude_reached[rows], stiffness.real, stiffness.imag])
     scale = 10.0 ** (_DIGITS - 1 - np.floor(np.log10(np.maximum(np.abs(numbers), 1e-300))))

@@ -36,7 +36,7 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
     """Convert the value of a model parameter to SI. Ratios, and parameters of added effects, may be plain numbers.
 
     Args:
-        place: key of the value in the file, which errors name.
+        place: key of the value in the file, for error messages.
         name: name of the parameter.
         raw: text with a unit, or number.
 
@@ -44,7 +44,7 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
         Value in SI.
 
     Raises:
-        UnitError: a unit that is missing or does not fit.
+        UnitError: a missing or incompatible unit.
         CampaignError: an unknown parameter.
     """
     with error_location(place=place):
@@ -59,12 +59,12 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
 
 
 def parameter_values(raw: dict[str, Any]) -> dict[str, float]:
-    """Values by parameter, in SI."""
+    """Convert a table of texts or numbers by parameter name to SI values."""
     return {name: parameter_value(name, name, value) for name, value in raw.items()}
 
 
 def effect_values(raw: dict[str, Any]) -> dict[str, Any]:
-    """Values by effect and parameter, in SI; what is no table is left to pydantic."""
+    """Convert tables of parameter values by effect to SI; pydantic checks entries that are not tables."""
     return {
         effect: {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
         if isinstance(table, dict)
@@ -74,7 +74,10 @@ def effect_values(raw: dict[str, Any]) -> dict[str, Any]:
 
 
 def with_sizes(raw: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
-    """Tables by parameter with the values of some keys in SI; what is no table is left to pydantic."""
+    """Convert the values of the given keys, such as "min", in tables by parameter name to SI.
+
+    Pydantic checks entries that are not tables.
+    """
     return {
         name: table | {key: parameter_value(f"{name}.{key}", name, table[key]) for key in keys if key in table}
         if isinstance(table, dict)
@@ -89,13 +92,13 @@ def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
     A min or a max outside the bounds of the parameter is moved to the bound, such as a min of "0 MPa".
 
     Args:
-        raw: tables of value, min, max and vary, by parameter.
+        raw: tables of value, min, max and vary by parameter name.
 
     Returns:
         The same tables with value, min and max in SI.
 
     Raises:
-        CampaignError: limits that hold no value.
+        CampaignError: min, value and max that are not increasing, or outside the bounds of the parameter.
     """
     keys = ("min", "value", "max")
     settings = with_sizes(raw, keys)
@@ -115,22 +118,18 @@ def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
 
 
 def _plain_number(quantity: str, unit: str, example: str, largest: float, smallest: float = 0.0) -> BeforeValidator:
-    """Validator of a text with a unit that pint does not know; the JSON Schema has the example.
+    """Validator that converts a text with a unit unknown to pint, such as "60 Shore A", to a number.
 
     Args:
-        quantity: for errors, such as "a hardness".
+        quantity: quantity for error messages, such as "a hardness".
         unit: regular expression of the unit.
-        example: text with the unit.
-        largest, smallest: limits of the number.
+        example: example of a valid text, for error messages and the JSON Schema.
+        largest, smallest: largest and smallest valid number.
     """
     pattern = re.compile(rf"\s*(\d{{1,4}}(?:\.\d{{1,6}})?)\s*(?:{unit})\s*", re.ASCII | re.IGNORECASE)
 
     def convert(raw: object, _: object) -> float:
-        """Number of the text.
-
-        Returns:
-            The number, in the unit of the text.
-        """
+        """Number in a text, in the unit of the text."""
         match = pattern.fullmatch(raw) if isinstance(raw, str) else None
         if not match:
             raise UnitError(f"this is not {quantity}", found=str(raw), expected=f'"{example}"')
@@ -147,9 +146,9 @@ class Compound:
     """[compound]: a rubber that was not tested yet, for `bushfit plan`.
 
     Args:
-        hardness: [Shore A].
-        filler: carbon black, parts by weight per hundred of rubber [phr].
-        rubber: the polymer.
+        hardness: hardness [Shore A].
+        filler: carbon black [phr], parts by weight per hundred parts of rubber.
+        rubber: polymer of the compound.
     """
 
     hardness: Annotated[float, _plain_number("a hardness", r"sh(?:ore)?\.?\s*a", "61 Shore A", *_HARDNESS[::-1])]
@@ -162,13 +161,13 @@ class ReportSettings:
     """[report]: texts and logo in the head of the report.
 
     Args:
-        customer: whose part it is.
-        part_number: of the bushing.
-        drawing: its number, with the issue.
-        compound: the rubber, by its name.
-        laboratory: that tested it.
-        date: of the report.
-        logo: a PNG or SVG file, relative to the campaign file.
+        customer: customer of the part.
+        part_number: part number of the bushing.
+        drawing: number and issue of the drawing.
+        compound: name of the rubber compound.
+        laboratory: laboratory that tested the part.
+        date: date of the report.
+        logo: PNG or SVG file, relative to the campaign file.
     """
 
     customer: Name | None = None
@@ -181,7 +180,7 @@ class ReportSettings:
 
     @property
     def lines(self) -> dict[str, str]:
-        """Texts of the head by key, in order, without the logo."""
+        """Stated texts for the head of the report by key, in order, without the logo."""
         return {key: value for key, value in vars(self).items() if value is not None and key != "logo"}
 
 

@@ -47,7 +47,7 @@ Loss = Literal["linear", "soft_l1"]
 
 
 def _fit_table(raw: dict[str, Any]) -> dict[str, Any]:
-    """[fit] with its tables by parameter, such as [fit.mu] or [fit."inertia.mass"], under the key "parameters"."""
+    """Move the parameter tables of [fit], such as [fit.mu] or [fit."inertia.mass"], below the key "parameters"."""
     if "parameters" in raw:
         raise unknown_key("parameters", known_keys(FitSettings))
     settings = {key: value for key, value in raw.items() if not is_parameter(key)}
@@ -65,11 +65,11 @@ class BushingSettings:
     """[bushing]: a tube of rubber between two sleeves, by its radii or its diameters.
 
     Args:
-        name: tables and plots are headed with it.
-        inner_radius, outer_radius: of the rubber [m].
-        inner_diameter, outer_diameter: in place of a radius [m].
+        name: name of the bushing, used as title of tables and plots.
+        inner_radius, outer_radius: radius of the rubber [m].
+        inner_diameter, outer_diameter: diameter of the rubber in place of the radius [m].
         length: mean length of the rubber [m].
-        shape: the radial formulas: the paper's as they are, or corrected by finite elements.
+        shape: formulas for radial stiffness: those of the paper, or corrected by finite elements.
     """
 
     name: Name
@@ -89,7 +89,7 @@ class BushingSettings:
                 raise ValueError(CampaignError(problem, place=f"{side}_radius", expected=expected))
 
     def to_bushing(self) -> Bushing:
-        """The bushing, with its radii."""
+        """Make the bushing; diameters are converted to radii."""
         radii = {
             f"{side}_radius": getattr(self, f"{side}_radius") or getattr(self, f"{side}_diameter") / 2.0
             for side in ("inner", "outer")
@@ -99,15 +99,15 @@ class BushingSettings:
 
 @dataclass(frozen=True)
 class SpecimenSettings:
-    """[[specimens]]: another body of the same compound, and what its tests give. See geometry.Specimen.
+    """[[specimens]]: another body of the same compound, and the kind of its tests. See geometry.Specimen.
 
     Args:
-        name: its tests and tables go by it.
-        kind: "modulus" where tests give strain and modulus, "shear" where they give displacement and force of blocks.
-        strain: that files of a modulus test state: shear, the tensor's (half of it), or that of a bar in tension.
-        area: of one block in shear [m^2].
-        thickness: of one block in shear [m].
-        elements: blocks in parallel.
+        name: name of the specimen in tests and tables.
+        kind: "modulus" if tests give strain and modulus, "shear" if tests give displacement and force of blocks.
+        strain: strain in files of a modulus test: engineering shear, tensor (half of it), or that of a bar in tension.
+        area: area of one block in shear [m^2].
+        thickness: thickness of one block in shear [m].
+        elements: number of blocks in parallel.
     """
 
     name: Name
@@ -125,12 +125,12 @@ class SpecimenSettings:
 
 @dataclass(frozen=True)
 class ParameterSetting:
-    """[fit.<parameter>]: start value and bounds [SI], None where the fit chooses.
+    """[fit.<parameter>]: start value and bounds [SI]; None for the default.
 
     Args:
-        value: to start from, or to hold.
-        min, max: least and largest value.
-        vary: false holds the value.
+        value: start value of the fit, or fixed value.
+        min, max: smallest and largest value.
+        vary: false keeps the parameter fixed.
     """
 
     value: ParameterValue | None = None
@@ -141,18 +141,18 @@ class ParameterSetting:
 
 @dataclass(frozen=True)
 class RigSettings:
-    """[rig]: the class of the test machine, and what it can do.
+    """[rig]: accuracy class and limits of the test machine; None if not stated.
 
     Args:
-        gain_error, displacement_error: standard deviations of the force's and of the displacement's calibration,
-            relative, which all repeats of a test may share.
+        gain_error, displacement_error: relative standard deviation of the calibration of force and of displacement,
+            which all repeats of a test may share.
         phase_error: standard deviation of the phase [rad], which all repeats of a test may share.
-        max_force, max_moment: zero-to-peak [N, N m]; None where nothing is stated, as of all that follows.
-        max_displacement, max_rotation: zero-to-peak [m, rad].
-        max_frequency: [Hz].
-        max_velocity: zero-to-peak [m/s].
-        minutes_per_point: of a sweep, with settling [s].
-        minutes_per_setup: to mount the bushing in another direction [s].
+        max_force, max_moment: largest zero-to-peak force or moment [N, N m].
+        max_displacement, max_rotation: largest zero-to-peak displacement or rotation [m, rad].
+        max_frequency: largest frequency [Hz].
+        max_velocity: largest zero-to-peak velocity [m/s].
+        minutes_per_point: time for a point of a sweep, with settling [s].
+        minutes_per_setup: time to mount the bushing in another direction [s].
     """
 
     gain_error: Share | None = None
@@ -186,10 +186,10 @@ class FitSettings:
     """[fit]: how the model is fitted.
 
     Args:
-        dynamic_amplitudes: [m or rad] that fit-dynamic uses; none for the smallest.
-        residuals: compare real and imaginary part, or |K| and loss factor.
-        loss: "linear" for least squares; with "soft_l1" points far off pull less, wild ones not at all.
-        effects: added to the paper's model, such as "stiffness_factor.mount".
+        dynamic_amplitudes: amplitudes [m or rad] that fit-dynamic uses; empty for the smallest.
+        residuals: residuals of real and imaginary part, or of |K| and loss factor.
+        loss: "linear" for least squares; "soft_l1" reduces the weight of distant points and leaves outliers out.
+        effects: effects added to the paper's model, such as "stiffness_factor.mount".
     """
 
     dynamic_amplitudes: Annotated[tuple[Annotated[float, si("m", "rad"), Field(gt=0)], ...], Field(fail_fast=True)] = ()
@@ -203,12 +203,12 @@ class FitSettings:
 
 @dataclass(frozen=True)
 class PredictSettings:
-    """[predict]: what to predict, and where; None for the default.
+    """[predict]: grid and directions of the prediction; None for the default.
 
     Args:
-        frequencies: [Hz].
-        amplitudes, torsion_amplitudes, strain_amplitudes: zero-to-peak [m], [rad] and, of a modulus, [1].
-        directions: of the bushing, or specimens by name.
+        frequencies: frequencies [Hz].
+        amplitudes, torsion_amplitudes, strain_amplitudes: zero-to-peak displacements [m], rotations [rad], strains [1].
+        directions: directions of the bushing, or names of specimens.
     """
 
     frequencies: Frequencies | None = None
@@ -223,9 +223,9 @@ class SimulatedTest:
     """Common keys of [[simulate.loops]], [[simulate.sweeps]] and [[simulate.resonances]].
 
     Args:
-        direction: of the bushing that is tested; a specimen has none, which may be written "shear".
-        specimen: that is tested in place of the bushing, by its name in [[specimens]].
-        temperature: of the test [K], where that is to be known.
+        direction: direction of the bushing that is tested; for a specimen, none or "shear".
+        specimen: name in [[specimens]] of the specimen that is tested in place of the bushing.
+        temperature: temperature of the test [K]; None if not stated.
     """
 
     direction: Annotated[Place, InstanceOf[Place], WithJsonSchema({"type": "string"})] = field(
@@ -236,16 +236,16 @@ class SimulatedTest:
 
 @dataclass(frozen=True)
 class SimulatedLoop(SimulatedTest):
-    """[[simulate.loops]]: one loop, or a programme of all amplitudes in turn at each frequency, in one go from rest.
+    """[[simulate.loops]]: one loop, or one record of several loops: all amplitudes in turn at each frequency.
 
     Args:
-        amplitude: zero-to-peak [m or rad, or strain].
-        frequency: [Hz].
-        cycles: of each loop.
-        waveform: of the displacement.
-        amplitudes: of a programme, in place of the one amplitude.
-        frequencies: of a programme, in place of the one frequency [Hz].
-        pause: at zero between two loops of a programme [s].
+        amplitude: zero-to-peak amplitude [m or rad, or strain].
+        frequency: frequency [Hz].
+        cycles: number of cycles of each loop.
+        waveform: waveform of the displacement.
+        amplitudes: amplitudes of a record of several loops, in place of `amplitude`.
+        frequencies: frequencies of a record of several loops [Hz], in place of `frequency`.
+        pause: pause at zero displacement between two loops of a record [s].
     """
 
     amplitude: Displacement = 0.0
@@ -266,7 +266,7 @@ class SimulatedLoop(SimulatedTest):
 
     @property
     def parts(self) -> list[tuple[float, float]]:
-        """Frequency [Hz] and amplitude [m or rad] of each part of a programme; one of a single loop."""
+        """Frequency [Hz] and amplitude [m or rad, or strain] of each loop of the record."""
         amplitudes = self.amplitudes or (self.amplitude,)
         return [(frequency, size) for frequency in self.frequencies or (self.frequency,) for size in amplitudes]
 
@@ -276,11 +276,11 @@ class SimulatedSweep(SimulatedTest):
     """[[simulate.sweeps]]: all combinations of amplitudes and frequencies.
 
     Args:
-        amplitudes: zero-to-peak [m or rad, or strain].
-        frequencies: [Hz].
-        stepped: what changes from point to point of a run; the other is held.
-        reached: standard deviation of the amplitude that a point really reached, relative to the one that was asked.
-        repeats: of this sweep; None for those of all.
+        amplitudes: zero-to-peak amplitudes [m or rad, or strain].
+        frequencies: frequencies [Hz].
+        stepped: quantity that changes from point to point of a run, frequency or amplitude; the other is constant.
+        reached: standard deviation of the reached amplitude, relative to the requested amplitude.
+        repeats: number of repeats of this sweep; None for `repeats` of [simulate].
     """
 
     amplitudes: Several[Displacement]
@@ -311,9 +311,9 @@ class SimulatedResonance(SimulatedTest):
     """[[simulate.resonances]]: a mass on the bushing, or on blocks in shear, whose base is shaken with a sine.
 
     Args:
-        mass: [kg].
-        base_acceleration: zero-to-peak, the same at all frequencies [m/s^2].
-        frequencies: [Hz].
+        mass: mass on the bushing [kg].
+        base_acceleration: zero-to-peak acceleration of the base, equal at all frequencies [m/s^2].
+        frequencies: frequencies [Hz].
     """
 
     mass: Annotated[float, si("kg"), SHAKEN]
@@ -332,23 +332,23 @@ class SimulatedResonance(SimulatedTest):
 
 @dataclass(frozen=True)
 class SimulateSettings:
-    """[simulate]: what the virtual rig tests, and how well it measures.
+    """[simulate]: tests, noise and errors of the virtual rig.
 
     Args:
-        parameters: values by name [SI].
+        parameters: parameter values by name [SI].
         effects: added effects, each with the values of its parameters [SI].
-        seed: of the random numbers.
-        repeats: of each sweep and resonance test, unless it states its own.
-        noise: standard deviation of a sweep point's real and imaginary part, relative to |K|, or of those of a
-            resonance test's transmissibility.
+        seed: seed of the random numbers.
+        repeats: repeats of each sweep and resonance test that does not state its own.
+        noise: standard deviation of the real and imaginary part of a sweep point, relative to |K|, or of the
+            transmissibility of a resonance test.
         force_noise, displacement_noise: standard deviation of a loop's samples, relative to the amplitude.
-        force_correlation: of the noise of one row's force with that of the next, as a filter makes it (AR(1)).
-        gain_error: standard deviation of the gain of a run: of one repeat of what is held, or of a resonance test.
+        force_correlation: correlation of the force noise between successive rows, as a filter causes it (AR(1)).
+        gain_error: standard deviation of the relative gain of a run: one repeat of one level, or a resonance test.
         phase_error: standard deviation of the phase of a run [rad].
-        level_gain_error: standard deviation of the gain that all repeats share of what a sweep holds, and of the gain
-            of a loop's record.
-        level_phase_error: of the phase that they share [rad].
-        loops, sweeps, resonances: the tests; empty for the rig's own choice.
+        level_gain_error: standard deviation of the relative gain that all repeats of a level share, or that applies to
+            the record of a loop.
+        level_phase_error: standard deviation of the phase that all repeats of a level share [rad].
+        loops, sweeps, resonances: tests; without any, the tests of the paper.
     """
 
     parameters: Annotated[Mapping[str, ParameterValue], table(parameter_values)] = field(default_factory=dict)
@@ -373,16 +373,16 @@ class CampaignFile:
     """A whole campaign file: a bushing, or specimens of a compound, and their tests. Quantities are texts with a unit.
 
     Args:
-        bushing: geometry.
-        name: of the campaign and its results folder; that of the bushing unless stated.
+        bushing: geometry of the bushing.
+        name: name of the campaign and its results folder; default the name of the bushing.
         specimens: other bodies of the same compound.
         loops: hysteresis loops.
         sweeps: stepped sines.
-        simulate: what the virtual rig tests, and how well it measures; for bushfit simulate alone.
-        rig: the test machine.
-        compound: of a bushing that was not tested yet.
-        fit: how the model is fitted.
-        predict: what to predict, and where.
+        simulate: tests and errors of the virtual rig, used only by bushfit simulate.
+        rig: accuracy and limits of the test machine.
+        compound: rubber of a bushing that was not tested yet.
+        fit: settings of the fit.
+        predict: grid and directions of the prediction.
         report: texts and logo in the head of the report.
     """
 

@@ -10,19 +10,19 @@ from bushfit.effects.contract import Array, Circumstances
 from bushfit.geometry import Bushing, Place, Specimen, unit_strain
 from bushfit.reading.measurement import Loop, Sweep
 
-#: Amplitudes that differ by less than this share belong to one level [1]: more than a rig misses one by, and less than
-#: programmes step by (chosen).
+#: Relative difference of amplitudes below which they belong to one level; chosen: more than the error of a rig, and
+#: less than the step between levels.
 _LEVEL_STEP = 0.15
 
 
 class Visit(NamedTuple):
-    """One test as the session sees it.
+    """One test of a session: a sequence of tests on one body.
 
     Args:
         place: direction of the bushing, or specimen.
-        amplitude: zero-to-peak [m or rad] of its points as they were measured, (n,); a loop has one.
-        temperature: [K], a number or (n,); None where it is not stated.
-        order: number in the session, where the campaign states it; else its place in the list, from 1.
+        amplitude: zero-to-peak amplitudes [m or rad, or strain] of the points in measured order, (n,); one for a loop.
+        temperature: temperature [K], a number or (n,); None if not stated.
+        order: number of the test in the session, if the campaign states it; None for its position in the list.
     """
 
     place: Place
@@ -32,10 +32,10 @@ class Visit(NamedTuple):
 
 
 def measured_session(bushing: Bushing | None, tests: Sequence[Loop | Sweep]) -> list[Circumstances]:
-    """Circumstances of measured tests.
+    """Circumstances of measured tests: temperature, time in the session and earlier strains of each point.
 
     Args:
-        bushing: None if only specimens were tested.
+        bushing: the bushing; None if only specimens were tested.
         tests: loops and sweeps, in order; the condition `order` of a test takes precedence.
 
     Returns:
@@ -54,7 +54,7 @@ def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], rep
     """Circumstances of planned tests. The strains of a resonance test depend on its result and are taken as zero.
 
     Args:
-        bushing: None if only specimens are tested.
+        bushing: the bushing; None if only specimens are tested.
         tests: tables of [simulate].
         repeats: repeats of each sweep and resonance test that states none.
 
@@ -77,12 +77,12 @@ def session(bushing: Bushing | None, visits: Sequence[Visit]) -> list[Circumstan
     """Circumstances of the tests of a session. Each body has a session of its own.
 
     Args:
-        bushing: None if only specimens were tested.
+        bushing: the bushing; None if only specimens were tested.
         visits: tests in the order of the campaign.
 
     Returns:
-        Circumstances of each test, in the order given: temperature, turn (0 to 1 over the session), and the strains
-        before each point, (n,) each.
+        Circumstances of each test, in the order of `visits`: temperature [K], position in the session (turn, from 0 to
+        1), and the strain amplitudes before each point, (n,) each.
     """
     numbers = [place if visit.order is None else visit.order for place, visit in enumerate(visits, start=1)]
     bodies = [visit.place if isinstance(visit.place, Specimen) else None for visit in visits]
@@ -100,9 +100,9 @@ def session(bushing: Bushing | None, visits: Sequence[Visit]) -> list[Circumstan
 
 
 def _last_larger(strain: Array, turn: Array) -> tuple[Array, Array]:
-    """The last strain amplitude before each point that was of a larger level, and the turns since then, (n,) each.
+    """Last strain amplitude before each point that was of a larger level, and the turn elapsed since then, (n,) each.
 
-    Where none was larger, both are 0 and the point's own turn.
+    If no earlier strain was larger, the values are 0 and the turn of the point.
     """
     # an unknown strain, of a resonance test, counts as none
     level = np.round(np.log(np.maximum(strain, 1e-9)) / np.log1p(_LEVEL_STEP))

@@ -17,7 +17,7 @@ T = TypeVar("T")
 #: A key of more than 16 parts, such as a.b.c; parsing one takes time in proportion to the square of their number.
 _DEEP_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}""")
 
-#: What to do about an error of TOML, by how it begins.
+#: Hint for an error of the TOML parser, by the first words of its message.
 _WAYS = {
     ("Unescaped", "Invalid hex"): "write / for each \\ of a path, or the text in single quotes",
     ("Cannot",): "name each table and key once; list several tests under [[loops]] or [[sweeps]], in two brackets",
@@ -29,16 +29,16 @@ def read_toml(path: Path, schema: type[T], *, description: str = "a campaign fil
 
     Args:
         path: TOML file.
-        schema: a pydantic dataclass, or one of its tables; unknown keys are refused.
-        description: kind of file, for errors.
-        largest: size of the file at most [bytes]; that of a campaign of thousands of tests.
+        schema: dataclass of the file with annotations of pydantic; unknown keys are refused.
+        description: kind of file, for error messages.
+        largest: maximum size of the file [bytes]; the default is enough for thousands of tests.
 
     Returns:
-        Content as an instance of `schema`, quantities in SI.
+        Content as an instance of `schema`, with quantities in SI.
 
     Raises:
-        CampaignError: the file is missing, too large, no TOML, or has keys or values that are not understood.
-        UnitError: a quantity without a unit, or with one that does not fit.
+        CampaignError: the file is missing, too large, not TOML, or has invalid keys or values.
+        UnitError: a quantity without a unit, or with an incompatible unit.
     """
     return validate_tables(_parsed(path, description, largest), path, schema)
 
@@ -75,7 +75,7 @@ def body_lines(bushing: Bushing | None, specimens: Iterable[Specimen]) -> list[s
     """Lines of the tables [bushing] and [[specimens]].
 
     Args:
-        bushing: None for specimens alone.
+        bushing: the bushing; None for specimens only.
         specimens: bodies of the same compound.
 
     Returns:
@@ -118,7 +118,7 @@ def table_lines(kind: str, file: str, place: Place, temperature: Any = None) -> 
         kind: "loops" or "sweeps".
         file: test file, relative to the campaign.
         place: direction or specimen that was tested.
-        temperature: of the test [K]; None if it is not known.
+        temperature: temperature of the test [K]; None if unknown.
 
     Returns:
         Lines of TOML, the first empty.
@@ -128,12 +128,12 @@ def table_lines(kind: str, file: str, place: Place, temperature: Any = None) -> 
 
 
 def place_line(place: Place) -> str:
-    """The line that says what a test is made on."""
+    """Line of TOML that states the specimen or direction of a test."""
     return f"specimen = {toml_value(place.name)}" if isinstance(place, Specimen) else f'direction = "{place}"'
 
 
 def toml_value(value: Any) -> str:
-    """A value as TOML writes it."""
+    """Format a text, a number or a table as a TOML value."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{key} = {toml_value(entry)}" for key, entry in value.items()) + " }"
     if isinstance(value, str):

@@ -29,14 +29,14 @@ from bushfit.reading.parts import parts_of
 
 @dataclass(frozen=True)
 class TestSource:
-    """A file, or a sheet of a workbook, that holds a test.
+    """A file, or a sheet of a workbook, that contains a test.
 
     Args:
         file: test file.
-        sheet: sheet of a workbook with several; None for the whole file.
+        sheet: name of a sheet, if the workbook has several; None for the whole file.
         is_named: True if the user named the file itself, False if it was found in a folder.
-        test_options: keys of [[loops]] and [[sweeps]] that the user states for it.
-        of_book: labels in the sheets of its workbook without a test.
+        test_options: keys of [[loops]] and [[sweeps]] that the user states for the test.
+        of_book: labels (quantities stated in text) in the sheets of the workbook that contain no test.
     """
 
     file: Path
@@ -49,20 +49,20 @@ class TestSource:
         return f"{self.file}, {word_for_part(self.file)} {self.sheet}" if self.sheet else str(self.file)
 
     def without(self, *keys: str) -> "TestSource":
-        """Copy of the source without some options."""
+        """Copy of the source without the options of the given keys."""
         return replace(self, test_options={key: value for key, value in self.test_options.items() if key not in keys})
 
     def inspect(self) -> Inspection:
-        """Inspection of the test, see `opening.inspect_file`."""
+        """Inspect the test: its kind, contents and oddities, see `opening.inspect_file`."""
         return inspect_file(self.file, self.test_options, self.of_book)
 
 
 def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list[TestSource], tuple[str, ...]]:
-    """Find the tests among files, the sheets of workbooks, and the files of folders and of the folders in them.
+    """Find the tests in files, in the sheets of workbooks, and in folders and their subfolders.
 
     Args:
-        paths: files and folders. A named file that is no workbook with several sheets is not opened.
-        test_options: keys of [[loops]] and [[sweeps]] that hold for all tests, as TOML has them.
+        paths: files and folders. A named file is not searched, unless it is a workbook with several sheets.
+        test_options: keys of [[loops]] and [[sweeps]] that apply to all tests, with the values that TOML gives.
 
     Returns:
         The tests in order, and a sentence for each file and sheet without a test.
@@ -99,7 +99,7 @@ def list_folder(folder: Path) -> tuple[list[TestSource], list[str]]:
     """List the files of a folder and its subfolders by name.
 
     Returns:
-        Those that may hold tests, and a sentence on each of the others.
+        Files that may contain tests, and a sentence on each of the other files.
     """
     files, left_out = list[TestSource](), list[str]()
     for path in sorted(folder.iterdir()):
@@ -122,11 +122,11 @@ def list_folder(folder: Path) -> tuple[list[TestSource], list[str]]:
 
 
 def split_sheets(file: TestSource, test_options: Mapping[str, Any]) -> tuple[list[TestSource], list[str]]:
-    """Select the sheets of a workbook that may hold a test, or the file itself if it has one sheet.
+    """Select the sheets of a workbook that may contain a test, or the file itself if it has one sheet.
 
     Args:
-        file: test file; one that the user named and that is no workbook with several sheets is not opened.
-        test_options: options that hold for all tests; with `sheet` the file is one test.
+        file: test file; a file with one sheet that the user named is accepted without a check of its columns.
+        test_options: options that apply to all tests; with the key `sheet`, the file is one test.
 
     Returns:
         The tests, and a sentence on each sheet or file without one.
@@ -158,12 +158,12 @@ def split_sheets(file: TestSource, test_options: Mapping[str, Any]) -> tuple[lis
 
 
 def split_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
-    """Split a file into the tests that its columns mark: directions, parts and runs.
+    """Split a file with columns for direction, part number or run into one test for each combination of their values.
 
-    The runs of a sweep are repeats. The runs of a loop are tests where time starts again in each.
+    The runs of a sweep are repeats and are not split. The runs of a loop are split only if time restarts in each run.
 
     Returns:
-        The tests, and a sentence on the rows that are left out.
+        The tests, and a sentence on the rows of each combination that is left out.
     """
     test_options, tests, left_out = source.test_options, list[TestSource](), list[str]()
     try:
@@ -190,12 +190,12 @@ def split_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
 def distribute_options(sources: Sequence[TestSource], test_options: Mapping[str, Any]) -> list[TestSource]:
     """Give each test the options that apply to it.
 
-    A column that only some tests have is left out for the others. The same holds for a unit where the header has
-    one, and for a temperature that selects rows where a file has no column for it.
+    The option for a column is dropped for tests without this column, and the option for a unit is dropped for tests
+    whose header states the unit. A temperature that selects rows is dropped for files without a temperature column.
 
     Args:
-        sources: tests.
-        test_options: options that hold for all of them.
+        sources: the tests.
+        test_options: options that the user states for all tests.
 
     Returns:
         The tests with their options.
@@ -223,11 +223,11 @@ def needs_option(file: Path, key: str, role: str, test_options: Mapping[str, Any
     Args:
         file: test file.
         key: "columns" or "units".
-        role: of the column.
+        role: role of the column, such as "force".
         test_options: options of the test.
 
     Returns:
-        True if the file has the column, or lacks its unit; None if it cannot be read.
+        True if the file has the stated column, or the column lacks a unit; None if the file cannot be read.
     """
     names = LOOP_COLUMNS if role in LOOP_COLUMNS else SWEEP_COLUMNS
     columns = {role: test_options["columns"][role]} if key == "columns" else test_options["columns"]
@@ -241,12 +241,12 @@ def needs_option(file: Path, key: str, role: str, test_options: Mapping[str, Any
 
 
 def with_contradictions(files: Sequence[Inspection]) -> list[Inspection]:
-    """Compare inspected files: add an oddity where files hold identical data or contradict each other.
+    """Compare inspected tests, and add an oddity to those with identical data or contradictory results.
 
-    Contradictions are looked for among tests of one part in one direction.
+    Only tests of one part in one direction can contradict each other.
 
     Args:
-        files: inspections, in order.
+        files: inspections of the tests, in order.
 
     Returns:
         The inspections, with the added oddities.

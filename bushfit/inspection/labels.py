@@ -23,7 +23,7 @@ _AGREEMENT = 0.03
 
 
 def temperatures_of(table: Table) -> int:
-    """Count the temperatures of a table's rows: 0 without a column for it, 1, or 2 for several."""
+    """Number of temperatures in a table: 0 without a temperature column, 1 for one temperature, 2 for several."""
     if (column := table.roles.get("temperature")) is None:
         return 0
     found = table.read({"temperature": column}, fewest_rows=1)["temperature"]
@@ -31,15 +31,15 @@ def temperatures_of(table: Table) -> int:
 
 
 def labels_of_file(file: Path, sheet: str, test_options: Mapping[str, Any]) -> Labels:
-    """Labels in the names of a sheet and of its file.
+    """Labels in the names of a file and its sheet: quantities and conditions, such as "25 Hz".
 
     Args:
         file: test file.
-        sheet: name of its sheet, or "".
-        test_options: options of the test; `amplitude` states how amplitudes in the names are counted.
+        sheet: name of the sheet, or "".
+        test_options: options of the test; `amplitude` states whether amplitudes are zero-to-peak or peak-to-peak.
 
     Returns:
-        The labels; the sheet's name takes precedence.
+        The labels; the name of the sheet takes precedence.
     """
     labels = labels_in_names(sheet, file.stem)
     counting = test_options.get("amplitude")
@@ -56,21 +56,21 @@ def labels_of_file(file: Path, sheet: str, test_options: Mapping[str, Any]) -> L
 def keys_from_labels(
     table: Table, place: Place, test_options: Mapping[str, Any], by_name: Labels, of_book: Labels, *, is_sweep: bool
 ) -> tuple[dict[str, Any], dict[str, str], bool]:
-    """Keys of a test's table in a campaign that only its labels state.
+    """Campaign keys of a test, such as temperature, that only its labels state: text outside the columns.
 
     An option takes precedence, then a column, the names, the lines above the table, and the other sheets.
 
     Args:
-        table: of the test.
+        table: table of the test.
         place: direction or specimen; it determines the unit of an amplitude.
         test_options: options of the test.
         by_name: labels in the names of file and sheet.
         of_book: labels in the other sheets of the workbook.
-        is_sweep: whether it is a sweep, whose frequency and amplitude have to be known.
+        is_sweep: True for a sweep, whose frequency and amplitude have to be known.
 
     Returns:
-        The keys with their values, the labels as facts by their origin, and whether it is known how an amplitude is
-        counted that no column has.
+        The keys with their values; the labels as facts by their origin; and False if a label states an amplitude
+        without saying whether it is zero-to-peak or peak-to-peak.
 
     Raises:
         MeasurementError: a sweep without an amplitude or a frequency.
@@ -104,7 +104,7 @@ def keys_from_labels(
 
 
 def _held_quantity(table: Table, place: Place, key: str, sources: Mapping[str, Labels]) -> tuple[str, StatedQuantity]:
-    """Origin and value of the amplitude or frequency that a sweep was tested at."""
+    """Find the constant amplitude or frequency of a sweep in its labels: origin of the label, and stated quantity."""
     role = _HELD_ROLES[key]
     expected = place.motion.displacement_unit if role == "amplitude" else "Hz"
     label, found = next(
@@ -132,10 +132,10 @@ def wrong_labels(
     """Warn where the name of a file states an amplitude or a frequency that the file does not contain.
 
     Args:
-        labels: in the names of file and sheet.
+        labels: labels in the names of file and sheet.
         direction: direction or specimen.
-        amplitudes: of the file, zero-to-peak [m, rad or strain].
-        frequencies: of the file [Hz].
+        amplitudes: zero-to-peak amplitudes in the file [m, rad or strain].
+        frequencies: frequencies in the file [Hz].
 
     Returns:
         One sentence for each wrong label.

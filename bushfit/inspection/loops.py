@@ -57,7 +57,7 @@ def describe_sampling(history: Loop) -> str:
     """Describe the time steps of a record.
 
     Returns:
-        Such as "even, every 0.01 s".
+        A clause such as "even, every 0.01 s".
     """
     if not history.timed:
         return "no time in the file"
@@ -69,7 +69,7 @@ def describe_sampling(history: Loop) -> str:
 
 
 class RecordedChannel(NamedTuple):
-    """A recorded channel: name, display unit, factor from SI to that unit, and values in SI, (n,)."""
+    """A recorded channel: name, display unit, factor from SI to the display unit, and values [SI], (n,)."""
 
     name: str
     unit: str
@@ -82,10 +82,10 @@ class RecordedChannel(NamedTuple):
 
 
 def odd_channels(history: Loop) -> list[str]:
-    """Find faults in the channels of a record: gaps, a stuck recorder, cut-off tops, outliers.
+    """Find faults in the channels of a record: gaps, a stuck recorder, clipped values, outliers.
 
     Args:
-        history: a loop or a raw history.
+        history: record of a loop or a raw history [SI].
 
     Returns:
         One sentence for each fault.
@@ -109,10 +109,10 @@ def odd_channels(history: Loop) -> list[str]:
 
 
 def gaps(motion: RecordedChannel, history: Loop) -> list[str]:
-    """Find gaps in the recorded time, or in the motion where no time was recorded.
+    """Find gaps in the recorded time, or in the motion if no time was recorded.
 
     Returns:
-        One sentence on them; empty without gaps.
+        List with one sentence on the gaps; empty without gaps.
     """
     steps = np.diff(history.time) if history.timed else np.abs(np.diff(motion.values))
     widest = np.quantile(steps, 0.99)  # gaps left out
@@ -131,10 +131,10 @@ def gaps(motion: RecordedChannel, history: Loop) -> list[str]:
 
 
 def stuck_rows(motion: RecordedChannel, force: RecordedChannel) -> list[str]:
-    """Find rows in which the recorder repeats its values while the motion goes on.
+    """Find rows in which the recorder repeats its values although the motion continued.
 
     Returns:
-        One sentence on the longest run of them; empty without such rows.
+        List with one sentence on the longest run of such rows; empty without such rows.
     """
     is_still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], is_still.astype(np.int8), [0]))))
@@ -150,10 +150,10 @@ def stuck_rows(motion: RecordedChannel, force: RecordedChannel) -> list[str]:
 
 
 def cut_off_ends(channel: RecordedChannel) -> list[str]:
-    """Find the ends of its range at which a channel is cut off.
+    """Find whether a channel is clipped at its largest or smallest value.
 
     Returns:
-        One sentence for each such end.
+        One sentence for each clipped end.
     """
     values, span, odd = channel.values, float(np.ptp(channel.values)), list[str]()
     rounding, steps = 1e-9 * span, np.abs(np.diff(values))
@@ -173,8 +173,8 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     """Facts and oddities of a loop.
 
     Args:
-        loop: in SI.
-        labels: in the names of its file and sheet.
+        loop: loop [SI].
+        labels: labels in the names of its file and sheet.
 
     Returns:
         Facts by name, and a sentence on each oddity.
@@ -223,8 +223,8 @@ def describe_history(history: Loop, labels: Labels) -> Findings:
     """Facts and oddities of a raw stepped-sine history.
 
     Args:
-        history: in SI.
-        labels: in the names of its file and sheet.
+        history: record of the raw history [SI].
+        labels: labels in the names of its file and sheet.
 
     Returns:
         Facts by name, and a sentence on each oddity.
@@ -250,12 +250,12 @@ def describe_history(history: Loop, labels: Labels) -> Findings:
 
 
 def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> Findings:
-    """Facts and oddities of a record that holds several loops.
+    """Facts and oddities of a record that contains several loops.
 
     Args:
-        record: the whole record.
-        loops: its loops, in order.
-        labels: in the names of its file and sheet.
+        record: the whole record [SI].
+        loops: loops of the record, in order.
+        labels: labels in the names of its file and sheet.
 
     Returns:
         Facts by name, and a sentence on each oddity.
@@ -290,7 +290,7 @@ def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> F
 
 
 def changing_cycles(drive: Drive) -> list[str]:
-    """Find a force amplitude, a mean force or a mean motion that changes from the first to the last cycles of a loop.
+    """Find a force amplitude, mean force or mean motion that changes from the first to the last cycles of a loop.
 
     Loops of one cycle, or with too few rows in a cycle, are not checked.
 
@@ -344,8 +344,8 @@ def ripple(drive: Drive) -> list[str]:
         One sentence on the ripple; empty without one.
 
     Notes:
-        The largest line in the spectrum of what the motion's slow harmonics leave, with a Hann window. White noise
-        makes lines up to about five times the median.
+        The slow harmonics are subtracted from the motion; the ripple is the largest line in the spectrum of the
+        remainder, with a Hann window. White noise makes lines up to about five times the median.
     """
     loop, steps = drive.loop, np.diff(drive.loop.time)
     if not loop.timed or steps.size < _FEWEST_RIPPLE_ROWS or np.ptp(steps) > 2.0 * _EVEN_CLOCK * np.median(steps):

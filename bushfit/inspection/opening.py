@@ -48,14 +48,14 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
 
     Args:
         file: test file.
-        test_options: keys of [[loops]] and [[sweeps]], as TOML has them; the fitting ones are used.
+        test_options: keys of [[loops]] and [[sweeps]], as TOML gives them; keys that do not apply are ignored.
 
     Returns:
-        The table, and whether it is a sweep's.
+        The table, and True if it is a sweep.
 
     Raises:
-        NoTestError: a file that cannot be opened as a table, or whose columns make no test.
-        MeasurementError, UnitError: columns that may make one, if they were clear.
+        NoTestError: a file that cannot be opened as a table, or whose columns are not those of a test.
+        MeasurementError, UnitError: unclear columns or units, which may be those of a test.
     """
     opened: list[tuple[Table, bool]] = []
     failed: list[tuple[Mapping[str, Sequence[str]], BushfitError]] = []
@@ -103,9 +103,9 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
 
 
 def missing_role(table: Table, *, is_sweep: bool) -> str | None:
-    """First role of a column that a test needs and the table lacks; None if it is complete.
+    """Role of the first column that a test needs and the table lacks, such as "force"; None if the table is complete.
 
-    Frequency or amplitude of a sweep may be constant, and stated outside of the table.
+    Frequency and amplitude of a sweep are not required, because they may be constant and stated outside the table.
     """
     roles = set(table.roles)
     if not is_sweep:
@@ -116,21 +116,21 @@ def missing_role(table: Table, *, is_sweep: bool) -> str | None:
 
 
 def test_place(file: Path, table: Table, test_options: Mapping[str, Any]) -> Place | None:
-    """Body and direction of a test: a specimen, or a direction of the bushing.
+    """Determine the direction of the bushing, or the specimen, that was tested.
 
-    A modulus is that of a specimen, a stiffness that of the bushing unless the sizes of a block in shear are given.
+    A modulus belongs to a specimen, a stiffness to the bushing unless the options give the sizes of a block in shear.
 
     Args:
         file: test file.
-        table: of the file.
+        table: table of the file.
         test_options: options of the test.
 
     Returns:
         Direction or specimen; None if neither options nor file state it.
 
     Raises:
-        MeasurementError: units of torsion where an option states another direction.
-        CampaignError, UnitError, ModelError: sizes that make no specimen.
+        MeasurementError: units of torsion although an option states another direction.
+        CampaignError, UnitError, ModelError: invalid sizes of a specimen.
     """
     keys: dict[str, Any] = {"kind": "shear"} | {key: test_options[key] for key in BLOCK_KEYS if key in test_options}
     if table.motion is STRAINING:
@@ -143,18 +143,18 @@ def test_place(file: Path, table: Table, test_options: Mapping[str, Any]) -> Pla
 
 
 def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) -> Direction | None:
-    """Direction of a test of the bushing, by an option, or else by its file.
+    """Determine the direction of a test of the bushing from an option, or else from the file.
 
     Args:
         file: test file.
-        table: of the file.
+        table: table of the file.
         test_options: options of the test.
 
     Returns:
-        The direction; None if neither states it.
+        The direction; None if neither option nor file states it.
 
     Raises:
-        MeasurementError: a file that states another direction than the option.
+        MeasurementError: the file states another direction than the option, or several directions.
     """
     turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
     headers = table.layout.written or table.headers
@@ -178,7 +178,7 @@ def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) ->
 
 
 def open_content(file: Path, test_options: Mapping[str, Any]) -> OpenedFile:
-    """Open a test file with its format as the user states it.
+    """Open a test file with the format options (keys of `FileFormat`) that the user states.
 
     Raises:
         MeasurementError: the file cannot be read.
@@ -196,8 +196,8 @@ def open_table(
 
     Args:
         file: test file, or its opened content.
-        names: headers of the columns by role, of one kind of test.
-        test_options: options of the test; those of other columns are ignored.
+        names: known headers of the columns of this kind of test, by role.
+        test_options: options of the test; options for columns of other tests are ignored.
         motion: kind of motion that the columns describe.
 
     Returns:
@@ -220,12 +220,12 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
 
     Args:
         file: test file.
-        test_options: keys of [[loops]] and [[sweeps]], as TOML has them, and sizes of a specimen in shear; the
-            fitting ones are used.
+        test_options: keys of [[loops]] and [[sweeps]], as TOML gives them, and sizes of a specimen in shear; keys that
+            do not apply are ignored.
         of_book: labels in the other sheets of its workbook.
 
     Returns:
-        The inspection, with the content in SI.
+        The inspection, with the test in SI.
 
     Raises:
         NoTestError: a file without a test.
@@ -260,14 +260,14 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
 
 
 def read_history(file: Path, test_options: Mapping[str, Any]) -> tuple[Loop, Direction | None]:
-    """Read a raw history.
+    """Read a raw history of displacement and force over time.
 
     Args:
         file: test file.
-        test_options: keys of [[loops]], as TOML has them.
+        test_options: keys of [[loops]], as TOML gives them.
 
     Returns:
-        The history in SI, and its direction; None where neither file nor options state it.
+        The history in SI, and its direction; None if neither file nor options state it.
 
     Raises:
         MeasurementError, UnitError, CampaignError: a file or an option that cannot be used.
@@ -287,16 +287,16 @@ def read_history(file: Path, test_options: Mapping[str, Any]) -> tuple[Loop, Dir
 def campaign_entry(
     table: Table, place: Place | None, test_options: Mapping[str, Any], *, is_sweep: bool
 ) -> dict[str, Any]:
-    """Keys that a campaign has to state for a test.
+    """Keys that the [[loops]] or [[sweeps]] table of a campaign has to state for a test.
 
     Args:
-        table: of the test.
-        place: its direction or specimen; None if unknown.
+        table: table of the test.
+        place: direction or specimen; None if unknown.
         test_options: options of the test.
-        is_sweep: whether it is a sweep.
+        is_sweep: True for a sweep, False for a loop.
 
     Returns:
-        The fitting options, without those that the file itself states.
+        The options that apply to the test, without those that the file itself states.
     """
     roles, schema = (SWEEP_COLUMNS, SweepFile) if is_sweep else (LOOP_COLUMNS, LoopFile)
     needless = {"direction", "specimen", "columns", "units"} | {f"at_{role}" for role in table.roles}
@@ -314,16 +314,16 @@ def campaign_entry(
 def reader_arguments(
     file: Path, place: Place, entry: Mapping[str, Any], schema: type[LoopFile] | type[SweepFile]
 ) -> dict[str, Any]:
-    """Keyword arguments of the reader for a file with these keys in a campaign.
+    """Keyword arguments of `read_loop` or `read_sweep` for a test file with the given campaign keys.
 
     Args:
         file: test file.
         place: direction or specimen.
-        entry: keys of its table in a campaign.
-        schema: of that table.
+        entry: keys of the test's table in a campaign.
+        schema: dataclass of the table, for a loop or a sweep.
 
     Returns:
-        Arguments of `read_loop` or `read_sweep`.
+        Keyword arguments of the reader.
     """
     specimens = [place] if isinstance(place, Specimen) else []
     tested = {} if specimens else {"direction": str(place)}
@@ -335,16 +335,16 @@ def reader_arguments(
 def read_either_sign(
     file: Path, place: Place, entry: dict[str, Any], table: Table
 ) -> tuple[Loop, dict[str, Any], list[str]]:
-    """Read a loop; a force of reversed sign is turned.
+    """Read a loop, and reverse the sign of its force if the force falls while the displacement rises.
 
     Args:
         file: test file.
         place: direction or specimen.
-        entry: keys of its table in a campaign.
-        table: of the file.
+        entry: keys of the test's table in a campaign.
+        table: table of the file.
 
     Returns:
-        The loop, its keys in a campaign, and a sentence on a force that was turned.
+        The loop, its keys in a campaign, and a list with a sentence on the reversed force, if any.
     """
     try:
         return read_loop(**reader_arguments(file, place, entry, LoopFile)), entry, []
@@ -364,12 +364,12 @@ def read_either_sign(
 
 
 def classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tuple[Kind, Findings]:
-    """Tell loops, programmes of loops and raw histories apart.
+    """Determine whether a recording is a loop, a programme of several loops, or a raw stepped-sine history.
 
     Args:
         measured: recording in SI.
         by_name: labels in the names of its file and sheet.
-        test: its keys in a campaign.
+        test: table of the recording in a campaign.
 
     Returns:
         Kind of the recording, with its facts and oddities.
@@ -412,10 +412,10 @@ def seen_columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
 
 
 def written_with(table: Table) -> dict[str, str]:
-    """Describe how a file is written.
+    """Describe the format of a file.
 
     Returns:
-        Encoding, delimiter, decimal mark and place of the header, by label.
+        Texts such as encoding, delimiter, decimal mark and line of the header, by label.
     """
     source, layout = table.source, table.layout
     if isinstance(source, Channels):

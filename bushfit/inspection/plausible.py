@@ -21,9 +21,9 @@ def implausible_sizes(place: Place, frequency: Array, amplitude: Array, stiffnes
 
     Args:
         place: direction or specimen.
-        frequency: [Hz], (n,).
-        amplitude: zero-to-peak [m, rad or strain], (n,).
-        stiffness: magnitude [N/m, N m/rad or Pa], (n,).
+        frequency: frequencies [Hz], (n,).
+        amplitude: zero-to-peak amplitudes [m, rad or strain], (n,).
+        stiffness: magnitudes of the stiffness [N/m, N m/rad or Pa], (n,).
 
     Returns:
         One sentence for each quantity beyond its limits.

@@ -28,7 +28,7 @@ _TABLES = {"loop": "loops", "sweep": "sweeps"}
 
 
 def format_frequencies(frequencies: Sequence[float] | Array) -> str:
-    """Number and range of frequencies [Hz], (n,), increasing, such as "16, from 5 to 155 Hz"."""
+    """Format the number and range of increasing frequencies [Hz]: "16, from 5 to 155 Hz"."""
     low, high = (f"{end:.4g}" for end in (frequencies[0], frequencies[-1]))
     return f"{len(frequencies)}, {f'at {low}' if low == high else f'from {low} to {high}'} Hz"
 
@@ -38,10 +38,10 @@ class ColumnSeen:
     """A column of a file.
 
     Args:
-        header: its cell.
-        role: that it was taken for; None where it is not needed.
-        unit: of its numbers; None where it is not stated.
-        low, high: the range of its values in that unit; None where they were not read.
+        header: text of the header cell.
+        role: role of the column, such as force; None if the column is not used.
+        unit: unit of the numbers; None if it is not stated.
+        low, high: smallest and largest value in this unit; None if the values were not read.
     """
 
     header: str
@@ -52,7 +52,7 @@ class ColumnSeen:
 
 
 class InspectedFile(TypedDict):
-    """A file, or a sheet of a workbook, and what was found in it."""
+    """Result of the inspection of a file or a sheet of a workbook, as JSON."""
 
     file: Annotated[str, Doc("as it was named.")]
     sheet: Annotated[str | int | None, Doc("of a workbook; null where there is one only.")]
@@ -77,15 +77,15 @@ class InspectionDocument(TypedDict):
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """A test file that can be used, with all that an inspection finds.
+    """Result of the inspection of a usable test file.
 
     Args:
         file: test file.
         kind: loop, sweep or raw history.
         direction: direction or specimen of the test; None if neither file nor options state it.
-        written, columns, facts, odd: see `InspectedFile`.
-        entry: further keys of its table in a campaign, as TOML has them.
-        measured: content in SI.
+        written, columns, facts, odd: format of the file, its columns, facts and oddities, see `InspectedFile`.
+        entry: further keys of the test's table in a campaign, with values as TOML gives them.
+        measured: the test in SI.
         counted: True if the header of a sweep states zero-to-peak or peak-to-peak.
     """
 
@@ -102,7 +102,7 @@ class Inspection:
 
     @property
     def label(self) -> str:
-        """Name of the file, with its sheet, direction and part where it holds several."""
+        """Name of the file, followed by sheet, direction and part if the file contains several."""
         in_columns = {column.role for column in self.columns}
         direction = self.direction if "direction" in in_columns else None
         part = self.part if "specimen number" in in_columns else None
@@ -112,13 +112,13 @@ class Inspection:
 
     @property
     def part(self) -> str | None:
-        """Number of its specimen by a column, the file's name or the lines above its table; None if it is not known."""
+        """Number of the tested part, from a column, a name or the lines above the table; None if unknown."""
         number: str | None = self.entry.get("specimen_number")
         return number
 
     @property
     def is_counting_open(self) -> bool:
-        """True for a sweep whose amplitudes may be zero-to-peak or peak-to-peak."""
+        """True for a sweep that does not state whether its amplitudes are zero-to-peak or peak-to-peak."""
         return self.kind == "sweep" and not self.counted and "amplitude" not in self.entry
 
     @property
@@ -164,10 +164,10 @@ def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[
     """Text of a whole campaign file.
 
     Args:
-        name: of the campaign and of its bushing.
-        bushing: other keys of [bushing], quantities as texts; None where specimens alone were tested.
-        files: inspections of its tests.
-        folder: folder of the campaign; files are named relative to it.
+        name: name of the campaign and of its bushing.
+        bushing: other keys of [bushing], quantities as texts; None if only specimens were tested.
+        files: inspections of the tests.
+        folder: folder of the campaign, to which the paths of files are relative.
     """
     head = [*(["[bushing]"] if bushing else []), *key_lines({"name": name, **(bushing or {})}), ""]
     tests = [inspection for kind in _TABLES for inspection in files if inspection.kind == kind]
@@ -179,20 +179,20 @@ def campaign_text(name: str, bushing: Mapping[str, str] | None, files: Sequence[
 def campaigns_of_parts(
     name: str, bushing: Mapping[str, str] | None, files: Sequence[Inspection], folder: Path, listed_in: str
 ) -> dict[str, str]:
-    """Texts of one campaign for each part, and of the batch manifest that lists them.
+    """Texts of one campaign file for each part, and of the batch manifest that lists the campaigns.
 
     Args:
-        name: of the bushing.
-        bushing: other keys of [bushing], quantities as texts; None where specimens alone were tested.
-        files: inspections, each with the number of its specimen.
+        name: name of the bushing.
+        bushing: other keys of [bushing], quantities as texts; None if only specimens were tested.
+        files: inspections of the tests, each with a part number.
         folder: folder of the campaigns.
-        listed_in: name of the manifest.
+        listed_in: file name of the manifest.
 
     Returns:
         The texts by file name, the manifest first.
 
     Raises:
-        CampaignError: a file without the number of its specimen.
+        CampaignError: a test without a part number.
     """
     of_parts = dict[str, list[Inspection]]()
     for inspection in files:
@@ -219,10 +219,10 @@ def with_specimens_named(files: Sequence[Inspection]) -> list[Inspection]:
     """Give different specimens different names: coupon, coupon_2 and so on.
 
     Args:
-        files: inspections.
+        files: inspections of the tests.
 
     Returns:
-        The same inspections, renamed where two specimens had one name.
+        The same inspections; different specimens no longer share a name.
     """
     named, renamed = dict[Specimen, Specimen](), list[Inspection]()
     for inspection in files:
@@ -239,19 +239,19 @@ def with_specimens_named(files: Sequence[Inspection]) -> list[Inspection]:
 
 
 def key_lines(keys: Mapping[str, Any]) -> list[str]:
-    """Keys and their values in TOML, a line each."""
+    """Lines of TOML, one for each key with its value."""
     return [f"{key} = {toml_value(value)}" for key, value in keys.items()]
 
 
 def campaign_tables(files: Sequence[Inspection], folder: Path | None = None) -> list[str]:
-    """Tables of a campaign for its specimens and tests; for a raw history, a comment on what to do first.
+    """Campaign tables for specimens and tests; for a raw history, a comment with the command that reduces it.
 
     Args:
-        files: inspections.
-        folder: folder of the campaign; without it, the full paths of files are written.
+        files: inspections of the tests.
+        folder: folder of the campaign, to which the paths of files are relative; None for full paths.
 
     Returns:
-        Texts in TOML.
+        TOML text of each table.
     """
     specimens = dict.fromkeys(one.direction for one in files if isinstance(one.direction, Specimen))
     tables = ["\n".join([*specimen_lines(specimen), ""]) for specimen in specimens]
@@ -274,6 +274,6 @@ def campaign_tables(files: Sequence[Inspection], folder: Path | None = None) -> 
 
 
 def pasted_text(files: Sequence[Inspection]) -> str:
-    """Tables to paste into a campaign in any folder: files are named by their full path."""
+    """TOML tables of the tests, to paste into a campaign in any folder: files have their full path."""
     head = "# files with their full path; bushfit init writes paths relative to the campaign\n"
     return head * any(inspection.kind in _TABLES for inspection in files) + "\n".join(campaign_tables(files))

@@ -48,8 +48,8 @@ def describe_sweep(sweep: Sweep, labels: Labels) -> Findings:
     """Facts and oddities of a sweep.
 
     Args:
-        sweep: in SI.
-        labels: in the names of its file and sheet.
+        sweep: sweep [SI].
+        labels: labels in the names of its file and sheet.
 
     Returns:
         Facts by name, and a sentence on each oddity.
@@ -82,7 +82,7 @@ def copied_rows(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
     """Warn of rows equal to others at the same frequency and amplitude.
 
     Returns:
-        One sentence, where noise would hardly make as many rows equal by chance in as many digits as the file has.
+        One sentence, if noise is unlikely to make this number of rows equal in the digits of the file.
     """
     # nine digits leave out what the conversion of units leaves in the last ones
     magnitude, phase = (
@@ -110,11 +110,11 @@ def copied_rows(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
 
 
 def odd_levels(sweep: Sweep) -> Iterator[str]:
-    """Warn of levels that may be repeats of one, and of a level that was missed.
+    """Warn of amplitude levels that may be repeats of one level, and of a level that the rig did not reach.
 
     Returns:
-        A sentence on amplitudes at one frequency that are too close for levels, where no passes mark them as repeats;
-        and one on the point that missed the amplitude of its level by most.
+        A sentence on amplitudes at one frequency that are too close for separate levels and not numbered as repeats;
+        and a sentence on the point whose reached amplitude is farthest from its level.
     """
     passes, of_frequency = np.unique(sweep.repeat).size, sweep.frequency.size / np.unique(sweep.frequency).size
     steps = [
@@ -137,10 +137,10 @@ def odd_levels(sweep: Sweep) -> Iterator[str]:
 
 
 def missing_frequencies(sweep: Sweep) -> Iterator[str]:
-    """Warn of blocks, repeats of a level, without frequencies that most others have.
+    """Warn of blocks (one repeat of one level) that lack frequencies which most other blocks contain.
 
     Returns:
-        One sentence for each such block.
+        One sentence for each incomplete block.
     """
     frequencies, blocks = np.unique(sweep.frequency), rows_alike(sweep.amplitude, sweep.repeat.astype(float))
     measured = np.array([np.isin(frequencies, sweep.frequency[rows]) for rows in blocks])
@@ -155,7 +155,7 @@ def missing_frequencies(sweep: Sweep) -> Iterator[str]:
 
 
 def distance_from_repeats(sweep: Sweep) -> Array:
-    """Distance of ln K from the median of its repeats, nan where there are fewer than three, (n,)."""
+    """Complex distance of ln K of each point from the median of its repeats, NaN for fewer than three repeats, (n,)."""
     log_stiffness, distance = np.log(sweep.stiffness), np.full(sweep.frequency.size, np.nan + 0j)
     for rows in rows_alike(sweep.frequency, sweep.amplitude):
         if rows.size > 2:
@@ -164,15 +164,15 @@ def distance_from_repeats(sweep: Sweep) -> Array:
 
 
 def distance_from_curve(sweep: Sweep) -> Array:
-    """Distance of ln K from the smooth curve of its run.
+    """Complex distance of ln K of each point from a smooth curve through its run.
 
     Returns:
-        Distance of the points that are far beyond the scatter of the others; else 0, (n,).
+        Distance of the points that deviate far more than the scatter of their run; 0 for the others, (n,).
 
     Notes:
-        Two curves with the least sum of distances are tried, which a few outliers do not bend, even at an end of the
-        run: a line over the logarithm of what is stepped, and a parabola over the number of the step. An outlier is far
-        from both.
+        Two curves are fitted by least absolute distances, which a few outliers do not bend, even at an end of the run:
+        a line over the logarithm of the stepped quantity, and a parabola over the index of the step. The smaller of the
+        two distances is returned.
     """
     distance = np.zeros(sweep.frequency.size, dtype=complex)
     runs = rows_alike(sweep.repeat.astype(float), sweep.held) if sweep.stepped else []
@@ -195,15 +195,15 @@ def distance_from_curve(sweep: Sweep) -> Array:
 
 
 def outlying_points(sweep: Sweep, noise: SweepNoise, from_repeats: Array) -> Iterator[str]:
-    """Warn of points far from their repeats or, where these are fewer than three, from the curve of their run.
+    """Warn of points far from their repeats or, for fewer than three repeats, from the smooth curve of their run.
 
     Args:
-        sweep: in SI.
-        noise: of the sweep.
-        from_repeats: distance of ln K from the median of its repeats, (n,).
+        sweep: sweep [SI].
+        noise: noise of the sweep.
+        from_repeats: complex distance of ln K from the median of its repeats, (n,).
 
     Returns:
-        A sentence on each of the first four, and on the number of the others.
+        A sentence on each of the first four outliers, and one on the number of further outliers.
     """
     distance = np.nan_to_num(from_repeats)
     for rows in rows_alike(sweep.repeat.astype(float), sweep.amplitude):  # what a block has in common is no outlier
@@ -231,10 +231,14 @@ def outlying_points(sweep: Sweep, noise: SweepNoise, from_repeats: Array) -> Ite
 
 
 def outlying_blocks(sweep: Sweep, from_repeats: Array) -> Iterator[str]:
-    """Warn of blocks, repeats of a level, that differ from the others as a whole, and of a drift over the repeats.
+    """Warn of blocks (one repeat of one level) that differ from the other repeats, and of a drift over the repeats.
+
+    Args:
+        sweep: sweep [SI].
+        from_repeats: complex distance of ln K from the median of its repeats, (n,).
 
     Returns:
-        One sentence for each such block, and one on the drift.
+        One sentence for each outlying block, and one on the drift.
     """
     blocks = rows_alike(sweep.repeat.astype(float), sweep.amplitude)
     blocks = [rows for rows in blocks if not np.isnan(from_repeats[rows]).any()]
@@ -260,10 +264,10 @@ def outlying_blocks(sweep: Sweep, from_repeats: Array) -> Iterator[str]:
 
 
 def odd_losses(sweep: Sweep) -> Iterator[str]:
-    """Warn of losses below zero, and of a loss that hardly any rubber has.
+    """Warn of negative loss factors, and of a median loss factor that is unusual for rubber.
 
     Returns:
-        A sentence for each, with what the file may state instead.
+        A sentence for each, with possible causes.
     """
     negative = np.flatnonzero(sweep.stiffness.imag < 0.0)
     if negative.size:
@@ -280,5 +284,5 @@ def odd_losses(sweep: Sweep) -> Iterator[str]:
 
 
 def complex_median(values: Array) -> complex:
-    """Median of the real and of the imaginary parts."""
+    """Complex number of the median real part and the median imaginary part."""
     return complex(np.median(values.real), np.median(values.imag))
