@@ -1,7 +1,7 @@
 """Maxwell arms in place of what fades with memory: the law of a springpot in a form that steps through time.
 
-A springpot remembers its whole past, and most programs cannot. Over a band of frequencies a few springs with dashpots
-in series do the same within a stated error.
+A springpot depends on the whole past motion, which most programs cannot store. Over a band of frequencies a few springs
+with dashpots in series (Maxwell arms) have the same modulus within a stated error.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -19,43 +19,43 @@ from bushfit.model.model import Model
 from bushfit.model.structure import seen_by
 from bushfit.units import number
 
-#: Error that arms have at most where none is asked for, relative to the modulus: that of good tests.
+#: Default of the largest error of the arms, relative to the modulus: that of good tests.
 ACCURACY = 0.01
-#: Least error that may be asked for: below it rounding decides.
+#: Smallest error that may be requested; below it rounding dominates.
 LEAST_ACCURACY = 1e-6
-#: Arms at most: a thousandth over ten decades takes fewer.
+#: Maximum number of arms; an error of 0.001 over ten decades needs fewer.
 _MOST_ARMS = 30
-#: Share of the error that one arm more leaves at most where it counts as better.
+#: Ratio of errors with and without one more arm, below which the additional arm is an improvement.
 _BETTER = 0.95
-#: Arms in a row that may be no better: then no number of them will do.
+#: Successive additional arms without improvement after which the search ends.
 _PATIENCE = 3
-#: Frequencies per decade at which the error is judged: it ripples once an arm, and arms lie half a decade apart.
+#: Frequencies per decade at which the error is computed: it has one ripple per arm, every half decade.
 _PER_DECADE = 30
-#: Least-squares fits in which the weights move to where the error is largest; chosen: more gain nothing.
+#: Number of reweighted least-squares fits that reduce the largest error; chosen: more do not help.
 _ROUNDS = 25
-#: Error of a plain least-squares fit over that asked for, up to which these weights can make it good: they halve it.
+#: Ratio of the error of a plain fit to the requested error, up to which reweighting is tried: it halves the error.
 _WORTHWHILE = 4.0
-#: How far relaxation times may lie beyond the band: there an arm is a spring or a dashpot to seven digits.
+#: Factor by which relaxation times may lie outside the band; there an arm is a spring or dashpot to seven digits.
 _BEYOND = 1e7
-#: Nepers by which the first relaxation times reach over the ends of the band, one try each: which is best goes by the
-#: number of arms.
+#: Distances by which the initial relaxation times extend beyond the band, in ln time; the best depends on the number
+#: of arms, so each is tried.
 _OVERHANGS = (0.0, 1.0, 2.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Arms:
-    """Springs with dashpots in series, side by side: mu^ = sum_k G_k i w tau_k/(1 + i w tau_k), all G_k, tau_k > 0.
+    """Parallel Maxwell arms (spring and dashpot in series): mu^ = sum_k G_k i w tau_k/(1 + i w tau_k), G_k, tau_k > 0.
 
     Args:
-        stands_for: the effects in whose place they are, in words.
+        stands_for: names of the effects that the arms replace, such as "springpot".
         size: name of the parameter that all moduli are proportional to.
-        modulus: G_k [Pa], of the shear modulus mu^, shortest relaxation time first, (k,).
-        time: tau_k [s], (k,).
-        band: lowest and highest frequency [Hz] at which they are judged.
-        error: largest relative error of the complex modulus there.
-        under: the rubber's temperature, where it is another than that at which a model stands by itself.
+        modulus: G_k [Pa], contributions to the shear modulus mu^, shortest relaxation time first, (k,).
+        time: relaxation times tau_k [s], (k,).
+        band: lowest and highest frequency [Hz] of the approximation.
+        error: largest relative error of the complex modulus in the band.
+        under: temperature of the rubber; unknown for the reference temperature of the model.
 
-    Notes: with no modulus and no time below zero the arms take up energy in any motion; nothing has to be checked.
+    Notes: because all moduli and times are positive, the arms dissipate energy in any motion.
     """
 
     stands_for: str
@@ -67,12 +67,12 @@ class Arms:
     under: Circumstances = UNKNOWN
 
     def complex_modulus(self, omega: Array) -> Array:
-        """mu^ [Pa] at angular frequencies [rad/s], (n,)."""
+        """Complex shear modulus mu^ of the arms [Pa], (n,), at angular frequencies [rad/s], (n,)."""
         return _basis(omega, self.time) @ self.modulus
 
     @property
     def sentence(self) -> str:
-        """How many they are, what they stand for, and their error."""
+        """Sentence with the number of arms, the effects that they replace, and their error."""
         count, (low, high) = self.time.size, (number(end, 3) for end in self.band)
         arms = f"{count} Maxwell arm{'s' * (count > 1)} represent the {self.stands_for}"
         return f"{arms}: error at most {number(100.0 * self.error, 2)} % of its modulus from {low} to {high} Hz"
@@ -86,7 +86,7 @@ def fitted_arms(
     stands_for: str = "",
     size: str = "",
 ) -> Arms:
-    """The fewest arms that have a modulus [Pa], given over rad/s, within a relative error over a band [Hz].
+    """Fit the smallest number of Maxwell arms that approximate a complex modulus within a relative error.
 
     Args:
         modulus: complex modulus [Pa] at angular frequencies [rad/s], (n,) -> (n,).
@@ -99,7 +99,7 @@ def fitted_arms(
         Arms by ascending relaxation time, with their largest relative error.
 
     Raises:
-        ModelError: no passive arms come as near, or an accuracy that is none.
+        ModelError: no number of arms reaches the accuracy, or the accuracy is out of range.
 
     >>> arms = fitted_arms(lambda omega: 1e5 * (1j * omega) ** 0.24, (5.0, 155.0))
     >>> arms.time.size, round(float(arms.error), 4)
@@ -133,12 +133,13 @@ def fitted_arms(
 def model_arms(
     model: Model, band: tuple[float, float], accuracy: float = ACCURACY, under: Circumstances = UNKNOWN
 ) -> tuple[Arms, ...]:
-    """Arms for each part of a model that fades with memory, the springpot first, at the model's values.
+    """Fit Maxwell arms to each linear viscoelastic part of a model, at the model's values, the springpot first.
 
-    Effects that share a size, as the springpot and the spring in series with it, are one part. A size of 0 is none.
+    Effects whose moduli are proportional to the same parameter (`size`), such as the springpot and the spring in series
+    with it, are one part. Parts whose size is 0 are left out.
 
     Args:
-        model: the model.
+        model: model with its parameter values.
         band: lowest and highest frequency [Hz].
         accuracy: largest relative error of each modulus.
         under: test conditions, such as the temperature.
@@ -160,7 +161,7 @@ def model_arms(
 
 
 def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float]]:
-    """Springs of the arms: the part of each, its modulus [Pa] and relaxation time [s]; the elastic spring first.
+    """Rows of the arms: effect name, modulus [Pa] and relaxation time [s]; the elastic spring is first, with time nan.
 
     >>> [row[0] for row in arm_rows(paper, model_arms(paper, (5.0, 155.0)))]
     ['elastic', 'springpot', 'springpot', 'springpot', 'springpot']
@@ -172,18 +173,18 @@ def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float
 
 
 def qualified_size(branch: Branch) -> str:
-    """The parameter that a branch's modulus goes with, as files and reports name it."""
+    """Name, in files and reports, of the parameter that the branch's modulus is proportional to."""
     qualified_names = {parameter.name: qualified_name(branch, parameter) for parameter in branch.parameters}
     assert branch.size is not None
     return qualified_names.get(branch.size, branch.size)
 
 
 def part_modulus(model: Model, size: str, omega: Array, under: Circumstances = UNKNOWN) -> Array:
-    """mu^ [Pa] of the branches of one size at angular frequencies [rad/s], (n,).
+    """Complex modulus of the viscoelastic branches whose moduli are proportional to the same parameter.
 
     Args:
-        model: the model.
-        size: qualified name of the parameter that scales the branches.
+        model: model with its parameter values.
+        size: name of this parameter in files and reports.
         omega: angular frequencies [rad/s], (n,).
         under: test conditions, such as the temperature.
 
@@ -196,7 +197,7 @@ def part_modulus(model: Model, size: str, omega: Array, under: Circumstances = U
 
 
 def values_under(model: Model, under: Circumstances) -> Values:
-    """The values of a model as its temperature leaves them, whatever the motion."""
+    """Parameter values [SI] of a model at the temperature of a test; unchanged if the temperature is unknown."""
     if under.temperature is None:
         return model.values
     other_modifiers = [
@@ -206,13 +207,13 @@ def values_under(model: Model, under: Circumstances) -> Values:
 
 
 def _basis(omega: Array, time: Array) -> Array:
-    """i w tau/(1 + i w tau), (n, k)."""
+    """Moduli of arms with G_k = 1: i w tau_k/(1 + i w tau_k), (n, k)."""
     turn = 1j * omega[:, None] * time
     return turn / (1.0 + turn)
 
 
 def _starts(omega: Array, target: Array, arms: int) -> Iterator[tuple[Array, Array]]:
-    """Moduli and relaxation times to start from: times evenly over the band or a little more, moduli by the loss.
+    """Start moduli [Pa] and relaxation times [s], (k,) each: times evenly in ln over the band, moduli from the loss.
 
     Notes: arms d apart in ln tau have G = 2/pi G''(1/tau) d, where the loss modulus G'' changes little (J. D. Ferry,
     Viscoelastic Properties of Polymers, 3rd ed., 1980, ch. 4).
@@ -226,10 +227,10 @@ def _starts(omega: Array, target: Array, arms: int) -> Iterator[tuple[Array, Arr
 
 
 def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 1) -> tuple[float, Array, Array]:
-    """Largest relative error of arms that are fitted to it, their moduli and times, from a start.
+    """Fit arms to a target modulus from a start; return the largest relative error, moduli [Pa] and times [s].
 
-    Notes: least squares in the logarithms, again and again, with weights times the error (Lawson's way to the smallest
-    largest error); the logarithms keep all moduli and times positive.
+    Notes: repeated least squares in the logarithms, with weights multiplied by the error (Lawson's method for the
+    smallest maximum error); the logarithms keep all moduli and times positive.
     """
     from scipy.optimize import least_squares
 
@@ -238,7 +239,7 @@ def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 
     unit = np.abs(target).mean()
 
     def parts(x: Array) -> tuple[Array, Array]:
-        """Each arm over the target, (n, k), and its slope by the logarithm of its time."""
+        """Modulus of each arm relative to the target, and its derivative by the logarithm of the time, (n, k) each."""
         basis = _basis(omega, np.exp(x[count:]))
         # a step that goes too far is held, as `exp` would overflow
         arm = basis * unit * np.exp(np.minimum(x[:count], 100.0)) / target[:, None]

@@ -12,21 +12,21 @@ from bushfit.effects.contract import Array
 
 #: Half width of a 95 % interval [standard deviations] of a normal quantity whose standard deviation is known.
 Z95 = 1.959963984540054
-#: Degrees of freedom at most: from here on, Student's t is the normal distribution to a millionth.
+#: Maximum degrees of freedom: here Student's t equals the normal distribution to a millionth.
 _MOST_FREEDOM = 1e6
-#: Degrees of freedom at least: Student's t with fewer has no variance, and its interval says next to nothing.
+#: Minimum degrees of freedom: with fewer, Student's t has no variance and the interval is useless.
 _LEAST_FREEDOM = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class Covariance:
-    """Covariance matrix of parameter values in their SI units, and how well it is known itself.
+    """Covariance matrix of parameter values in their SI units, and its own uncertainty.
 
     Args:
-        names: of the k parameters.
-        matrix: (k, k).
-        spread: for each figure of the noise behind the matrix that was itself estimated, how far the matrix moves, up
-            or down, when that figure moves up by its own standard error, (k, k) each.
+        names: names of the k parameters.
+        matrix: covariance matrix, (k, k).
+        spread: changes of the matrix if one of the estimated noise figures rises by its standard error, one (k, k)
+            matrix per figure.
 
     >>> known = Covariance(("mu", "m"), np.array([[4.0, 3.0], [3.0, 9.0]]))
     >>> known.stderr("m"), known.correlations(), round(known.half("mu"), 2)
@@ -38,7 +38,7 @@ class Covariance:
     spread: tuple[Array, ...] = ()
 
     def stderr(self, name: str) -> float | None:
-        """Standard error of a parameter; None where it was held at an exact value."""
+        """Standard error of a parameter [its SI unit]; None if the parameter was fixed at an exact value."""
         if name not in self.names:
             return None
         i = self.names.index(name)
@@ -46,10 +46,10 @@ class Covariance:
 
     @cached_property
     def root(self) -> Array:
-        """A matrix B with B B^T the covariance, (k, k), from the eigenvectors of the correlation matrix.
+        """Square root of the covariance: matrix B with B B^T equal to the covariance, (k, k).
 
-        Notes: |B^T slope| is the standard error of a quantity with these slopes. Unlike sqrt(slope^T C slope), it is
-        never the root of a negative number, however ill-conditioned the covariance C is.
+        Notes: |B^T slope| is the standard error of a quantity with the derivatives `slope`, (k,). Unlike
+        sqrt(slope^T C slope), it is never the root of a negative number for an ill-conditioned covariance C.
         """
         sigma = np.sqrt(np.diag(self.matrix))
         safe = np.where(sigma > 0.0, sigma, 1.0)
@@ -57,15 +57,15 @@ class Covariance:
         return sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
 
     def half_width(self, slopes: Array) -> Array:
-        """Half width of the 95 % intervals of n quantities, (n,), by Student's t.
+        """Half widths of the 95 % intervals of n quantities, (n,), by Student's t.
 
         Args:
-            slopes: of each quantity by each parameter, (k, n).
+            slopes: derivatives of each quantity by each parameter, (k, n).
         """
         return stdtrit(self.freedom(slopes), 0.975) * np.linalg.norm(self.root.T @ slopes, axis=0)
 
     def half(self, name: str) -> float:
-        """Half width of the 95 % interval of one of the parameters, in its SI unit."""
+        """Half width of the 95 % interval of the named parameter [its SI unit]."""
         return self._halves[name]
 
     @cached_property
@@ -73,15 +73,18 @@ class Covariance:
         return dict(zip(self.names, self.half_width(np.eye(len(self.names))).tolist(), strict=True))
 
     def left_open(self, values: Mapping[str, float]) -> str:
-        """Sentence on parameters whose 95 % half-width is at least their value; "" for no such parameter."""
+        """Sentence that names the parameters whose 95 % half-width is at least their value; "" if there are none."""
         unknown = ", ".join(name for name in self.names if self.half(name) >= abs(values[name]))
         return unknown and f"the tests leave {unknown} open (unknown by 100 % or more)"
 
     def freedom(self, slopes: Array) -> Array:
-        """Effective degrees of freedom of the variances of n quantities with these slopes, (k, n) -> (n,).
+        """Effective degrees of freedom of the variances of n quantities, (n,).
 
-        Notes: as Satterthwaite (1946) has them: 2 v^2 over the variance of v, where v is the quantity's variance, and
-        the variance of v is the sum of squares of what each spread adds to v.
+        Args:
+            slopes: derivatives of each quantity by each parameter, (k, n).
+
+        Notes: by Satterthwaite (1946): 2 v^2/var(v), where v is the variance of the quantity and var(v) is the sum of
+        squares of the changes of v by each matrix in `spread`.
         """
         variance = np.sum(np.square(self.root.T @ slopes), axis=0)
         changes = [np.sum(slopes * (part @ slopes), axis=0) for part in self.spread]
@@ -91,7 +94,7 @@ class Covariance:
         return np.maximum(2.0 / np.square(np.maximum(share, smallest)), _LEAST_FREEDOM)
 
     def correlations(self) -> list[tuple[str, str, float]]:
-        """Two names and their correlation for every pair of parameters, the most correlated first."""
+        """Two names and the correlation (-1 to 1) for every pair of parameters, the largest magnitude first."""
         sigma = np.sqrt(np.diag(self.matrix))
         pairs = [
             (self.names[i], self.names[j], float(self.matrix[i, j] / (sigma[i] * sigma[j])))
@@ -100,7 +103,7 @@ class Covariance:
         return sorted(pairs, key=lambda pair: -abs(pair[2]))
 
     def restricted(self, names: Sequence[str]) -> "Covariance":
-        """The covariance of some of the parameters, in the order that they have here."""
+        """Covariance of the named parameters alone, in their order in this covariance; unknown names are ignored."""
         indices = [i for i, name in enumerate(self.names) if name in names]
         square = np.ix_(indices, indices)
         names = tuple(self.names[i] for i in indices)

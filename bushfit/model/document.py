@@ -31,7 +31,7 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class BushingTable:
-    """Bushing with its geometry."""
+    """Name and geometry of the bushing in a model file."""
 
     name: Annotated[Name, Field(description="Name of the bushing.")]
     inner_radius_m: Annotated[Number, Field(description="Inner radius of the rubber [m].")]
@@ -44,7 +44,7 @@ class BushingTable:
 
 @dataclass(frozen=True)
 class SpecimenTable:
-    """Another body of the compound."""
+    """Specimen of the compound other than a bushing, such as a coupon or blocks in shear, in a model file."""
 
     name: Annotated[Name, Field(description="Name of the specimen.")]
     kind: Annotated[SpecimenKind, Field(description='"modulus" for tests of the modulus, "shear" for blocks in shear.')]
@@ -58,7 +58,7 @@ class SpecimenTable:
 
 @dataclass(frozen=True)
 class ParameterTable:
-    """Value of a parameter with its uncertainty."""
+    """Value and uncertainty of one parameter in a model file."""
 
     value: Annotated[Number, Field(description="Value in the unit.")]
     unit: Annotated[str | None, Field(description='SI unit; "1" for a ratio.')] = None
@@ -74,7 +74,7 @@ class ParameterTable:
 
 @dataclass(frozen=True)
 class CovarianceTable:
-    """Covariance of the parameters in their SI units."""
+    """Covariance matrix of the parameters, in their SI units, in a model file."""
 
     names: Annotated[tuple[str, ...], Field(description="Names of the parameters that have errors.")]
     matrix: Annotated[Matrix, Field(description="Covariance matrix, in the order of the names.")]
@@ -85,7 +85,7 @@ class CovarianceTable:
 
 
 def _check_covariance(table: CovarianceTable) -> CovarianceTable:
-    """Refuse a matrix that is not a covariance of its names."""
+    """Return the table unchanged; raise a ValueError if its matrix is not a covariance of its names."""
     size = len(table.names)
     for matrix in (table.matrix, *table.spread):
         widths = {len(row) for row in matrix}
@@ -113,7 +113,7 @@ def _check_covariance(table: CovarianceTable) -> CovarianceTable:
 
 @dataclass(frozen=True)
 class FitTable(Quality):
-    """Quality of the fit, and operating conditions of the fitted tests."""
+    """Quality of the fit, and ranges of the fitted tests, in a model file."""
 
     frequency_Hz: Annotated[Interval | None, Field(description="Least and largest frequency [Hz].")] = None  # noqa: N815
     strain: Annotated[Interval | None, Field(description="Least and largest equivalent strain amplitude.")] = None
@@ -141,12 +141,12 @@ class FitTable(Quality):
 
     @property
     def quality(self) -> Quality:
-        """Quality of the fit alone."""
+        """Quality of the fit, without the ranges of the tests."""
         return Quality(self.nrmse, self.reduced_chi_square, self.points, self.noise, self.loop_gain_error)
 
     @property
     def measured(self) -> Range | None:
-        """Operating conditions of the fitted tests; None if the file does not state them."""
+        """Ranges of frequency, strain and temperature of the fitted tests; None if the file does not state them."""
         if self.frequency_Hz is None or self.strain is None:
             return None
         return Range(self.frequency_Hz, self.strain, self.directions, self.temperature_K)
@@ -154,7 +154,7 @@ class FitTable(Quality):
 
 @dataclass(frozen=True)
 class InputTable:
-    """File of a test."""
+    """Name, checksum and conditions of a test's data file, in the provenance of a model file."""
 
     file: Annotated[str, Field(description="Name of the file as in the campaign.")]
     sha256: Annotated[str, Field(description="SHA-256 of its content.")]
@@ -165,7 +165,7 @@ class InputTable:
 
 @dataclass(frozen=True)
 class ProvenanceTable:
-    """Origin of a model file."""
+    """Provenance of a model file: versions of the software, and the test files."""
 
     bushfit: Annotated[str | None, Field(description="Version of bushfit that wrote the file.")] = None
     inputs: Annotated[tuple[InputTable, ...], Field(description="Files of the tests.")] = ()
@@ -185,9 +185,9 @@ class AlternativeTable:
 
 @dataclass(frozen=True)
 class ModelFile:
-    """A model with its fit."""
+    """Content of a model file: model, parameters with uncertainty, fit and provenance."""
 
-    __pydantic_config__ = ConfigDict(str_max_length=10_000)  # of a text that is shown
+    __pydantic_config__ = ConfigDict(str_max_length=10_000)  # for texts that pages show
 
     schema: Annotated[Literal["bushfit/model/1"], Field(description="Schema of the file.")]
     bushing: Annotated[BushingTable | None, Field(description="The bushing; null for specimens alone.")]

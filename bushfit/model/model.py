@@ -21,7 +21,7 @@ from bushfit.model.stack import adjusted_values, branch_stiffness, layered_stiff
 from bushfit.model.structure import Structure, seen_by
 from bushfit.units import display_unit
 
-#: What records a response: a sweep or a loop, which may have force chains of their own.
+#: Kind of test: stepped-sine sweep or hysteresis loop. The two may use different force channels of the rig.
 Kind = Literal["sweep", "loop"]
 
 #: Names of the paper's five parameters.
@@ -30,17 +30,17 @@ FIVE = tuple(parameter.name for name in BASE for parameter in get_effect(name).p
 
 @dataclass(frozen=True)
 class Model:
-    """A bushing, the effects that its response is made of, and one value per parameter; it does not change.
+    """Immutable model of a bushing: its geometry, the effects that act, and one value per parameter.
 
     Args:
-        bushing: geometry; None where specimens of the compound alone are known.
-        effects: names from the library, in any order.
-        values: SI value of every parameter, by the names of files and reports.
-        unnamed: the data of the effect of that name; None without it.
+        bushing: geometry; None for a compound of which only specimens are known.
+        effects: names of effects from the library, in any order.
+        values: SI value of every parameter, by its name in files and reports.
+        unnamed: data of the smooth correction `unnamed`; None if `effects` does not include it.
 
     Raises:
-        ModelError: an unknown effect, one named twice, one without its data, or a value that is missing, unknown, not
-            finite or outside the parameter's bounds.
+        ModelError: an effect is unknown, listed twice or without its data, or a value is missing, unknown, not finite
+            or outside the parameter's bounds.
     """
 
     bushing: Bushing | None
@@ -71,17 +71,17 @@ class Model:
 
     @property
     def records(self) -> tuple[Effect, ...]:
-        """The effects from the rubber outward: by level, and within a level in the order of the library."""
+        """Effects of the model from the rubber outward: by level, and within a level in the order of the library."""
         return self.structure.records
 
     @property
     def parameters(self) -> Mapping[str, Parameter]:
-        """Every parameter by its name in files and reports."""
+        """Definitions (unit, bounds, meaning) of all parameters, by name in files and reports."""
         return self.structure.parameters
 
     @property
     def viscoelastic(self) -> tuple[Branch, ...]:
-        """The linear branches that fade with memory."""
+        """Linear viscoelastic branches, such as the springpot, which Maxwell arms can replace."""
         return self.structure.viscoelastic
 
     @property
@@ -91,7 +91,7 @@ class Model:
 
     @property
     def knows_circumstances(self) -> bool:
-        """True if the response depends on test conditions other than the motion, such as the temperature."""
+        """True if the response depends on the temperature or the history of the rubber."""
         return any(effect.under for effect in self.records)
 
     @property
@@ -114,11 +114,11 @@ class Model:
         return geometry.unit_strain(self.bushing, place)
 
     def stiffness_per_modulus(self, place: Place) -> float:
-        """Stiffness per unit equivalent shear modulus: [m], [m^3/rad] of a rotation, [1] of a modulus."""
+        """Stiffness per unit shear modulus: [m] for translation, [m^3/rad] for rotation, [1] for a modulus specimen."""
         return geometry.stiffness_per_modulus(self.bushing, place)
 
     def with_values(self, values: Mapping[str, float]) -> "Model":
-        """Copy of the model with some values replaced."""
+        """Copy the model with some parameter values [SI] replaced."""
         return replace(self, values={**self.values, **values})
 
     @classmethod
@@ -129,13 +129,13 @@ class Model:
         values: Mapping[str, float],
         unnamed: Unnamed | None = None,
     ) -> "Model":
-        """A model with the values given; other parameters have their neutral value, or a typical one.
+        """Create a model; parameters without a given value have their neutral value, or else a typical value.
 
         Args:
             bushing: geometry, or None for a compound.
             effects: names of the effects.
-            values: parameter values [SI] by qualified name.
-            unnamed: data of the correction without a name, if it is among the effects.
+            values: parameter values [SI] by name in files; values of other effects are ignored.
+            unnamed: data of the smooth correction `unnamed`, if it is among the effects.
 
         Returns:
             The model.
@@ -152,9 +152,11 @@ class Model:
         return cls(bushing, tuple(effects), found, unnamed)
 
     def with_effect(self, name: str, values: Mapping[str, float] | None = None) -> "Model":
-        """The model with one effect more, in place of the branch that it replaces, if it replaces one.
+        """Create a model with one more effect, without the branch that the effect replaces, if any.
 
-        Parameters of it without a value start from those of that branch, or else as in `started`.
+        Args:
+            name: name of the effect.
+            values: values [SI] of its parameters; others are derived from the replaced branch, or are the defaults.
 
         >>> paper.with_effect("sliders").effects
         ('elastic', 'springpot', 'sliders')
@@ -165,7 +167,7 @@ class Model:
         return Model.with_defaults(self.bushing, (*names, name), start, self.unnamed)
 
     def starts(self, effect: Effect) -> list[dict[str, float]]:
-        """Start values for a fit of an effect, derived from the branch that it replaces.
+        """Start values for a fit with an additional effect, derived from the branch that the effect replaces.
 
         Returns:
             Parameter values [SI] of each start by qualified name; one empty start if the effect replaces no branch.
@@ -179,10 +181,10 @@ class Model:
         ]
 
     def with_twin(self, name: str) -> "Model":
-        """Replace the twins of an effect by the effect itself, with the same values.
+        """Replace the twins of an effect (effects that no test can distinguish from it) by the effect itself.
 
         Returns:
-            The changed model, or the same model if it has no twin of the effect.
+            The changed model, or the same model if it includes no twin of the effect.
         """
         twins = [effect for effect in self.records if effect.name in twins_of(name) and effect.name != name]
         effects = [effect.name for effect in self.records if effect not in twins]
@@ -197,7 +199,7 @@ class Model:
         return Model.with_defaults(self.bushing, [*effects, *added], {**self.values, **twin_values}, self.unnamed)
 
     def without(self, *left: Level | str) -> "Model":
-        """The model without the effects of these levels and names.
+        """Create a model without the effects that have one of the given levels or names.
 
         >>> paper.with_effect("inertia").without(Level.INSTRUMENT).effects
         ('elastic', 'springpot', 'friction')
@@ -206,7 +208,7 @@ class Model:
         return Model.with_defaults(self.bushing, names, self.values, self.unnamed if UNNAMED in names else None)
 
     def equation(self) -> str:
-        """The model as text: the formula of its first-harmonic stiffness, other effects, and values in common units.
+        """Describe the model as text: formula of the first-harmonic stiffness, other effects, and parameter values.
 
         Returns:
             Lines of text: stiffness formula, other effects, then parameter values.
@@ -235,20 +237,20 @@ class Model:
         """Complex dynamic stiffness of the steady first harmonic [N/m or N m/rad].
 
         Args:
-            direction: of the test, or its name: axial, radial or torsion; or the specimen under test.
-            frequency: [Hz], broadcast with amplitude.
+            direction: direction of the motion, or its name (axial, radial, torsion), or the specimen under test.
+            frequency: frequency [Hz], broadcast with amplitude.
             amplitude: zero-to-peak displacement [m] or rotation [rad].
-            kind: whether a loop or a sweep records it; only effects of the instrument tell them apart.
+            kind: kind of test, "loop" or "sweep"; only effects of the instrument differ between them.
             values: parameter values in place of the model's own; arrays whose last axis has length 1 add
                 leading axes to the result.
-            under: what the test was made under.
+            under: temperature and history of the rubber in the test.
 
         Returns:
             Complex stiffness, in the common shape of frequency and amplitude.
 
         Notes:
             The rubber has k = G mu^(omega, e0), with G of Eqs. 10, 11, 12 and e0 of Eqs. 7, 8 (Eqs. 6 to 12); the
-            layers of the model stand around it.
+            layers of the model are applied to it.
 
         >>> k = paper.stiffness("axial", 100.0, 1e-4)
         >>> print(f"{abs(k) / 1e3:.1f} N/mm, loss factor {k.imag / k.real:.3f}")
@@ -281,15 +283,13 @@ class Model:
         values: Values | None = None,
         under: Circumstances = UNKNOWN,
     ) -> Array:
-        """Force over a history of displacement [m or rad], from rest or on the steady cycle: (..., n) [N or N m].
-
-        The other arguments are as of `stiffness`.
+        """Force over time for a displacement history, from rest or in a steady cycle.
 
         Args:
             direction: direction or specimen, or the name of a direction.
             displacement: history of displacement [m] or rotation [rad], (..., n).
-            kind: kind of record; only effects of the instrument differ between loop and sweep.
-            values: parameter values in place of the model's own.
+            kind: kind of test, "loop" or "sweep"; only effects of the instrument differ between them.
+            values: parameter values [SI] in place of the model's own.
             under: test conditions, such as the temperature.
 
         Returns:
@@ -304,21 +304,21 @@ class Model:
         return respond(displacement)
 
     def setting(self, place: Place | str, kind: Kind = "sweep", under: Circumstances = UNKNOWN) -> Setting:
-        """Setting of a test.
+        """Collect the properties of a test that its response depends on.
 
         Args:
             place: direction or specimen, or the name of a direction.
-            kind: kind of record, "loop" or "sweep".
+            kind: kind of test, "loop" or "sweep".
             under: test conditions, such as the temperature.
 
         Returns:
-            Geometry, direction and test conditions that a response depends on.
+            Geometry, direction, kind and test conditions.
         """
         direction = Direction(place) if isinstance(place, str) else place
         return Setting(self.bushing, direction, kind, under, self.unnamed)
 
     def layers(self, setting: Setting) -> tuple[Layer, ...]:
-        """The layers that act on a test: a coupon whose modulus is measured has no rig and no sleeves around it."""
+        """Layers of the model that act in a test, from the rubber outward; a test of a modulus has no rig layers."""
         place, layers = setting.direction, self.structure.layers
         if place.motion is STRAINING:
             layers = tuple(layer for layer in layers if layer.corrects)
@@ -327,11 +327,11 @@ class Model:
     def values_at(
         self, place: Place, frequency: float, amplitude: float, under: Circumstances = UNKNOWN
     ) -> dict[str, float]:
-        """All values as the modifiers leave them at an operating condition [Hz, m or rad].
+        """Parameter values after all modifiers, at one operating condition.
 
         Args:
             place: direction or specimen.
-            frequency: [Hz].
+            frequency: frequency [Hz].
             amplitude: zero-to-peak displacement [m] or rotation [rad].
             under: test conditions, such as the temperature.
 
@@ -349,14 +349,14 @@ class Model:
         return {name: float(np.asarray(value).item()) for name, value in found.items()}
 
     def shift_factor(self, under: Circumstances, values: Values | None = None) -> Value:
-        """How many times as fast a motion is on the rubber's own time scale as on the clock's: the shift factor a_T."""
+        """Time-temperature shift factor a_T under given test conditions: ratio of reduced to actual frequency."""
         values = self.values if values is None else values
         shifts = ((modifier, modifier.shift_factor) for modifier in self.structure.modifiers)
         return prod(shift(seen_by(modifier, values), under) for modifier, shift in shifts if shift)
 
 
 def _check(name: str, value: float, parameter: Parameter) -> None:
-    """Refuse a value outside the bounds of its parameter; the neutral value is always allowed."""
+    """Raise a ModelError if a value is outside the bounds of its parameter; the neutral value is always valid."""
     low, high = parameter.bounds
     if parameter.neutral is not None:
         low, high = min(low, parameter.neutral), max(high, parameter.neutral)

@@ -18,27 +18,26 @@ from bushfit.reading.measurement import Source, Stepped
 from bushfit.units import display_unit, format_aligned, number
 from bushfit.validation import Flag, Number, WholeNumber
 
-#: A picture as a data URI: what a page may show of a file that somebody else wrote, and nothing else.
+#: Picture as a data URI, the only form of a logo that a page shows.
 _PICTURE = re.compile(r"data:image/(png|svg\+xml);base64,[A-Za-z0-9+/]+=*")
-#: Largest half width, in units of the value, of which the exponential is taken: exp(300) is far beyond every bound of
-#: a parameter, and still a finite number.
+#: Largest ratio of half width to value in an exponential: exp(300) exceeds the bounds of all parameters and is finite.
 _LARGEST_EXPONENT = 300.0
 
-#: The least or the largest value that a parameter may have.
+#: Bound of a parameter: its smallest or its largest value.
 End = Literal["min", "max"]
 
 
 @dataclass(frozen=True)
 class Quality:
-    """How well a model meets the data it was fitted to.
+    """Agreement of a model with the data that it was fitted to.
 
     Args:
         nrmse: root mean square difference, relative to half a loop's force range and to |K|.
-        reduced_chi_square: mean square residual in units of noise; 1 where noise is all that is left.
+        reduced_chi_square: mean square residual in units of noise; 1 if only noise remains.
         points: number of residuals.
-        noise: standard deviation of one point, relative, root mean square over all.
-        loop_gain_error: standard deviation of a loop's gain, relative, by the class of the rig; None without loops, and
-            where an older file does not say it.
+        noise: relative standard deviation of the noise of one point, root mean square over all points.
+        loop_gain_error: relative standard deviation of the force gain of a loop, by the class of the rig; None without
+            loops, or if an older file does not state it.
     """
 
     nrmse: Number
@@ -50,13 +49,13 @@ class Quality:
 
 @dataclass(frozen=True)
 class Range:
-    """The operating conditions of the tests that were fitted.
+    """Ranges of the operating conditions of the fitted tests.
 
     Args:
-        frequency: least and largest [Hz].
-        strain: least and largest equivalent strain amplitude.
-        directions: of the tests, and specimens, by name; none where an older file does not say which.
-        temperature: lowest and highest [K]; None where no test states one.
+        frequency: lowest and highest frequency [Hz].
+        strain: smallest and largest equivalent strain amplitude [1].
+        directions: names of the directions and specimens; empty if an older file does not state them.
+        temperature: lowest and highest temperature [K]; None if no test states one.
     """
 
     frequency: tuple[float, float]
@@ -67,19 +66,19 @@ class Range:
 
 @dataclass(frozen=True)
 class Misfit:
-    """How well a model meets one test, or one run of it.
+    """Misfit between a model and one test, or one run of a test (points of one amplitude or frequency).
 
     Args:
-        test: by its name.
-        place: direction, or specimen by its name.
-        fitted: whether the model was fitted to it.
-        held: what the run holds; None of the whole test.
-        value: at which it is held.
-        unit: of the value, SI: "m", "rad" or "1" of an amplitude, "Hz".
-        points: that carry weight: operating points of a sweep, rows of a loop.
+        test: name of the test.
+        place: name of the direction or specimen.
+        fitted: True if the model was fitted to this test.
+        held: quantity that is constant in the run; None for the whole test.
+        value: constant value of this quantity; None for the whole test.
+        unit: SI unit of the value: "m", "rad" or "1" for an amplitude, "Hz" for a frequency.
+        points: number of points with weight: operating points of a sweep, rows of a loop.
         nrmse: root mean square difference, relative to |K| or to half the loop's force range.
         reduced_chi_square: mean square residual in units of noise.
-        gain: |K| of the model over the measured one, less 1, mean of the points.
+        gain: mean relative error of the model's |K|: positive if the model is stiffer than measured.
     """
 
     test: str
@@ -96,14 +95,14 @@ class Misfit:
 
 @dataclass(frozen=True)
 class Usable:
-    """Within what a model meets the measurement at a place: 95 % of the points lie nearer.
+    """Expected error of a model for one direction or specimen: 95 % of the measured points have a smaller error.
 
     Args:
-        place: direction, or specimen by its name.
-        stiffness: relative difference of |K|.
-        loss_factor: difference of the loss factor.
-        points: operating points that were compared; a loop is one.
-        held_out: whether each was predicted from the fit without its run; else from the fit to all.
+        place: name of the direction or specimen.
+        stiffness: relative error of |K|.
+        loss_factor: absolute error of the loss factor.
+        points: number of compared operating points; a loop is one point.
+        held_out: True if each point was predicted by a fit without its run, False if by the fit to all points.
     """
 
     place: str
@@ -115,14 +114,14 @@ class Usable:
 
 @dataclass(frozen=True)
 class Outlier:
-    """A point that lies farther from the model than noise explains, beside neighbours that do not.
+    """Measured point that deviates from the model by more than noise explains, unlike its neighbours.
 
     Args:
-        test: by its name.
-        file: it came from, as the campaign names it; None for a test that came from no file.
-        row: of its data, from 1; header, comments and blank lines do not count.
-        column: displacement, force or stiffness.
-        distance: from where it should be, in units of noise.
+        test: name of the test.
+        file: data file as named in the campaign; None if the test has no file.
+        row: row of the data, from 1, without header, comments and blank lines.
+        column: "displacement", "force" or "stiffness".
+        distance: deviation in units of noise.
     """
 
     test: str
@@ -133,16 +132,17 @@ class Outlier:
 
     @property
     def place(self) -> str:
-        """File, or test, and column, for messages that list the rows."""
+        """File name (or test name) and column, for messages that list the rows."""
         return f"{self.file or self.test}, {self.column}"
 
 
 @dataclass(frozen=True)
 class Alternative:
-    """Another model that may be the right one, as the tests cannot tell.
+    """Alternative model that the tests do not rule out.
 
     Args:
-        probability: of it, by the diagnosis that found it.
+        model: the alternative model with its fitted values.
+        probability: probability of this model by the diagnosis.
     """
 
     model: Model
@@ -151,22 +151,22 @@ class Alternative:
 
 @dataclass(frozen=True)
 class TestTable:
-    """A test of the campaign, its range, and what the campaign says of it.
+    """Description of one test of a campaign: ranges, levels, file and conditions.
 
     Args:
-        test: its name.
+        test: name of the test.
         kind: "loop" or "sweep".
-        place: direction, or specimen by its name.
-        frequency_Hz: least and largest [Hz].
-        amplitude: least and largest, zero-to-peak, in the unit.
-        unit: of the amplitude, SI; "1" of a strain.
-        rows: of a loop, or operating points.
-        repeats: of each operating point.
-        frequencies_Hz, amplitudes: levels of a sweep, rising [Hz; the unit]; none of a loop, or of an older file.
-        stepped: what a sweep steps through, "frequency" or "amplitude"; null of a loop.
-        file: that it was read from; null where it came from none.
-        sha256: of the file.
-        conditions: that the campaign states, such as its temperature, preload or date.
+        place: name of the direction or specimen.
+        frequency_Hz: lowest and highest frequency [Hz].
+        amplitude: smallest and largest zero-to-peak amplitude, in `unit`.
+        unit: SI unit of the amplitude; "1" for a strain.
+        rows: number of rows of a loop, or of operating points of a sweep.
+        repeats: number of measurements of each operating point.
+        frequencies_Hz, amplitudes: levels of a sweep in ascending order [Hz; `unit`]; empty for loops and older files.
+        stepped: quantity that a sweep steps through, "frequency" or "amplitude"; null for a loop.
+        file: data file; null if the test has no file.
+        sha256: SHA-256 checksum of the data file.
+        conditions: conditions that the campaign states, such as temperature, preload or date.
     """
 
     __test__ = False  # no test of pytest's
@@ -189,17 +189,16 @@ class TestTable:
 
 @dataclass(frozen=True)
 class CampaignTable:
-    """The campaign that a model comes from.
+    """Campaign (set of tests) that a model was fitted to.
 
     Args:
-        name: of the campaign.
-        file: its name.
-        sha256: of the file.
-        command: with all that settles the numbers, as it would be typed beside the file.
-        tests: all that the campaign has.
-        report: head of the report: customer, part_number, drawing, compound, laboratory and date, if
-            they are known.
-        logo: beside it, as a data URI of a PNG or SVG; null without a logo.
+        name: name of the campaign.
+        file: name of the campaign file.
+        sha256: SHA-256 checksum of the campaign file.
+        command: command line that reproduces the numbers, for the folder of the campaign file.
+        tests: all tests of the campaign.
+        report: entries of the report's head: customer, part_number, drawing, compound, laboratory and date, if known.
+        logo: logo for the report's head, as a data URI of a PNG or SVG; null without a logo.
     """
 
     name: str
@@ -218,20 +217,27 @@ class CampaignTable:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
-    """A fitted model, or one given by hand, as the JSON files hold it.
+    """Fitted model, or a model given by hand, with its uncertainty, quality and origin; content of a model file.
 
     Args:
-        covariance: of the fitted parameters, and of held ones whose error is known.
-        quality: None where the model was not fitted.
-        measured: operating conditions of the tests that were fitted; None where the model was not fitted.
+        model: the model with its parameter values.
+        fitted: names of the fitted parameters.
+        covariance: covariance of the fitted parameters, and of fixed parameters whose error is known.
+        quality: agreement with the fitted tests; None if the model was not fitted.
+        measured: ranges of the fitted tests; None if the model was not fitted.
         warnings: warnings on the use of the numbers.
-        profile: 95 % intervals by profile likelihood, where they were asked for; None is an open end.
-        at_bound: parameters that came to rest on the least or largest value they may have, and on which.
-        unresolved: effects of the model with a twin of the rig, which these tests cannot tell from it.
-        model_error: what the fit counted beside noise, as a share of the stiffness, or what corrected the bushing that
-            a compound was carried from; None where noise was all.
-        alternatives: models that explain the tests, where these cannot tell which does.
-        campaign: as the model file has it; None of a model that comes from none, or that no file was read for.
+        inputs: data files of the tests.
+        outliers: measured points far outside their noise.
+        profile: 95 % intervals by profile likelihood, if requested, by parameter [SI]; None for an open end.
+        at_bound: parameters whose fitted value is at a bound, and which bound.
+        specimens: specimens of the compound other than the bushing.
+        tests: misfit of each test and run.
+        usable: expected error for each direction or specimen.
+        unresolved: effects of the model that these tests cannot distinguish from an effect of the rig.
+        model_error: error of the model that the fit assumed in addition to noise, relative to the stiffness, or the
+            smooth correction of the bushing that the compound was transferred from; None if there is neither.
+        alternatives: other models that the tests do not rule out.
+        campaign: description of the campaign; None for a model without a campaign.
     """
 
     model: Model
@@ -253,7 +259,7 @@ class Result:
     campaign: CampaignTable | None = None
 
     def __repr__(self) -> str:
-        """The parameters with their standard errors, a line each, and how well the model meets its tests."""
+        """Text with one line per parameter (value and standard error), and the quality of the fit."""
         lines = [f"Result of {self.name}"]
         for name, parameter in self.model.parameters.items():
             value, stderr = self.model.values[name], self.covariance.stderr(name)
@@ -279,7 +285,7 @@ class Result:
 
     @property
     def undecided(self) -> list[str]:
-        """A warning where the tests leave several models possible; none where they do not."""
+        """List with one warning if the tests do not rule out other models; otherwise empty."""
         if not self.alternatives:
             return []
         added = (sorted(set(alternative.model.effects) - {*self.model.effects}) for alternative in self.alternatives)
@@ -290,14 +296,14 @@ class Result:
         return [f"{lacking if names else open_values} the bands, low to high, include each alternative"]
 
     def place(self, name: str) -> Place:
-        """The specimen of this name, or else the direction; a ModelError where it is neither."""
+        """Return the specimen or direction with the given name; raise a ModelError for other names."""
         return get_place(name, self.specimens)
 
     def interval(self, name: str) -> tuple[float, float] | None:
-        """95 % interval of a parameter [its SI unit], cut at its bounds; None where it was held at an exact value.
+        """95 % interval of a parameter, cut at its bounds.
 
         Returns:
-            Lower and upper end [SI], or None.
+            Lower and upper end [SI unit of the parameter]; None if the parameter was fixed at an exact value.
 
         Notes: symmetric in the logarithm for strictly positive parameters, and in the value for others.
 
@@ -319,12 +325,16 @@ class Result:
 
 
 def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
-    """The compound of a fitted model in another bushing, and a sentence on what stayed behind.
+    """Transfer the compound of a fitted model to another bushing.
 
-    What belongs to the material is kept, and the factors of specimens of it.
+    Effects of the material and factors of specimens are kept; effects of the first bushing and its rig are left out.
+
+    Args:
+        result: fitted model.
+        bushing: geometry of the other bushing.
 
     Returns:
-        Result for the other bushing, and the sentence.
+        Result for the other bushing, and a sentence that lists the effects that are left out.
     """
     names = [specimen.name for specimen in result.specimens]
 

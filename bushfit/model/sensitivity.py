@@ -1,9 +1,9 @@
 """Derivatives of a model's response with respect to its parameters.
 
-In a model of branches alone the derivatives add up: the paper's three branches bring analytic ones, the others are
-differenced one by one. Modifiers and layers mix everything, so with them the whole response is differenced, all
-parameters in one call, with the values along a leading axis. The differences are one-sided: half the price of central
-ones, and good to a millionth, which is more than the steps and errors of a fit need.
+In a model of branches alone the derivatives of the branches add up: the paper's three branches have analytic
+derivatives, the others finite differences. With modifiers or layers, the derivatives are finite differences of the
+whole response, computed in one call with the parameter values along a leading axis. The differences are one-sided: half
+the cost of central differences, and accurate to a millionth, which is enough for a fit.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,7 +18,7 @@ from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model
 from bushfit.model.structure import seen_by
 
-#: Step of the differences, relative to the value (log parameters) or to the typical size (linear ones);
+#: Step of the differences, relative to the value (log parameters) or to the typical distance (linear parameters);
 #: chosen: the differences are good to about a millionth.
 _RELATIVE_STEP = 1e-6
 
@@ -32,21 +32,19 @@ def stiffness_and_slopes(
     kind: Kind = "sweep",
     under: Circumstances = UNKNOWN,
 ) -> tuple[Array, Array]:
-    """The complex dynamic stiffness, (n,) [N/m or N m/rad], and its derivatives by parameters, (k, n) [per unit].
-
-    Frequencies are in Hz, amplitudes zero-to-peak in m or rad, (n,) each.
+    """Complex dynamic stiffness of a model and its derivatives by parameters, for the Jacobian of a fit.
 
     Args:
-        model: model at whose values the derivatives are taken.
+        model: model; the derivatives are taken at its parameter values.
         direction: direction or specimen.
-        frequency: [Hz], (n,).
-        amplitude: zero-to-peak [m or rad], (n,).
-        names: k parameters.
-        kind: of test, "loop" or "sweep".
-        under: circumstances of the points.
+        frequency: frequency [Hz], (n,).
+        amplitude: zero-to-peak amplitude [m or rad], (n,).
+        names: names of k parameters.
+        kind: kind of test, "loop" or "sweep".
+        under: temperature and history of the rubber at the points.
 
     Returns:
-        Stiffness, complex (n,), and derivatives, complex (k, n).
+        Complex stiffness [N/m or N m/rad], (n,), and its derivatives per SI unit of each parameter, (k, n).
 
     >>> _, slopes = stiffness_and_slopes(paper, "axial", np.array([5.0]), np.array([1e-4]), ["mu"])
     >>> slopes.round(4)
@@ -71,18 +69,17 @@ def stiffness_and_slopes(
 def force_and_slopes(
     model: Model, direction: Place, displacement: History, names: Sequence[str], under: Circumstances = UNKNOWN
 ) -> tuple[Array, Array]:
-    """The force of a loop along a history of displacement, (n,) [N or N m], and its derivatives by parameters, (k, n)
-    [per unit].
+    """Force of a loop over time and its derivatives by parameters, for the Jacobian of a fit.
 
     Args:
-        model: model at whose values the derivatives are taken.
+        model: model; the derivatives are taken at its parameter values.
         direction: direction or specimen.
-        displacement: history [m or rad] of n samples.
-        names: k parameters.
-        under: circumstances of the test.
+        displacement: displacement history [m or rad] of n samples.
+        names: names of k parameters.
+        under: temperature and history of the rubber in the test.
 
     Returns:
-        Force, (n,), and derivatives, (k, n).
+        Force [N or N m], (n,), and its derivatives per SI unit of each parameter, (k, n).
     """
     if not model.only_branches:
         return _differences_at(
@@ -108,9 +105,9 @@ def _add_slopes(
     sensitivities: Callable[..., dict[str, Array]] | None,
     test: tuple[object, ...],
 ) -> None:
-    """Add the derivatives of a branch by parameters to `slopes`, (len(names), n).
+    """Add the derivatives of a branch by the named parameters to `slopes`, (len(names), n).
 
-    The response and its analytic derivatives, if the branch has them, take the values and the test.
+    `respond` and `sensitivities` (None without analytic derivatives) are called with the values and then `test`.
     """
     row = {name: i for i, name in enumerate(names)}
     qualified = {parameter.name: qualified_name(branch, parameter) for parameter in branch.parameters}
@@ -128,7 +125,7 @@ def _add_slopes(
 def _differences_at(
     place: Place, model: Model, names: Sequence[str], respond: Callable[[Values], Array]
 ) -> tuple[Array, Array]:
-    """Call `differences` for the parameters of this direction; the derivatives by the others are 0."""
+    """Call `differences` for the parameters that act in this direction; the derivatives by other parameters are 0."""
     local = [i for i, name in enumerate(names) if place_suffix(name) in (None, str(place))]
     response, local_slopes = differences(model, [names[i] for i in local], respond)
     slopes = np.zeros((len(names), response.size), dtype=response.dtype)
@@ -137,17 +134,16 @@ def _differences_at(
 
 
 def differences(model: Model, names: Sequence[str], respond: Callable[[Values], Array]) -> tuple[Array, Array]:
-    """Any response, (n,), and its derivatives by parameters, as one-sided differences away from the bounds, (k, n).
-
-    `respond` gives the response, (..., n), for values with leading axes; it is called once.
+    """Response of a model and its derivatives by parameters, by one-sided differences that stay inside the bounds.
 
     Args:
-        model: model at whose values the derivatives are taken.
-        names: k parameters.
-        respond: function of values with leading axes.
+        model: model; the derivatives are taken at its parameter values.
+        names: names of k parameters.
+        respond: function from parameter values to the response, (..., n), called once; the values are arrays of shape
+            (k + 1, 1).
 
     Returns:
-        Response, (n,), and derivatives, (k, n).
+        Response, (n,), and its derivatives per SI unit of each parameter, (k, n).
     """
     count = len(names)
     stacked: dict[str, Value] = dict(model.values)

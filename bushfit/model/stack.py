@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def layered_stiffness(
     model: Model, setting: Setting, values: Values, layers: Sequence[Layer], omega: Array, amplitude: Array
 ) -> Array:
-    """Stiffness of the rubber and the layers around it.
+    """Complex stiffness of the rubber and the layers around it.
 
     Args:
         model: the model.
@@ -40,13 +40,13 @@ def layered_stiffness(
     }
 
     def below(count: int) -> StiffnessBelow:
-        """Response of the rubber and some layers.
+        """Build the response of the rubber and the innermost groups of layers.
 
         Args:
             count: number of groups of layers, from the rubber outward.
 
         Returns:
-            Stiffness and steady-cycle force.
+            Functions for the stiffness, and for the force over a steady cycle.
         """
 
         def cycle(omega: Array, motion: Array, points: Any) -> Array:
@@ -72,7 +72,7 @@ def layered_stiffness(
 
 
 def rubber_stiffness(model: Model, setting: Setting, values: Values, omega: Array, amplitude: Array) -> Array:
-    """Complex stiffness of the rubber without layers [N/m or N m/rad], (..., n).
+    """Complex stiffness of the rubber without layers, with modifiers [N/m or N m/rad], (..., n).
 
     Args:
         model: the model.
@@ -87,7 +87,7 @@ def rubber_stiffness(model: Model, setting: Setting, values: Values, omega: Arra
 
 
 def stack_force(model: Model, setting: Setting, values: Values, layers: Sequence[Layer]) -> ForceBelow:
-    """Force of the rubber and the layers around it.
+    """Build the function that computes the force of the rubber and the layers around it.
 
     Args:
         model: the model.
@@ -142,7 +142,7 @@ def stack_force(model: Model, setting: Setting, values: Values, layers: Sequence
 def branch_stiffness(
     model: Model, setting: Setting, values: Values, omega: Array, strain: Array, base: Values
 ) -> Array:
-    """Complex stiffness of the rubber without layers.
+    """Complex stiffness of the sum of the branches, for given parameter values.
 
     Args:
         model: the model.

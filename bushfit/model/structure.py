@@ -13,14 +13,17 @@ from bushfit.errors import ModelError
 
 @dataclass(frozen=True)
 class Structure:
-    """The effects of a model by kind, and their parameters; the same for all models with these effects.
+    """Effects of a model sorted by kind, and their parameters; equal for all models with the same effects.
 
     Args:
-        records: all of them, from the rubber outward.
-        parameters: by their names in files and reports.
-        viscoelastic: the linear branches that fade with memory, whose steady answers add up harmonic by harmonic.
-        others: the branches that do not.
-        moduli: names of the rubber's moduli and stresses, to which its stiffness is proportional together.
+        records: all effects, from the rubber outward.
+        parameters: definitions of all parameters by name in files and reports.
+        branches: effects that add a stress, in parallel.
+        viscoelastic: linear viscoelastic branches, whose steady responses add up harmonic by harmonic.
+        others: all other branches.
+        modifiers: effects that change parameter values of other effects.
+        layers: effects around the rubber, such as the rig, from the rubber outward.
+        moduli: names of the moduli and stresses; if all are scaled by a factor, so is the stiffness of the rubber.
     """
 
     records: tuple[Effect, ...]
@@ -35,7 +38,7 @@ class Structure:
     @classmethod
     @lru_cache(maxsize=256)
     def from_names(cls, names: tuple[str, ...]) -> "Structure":
-        """The structure of a model with these effects, in any order; kept, because a fit makes thousands of models.
+        """Create the structure of a model from the names of its effects, in any order; cached for fits.
 
         Returns:
             Effects by kind, from the rubber outward, and their parameters.
@@ -71,12 +74,15 @@ class Structure:
 
 
 def in_groups(layers: Sequence[Layer]) -> list[list[Layer]]:
-    """Layers that act one after the other; neighbours of one law whose amounts add, in a group."""
+    """Group adjacent layers with the same equation and an additive amount, such as two compliances in series.
+
+    Other layers form groups of one. The order, from the rubber outward, is kept.
+    """
     return [list(group) for _, group in groupby(layers, key=lambda layer: layer.force if layer.adds else layer.name)]
 
 
 def as_one_layer(group: Sequence[Layer], values: Values) -> tuple[Layer, Values]:
-    """A group of layers as the first of them, with the values that it reads."""
+    """Combine a group of layers with the same equation into the first layer, with the sum of their amounts."""
     first, layer_values = group[0], [seen_by(layer, values) for layer in group]
     return first, {
         **layer_values[0],
@@ -85,7 +91,7 @@ def as_one_layer(group: Sequence[Layer], values: Values) -> tuple[Layer, Values]
 
 
 def seen_by(effect: Effect, values: Values) -> Values:
-    """The values that an effect reads: all by their full names, and its own by short ones, too."""
+    """Parameter values as an effect reads them: all values by full name, and those of the effect also by short name."""
     if effect.name in BASE:
         return values
     return {**values, **{parameter.name: values[qualified_name(effect, parameter)] for parameter in effect.parameters}}
