@@ -51,7 +51,7 @@ def export(order: Order) -> Exported:
         order: model, predictions and settings.
 
     Returns:
-        File bushing.inp, and the losses of the format.
+        File bushing.inp, and sentences on properties that the format cannot represent.
     """
     units = order.units or MM_T_S_N
     losses = tuple(table_losses(order, _FORM))

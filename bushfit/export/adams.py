@@ -97,7 +97,7 @@ def export(order: Order) -> Exported:
         order: model, predictions and settings.
 
     Returns:
-        Content of bushing_car.bus and bushing_ride.bus, and the losses of the format.
+        Files bushing_car.bus and bushing_ride.bus, and sentences on properties that the format cannot represent.
     """
     predictions = exported_directions(order)
     elements = [_element(stiffness_tables(prediction)) for prediction in predictions]

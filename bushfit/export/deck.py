@@ -81,9 +81,10 @@ def stiffness_tables(prediction: Prediction) -> list[StiffnessTable]:
 
 
 def amplitude_levels(order: Order) -> list[AmplitudeLevel]:
-    """Combine the tables of all directions by rank: the smallest amplitude of each, the second smallest, and so on.
+    """Group the stiffness tables of all directions by the rank of their amplitude, one level for each solver property.
 
-    A direction with fewer amplitudes than others repeats its largest.
+    The first level has the smallest amplitude of each direction. A direction with fewer amplitudes than others repeats
+    its largest.
     """
     by_direction = [stiffness_tables(prediction) for prediction in exported_directions(order)]
     count = max(map(len, by_direction))
@@ -91,7 +92,7 @@ def amplitude_levels(order: Order) -> list[AmplitudeLevel]:
 
 
 def by_dof(level: AmplitudeLevel) -> Iterator[tuple[int, StiffnessTable]]:
-    """Yield each degree of freedom of a level, 1 to 6, with its table, in increasing order."""
+    """Yield the number of each degree of freedom (1 to 6) of an amplitude level with its stiffness table."""
     yield from sorted(((dof, table) for table in level for dof in DOFS[table.direction]), key=lambda pair: pair[0])
 
 

@@ -59,7 +59,7 @@ def export(order: Order) -> Exported:
         order: model, predictions and settings.
 
     Returns:
-        The FMU, its losses and the Maxwell arms in it.
+        File with the FMU, sentences on properties that the FMU cannot represent, and the Maxwell arms in it.
 
     Raises:
         ModelError: an effect has no law in the time domain.

@@ -124,7 +124,7 @@ def time_model(order: Order) -> TimeModel:
 
 
 def fields_of(effect: Effect) -> list[str]:
-    """Names of the C fields for the parameters of an effect, in their order; empty if the C sources lack its law."""
+    """Names of the fields in the C sources for the parameters of an effect; empty if the C sources lack the effect."""
     kind = f"{effect.name.partition('.')[0]}." if place_suffix(effect.name) else effect.name
     return FIELDS.get(kind, [])
 
@@ -136,9 +136,9 @@ def middle_point(prediction: Prediction) -> tuple[float, float]:
 
 
 def _values(order: Order, model: Model, arms: tuple[Arms, ...]) -> tuple[tuple[FmuValue, ...], list[dict[str, str]]]:
-    """List the values of the FMU, and for each place the name of the value for each parameter.
+    """List the values of the FMU; and for each direction or specimen, the name of the FMU value of each parameter.
 
-    If modifiers change a parameter differently in different places, each place has a value `<parameter>.<place>`.
+    If a parameter differs between places (directions or specimens), each place has a value `<parameter>.<place>`.
     """
     places = order.places
     local_values = [
@@ -174,7 +174,7 @@ def _values(order: Order, model: Model, arms: tuple[Arms, ...]) -> tuple[tuple[F
 
 
 def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Arms, ...]) -> dict[str, str]:
-    """Name of the value for each C field in one direction or specimen."""
+    """Name of the FMU value for each field of the C structure of one direction or specimen."""
     layers = model.layers(model.setting(place))
     fields = {key: names[key] for key in ("unit_strain", "stiffness_per_modulus")}
     fields |= {f"size[{index}]": names[part.size] for index, part in enumerate(arms)}

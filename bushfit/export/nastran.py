@@ -42,7 +42,7 @@ def export(order: Order) -> Exported:
         order: model, predictions and settings.
 
     Returns:
-        File with the deck, and the losses of the format.
+        File with the deck, and sentences on properties that the format cannot represent.
     """
     (names, form, file), units = _DIALECTS[order.dialect], order.units or MM_T_S_N
     losses = tuple(table_losses(order, form))

@@ -261,7 +261,9 @@ def get_place(name: str, specimens: Iterable[Specimen]) -> Place:
 
 
 def unit_strain(bushing: Bushing | None, place: Place) -> float:
-    """Equivalent strain of the rubber per displacement [1/m], rotation [1/rad] or stated strain [1].
+    """Equivalent strain of the rubber per displacement [1/m], rotation [1/rad] or stated strain [1] at a place.
+
+    A place is a direction of the bushing, which is then required, or a specimen.
 
     Raises:
         ModelError: the place is a direction, but there is no bushing.
@@ -277,7 +279,9 @@ def unit_strain(bushing: Bushing | None, place: Place) -> float:
 
 
 def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
-    """Stiffness of a direction or specimen per equivalent shear modulus: [m], [m^3/rad] in torsion, [1] for a modulus.
+    """Stiffness at a place per equivalent shear modulus: [m], [m^3/rad] in torsion, [1] for a modulus test.
+
+    A place is a direction of the bushing, which is then required, or a specimen.
 
     Raises:
         ModelError: the place is a direction, but there is no bushing.

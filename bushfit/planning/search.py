@@ -44,7 +44,7 @@ class PlanSearch:
 
     @cached_property
     def budget(self) -> Budget:
-        """Durations and limits of the tests, with the hours as largest total duration."""
+        """Durations and limits of the candidate tests, with the available hours as largest total duration."""
         return replace(self.problem.budget, maximum_minutes=60.0 * self.hours)
 
     @cached_property
@@ -64,7 +64,7 @@ class PlanSearch:
 
     @cached_property
     def strict(self) -> Criterion:
-        """Criterion with a large penalty for effects that the tests detect less well than the standard programme."""
+        """Search criterion with a large penalty for effects detected less well than with the standard programme."""
         problem = self.problem
         probabilities = np.array([rival.probability for rival in problem.knowledge.rivals])
         return Criterion(problem.models, problem.weight, probabilities, self.minimum_noncentrality, _STRICT_PENALTY)
@@ -312,7 +312,7 @@ class PlanSearch:
             drift: noncentrality of a unit drift of the gain.
 
         Returns:
-            Iterator over the amounts, each for the effect's most visible shape, and last the drift of the gain.
+            Iterator over the amounts in SI units, each for the effect's most visible shape, and last the gain drift.
         """
         effects, visible = self.problem.effects, self.minimum_noncentrality
         with np.errstate(divide="ignore"):

@@ -116,7 +116,7 @@ class Cycles:
 
 
 def stretches(changes: NDArray[np.bool_], fewest: int = 1) -> list[slice]:
-    """Split a sequence of n entries at given borders.
+    """Split a sequence of n entries, such as cycles, at given borders.
 
     Args:
         changes: true at the borders between neighbouring entries where the sequence is split, (n - 1,).
@@ -240,7 +240,7 @@ def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
 
 
 def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
-    """Number of cycles after which to cut a run in two; 0 if the run is steady.
+    """Number of cycles after which a run of cycles changes its frequency or amplitude most; 0 if the run is steady.
 
     `phase` is the deviation of the crossings from an even sine, (m + 1,), in units of `jitter` [periods]; `level` is ln
     of the amplitude of each cycle, (m,), in units of `spread`.

@@ -79,7 +79,7 @@ def least_squares(columns: Floats, values: Floats, weight: NDArray[Any] | None =
 
 
 def as_complex(real: Floats) -> Complex:
-    """Convert the real coefficients of a Fourier series, (2 m + 1,), to complex ones, (m + 1,)."""
+    """Convert real Fourier coefficients (mean, cosines, negative sines), (2 m + 1,), to complex ones, (m + 1,)."""
     order = real.size // 2
     return np.concatenate((real[:1], real[1 : order + 1] + 1j * real[order + 1 :]))
 
@@ -247,7 +247,10 @@ def _drift_and_harmonics(time: Floats, values: Floats, frequency: float, order: 
 
 
 def _chunks(time: Floats, frequency: float, order: int) -> Iterator[tuple[slice, Floats]]:
-    """Generate the rows of each chunk with the basis functions (drift, cosines, sines) there, (3 + 2 order, m)."""
+    """Generate, chunk by chunk, a slice of m rows and the drift and harmonics at these rows, (3 + 2 order, m).
+
+    Time [s], (n,), is centred at 0; frequency in Hz.
+    """
     half = max(float(np.abs(time[[0, -1]]).max()), 1e-300)
     for start in range(0, time.size, _CHUNK_ROWS):
         rows = slice(start, start + _CHUNK_ROWS)

@@ -161,11 +161,11 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
 
 
 def _alike_runs(values: Floats, reach: Floats) -> Iterator[slice]:
-    """Generate slices of two or more neighbouring values, (n,), that are equal within their `reach`, (n,).
+    """Generate slices of two or more neighbouring strokes with equal values, (n,), within the tolerance `reach`, (n,).
 
-    The values belong to strokes or half cycles, upward and downward in turn. Upward and downward values may differ by
-    three times the reach, as in a drift, if each equals the next value of its kind. Over two cycles the values may
-    change by 1.5 times the reach.
+    The values are ranges or durations of strokes, upward and downward in turn. Upward and downward strokes may differ
+    by three times the tolerance, as in a drift, if each equals the next stroke of its kind. Over two cycles the values
+    may change by 1.5 times the tolerance.
     """
     change = np.abs(np.diff(values))
     of_a_kind = np.concatenate(([False], np.abs(values[2:] - values[:-2]) <= reach[2:], [False]))
