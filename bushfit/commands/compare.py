@@ -38,9 +38,9 @@ from bushfit.version import __version__
 
 #: Largest number of results: the colours of a figure, and the columns of a table.
 MOST = 8
-#: Compound of a result, whose modulus over strain is compared if no direction is common to all.
+#: Specimen whose modulus over strain is compared if the results have no direction in common.
 _COMPOUND = Specimen("compound", "modulus")
-#: Probability from which on a family counts as a possible explanation.
+#: Probability from which on a family is a possible explanation.
 _LIKELY = 0.05
 #: Relative difference of moduli below which families agree: the scatter of bushings of one batch.
 _AGREED = 0.05
@@ -55,10 +55,10 @@ class ComparedResult:
     """One of the results that are compared.
 
     Args:
-        name: name in tables.
-        source: file or folder as it was given.
-        result: the result.
-        sweeps: sweeps of its campaign, which set the grid.
+        name: name of the result in tables.
+        source: file or folder that the user named.
+        result: fitted model with its uncertainty.
+        sweeps: sweeps of its campaign, which determine the grid.
         sha256: SHA-256 of the model file or campaign.
     """
 
@@ -69,7 +69,7 @@ class ComparedResult:
     sha256: str | None = None
 
 
-#: What can be compared.
+#: Types of objects that can be compared.
 Comparable = Result | HasResult | Campaign | ComparedResult
 
 
@@ -78,14 +78,14 @@ class ComparisonOutput:
     """Results of a comparison.
 
     Args:
-        entries: the results, the reference first.
-        comparisons: each result but the first against the first.
-        families: model families, if these are compared.
+        entries: compared results, the reference first.
+        comparisons: comparison of each further result with the reference.
+        families: fitted model families; empty when results are compared.
         labels: letters of the results in tables and sentences: A, B and so on.
-        advice: sentences on which family to use, and on how each family predicts what was held out.
-        words: sentences on what differs, one for each result and direction.
+        advice: sentences on the family to use, and on how well each family predicts held-out data.
+        words: sentences on the differences, one for each result and direction.
         notes: further warnings.
-        warnings: warnings, each once, with the letters of the results that it is about.
+        warnings: all warnings without repetition, each with the letters of the results that it concerns.
         document: content of compare.json.
         files: document, tables, figure and page.
     """
@@ -116,24 +116,24 @@ def compare(
     strain_amplitudes: Numbers | None = None,
     command: str = "",
 ) -> ComparisonOutput:
-    """Compare results with the first: what differs, by how much, and whether by more than chance.
+    """Compare parameters and predicted stiffness of results with a reference, and test the differences for chance.
 
     Args:
         reference: result, output with a result, or campaign, which is fitted as by `fit`; also a `ComparedResult`.
-        others: results, outputs or campaigns that are compared with it.
-        families: with one campaign alone, model families to fit to it, such as "sliders" or "kraus+inertia"; () is all.
-        directions: directions or specimens; default those in which all were fitted.
-        frequencies: [Hz]; default those at which all were measured, as also of the amplitudes.
+        others: results, outputs or campaigns that are compared with the reference.
+        families: model families to fit to a single campaign, such as "sliders" or "kraus+inertia"; () for all.
+        directions: directions or specimens; default those in which all results were fitted.
+        frequencies: frequencies [Hz]; by default, frequencies and amplitudes are those measured for all results.
         amplitudes: zero-to-peak displacements [m].
         torsion_amplitudes: zero-to-peak rotations [rad].
         strain_amplitudes: zero-to-peak strains of specimens that give a modulus.
-        command: command that the document states.
+        command: command line for the document.
 
     Returns:
         Differences of parameters and of predicted stiffness from the reference, with tables, figure and page.
 
     Raises:
-        BushfitError: too few results or too many, or directions and points that one of them cannot be predicted at.
+        BushfitError: too few or too many results, or directions and points that one of them cannot predict.
     """
     grid = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
     if families is not None and isinstance(reference, Campaign) and not others:
@@ -152,7 +152,7 @@ def compare(
 def compared_result(
     source: Comparable, name: str | None = None, sha256: str | None = None, directions: Sequence[str] = ()
 ) -> ComparedResult:
-    """Result of a model or output, or of a campaign, which is fitted as by `fit`.
+    """Make an entry of a comparison from a model or output, or from a campaign, which is fitted as by `fit`.
 
     Args:
         source: result, output with a result, campaign, or compared result, which is returned as it is.
@@ -180,7 +180,7 @@ def _compared(
     notes: Sequence[str] = (),
     command: str = "",
 ) -> ComparisonOutput:
-    """Compare each result with the first, in the directions and on the grid asked for."""
+    """Compare each result with the first, in the directions and on the grid of `grid`."""
     results, labels = [entry.result for entry in entries], list(ascii_uppercase[: len(entries)])
     columns, grids = _common_places(results, grid.directions), []
     for places in columns:
@@ -244,7 +244,7 @@ def _warnings(
     *,
     are_families: bool,
 ) -> list[str]:
-    """Warnings of the results, each once with the letters of the results, after those that results share tests."""
+    """Warnings on results that share tests, then the warnings of each result with the letters of the results."""
     shared = "intervals of their {} assume independent tests and are usually too wide"
     if are_families:
         warnings = [
@@ -267,7 +267,7 @@ def _warnings(
 
 
 def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> list[list[Place]]:
-    """Directions and specimens to compare, each as every result has it; the compound if none is common to all."""
+    """Directions or specimens to compare, each as a list with one entry per result; the compound if none is common."""
     if names:
         return [[result.place(name) for result in results] for name in names]
     known = []
@@ -284,7 +284,11 @@ def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> li
 def _fit_families(
     campaign: Campaign, names: Sequence[str], directions: Sequence[str] | None
 ) -> tuple[list[ComparedResult], list[FittedFamily], list[str]]:
-    """Fit model families to a campaign, the model of its [fit] first; all that the library has unless named."""
+    """Fit model families to a campaign: the model of [fit], then the named families, or all families of the library.
+
+    Returns:
+        Entries for the comparison, the fitted families in the same order, and notes.
+    """
     data = prepare_tests(campaign)
     data_sets = [data_set.with_weight() for data_set in data.select_tests(directions or None)]
     model = data.starting_model(data.effects, data_sets, {})
@@ -334,7 +338,7 @@ def _family_to_use(families: Sequence[FittedFamily], entries: Sequence[ComparedR
 
 
 def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
-    """One of the results as compare.json has it."""
+    """Entry of a compared result in compare.json."""
     result, bushing = entry.result, model_document(entry.result.model)["bushing"]
     return {
         "label": label,
@@ -351,7 +355,7 @@ def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
 
 
 def _family_document(label: str, family: FittedFamily, result: Result) -> FamilyEntry:
-    """Fit and held-out error of a family as compare.json has them."""
+    """Entry of a family in compare.json: its fit and held-out error."""
     evidence, held_out = family.evidence, family.held
     return {
         "label": label,

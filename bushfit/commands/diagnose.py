@@ -46,7 +46,7 @@ class DiagnosisOutput:
 
     @property
     def headline(self) -> str:
-        """Verdict, and the parameters that the tests leave unknown by 100 %."""
+        """Verdict, and the parameters whose uncertainty is 100 % or more."""
         return "; ".join(filter(None, (self.diagnosis.verdict, self.result.left_open)))
 
     @property
@@ -69,12 +69,12 @@ def diagnose(
 
     Args:
         campaign: the campaign, or a campaign prepared by `prepare_tests`.
-        model: result, or output with a result, whose effects are the start; default the paper's three.
+        model: result, or output with a result, whose effects the diagnosis starts from; default the paper's three.
         adopt: effects that are added, and mistakes that are corrected, whatever the evidence.
         without: effects and mistakes that are not considered.
         max_effects: largest number of effects that are added.
-        tolerance: gap below which model and tests agree, as a share of the stiffness magnitude.
-        joint: plain fit of the campaign, if it was made before.
+        tolerance: gap between model and tests, relative to the stiffness magnitude, below which they agree.
+        joint: joint fit of the campaign, if already computed, to save time.
 
     Returns:
         Verdict, gap, candidates and the model to use, with the result files.
@@ -132,7 +132,7 @@ def _require_free_parameter(data: PreparedCampaign, model: Model | None, setting
 
 
 def _with_plan(diagnosis: Diagnosis, campaign: Campaign) -> Diagnosis:
-    """Diagnosis whose next test names the plan that separates its look-alikes, if there are any."""
+    """Add the `bushfit plan` command that separates look-alike effects to the next test of an ambiguous diagnosis."""
     path = campaign.path
     if diagnosis.verdict != "ambiguous" or path.suffix != ".toml" or not (sets := look_alikes(diagnosis)):
         return diagnosis

@@ -32,7 +32,7 @@ FORMATS = {
 
 
 class FormatEntry(TypedDict):
-    """One format."""
+    """Entry of an export format in `export --json`."""
 
     files: Annotated[list[str], Field(description="Names of its files.")]
     left_out: Annotated[list[str], Field(description="Properties that it cannot hold, with the error that this makes.")]
@@ -51,7 +51,7 @@ class ExportOutput:
 
     Args:
         predicted: prediction over the exported grid.
-        exported: files and losses of each format, by name.
+        exported: files and limitations of each format, by its name.
         files: files of all formats, and table and figure of the Maxwell arms.
     """
 
@@ -89,7 +89,7 @@ def export(
         accuracy: largest relative error of the modulus in an FMU.
         units: units of length, mass, time and force; default those usual for each format.
         dialect: dialect of the format nastran.
-        decimal_comma: whether CSV files have decimal commas.
+        decimal_comma: True to write CSV files with decimal commas.
         grid: directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes and temperature, as of
             `predict`; all directions share one list of frequencies.
 
@@ -97,7 +97,7 @@ def export(
         Predictions, the content for each format with its losses, and the result files.
 
     Raises:
-        ModelError: a model that a format cannot hold, or a grid that it cannot have.
+        ModelError: a model that a format cannot represent, or an invalid grid.
     """
     result = load_result(model)
     predicted = predict(result, campaign, **grid)

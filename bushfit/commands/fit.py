@@ -58,7 +58,7 @@ def fit(
         campaign: the campaign, or a campaign prepared by `prepare_tests`.
         directions: directions or specimens whose tests are fitted; default axial, and all specimens.
         effects: effects added to the paper's three, such as "inertia".
-        profile: whether to add 95 % intervals by profile likelihood, which takes some seconds.
+        profile: True to add 95 % intervals by profile likelihood, which takes some seconds.
         loss: "soft_l1" reduces the weight of distant points and leaves outliers out; default the campaign's.
 
     Returns:
@@ -131,11 +131,11 @@ def fit_dynamic(
 
 
 def prepare_tests(campaign: Campaign | PreparedCampaign, loss: Loss | None = None) -> PreparedCampaign:
-    """Campaign prepared for a fit: a data set with its noise for each test.
+    """Prepare a campaign for a fit: one data set with its noise for each test.
 
     Args:
-        campaign: the campaign; one that is prepared already is returned as it is.
-        loss: "soft_l1" or "linear" in place of the campaign's.
+        campaign: the campaign; a prepared campaign is returned unchanged.
+        loss: "soft_l1" or "linear"; default the campaign's.
     """
     if isinstance(campaign, PreparedCampaign):
         return campaign
@@ -145,7 +145,7 @@ def prepare_tests(campaign: Campaign | PreparedCampaign, loss: Loss | None = Non
 def campaign_files(
     data: PreparedCampaign, result: Result, kinds: Collection[str] = ("loop", "sweep")
 ) -> list[ResultFile]:
-    """Tables and figures of the tests beside the model; outliers that the fit left out have no weight.
+    """Tables and figures that compare the tests with the model; outliers that the fit left out have no weight.
 
     Sweeps at several temperatures add a master curve, if the model has the effect of temperature.
 

@@ -12,15 +12,15 @@ from bushfit.reading.measurement import Source
 
 
 class HasResult(Protocol):
-    """Output of a command with a result."""
+    """Output of a command that contains a result."""
 
     @property
     def result(self) -> Result:
-        """Model with its uncertainty."""
+        """Fitted model with its uncertainty."""
 
 
 def as_result(model: Result | HasResult) -> Result:
-    """Result that is given itself or as part of the output of a command."""
+    """Return the result itself, or the result of a command's output."""
     return model if isinstance(model, Result) else model.result
 
 
@@ -28,16 +28,16 @@ def load_model(path: str | Path) -> Result:
     """Load the fitted model of a model file or of a results folder, with its uncertainty.
 
     Args:
-        path: a model file such as model.json, or a folder that holds a model.json.
+        path: model file such as model.json, or folder that contains model.json.
 
     Raises:
-        ModelError: no such file, or no model.
+        ModelError: the file is missing or contains no model.
     """
     return load_result(model_file(Path(path)))
 
 
 def model_file(path: Path) -> Path:
-    """Model file that a path names: the file itself, or model.json of a results folder.
+    """Return the path of a model file: the path itself, or model.json in a results folder.
 
     Returns:
         Path of the model file; any other path is returned unchanged.

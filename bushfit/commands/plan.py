@@ -44,8 +44,8 @@ class PlanOutput:
     """Results of a plan.
 
     Args:
-        plan: the plan.
-        check: simulations of the plan, if they were asked for.
+        plan: planned tests with their expected results.
+        check: result of simulations of the plan; None without simulations.
     """
 
     plan: Plan
@@ -53,7 +53,7 @@ class PlanOutput:
 
     @property
     def files(self) -> list[ResultFile]:
-        """Document, sheet of tests, figure, and the plan as a campaign file unless it has no tests."""
+        """Document, table of tests and figure; and a campaign file, if the plan has tests."""
         files = [
             json_file("plan", self.document),
             table_file("plan", partial(plan_sheet, self.plan)),
@@ -89,25 +89,25 @@ def plan(
 
     Args:
         source: campaign with tests, with a compound, or with a model to simulate; or a fitted model.
-        campaign: of a fitted model, campaign with the rig and the wanted predictions.
-        aim: "parameters", "predictions" or "rivals".
-        hours: largest duration on the rig [h].
+        campaign: campaign with the rig and the wanted predictions, if `source` is a fitted model.
+        aim: reduce the uncertainty of "parameters" or "predictions", or distinguish "rivals".
+        hours: maximum duration on the rig [h].
         test_directions: directions or specimens that the rig can test; default axial and radial, or all specimens.
-        parameters: parameters whose errors count; default all.
-        rivals: effects to separate; default those that the diagnosis leaves open.
-        targets: half of the 95 % interval over the value, by parameter, or by "stiffness" or "loss_factor" everywhere
-            or at one direction, such as "stiffness.axial".
+        parameters: parameters whose errors are reduced; default all.
+        rivals: effects to distinguish; default those that the diagnosis cannot distinguish.
+        targets: wanted half-width of the 95 % interval relative to the value, by parameter, or by "stiffness" or
+            "loss_factor" everywhere or in one direction, such as "stiffness.axial".
         directions: directions of the wanted predictions.
-        frequencies: [Hz] of the wanted predictions.
-        amplitudes: zero-to-peak displacements [m] of the wanted predictions.
-        torsion_amplitudes: zero-to-peak rotations [rad] of them.
-        strain_amplitudes: zero-to-peak strains of them.
+        frequencies: frequencies of the wanted predictions [Hz].
+        amplitudes: zero-to-peak displacements of the wanted predictions [m].
+        torsion_amplitudes: zero-to-peak rotations of the wanted predictions [rad].
+        strain_amplitudes: zero-to-peak strains of the wanted predictions [1].
 
     Returns:
         Tests in their order with their expected results, and the result files.
 
     Raises:
-        CampaignError: nothing is known of the rubber.
+        CampaignError: the campaign has no tests, no compound and no model.
         FitError: tests that cannot support a fit.
         ModelError: a parameter that is not fitted, a direction without a body, or no tests for this aim.
     """
@@ -134,7 +134,7 @@ def plan(
 
 
 def _knowledge(source: Campaign | Result | Knowledge, rivals: Sequence[str] | None) -> Knowledge:
-    """Model and uncertainty before further tests."""
+    """Model and uncertainty before the planned tests, from a fitted model, a campaign's tests or its compound."""
     if isinstance(source, Knowledge):
         return source
     if isinstance(source, Result):
@@ -149,7 +149,10 @@ def _knowledge(source: Campaign | Result | Knowledge, rivals: Sequence[str] | No
 def _wanted_points(
     result: Result, grid: PredictSettings, campaign: Campaign | None, default: Sequence[Place]
 ) -> Iterator[Points]:
-    """Operating points of the wanted predictions: as asked for, as [predict] states, or the grid of `predict`."""
+    """Operating points of the wanted predictions, one `Points` per direction.
+
+    The grid is that of the arguments, else that of [predict], else the default grid of `predict`.
+    """
     settings = grid_settings(grid, campaign)
     places = [get_place(name, result.specimens) for name in settings.directions or ()]
     for place in places or default:
@@ -160,7 +163,10 @@ def _wanted_points(
 
 
 def _targets(name: str, half: float, knowledge: Knowledge, points: Sequence[Points]) -> list[Target]:
-    """Targets of a name: a parameter, or a quantity at one direction or at all where predictions are wanted."""
+    """Targets with a name such as "mu", "stiffness" (all predicted directions) or "stiffness.axial".
+
+    `half` is the wanted half-width of the 95 % interval relative to the value.
+    """
     possible = {parameter: [Target(parameter, half)] for parameter in knowledge.names}
     for quantity in PREDICTED:
         targets = [Target(quantity, half, part.place) for part in points]
@@ -172,12 +178,12 @@ def _targets(name: str, half: float, knowledge: Knowledge, points: Sequence[Poin
 
 
 def plan_sheet(plan: Plan) -> pd.DataFrame:
-    """Sheet for the operator of the rig: a row for each run in its order, with zero-to-peak amplitudes.
+    """Table of tests for the operator of the rig: one row for each run in order, with zero-to-peak amplitudes.
 
-    The force, moment or stress is the largest that the model expects, to choose a load cell.
+    The force, moment or stress is the largest that the model predicts, to choose a load cell.
 
     Args:
-        plan: with its tests in order.
+        plan: plan with its tests in order.
 
     Returns:
         Table of texts, with durations [min].
@@ -208,5 +214,5 @@ def plan_sheet(plan: Plan) -> pd.DataFrame:
 
 
 def _distinct(values: Array) -> str:
-    """Distinct numbers of an array, in their order."""
+    """Format the distinct numbers of an array in order, separated by spaces."""
     return " ".join(dict.fromkeys(number(value, 4) for value in values.tolist()))

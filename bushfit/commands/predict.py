@@ -53,8 +53,8 @@ class PredictionOutput:
         predictions: stiffness over the grid, of each direction or specimen.
         measured: sweeps of the campaign that the model can predict.
         notes: further warnings.
-        resonances: resonance of a mass at each direction or specimen, if a mass was given.
-        arms: Maxwell arms, if they were asked for.
+        resonances: resonance of a mass for each direction or specimen; empty without a mass.
+        arms: Maxwell arms of each part of the model; empty unless requested.
         files: tables and figures.
     """
 
@@ -98,7 +98,7 @@ class PredictionOutput:
 
     @cached_property
     def tests(self) -> tuple[Misfit, ...]:
-        """Misfit of each measured sweep."""
+        """Relative difference between model and measurement for each measured sweep."""
         return misfits(self.result.model, *split_by_fit(self.result, self.measured))
 
     @cached_property
@@ -128,25 +128,25 @@ def predict(
 
     Args:
         model: result, or output with a result.
-        campaign: campaign whose sweeps are drawn_sweeps beside, and whose grid is the default.
+        campaign: campaign whose sweeps the figures show for comparison, and whose grid is the default.
         directions: directions or specimens; default axial and radial, and all specimens.
-        frequencies: [Hz].
+        frequencies: frequencies [Hz].
         amplitudes: zero-to-peak displacements [m].
         torsion_amplitudes: zero-to-peak rotations [rad].
         strain_amplitudes: zero-to-peak strains of specimens that give a modulus.
-        temperature: [K], if the model has the effect of temperature.
-        bushing: another bushing of the same compound.
-        mass: mass [kg] on the bushing, whose resonance is predicted.
+        temperature: temperature [K], if the model has the effect of temperature.
+        bushing: another bushing of the same compound, to predict instead of the tested one.
+        mass: mass on the bushing [kg], to predict its resonance.
         base_acceleration: zero-to-peak acceleration of the base under the mass [m/s^2].
-        wide: whether to add tables with amplitudes across.
-        arms: largest relative error of Maxwell arms, which are added if it is given.
+        wide: True to add tables with one column per amplitude.
+        arms: maximum relative error of Maxwell arms; None for no Maxwell arms.
         notes: further warnings.
 
     Returns:
         Predictions by direction, resonances and Maxwell arms, with the result files.
 
     Raises:
-        ModelError: a direction, frequency, amplitude or temperature that the model cannot have.
+        ModelError: a direction, frequency, amplitude or temperature for which the model cannot predict.
     """
     result, sweeps = as_result(model), campaign.sweeps if campaign else ()
     if bushing:
@@ -205,7 +205,7 @@ def predict(
 
 
 def grid_of(directions: Sequence[str] | None, *axes: Numbers | None) -> PredictSettings:
-    """Grid of a prediction; None selects the default of an axis.
+    """Make the grid settings of a prediction; None selects the default of an axis.
 
     Args:
         directions: directions or specimens by name.
@@ -219,7 +219,7 @@ def grid_of(directions: Sequence[str] | None, *axes: Numbers | None) -> PredictS
 
 
 def _predictable_sweeps(result: Result, campaign: Campaign) -> list[MeasuredSweep]:
-    """Sweeps of a campaign in directions that the model knows, each with what it was measured under."""
+    """Sweeps of a campaign that the model can predict, each with its circumstances (temperature, earlier strains)."""
     tests: tuple[Loop | Sweep, ...] = (*campaign.loops, *campaign.sweeps)
     circumstances = measured_session(result.model.bushing, tests)[len(campaign.loops) :]
     return [
@@ -230,7 +230,7 @@ def _predictable_sweeps(result: Result, campaign: Campaign) -> list[MeasuredSwee
 
 
 def split_by_fit(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[list[MeasuredSweep], list[MeasuredSweep]]:
-    """Sweeps whose files the model was fitted to, and the other ones."""
+    """Split sweeps into those to which the model was fitted, by the hash of their files, and the others."""
     digests = {source.sha256 for source in result.inputs}
     fitted = [sweep for sweep in sweeps if sweep.source and sweep.source.sha256 in digests]
     return fitted, [sweep for sweep in sweeps if sweep not in fitted]
@@ -239,7 +239,7 @@ def split_by_fit(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[list[
 def _files(
     output: PredictionOutput, drawn_sweeps: Sequence[MeasuredSweep], temperature: float | None, *, wide: bool
 ) -> list[ResultFile]:
-    """Tables and figures of a prediction at a temperature [K]; `drawn_sweeps` are those in its figures."""
+    """Tables and figures of a prediction at a temperature [K]; the figures show the sweeps in `drawn_sweeps`."""
     result, places = output.result, [prediction.direction for prediction in output.predictions]
     names = place_names(places)
 
@@ -295,5 +295,5 @@ def arms_files(result: Result, arms: Sequence[Arms], places: Sequence[Place]) ->
 
 
 def table_columns(table: pd.DataFrame) -> dict[str, list[Any]]:
-    """Columns of a table by header, None in an empty cell."""
+    """Convert a table to lists by column header, with None for empty cells."""
     return {str(name): [None if x != x else x for x in column.tolist()] for name, column in table.items()}

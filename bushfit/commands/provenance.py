@@ -16,17 +16,17 @@ from bushfit.reading.measurement import Loop, Sweep
 
 
 def result_document(result: Result, campaign: Mapping[str, Any]) -> dict[str, Any]:
-    """Content of a model file: the result, all its warnings, and the campaign that it comes from."""
+    """Content of a model file: the result, its warnings, and its campaign as `campaign_document` describes it."""
     return {**to_document(result), "warnings": warnings_of(result), "campaign": campaign}
 
 
 def campaign_document(data: PreparedCampaign, command: str, options: Iterable[str] = ()) -> dict[str, Any]:
-    """Campaign as result files state it, with its tests and the command that gives the same numbers.
+    """Description of a campaign for result files, with its tests and the command that reproduces the numbers.
 
     Args:
         data: the campaign, prepared for a fit.
         command: name of the command.
-        options: words of the options that change the numbers.
+        options: words of the command-line options that change the numbers.
 
     Returns:
         JSON data of the campaign: name, file, hash, command, tests and report head.
@@ -45,7 +45,7 @@ def campaign_document(data: PreparedCampaign, command: str, options: Iterable[st
 
 
 def command_line(command: str, *words: str) -> str:
-    """Command of bushfit as it is typed into a terminal."""
+    """Command line of bushfit as it is typed in a terminal, with quotes where necessary."""
     return " ".join(["bushfit", command, *(quote_path(Path(word)) for word in words)])
 
 
@@ -53,7 +53,7 @@ def option_words(**options: str | bool | Iterable[str] | None) -> list[str]:
     """Words of options on a command line.
 
     Args:
-        options: value of each option by its key: a text, several texts, or whether a flag is set; None leaves it out.
+        options: value of each option by its key: a text, several texts, or True for a flag; None to leave it out.
 
     Returns:
         Words such as ["--effect", "inertia", "--profile"].
@@ -69,7 +69,7 @@ def option_words(**options: str | bool | Iterable[str] | None) -> list[str]:
 
 
 def input_files(campaign: Campaign) -> list[Path]:
-    """Files that were read for a campaign: its own, its tests and its logo."""
+    """Files that were read for a campaign: campaign file, test files and logo."""
     folder, logo = campaign.path.parent, campaign.report.logo
     tests: tuple[Loop | Sweep, ...] = (*campaign.loops, *campaign.sweeps)
     files = [test.source.file for test in tests if test.source]
@@ -77,7 +77,7 @@ def input_files(campaign: Campaign) -> list[Path]:
 
 
 def _test_document(data_set: MeasuredTest) -> dict[str, Any]:
-    """Test as result files state it: direction or specimen, range [SI], file, and stated conditions."""
+    """Description of a test for result files: direction or specimen, ranges [SI], file, and stated conditions."""
     source, sweep = data_set.test.source, data_set.sweep if isinstance(data_set, MeasuredSweep) else None
     return {
         "test": data_set.name,

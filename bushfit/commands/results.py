@@ -19,20 +19,20 @@ if TYPE_CHECKING:
 
 
 class CommandOutput(Protocol):
-    """Output of a command."""
+    """Output of a command that contains result files."""
 
     @property
     def files(self) -> Sequence[ResultFile]:
-        """Result files."""
+        """Result files of the command, not yet rendered."""
 
 
 def table(output: CommandOutput, name: str) -> pd.DataFrame:
-    """Table of an output by the name of its file: "axial" of a prediction, "sweeps" of a fit."""
+    """Table of an output, by its file name without ending: "axial" of a prediction, "sweeps" of a fit."""
     return _content(output, name, "table")
 
 
 def picture(output: CommandOutput, name: str) -> Figure:
-    """Figure of an output by the name of its file, as a figure of matplotlib."""
+    """Figure of an output as a matplotlib figure, by its file name without ending, such as "sweeps"."""
     return _content(output, name, "figure")
 
 
@@ -40,8 +40,8 @@ def parameters(model: Result | HasResult) -> pd.DataFrame:
     """Parameters of a result, or of an output with a result, in SI.
 
     Returns:
-        Table with a row for each parameter: value, std error, ends of the 95 % interval, unit, and whether it was
-        fitted.
+        Table with a row for each parameter: value, std error, low and high end of the 95 % interval, unit, and fitted
+        (True or False).
     """
     from bushfit.report.spreadsheets import parameters_table
 
@@ -66,9 +66,9 @@ def save(
     Args:
         output: output of a command.
         folder: results folder.
-        tables: whether to write tables.
-        pictures: whether to write figures.
-        force: whether to replace files of an earlier result.
+        tables: True to write tables.
+        pictures: True to write figures.
+        force: True to replace files of an earlier result.
 
     Returns:
         The folder.
@@ -83,7 +83,7 @@ def save(
 
 
 def _content(output: CommandOutput, name: str, kind: Kind) -> Any:
-    """Content of a result file."""
+    """Make the content of the result file with the given name (without ending) and kind."""
     files = {file.name: file for file in output.files if file.kind == kind}
     if name not in files:
         word = {"figure": "picture"}.get(kind, kind)

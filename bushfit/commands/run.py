@@ -39,13 +39,13 @@ class RunDocument(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RunOutput:
-    """Results of the whole chain.
+    """Results of the whole chain: fits, diagnosis and prediction.
 
     Args:
         data: the campaign, prepared for the fits.
         static: fit of the loops, the first of the paper's two steps; None without loops.
-        two_step: the paper's procedure; None if it was left out.
-        reason_left_out: reason why the two-step procedure was left out.
+        two_step: results of the paper's two-step procedure; None if it was left out.
+        reason_left_out: reason why the two-step procedure was left out; empty otherwise.
         joint: fit of all parameters together.
         diagnosed: the diagnosis; None if no parameter is free.
         predicted: prediction of the model to use.
@@ -119,7 +119,7 @@ def run(campaign: Campaign | PreparedCampaign, *, loss: Loss | None = None) -> R
 
 
 def _two_step(data: PreparedCampaign) -> tuple[TwoStep | None, str]:
-    """The paper's procedure, or the reason why it is left out."""
+    """Result of the paper's two-step procedure, or None and the reason why it is left out."""
     if not (data.loops and data.sweeps):
         return None, f"no {'sweeps' if data.loops else 'loops'}"
     if not data.free(FIVE):

@@ -26,9 +26,9 @@ class SimulationOutput:
     """Results of a simulation.
 
     Args:
-        simulated: the simulated tests and the model behind them.
+        simulated: the simulated tests and the true model.
         files: campaign file, tables, and truth.json.
-        warnings: what the simulation leaves out.
+        warnings: sentences on parts of the model that the simulation leaves out.
     """
 
     simulated: Simulated
@@ -45,7 +45,7 @@ def simulate_campaign(truth: Model, settings: SimulateSettings, form: Form = "cs
     """Simulate the tests of a campaign.
 
     Args:
-        truth: the model; its correction without a name is left out, since it has no law in time.
+        truth: the true model; its unnamed correction is left out, because it has no law in time.
         settings: tests, noise and errors of the rig.
         form: format of the tables.
 
@@ -65,20 +65,20 @@ def simulate_campaign(truth: Model, settings: SimulateSettings, form: Form = "cs
 def simulate(
     source: Model | Result | HasResult | Campaign, folder: str | Path, *, force: bool = False, **settings: Any
 ) -> Campaign:
-    """Put a model on the virtual rig, write the campaign of its simulated tests, and load it.
+    """Simulate the tests of a model on the virtual rig, write them as a campaign, and load the campaign.
 
     Args:
-        source: model, result or output with a result, which is tested as the paper's bushing was; or a campaign with a
-            [simulate] table.
-        folder: folder for campaign.toml, the test files, and the model behind them in truth.json.
-        force: whether to replace files of an earlier simulation.
+        source: model, result or output with a result, with tests as in the paper unless stated in the settings; or a
+            campaign with a [simulate] table.
+        folder: folder for campaign.toml, the test files, and the true model in truth.json.
+        force: True to replace files of an earlier simulation.
         settings: further keys of [simulate], such as noise = 0.005, repeats = 3 or seed = 1.
 
     Returns:
         The simulated campaign, loaded from the folder.
 
     Raises:
-        BushfitError: no model, or files that would be replaced.
+        BushfitError: the source has no model, or files would be replaced.
     """
     if isinstance(source, Campaign):
         truth, tests = model_of(source), source.simulate or SimulateSettings()
