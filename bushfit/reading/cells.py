@@ -42,7 +42,7 @@ class Cells:
         layout: location of the table, with its headers, units row and delimiter.
         stated: format of the file as the user states it.
         roles: recognised columns, by role such as "force".
-        selected: positions of the rows of the test among all non-empty rows below the header, from 0; None for all.
+        selected: positions of the rows of the test among those of `all_rows`, from 0; None for all.
         needed: indices of columns that must contain a number; a row without one is not a row of data.
         clocks: indices of columns that contain times as texts, such as 20:07:10.
     """
@@ -98,7 +98,7 @@ class Cells:
             raise self.error("the table cannot be read", found=str(error)) from error
 
     def fault(self, cells: Sequence[str | float]) -> str | None:
-        """Return the reason why a row is not a row of data; None if it is one.
+        """Return the reason why a row is not data, as one of the words below; None for a row of data.
 
         "other": clearly not data, such as a remark or a mean; "missing": a known placeholder instead of a number;
         "word": another word instead of a number; "doubtful": looks like data, but cannot be read.
@@ -217,7 +217,7 @@ class Cells:
         return kind(problem, file=self.file, place=self.place(line, column), **details)
 
     def header_error(self, problem: str, found: str | None = None, **details: Any) -> MeasurementError:
-        """Return an error on the header line; `found` is by default the header cells, if the file is a table at all."""
+        """Return an error for the header line; if the file is a table, `found` is by default the header cells."""
         if found is None and self.is_table:
             found = ", ".join(self.headers)
         found = found or f"{len(self.headers)} cell{'s' * (len(self.headers) != 1)}, without the name of a column"
@@ -225,7 +225,7 @@ class Cells:
 
     @property
     def is_table(self) -> bool:
-        """True if the file is understood as a table of numbers; the text of any other file is not shown in errors."""
+        """True if the file is a table of numbers; errors do not quote the text of any other file."""
         return len(self.roles) > 1 or any(
             is_row(list(map(str, cells))) for _, cells in islice(self.rows(), _MOST_LISTED)
         )
@@ -242,7 +242,7 @@ class Cells:
 
     @cached_property
     def numerals(self) -> Numerals:
-        """Notation of the numbers in all columns with a role.
+        """Notation of the numbers in the columns whose quantity is known.
 
         Raises:
             MeasurementError: the numbers have two notations, or can be read in two ways.

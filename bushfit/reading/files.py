@@ -137,7 +137,7 @@ def line_of(data: bytes, index: int) -> str:
 
 
 def sha256(data: bytes) -> Future[str]:
-    """Start computing the SHA-256 of bytes, in a thread if they are many; the result is in hexadecimal digits."""
+    """Return a future with the SHA-256 of bytes in hexadecimal digits, computed in a thread if there are many bytes."""
     if len(data) <= CHUNK_BYTES:
         digest = Future[str]()
         digest.set_result(hashlib.sha256(data).hexdigest())

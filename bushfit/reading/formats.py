@@ -68,7 +68,7 @@ def _from_hdf5(node: Any) -> Any:
 
 
 def _bound(values: int) -> None:
-    """Raise a ValueError if a file unpacks to more values than are read."""
+    """Raise a ValueError if a number of values is larger than any recording has."""
     if values > _MOST_VALUES:
         raise ValueError(f"it unpacks to {values} values, of which at most {_MOST_VALUES} are read")
 

@@ -161,7 +161,7 @@ RESONANCE_COLUMNS: Mapping[str, Sequence[str]] = {
 
 
 def of_motion(names: Mapping[str, Sequence[str]], motion: Motion) -> dict[str, Sequence[str]]:
-    """Adapt the column names by role to a kind of motion: in a test of strain, G' names a modulus."""
+    """Return column names by role for a kind of motion: in a test of strain, G' names a modulus and not a stiffness."""
     return {role: _STRAINING.get(role, usual) if motion is STRAINING else usual for role, usual in names.items()}
 
 
@@ -227,7 +227,7 @@ class Vocabulary:
         return self._names[role]
 
     def roles(self, cells: Sequence[str]) -> set[str]:
-        """Return the roles that header cells name."""
+        """Return the roles, such as "force", of the columns with these header cells."""
         return {heading.role for cell in cells if (heading := self.heading(cell))}
 
     def _read(self, header: str) -> Heading | None:
@@ -320,7 +320,7 @@ def plain(name: str) -> str:
 
 
 def split_unit(header: str) -> tuple[str, str | None, AmplitudeConvention | None]:
-    """Split a header whose name has no known meaning into name, unit or None, and amplitude convention or None."""
+    """Return name, unit or None, and amplitude convention or None, of a header whose meaning is not known."""
     text, convention = split_convention(header)
     for name, unit, certain in _splits(text):
         if certain and unit is None and units.is_unit(name) and name != "-":
@@ -341,5 +341,5 @@ def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
 
 
 def _folded(text: str) -> str:
-    """Text in lower case without accents, of the same length."""
+    """Text in lower case without accents, with the same number of characters."""
     return "".join(unicodedata.normalize("NFKD", letter)[0] for letter in text.lower())

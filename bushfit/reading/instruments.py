@@ -74,7 +74,7 @@ def word_for_part(file: Path) -> str:
 
 
 def format_of(data: bytes, file: Path) -> Format | None:
-    """Identify the format of a recording by its first bytes; None for a text or a workbook.
+    """Return the format of a recording, identified by its first bytes; None for a text or a workbook.
 
     Raises:
         MeasurementError: the file has the ending of a recording, but not its content.

@@ -76,7 +76,7 @@ class FileFormat:
 
 @dataclass(frozen=True)
 class Layout:
-    """Location and header of a table in its file; lines count from 1.
+    """Location, delimiter, header and units of a table in its file; lines count from 1.
 
     Args:
         delimiter: character between cells; " " for runs of blanks; "" for a sheet, whose cells are separate already.
@@ -105,7 +105,7 @@ class Layout:
 
 
 def split(content: Content, delimiter: str) -> list[str]:
-    """Split a line into the texts of its cells, stripped of blanks and without empty cells at the end.
+    """Return the texts of the cells of a line, stripped of blanks and without empty cells at the end.
 
     Raises:
         csv.Error: the line or a quoted cell is far too long.
@@ -161,7 +161,7 @@ def find_layout(
 def _candidates(
     lines: Sequence[Line], before: Sequence[int], delimiters: Sequence[str], vocabulary: Vocabulary, commented: bool
 ) -> Iterator[tuple[tuple[int, ...], int, str, list[str]]]:
-    """Rank, index, delimiter and cells of each possible header: a line of `before` that names two columns or more."""
+    """Rank, index, delimiter and cells of each possible header: a line in `before` that names two columns or more."""
     for index in before:
         for order, delimiter in enumerate(delimiters):
             content = lines[index].content
@@ -187,7 +187,11 @@ def _is_unit_alone(header: str, vocabulary: Vocabulary) -> bool:
 
 
 def header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
-    """Yield the cells of a header line for each plausible way to split it, without empty cells at the end."""
+    """Split a header line into cells in each plausible way.
+
+    Yields:
+        Cells for one way to split the line, without empty cells at the end.
+    """
     if isinstance(content, str) and len(content := content.rstrip(f" \t{delimiter}")) > _LONGEST_HEADER:
         return
     content = _WIDE_GAP.sub("  ", content) if isinstance(content, str) else content

@@ -43,7 +43,7 @@ class Source:
     notes: tuple[str, ...] = ()
 
     def with_note(self, note: str) -> Source:
-        """Return a copy with a further note."""
+        """Return the provenance with a further note."""
         return replace(self, notes=(*self.notes, note))
 
 
@@ -95,13 +95,13 @@ class Loop:
         _check_lengths(self.name, self.time, self.displacement, self.force)
 
     def select(self, rows: slice | NDArray[np.bool_]) -> Loop:
-        """Return the loop with only some rows, selected by a slice or a mask, (n,)."""
+        """Return the loop with only the rows that a slice or a mask, (n,), selects."""
         return replace(self, **{name: getattr(self, name)[rows] for name in ("time", "displacement", "force")})
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """Complex dynamic stiffness at several operating points.
+    """Complex dynamic stiffness at several operating points, measured with a stepped sine.
 
     In a run, either the frequency is stepped at a constant amplitude, or the amplitude at a constant frequency. If a
     mass swings on a mount, neither is constant.

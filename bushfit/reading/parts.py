@@ -74,6 +74,9 @@ class OpenedFile:
 def open_file(file: Path, file_format: FileFormat) -> OpenedFile:
     """Read a text in any encoding, a workbook or a recording; `file_format.sheet` selects one of its parts.
 
+    Returns:
+        Content of the file, with all visible parts or the selected one.
+
     Raises:
         MeasurementError: the file cannot be read, or has no part with this name.
     """
@@ -208,5 +211,5 @@ def _row(cells: Sequence[object]) -> list[str | float]:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """List of names in quotation marks, shortened if there are many."""
+    """Names in quotation marks, separated by commas; only the first twelve."""
     return ", ".join(f'"{name}"' for name in names[:_MOST_LISTED]) + (", ..." if len(names) > _MOST_LISTED else "")

@@ -33,7 +33,7 @@ _FEWEST_POINTS = 3
 
 
 class Runs(NamedTuple):
-    """Runs of a sweep.
+    """Stepped quantity, nominal amplitudes and repeats of a sweep.
 
     Args:
         stepped: quantity that changes in a run; None if neither frequency nor amplitude is constant in a run.
@@ -59,7 +59,7 @@ def runs_of(
         stepped: stepped quantity if the user states it; None to detect it.
 
     Returns:
-        Runs of the sweep.
+        Stepped quantity, and the nominal amplitude and repeat number of each point.
 
     Notes:
         The quantity that changes less often from row to row is constant in a run. If the rows are not in the order of

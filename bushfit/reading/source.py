@@ -33,7 +33,7 @@ _GROUP_BY_BLANK = re.compile(rb"\d \d{3}(?!\d)")
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """Delimited text in UTF-8, with the original encoding of its file; search results and columns are cached."""
+    """Delimited text in UTF-8, with the original encoding of its file; parsed columns are cached."""
 
     data: bytes
     encoding: str | None
@@ -43,7 +43,7 @@ class Text:
     _parsed: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False)
 
     def head(self) -> list[Line]:
-        """Return the first non-empty lines of the text, in which the header is searched."""
+        """Return the first non-empty lines of the text, which can contain the header."""
         return list(islice(_lines(io.BytesIO(self.data[:HEAD_BYTES]), 0), MOST_HEAD_LINES))
 
     def lines(self, after: int) -> Iterator[Line]:
@@ -58,7 +58,7 @@ class Text:
         return ends[after] if len(ends) > after else len(self.data)
 
     def has(self, sign: str, layout: Layout) -> bool:
-        """Return True if the text below the header contains a character `sign`."""
+        """Return True if the text below the header contains the character `sign`."""
         start = self.offset(layout.lines_before_data)
         if (start, sign) not in self._parsed:
             self._parsed[start, sign] = self.data.find(sign.encode(), start) >= 0
@@ -202,7 +202,7 @@ class Sheet:
     numeric: frozenset[int] = frozenset()
 
     def head(self) -> list[Line]:
-        """Return the first non-empty rows of the sheet, in which the header is searched."""
+        """Return the first non-empty rows of the sheet, which can contain the header."""
         return list(islice(self.lines(0), MOST_HEAD_LINES))
 
     def lines(self, after: int) -> Iterator[Line]:
@@ -225,11 +225,11 @@ class Combined(Sheet):
     above: Sequence[Line] = ()
 
     def head(self) -> list[Line]:
-        """Return the lines above the first block, and the first rows."""
+        """Return the lines above the first block, and the first rows, which can contain the header."""
         return [*self.above, *islice(self.lines(0), MOST_HEAD_LINES)]
 
     def lines(self, after: int) -> Iterator[Line]:  # noqa: ARG002
-        """Yield all rows, with their original line numbers; `after` is ignored, since the header is stored apart."""
+        """Yield all rows, with their original line numbers; `after` is ignored: all rows are below the header."""
         return (Line(number, cells) for number, cells in zip(self.numbers, self.content, strict=True))
 
 
@@ -248,11 +248,11 @@ class Channels(Sheet):
     format: str = ""
 
     def head(self) -> list[Line]:
-        """Return the properties of the recording, and the first rows."""
+        """Return the properties of the recording as lines, and the first samples as rows."""
         return [*self.above, *islice(self.lines(0), MOST_HEAD_LINES)]
 
     def lines(self, after: int) -> Iterator[Line]:
-        """Yield the rows after row number `after`."""
+        """Yield the samples of all channels as rows, after row number `after`."""
         for start in range(after, len(self.arrays[0]), _CHUNK_ROWS):
             chunk = zip(*(values[start : start + _CHUNK_ROWS].tolist() for values in self.arrays), strict=True)
             yield from (Line(number, cells) for number, cells in enumerate(chunk, start=start + 1))

@@ -90,7 +90,7 @@ def place_tested(specimen: object, direction: object, specimens: Sequence[Specim
 
 
 def with_places(tables: Any, specimens: Sequence[Specimen]) -> Any:
-    """Return the parsed table [simulate] with the keys direction and specimen of each test resolved to objects.
+    """Return the parsed table [simulate] with the texts direction and specimen of each test replaced by an object.
 
     Raises:
         CampaignError: the keys of a test do not name a direction or specimen; see `place_tested`.

@@ -54,13 +54,13 @@ def stiffness_pair(table: Table) -> tuple[str, str]:
 
 
 def hint_of_derived(table: Table) -> str | None:
-    """Return the next step if the user can compute a column of a sweep from one of the table, such as a compliance."""
+    """Return the next step if a stiffness or loss can be computed from, say, a compliance in the table; else None."""
     headings = (_DERIVED.heading(header) for header in table.headers if header)
     return next((_WAYS_ON[heading.role] for heading in headings if heading), None)
 
 
 def refuse_ambiguous_damping(table: Table) -> None:
-    """Refuse a column "damping" that can be a loss factor or a damping ratio, if there is a stiffness or a force.
+    """Raise an error if a table with a stiffness or a force has a column "damping" that may be a factor or a ratio.
 
     Raises:
         MeasurementError: there is such a column.
@@ -123,7 +123,7 @@ def with_positive_loss(
 
 
 def complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tuple[Complex, Floats]:
-    """Compute the complex stiffness [N/m or N m/rad, or Pa], (n,), and the loss factor [-], (n,), from two columns.
+    """Return the complex stiffness [N/m or N m/rad, or Pa], (n,), and the loss factor [-], (n,), from two columns.
 
     Args:
         pair: roles of the two columns, one of PAIRS.

@@ -53,7 +53,7 @@ def ending(form: Form) -> str:
 
 
 def to_bytes(name: str, table: pd.DataFrame, form: Form) -> bytes:
-    """Convert a table to the bytes of a file.
+    """Return a table as the bytes of a file.
 
     Args:
         name: name of the sheet, if the file is a workbook.
@@ -67,7 +67,7 @@ def to_bytes(name: str, table: pd.DataFrame, form: Form) -> bytes:
 
 
 def to_csv(table: pd.DataFrame, *, decimal_comma: bool = False) -> bytes:
-    """Convert a table to the bytes of a CSV file, in which None and NaN are empty cells.
+    """Return a table as the bytes of a CSV file, in which None and NaN are empty cells.
 
     With `decimal_comma`, the file has semicolons, decimal commas and a byte order mark.
     """
@@ -152,7 +152,7 @@ def _write(book: Workbook, name: str, table: pd.DataFrame) -> None:
 
 
 def to_xlsx(tables: Mapping[str, pd.DataFrame]) -> bytes:
-    """Convert tables, by title, to the bytes of a workbook; titles are changed to sheet names that Excel allows.
+    """Return tables, by title, as the bytes of a workbook; titles are changed to sheet names that Excel allows.
 
     Raises:
         OutputError: a table is too large for a sheet.

@@ -24,9 +24,9 @@ _LARGEST_DAY_STEP = 1e-4
 
 
 def clock(text: str) -> float | None:
-    """Parse a clock time such as 20:07:10.1, or a date and a clock time.
+    """Return the time [s] in a text such as "20:07:10.1": since midnight, or since 1970 if a date precedes it.
 
-    Returns seconds since midnight, or since 1970 if there is a date; None if the text is neither.
+    None if the text is not a time.
 
     In 07:10:100 the last part is milliseconds. Days and months that are ambiguous are read as day and month; only the
     differences between rows are used.
