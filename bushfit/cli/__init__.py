@@ -15,8 +15,8 @@ import click
 from bushfit.errors import BushfitError, OutputError, did_you_mean, printable
 from bushfit.version import __version__
 
-#: Commands by what one wants to do, in their order: the module of each, loaded when it is called, with a function not
-#: called `command` after a point; and the line that `bushfit --help` shows.
+#: Commands by heading of `bushfit --help`: name of the command, module (with a function other than `command` after a
+#: point), and help line. The modules are imported when the command is called.
 _GROUPS = {
     "From tests to a result": {
         "run": ("run", "The main job: fits, diagnosis and prediction in one go."),
@@ -45,23 +45,22 @@ _GROUPS = {
 }
 _COMMANDS = {name: entry for commands in _GROUPS.values() for name, entry in commands.items()}
 
-#: Characters of the longest name of a command.
+#: Number of characters of the longest command name.
 _LONGEST = max(map(len, _COMMANDS))
 
-#: Linear algebra on one thread: the matrices are small, and a sum split over threads ends in other digits.
+#: Environment variables that limit linear algebra to one thread, so that rounding does not depend on the machine.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 #: Longest path that a message quotes, in characters.
 _LONGEST_PATH = 300
-#: Widest text of a help, in characters: longer lines are hard to read.
+#: Maximum width of help texts, in characters.
 _HELP_WIDTH = 110
 
-#: matplotlib reads the name of a backend when lmfit or a plot first imports it, and fails where it does not know it:
-#: notebooks set one that is not installed everywhere. Pictures go to files, so any backend without windows will do.
+#: Backend of matplotlib: writes figures to files. Set explicitly, because notebooks set backends that may be missing.
 _BACKEND = "agg"
 
 
 class _Commands(click.Group):
-    """Commands that are imported when called."""
+    """Command group that imports the module of a command when the command is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(_COMMANDS)
@@ -98,7 +97,11 @@ def cli() -> None:
 
 
 def main(command: click.Command = cli) -> None:
-    """Entry point: one clear error and exit status 2 for whatever the user can put right."""
+    """Run the command line and exit; errors that the user can correct are printed, with exit status 2.
+
+    Args:
+        command: click command to run, by default the group of all commands.
+    """
     os.environ.update(dict.fromkeys(_THREADS, "1"))
     os.environ["MPLBACKEND"] = _BACKEND
     if isinstance(sys.stdout, io.TextIOWrapper):
@@ -145,9 +148,9 @@ def _status(command: click.Command) -> int:
 
 
 class _Stream:
-    """A standard stream that nobody may read any more, because it is closed or its disk is full.
+    """Wrapper of standard output or standard error that handles closed pipes and full disks.
 
-    Output that `is_needed`, such as a result, then raises an error. Other messages are dropped, and the work continues.
+    If writing fails, a stream that `is_needed` (results) raises an OutputError; the other (messages) drops the text.
     """
 
     def __init__(self, stream: TextIO | None, *, is_needed: bool) -> None:
@@ -155,11 +158,11 @@ class _Stream:
         self._fault = None if stream else "it is closed"
 
     def write(self, text: str) -> int:
-        """Write a text, as a stream does."""
+        """Write a text; return the number of characters written."""
         return self._tried(lambda stream: stream.write(text))
 
     def flush(self) -> None:
-        """Write what is held back, as a stream does."""
+        """Write buffered text."""
         if self._stream:
             self._tried(lambda stream: stream.flush())
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from bushfit.batch.manifest import Command
     from bushfit.batch.summary import BatchResult
 
-#: Parts of a kind (failed, not judged, different) that the terminal names at most; batch.csv has all.
+#: Maximum number of parts per verdict (failed, not judged, different) that the terminal lists; batch.csv has all.
 _MOST_SHOWN = 10
 
 
@@ -120,7 +120,7 @@ def command(
 
 
 def _print_result(output: Output, result: BatchResult, folder: Path) -> None:
-    """Verdict, parts that need attention, then the scatter and capability of each quantity."""
+    """Print the verdict, the parts that need attention, and the scatter and capability of each quantity."""
     from bushfit.batch.run import FILES
 
     document, table = result.document, output.formats.table("batch")

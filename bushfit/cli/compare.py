@@ -16,9 +16,9 @@ from bushfit.progress import track
 if TYPE_CHECKING:
     from bushfit.commands.compare import ComparedResult, ComparisonOutput
 
-#: Value of --families without names.
+#: Value of the option --families if no names follow.
 _ALL = "all"
-#: Probability by chance, below which a parameter is said to differ.
+#: p-value below which the command reports that a parameter differs.
 _CHANCE = 0.05
 
 
@@ -90,7 +90,7 @@ def command(
 
 
 def _entry(source: Path, directions: tuple[str, ...]) -> ComparedResult:
-    """One of the results: of a model file, of a results folder, or of a campaign, which is fitted."""
+    """Load one result to compare from a model file, a results folder, or a campaign, which is fitted first."""
     from bushfit.campaign.campaign import Campaign
     from bushfit.commands.compare import compared_result
     from bushfit.commands.loading import load_source, model_file, model_source
@@ -101,7 +101,7 @@ def _entry(source: Path, directions: tuple[str, ...]) -> ComparedResult:
 
 
 def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> None:
-    """Print which results differ by more than chance, what to do, the letters of the results, and the numbers."""
+    """Print which results differ by more than chance, the next step, the sources of the results, and tables."""
     from bushfit.report.compared import FAMILY_HEADS, SideBySide, chance, parameter_cells
 
     first, *labels = compared.labels

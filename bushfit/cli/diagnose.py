@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from bushfit.commands.diagnose import DiagnosisOutput
     from bushfit.diagnosis.record import Diagnosis
 
-#: Colours of the verdicts on a terminal.
+#: Terminal colours of the verdicts.
 _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 
 
@@ -91,7 +91,7 @@ def command(
 
 
 def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
-    """Print a diagnosis: the verdict, the gap and where it is, the next test, and then the details."""
+    """Print a diagnosis: verdict, misfit between model and tests (gap), next test, and details."""
     from bushfit.effects import BASE
 
     diagnosis = diagnosed.diagnosis
@@ -109,7 +109,7 @@ def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
 
 
 def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") -> None:
-    """Print the verdict, what to do, the summary, and the probability of what may be missing."""
+    """Print the verdict of a diagnosis, the next step (`action`), a summary, and probabilities of missing effects."""
     from bushfit.diagnosis.record import odds_in_words
 
     colour = _COLOURS.get(diagnosed.headline, "yellow")
@@ -122,7 +122,7 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") 
 
 
 def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
-    """Print the effects named with their sizes, the gap before and after, where it is, and the next test."""
+    """Print the named effects with their sizes, the gap without and with them, its location, and the next test."""
     console, diagnosis, document = output.console, diagnosed.diagnosis, diagnosed.document
     for effect in document["effects"]:
         _print_effect(output, effect)
@@ -137,7 +137,7 @@ def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
 
 
 def _print_gap(output: Output, document: Mapping[str, Any]) -> None:
-    """Print the gap, held out first, and the expected error of the model."""
+    """Print the gap (misfit in units of noise), for held-out and fitted data, and the expected error of the model."""
     gap, usable, console = document["gap"], document["usable"], output.console
     held_out = gap["heldout"]
     cells = [f"{held_out[when]:.2f}" for when in ("before", "after")] if held_out else ["not testable", ""]
@@ -154,7 +154,7 @@ def _print_gap(output: Output, document: Mapping[str, Any]) -> None:
 
 
 def _print_effect(output: Output, effect: Mapping[str, Any]) -> None:
-    """Print one effect that was named: its physics, sizes and look-alikes."""
+    """Print one named effect: description, parameter values, and effects that the tests cannot distinguish from it."""
     console = output.console
     test = f" in {effect['test']}" if effect["test"] else ""
     console.print(f"  [bold]{effect['name']}[/bold]{escape(test)} ({effect['level']}): {escape(effect['sentence'])}")
@@ -178,7 +178,7 @@ def _print_effect(output: Output, effect: Mapping[str, Any]) -> None:
 
 
 def _print_candidates(output: Output, diagnosis: Diagnosis) -> None:
-    """Print every candidate that was refitted, and why it won or lost."""
+    """Print each candidate effect that was fitted, with its probability and the reason for the decision."""
     title = "candidates: reduction of chi-square (gain) and probability that the effect is missing in the model"
     fitted = ((candidate, candidate.gain) for candidate in diagnosis.candidates if candidate.gain is not None)
     rows = ((one.name, one.why, f"{gain:.0f}", f"{one.probability:.2f}") for one, gain in fitted)

@@ -12,7 +12,7 @@ import click
 from bushfit.cli.options import DIRECTIONS, FILE, Function, Parameter, add_parameters, option, option_of, under
 from bushfit.errors import BushfitError, MeasurementError
 
-#: What a test file does not say itself, as keys of a campaign, with metavar and words: of loops and sweeps, ...
+#: Options for metadata that a loop or sweep file may not contain: campaign key, metavar and help text.
 _OF_TESTS = {
     "amplitude": ("COUNTING", "zero-to-peak, peak-to-peak or rms [header]."),
     "at_amplitude": ("SIZE", '"0.1 mm", if no column states it [file name].'),
@@ -28,7 +28,7 @@ _OF_TESTS = {
     "elements": ("N", 'Of N blocks in shear: "772 mm^2", "6 mm" [1].'),
     "specimen_number": ("NUMBER", "Of the part, or of the rows to select."),
 }
-#: ... and how any file is written.
+#: Options for the file format: campaign key and metavar.
 _AS_WRITTEN = {
     "encoding": "NAME",
     "delimiter": "WORD",
@@ -37,9 +37,9 @@ _AS_WRITTEN = {
     "header_line": "LINE",
     "sheet": "NAME",
 }
-#: What test files are not, by their endings.
+#: Descriptions of files that are not test files, by extension.
 _NO_TESTS = {".toml": "a campaign, or what else TOML holds", ".json": "a model, or other JSON"}
-#: Types of what is stated, by key; else a text.
+#: click types of the options by key; other options are texts.
 TYPES: dict[str, "click.ParamType[Any]"] = {
     "direction": click.Choice(DIRECTIONS),
     "delimiter": click.Choice(["comma", "semicolon", "tab", "pipe", "caret", "blanks"]),
@@ -48,19 +48,20 @@ TYPES: dict[str, "click.ParamType[Any]"] = {
     **dict.fromkeys(("force_sign", "elements", "header_line"), click.INT),
 }
 _SAME_NAME = ("force_sign", *_OF_TESTS, *_AS_WRITTEN)
-#: What the options state of a test, by key; columns and units aside.
+#: Keys of all metadata options, except columns and units.
 STATED = ("direction", *_SAME_NAME)
-#: An inline table of TOML in the hint of an error.
+#: Pattern of an inline table of TOML in the hint of an error.
 _TABLE = re.compile(r"\{[^}]*\}")
-#: Such a table whose entries are options here, and one entry.
+#: Patterns of an inline table `columns` or `units`, and of one of its entries.
 _PAIRED = re.compile(r"(column|unit)s = \{([^}]*)\}")
 _ENTRY = re.compile(r'(\w+) = "([^"]*)"')
 
 
 def with_stated(*, sweeps: bool = True) -> Parameter:
-    """Decorator of a command on test `files`: what its options say of them becomes one `test_options`.
+    """Decorator that adds the argument `files` and the metadata options to a command, which receives `test_options`.
 
-    Beside loops there are `sweeps`, with all keys of a campaign, or else resonance tests, with those of any file.
+    Args:
+        sweeps: True for loops and sweeps, with the metadata of a campaign; False for histories and resonance tests.
     """
     keys = _OF_TESTS if sweeps else {}
     option_keys = ("direction", "force_sign", *keys, *_AS_WRITTEN)
@@ -106,13 +107,13 @@ def with_stated(*, sweeps: bool = True) -> Parameter:
 
 
 def _metadata_option(key: str, metavar: str, words: str | None = None) -> Parameter:
-    """The option of a key of a campaign."""
+    """Create the option of a campaign key, with its metavar and help text."""
     return option(option_of(key), metavar, words, type=TYPES.get(key))
 
 
 def _tests_alone(context: click.Context, _: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
-    """Refuse a campaign or a model among test files."""
-    for file in () if context.resilient_parsing else files:  # while somebody types, Tab is no error
+    """Callback of the argument `files`: raise a MeasurementError if a file is a campaign or a model."""
+    for file in () if context.resilient_parsing else files:  # no error during shell completion
         if (found := _NO_TESTS.get(file.suffix.lower())) and file.is_file():
             hint = "bushfit diagnose looks at all tests of a campaign together; name its files, or their folder, here"
             raise MeasurementError("a test file is needed", file=file, found=found, expected="a table", hint=hint)
@@ -121,7 +122,7 @@ def _tests_alone(context: click.Context, _: click.Parameter, files: tuple[Path, 
 
 @contextmanager
 def options_named() -> Iterator[None]:
-    """Add to an error that names keys of a campaign the options that do the same on the command line."""
+    """Context in which errors that name campaign keys also name the equivalent command-line options."""
     try:
         yield
     except BushfitError as error:
@@ -138,7 +139,7 @@ def options_named() -> Iterator[None]:
 
 
 def direction_error(file: Path, sheet: str | None = None) -> MeasurementError:
-    """The error for a file, or a part of it, of a direction that nothing settles."""
+    """Create the error for a test file, or a sheet of it, whose direction cannot be determined."""
     from bushfit.reading.instruments import word_for_part
 
     return MeasurementError(

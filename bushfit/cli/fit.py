@@ -106,7 +106,7 @@ def fit(
 
 
 def _finish(output: Output, folder: Path, fitted: FitOutput, model: Path | None, max_nrmse: float | None) -> None:
-    """Print and write the output of a fit; `model` is the model file that was read."""
+    """Print and write the result of a fit, and apply --max-nrmse; `model` is the model file that was read, if any."""
     from bushfit.commands.provenance import input_files
 
     campaign, result, file = fitted.data.campaign, fitted.result, quote_path(fitted.data.campaign.path)

@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from bushfit.inspection.gathering import TestSource
     from bushfit.inspection.record import Inspection, InspectionDocument
 
-#: Sides of the rubber whose radius or diameter is asked for.
+#: Sides of the rubber with a radius or diameter option.
 _SIDES = ("inner", "outer")
-#: An option that the hint of an error names, perhaps with the role of a column.
+#: Pattern of an option in the hint of an error, with the role of a column if it has one.
 _NAMED = re.compile(r'--(?:(column|unit) "?(\w+)=|([a-z][a-z-]+))')
-#: How a question is put, by the key that its answer is of, or else by the key itself.
+#: Text of the question for a missing option, by key; other questions show the key.
 _WORDS = {
     "column": "header of the column of the {role}",
     "unit": "unit of the {role}",
@@ -46,9 +46,9 @@ _WORDS = {
     "outer_diameter": 'its outer diameter, such as "36 mm"',
     "length": 'its length, the mean of inside and outside, such as "34 mm"',
 }
-#: The key that an answer is of, and of columns and units the role.
+#: Key of an option, and the role for columns and units ("" for other options).
 _Key = tuple[str, str]
-#: What is asked for once for all files, with what is offered.
+#: Options that are requested once for all files, with their default answers.
 _ONCE: dict[_Key, str] = {("amplitude", ""): "zero-to-peak", ("preload", ""): ""}
 _Read = TypeVar("_Read")
 
@@ -130,19 +130,19 @@ def command(
 
 
 def make_bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, dict[str, str]]:
-    """Make the bushing of the new campaign.
+    """Create the bushing of the new campaign from the options of its size.
 
     Args:
-        name: of the bushing.
+        name: name of the bushing.
         sizes: texts of the options for radii, diameters and the length, by key.
 
     Returns:
         The bushing, and the keys of its [bushing] table.
 
     Raises:
-        UsageError: radius and diameter of one side.
-        CampaignError, UnitError, ModelError: a size that is missing or impossible. Errors name the options, diameters
-            where these were given and halved.
+        UsageError: both radius and diameter of one side are given.
+        CampaignError, UnitError, ModelError: a size is missing or impossible. Errors name the options as given, radius
+            or diameter.
     """
     from bushfit.campaign.schema import BushingSettings
     from bushfit.validation import validate_tables
@@ -179,14 +179,14 @@ def make_bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, d
 def inspect_files(
     files: Sequence[Path], test_options: Mapping[str, Any], questions: Questions, *, is_sized: bool
 ) -> tuple[list[Inspection], list[str]]:
-    """Inspect the loops and sweeps among files, each of a known direction or specimen.
+    """Read the loops and sweeps among files, and determine the direction or specimen of each.
 
     Args:
         files: files and folders.
-        test_options: options that hold for all tests.
-        questions: of the command.
-        is_sized: whether sizes of a bushing are given: then a file that names a direction is a test of the bushing, and
-            not of a block in shear.
+        test_options: metadata from the command line, for all tests.
+        questions: asks for missing options at a terminal.
+        is_sized: True if sizes of a bushing are given: a file that names a direction is then a test of the bushing, not
+            of a block in shear.
 
     Returns:
         The inspections, and a sentence on each file that is left out.
@@ -227,7 +227,17 @@ def inspect_files(
 def inspect_source(
     source: TestSource, test_options: Mapping[str, Any], *, is_sized: bool, is_asking: bool
 ) -> Inspection:
-    """Inspect a test; raise an error for a missing option, at a terminal also for an optional one."""
+    """Read one test and its metadata.
+
+    Args:
+        source: file or sheet of the test.
+        test_options: metadata from the command line and from answers.
+        is_sized: True if sizes of a bushing are given.
+        is_asking: True at a terminal: a missing optional entry, such as the preload, is also an error.
+
+    Raises:
+        BushfitError: an option is missing; the hint names it.
+    """
     from bushfit.geometry import Specimen
     from bushfit.inspection.opening import BLOCK_KEYS
 
@@ -256,7 +266,7 @@ def inspect_source(
 
 
 def print_summary(output: Output, inspection: Inspection) -> None:
-    """Print one line on a file, then anything unusual in it."""
+    """Print one line on a test (kind, direction, levels), and warn of anything unusual in its file."""
     wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
     facts = [f"{key}: {value}" for key, value in inspection.facts.items() if key in wanted or key.startswith("from ")]
     name = inspection.file.parent / inspection.label
@@ -266,11 +276,11 @@ def print_summary(output: Output, inspection: Inspection) -> None:
 
 @dataclass(frozen=True)
 class Questions:
-    """Questions of one command at a terminal; the last answer is offered where a question comes again.
+    """Questions at a terminal for missing options of one command; a previous answer is the default next time.
 
     Args:
-        output: of the command.
-        enabled: whether somebody is there to answer, and no option forbids questions.
+        output: output of the command.
+        enabled: True if questions are permitted: at a terminal, without --no-input.
     """
 
     output: Output
@@ -279,7 +289,7 @@ class Questions:
 
     @classmethod
     def for_command(cls, output: Output, *, no_input: bool) -> Questions:
-        """Questions of a command; not enabled where nobody can answer, or wants to."""
+        """Create the questions of a command; disabled without a terminal and with --no-input, --quiet or --json."""
         enabled = not (no_input or output.quiet or output.as_json) and sys.stdin is not None and sys.stdin.isatty()
         return cls(output, enabled)
 
@@ -287,11 +297,11 @@ class Questions:
         """Call a function with options, and ask for those that its errors name until it succeeds.
 
         Args:
-            options: those of the command line.
-            read: function that needs options.
+            options: options of the command line.
+            read: function that takes the completed options.
 
         Returns:
-            What `read` returns.
+            Return value of `read`.
         """
         answers: dict[_Key, Any] = {}
         while True:
@@ -315,14 +325,14 @@ class Questions:
                 answers |= self.ask((new or wrong)[0], bare_error)
 
     def ask(self, key: _Key, error: BushfitError) -> dict[_Key, Any]:
-        """Ask for the option that an error names.
+        """Ask for the value of an option that an error names.
 
         Args:
-            key: of the option.
-            error: printed above the question.
+            key: key of the option, and its role.
+            error: error to print above the question.
 
         Returns:
-            The answer by its key: a rate in Hz is a frequency.
+            The answer by its key; a rate in Hz has the key of a frequency.
         """
         name, role = key
         answer = self._answers.get(key)
@@ -337,13 +347,13 @@ class Questions:
 
 
 def wanted_options(error: BushfitError) -> list[_Key]:
-    """Options that the hint of an error names; a column last, since files without one are more frequent."""
+    """Keys and roles of the options that the hint of an error names; columns are last, as they are rarely needed."""
     options = [(kind or option.replace("-", "_"), role) for kind, role, option in _NAMED.findall(error.hint or "")]
     known_options = [(name, role) for name, role in options if role or name in STATED or name in _WORDS]
     return sorted(known_options, key=lambda key: key[0] == "column")
 
 
 def is_about(error: BushfitError, key: _Key, answer: Any) -> bool:
-    """Return True if an error is about an answer."""
+    """Return True if an error concerns the answer to a question: it names the option `key` or quotes the answer."""
     is_placed, is_quoted = option_of(key[0]) in (error.place or ""), f'"{answer}"' in error.problem
     return is_placed or is_quoted or (error.found or "").strip('"') == str(answer)

@@ -14,27 +14,28 @@ from click.shell_completion import CompletionItem
 from bushfit.reading.tablefile import Form
 from bushfit.report.results import Picture
 
-#: In which a bushing is tested: geometry, which has them, is slow to import.
+#: Names of the directions of a bushing test; copied from `geometry`, which is slow to import.
 DIRECTIONS = ("axial", "radial", "torsion")
-#: What click asks for the words at the cursor.
+#: Type of click's shell-completion functions: (context, parameter, typed text) -> suggestions.
 Offer = Callable[[click.Context, click.Parameter, str], list[str]]
-#: What reads a file of this ending.
+#: Parsers by file extension.
 _READ: dict[str, Callable[[str], Any]] = {".toml": tomllib.loads, ".json": json.loads}
 Function = Callable[..., Any]
-#: Decorator that gives the function of a command an option or an argument.
+#: Decorator that adds an option or an argument to the function of a command.
 Parameter = Callable[[Function], Function]
 #: Type of an option or an argument that names a file or a folder.
 FILE = click.Path(path_type=Path)
-#: Characters of names in a help beside which their words stand; longer ones have them on the next line.
+#: Maximum width of option names in help texts [characters]; the text of longer names starts on the next line.
 _NAMES = 26
-#: What a command writes that has forms, and the option of these.
+#: Kinds of result files whose format can be chosen by an option.
 Written = Literal["tables", "pictures", "pages"]
 
 
 def _named(ctx: click.Context, tables: str, key: str) -> Iterator[str]:
-    """Values of a key of such tables in the campaigns and models that are typed already.
+    """Names for shell completion: values of a key in the files on the command line.
 
-    While somebody types, no file is an error.
+    `tables` is the name of an array of tables (such as "sweeps") in these campaigns or models. Files that cannot be
+    read are ignored.
     """
     values = [path for value in ctx.params.values() for path in (value if isinstance(value, tuple) else [value])]
     for path in {Path(path) for path in (*values, *ctx.args) if isinstance(path, str | Path)}:
@@ -45,7 +46,7 @@ def _named(ctx: click.Context, tables: str, key: str) -> Iterator[str]:
 
 
 def _offered(list_names: Callable[[click.Context], Iterable[str]], between: str = "") -> Offer:
-    """Shell completion from a list of names; with `between`, for the last name of a list separated by these signs."""
+    """Create a shell completion from a function that lists names; `between` are separators of several names."""
 
     def offer(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[str]:
         typed = re.match(f"(?:.*[{between}])?", incomplete) if between else None
@@ -62,7 +63,7 @@ def _effects(_: click.Context) -> list[str]:
 
 
 def _explanations(ctx: click.Context) -> Iterator[str]:
-    """Effects, and mistakes with the test that they may have been made in."""
+    """Names for shell completion: effects, and mistakes with the names of the tests in which they may occur."""
     from bushfit.effects.mistakes import MISTAKES, labelled
 
     yield from _effects(ctx)
@@ -72,12 +73,12 @@ def _explanations(ctx: click.Context) -> Iterator[str]:
         )
 
 
-#: What is offered in place of an option: an explanation, or several effects between commas and plus signs.
+#: Shell completions: an effect or mistake; several effects separated by commas or plus signs.
 explanations, effect_lists = _offered(_explanations), _offered(_effects, ",+")
 
 
 class Option(click.Option):
-    """An option that stands under a heading of its command's help, with its words alone: they say what a default is."""
+    """Option with a heading in its command's help; click adds no defaults to its help text."""
 
     heading: str | None = None
 
@@ -86,19 +87,26 @@ class Option(click.Option):
 
 
 def option(names: str, metavar: str | None, words: str | None = None, **more: Any) -> Parameter:
-    """An option of a command: its names (the last may be that in Python), what stands for its value, and its words."""
+    """Create an option of a command.
+
+    Args:
+        names: names separated by blanks; the last may be the name of the Python argument.
+        metavar: placeholder of the value in the help; None for an option without a value.
+        words: help text; None if the option shares the text of the next option.
+        **more: further arguments of click.option.
+    """
     return click.option(*names.split(), cls=Option, metavar=metavar, help=words, **more)
 
 
 def flag(names: str, words: str | None = None, **more: Any) -> Parameter:
-    """An option without a value."""
+    """Create an option without a value (True if given); the arguments are those of `option`."""
     return option(names, None, words, is_flag=True, **more)
 
 
 class Command(click.Command):
-    """A command whose help has its options under headings, in the order in which they are declared.
+    """Command whose help lists its options under headings, in the order in which they are declared.
 
-    Options without words share the line of the next that has some; without one, they are a paragraph of their own.
+    Options without a help text share the line of the next option; at the end of a heading they form a paragraph.
     """
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -128,7 +136,7 @@ else:
 
 
 class Folder(click.Path):
-    """A folder for results; an empty text, as of a variable that is not set, is none."""
+    """Option type for a results folder; an empty text is an error."""
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         return [CompletionItem(incomplete, type="dir")]
@@ -140,7 +148,7 @@ class Folder(click.Path):
 
 
 class Size(NumberType):
-    """Positive number up to `maximum`, also in per cent; error messages use the name of the quantity."""
+    """Option type for a positive number up to `maximum`, also in percent; error messages use `name`, the quantity."""
 
     def __init__(self, name: str, maximum: float) -> None:
         self.name, self._maximum = name, maximum
@@ -154,9 +162,11 @@ class Size(NumberType):
 
 
 def command_called(name: str, *examples: str) -> Callable[[Function], click.Command]:
-    """Decorator that makes a function a command, with command lines at the end of its help.
+    """Decorator that makes a function a command, with examples at the end of its help.
 
-    These work in a copy of the repository.
+    Args:
+        name: name of the command.
+        examples: arguments of the example command lines, which work in a copy of the repository.
     """
     title = f"Example{'s' * (len(examples) > 1)}:"
     return click.command(
@@ -165,14 +175,14 @@ def command_called(name: str, *examples: str) -> Callable[[Function], click.Comm
 
 
 def add_parameters(function: Function, *parameters: Parameter) -> Function:
-    """A command with options and arguments in the order of its help, before those that it has."""
+    """Add options and arguments to the function of a command, before its present ones; return the function."""
     for parameter in reversed(parameters):
         function = parameter(function)
     return function
 
 
 def under(heading: str, *parameters: Parameter) -> Parameter:
-    """Options that stand under a heading of the help, in this order."""
+    """Group options under a heading of the help, in the given order."""
 
     def decorate(function: Function) -> Function:
         before = len(getattr(function, "__click_params__", ()))
@@ -185,12 +195,12 @@ def under(heading: str, *parameters: Parameter) -> Parameter:
 
 
 def option_of(key: str) -> str:
-    """The option of a key: --force-sign of force_sign."""
+    """Name of the option for a key, such as --force-sign for force_sign."""
     return "--" + key.replace("_", "-")
 
 
 def place_option(words: str) -> Parameter:
-    """Directions or specimens by name, as `directions`; which specimens there are, only the campaign knows."""
+    """Create the option --direction for names of directions or specimens, with the help text `words`."""
 
     def check(ctx: click.Context, parameter: click.Parameter, places: tuple[str, ...]) -> tuple[str, ...]:
         if not all(place.strip() for place in places):
@@ -204,17 +214,17 @@ def place_option(words: str) -> Parameter:
 
 
 def effect_option(words: str) -> Parameter:
-    """Effects to add by name, as `effects`."""
+    """Create the option --effect for names of effects to add, with the help text `words`."""
     return option("--effect effects", "NAME", words, multiple=True, shell_complete=_offered(_effects))
 
 
 def file_option(name: str, words: str) -> Parameter:
-    """A file."""
+    """Create an option whose value is a file, with the help text `words`."""
     return option(name, "FILE", words, type=FILE)
 
 
 def format_options(*kinds: Written) -> list[Parameter]:
-    """Options for the formats of tables and figures, and for leaving pages out."""
+    """Create the format options for some kinds of result files: table format, figure format, or no HTML page."""
     options: dict[Written, Parameter] = {
         "tables": option(
             "--table-format",

@@ -48,14 +48,14 @@ _PATIENCE = 2.0
 _WIDTH = 100
 #: Largest number of warnings that are printed without -v.
 _MOST_WARNINGS = 3
-#: Signs in which warnings differ that say the same of several places or tests.
+#: Pattern of numbers, in which warnings of the same kind for several tests differ.
 _NUMBERS = re.compile(r"[-+\d.]+")
 #: Characters between two columns of a table.
 _GAP = 3
 
 
 class _Console(Console):
-    """Console on which texts from files cannot steer the terminal: their control characters are escaped."""
+    """Console that escapes control characters in texts from files."""
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         for segment in super().render(renderable, options):
@@ -64,14 +64,14 @@ class _Console(Console):
 
 @dataclass(frozen=True)
 class Output:
-    """Output of one call of a command, as the options that all commands share ask for it.
+    """Terminal messages and result files of one call of a command, controlled by the options that all commands share.
 
     Args:
-        output: folder for results, if it was given.
-        verbose, quiet: whether to print more, or nothing but errors.
-        as_json: whether to print the result as JSON on standard output.
-        force: whether to replace files of an earlier result.
-        no_plots, no_report: whether to leave out figures or HTML pages.
+        output: results folder from --output; None for the default.
+        verbose, quiet: True to print more, or errors only.
+        as_json: True to print the result as JSON on standard output.
+        force: True to replace files of an earlier result.
+        no_plots, no_report: True to leave out figures or HTML pages.
         table_format, plot_format: formats of tables and figures.
     """
 
@@ -89,7 +89,7 @@ class Output:
 
     @property
     def formats(self) -> Formats:
-        """Formats of result files, and the kinds to leave out."""
+        """Formats of result files, and the kinds that are written."""
         pictures = tuple(dict.fromkeys(self.plot_format))
         return Formats(True, not self.no_plots, not self.no_report, self.table_format, pictures)
 
@@ -103,41 +103,41 @@ class Output:
         return console
 
     def folder(self, name: str, form: str = "{}") -> Path:
-        """Folder for results: that of --output, else results/<name>, with text around the name by `form`."""
+        """Folder for results: --output, or results/<name>; `form` is a template of the name, such as "plan {}"."""
         return self.output or Path("results") / form.format(folder_name(name))
 
     def free_folder(self, name: str, *files: str, form: str = "{}") -> Path:
-        """Folder for results, checked before the work: it can be written, and these files may be written there.
+        """Folder for results, after a check that it is writable and that the files do not exist yet (unless --force).
 
         Args:
             name: name of the result.
-            files: names of its main files, with endings.
-            form: text around the name, such as "plan {}".
+            files: names of the main result files, with extensions.
+            form: template of the folder name, such as "plan {}".
 
         Raises:
-            OutputError: the folder cannot be written, or holds one of the files.
+            OutputError: the folder cannot be written, or contains one of the files.
         """
         folder = self.folder(name, form)
         check_free(folder, files, overwrite=self.force)
         return folder
 
     def print(self, text: str) -> None:
-        """Print a line as it is, without markup."""
+        """Print a line on standard error without interpreting markup."""
         self.console.print(text, markup=False)
 
     def print_headline(self, name: str, verdict: str, action: str = "", colour: str = "default") -> None:
-        """Print the first two lines of a result: its verdict, which no warning repeats, and what to do."""
+        """Print the first two lines of a result: name and verdict, then the next step (`action`)."""
         self._headlines.append(verdict)
         self.console.print(f"[bold]{escape(name)}:[/bold] [{colour}]{escape(verdict)}[/]")
         if action:
             self.print(f"  {action}")
 
     def warn(self, warnings: Iterable[str]) -> None:
-        """Keep warnings to be printed below the results."""
+        """Collect warnings, which are printed below the results."""
         self._warnings.update(dict.fromkeys(warnings))
 
     def print_warnings(self) -> None:
-        """Print the most important of the warnings that were kept, each for one place or test only; with -v all."""
+        """Print the most important collected warnings, one of each kind; with -v all."""
         if not self._warnings:
             return
         from bushfit.prediction.caveats import by_importance, use_of
@@ -166,8 +166,8 @@ class Output:
             title: title above the table.
             columns: headers.
             rows: cells of each row.
-            text_columns: number of columns with texts, which are wrapped; the other ones hold numbers, which are never
-                cut or wrapped.
+            text_columns: number of leading columns with texts, which are wrapped; the other columns contain numbers,
+                which are never cut or wrapped.
         """
         rows, console = [list(map(printable, row)) for row in rows], self.console
         widths = _column_widths(columns, rows, text_columns, console.width)
@@ -204,7 +204,7 @@ class Output:
         Args:
             folder: results folder.
             files: result files.
-            document: content of --json.
+            document: JSON data to print if --json is given; None for no JSON.
             inputs: files that the command has read and must not replace.
         """
         self.print_warnings()
@@ -216,10 +216,10 @@ class Output:
 
 
 def with_output(folder: str, *written: Written) -> Parameter:
-    """Decorator of a command: the options that all commands share become one `output`.
+    """Decorator that adds the options shared by all commands, and passes them to the command as one `output`.
 
     Args:
-        folder: default folder of results, as the help states it.
+        folder: default results folder, as text for the help.
         written: kinds of result file whose formats can be chosen.
     """
 
@@ -252,7 +252,7 @@ def with_output(folder: str, *written: Written) -> Parameter:
 
 
 def _column_widths(columns: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int, width: int) -> list[int]:
-    """Widths of columns that fit the terminal, headers and texts wrapped between words; none if they do not fit."""
+    """Column widths [characters] with headers and texts wrapped between words; empty if the table exceeds `width`."""
     widths, narrowest = [], []
     for index, (header, *cells) in enumerate(zip(columns, *rows, strict=True)):
         unbroken = [part for cell in cells for part in cell.split()] if index < text_columns else cells
@@ -267,7 +267,7 @@ def _column_widths(columns: Sequence[str], rows: Sequence[Sequence[str]], text_c
 
 @contextmanager
 def _progress(console: Console) -> Iterator[None]:
-    """Show a line for each kind of work from two seconds on; on a terminal alone, and not with --quiet."""
+    """Context that shows progress bars after two seconds; only on a terminal, and not with --quiet."""
     if console.quiet or not (console.is_interactive and console.file.isatty()):
         yield
         return
@@ -293,7 +293,7 @@ def _progress(console: Console) -> Iterator[None]:
         show()
 
     def show() -> None:
-        """Start or stop the bar: a message between two kinds of work gets a line of its own."""
+        """Show the progress bars if there is work in progress, and hide them otherwise."""
         if lines and not patient:
             bar.start()
         elif bar.live.is_started:

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from bushfit.planning.campaign import Check
     from bushfit.planning.document import PlanFile, Shown
 
-#: Hours of the rig at most: months, as a typing error.
+#: Maximum of --hours; larger values are typing errors.
 _MOST_HOURS = 2000.0
-#: Effects that the terminal shows at most without -v: those that the plan shows least well beside the standard.
+#: Maximum number of effects printed without -v: those that the plan detects least well compared with the standard.
 _MOST_EFFECTS = 6
-#: Amplitudes or frequencies of a test that are listed in full at most.
+#: Maximum number of amplitudes or frequencies of a test that are all printed.
 _MOST_VALUES = 6
 
 
@@ -128,12 +128,12 @@ def command(
 
 
 def _names(text: str | None) -> tuple[str, ...]:
-    """Names between commas, each once."""
+    """Split a comma-separated text into names without duplicates."""
     return tuple(dict.fromkeys(filter(None, (name.strip() for name in (text or "").split(",")))))
 
 
 def _target(text: str) -> tuple[str, float]:
-    """Name and size of a target such as "stiffness.axial=1 %"."""
+    """Parse a target such as "stiffness.axial=1 %" into its name and its relative size (0.01)."""
     name, equals, size = text.rpartition("=")
     if not equals:
         raise click.BadParameter(f"'{text}' is no name, '=' and size, such as \"mu=2 %\".", param_hint="'--target'")
@@ -141,7 +141,7 @@ def _target(text: str) -> tuple[str, float]:
 
 
 def _print_plan(output: Output, outcome: PlanOutput) -> None:
-    """Print the tests, the expected errors beside those of the standard programme, and the warnings."""
+    """Print the planned tests, their expected errors compared with the standard programme, and the warnings."""
     document = outcome.document
     hours = number(document["hours_planned"], 3)
     gains = (
@@ -180,7 +180,7 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
 
 
 def _print_tests(output: Output, outcome: PlanOutput) -> None:
-    """Print each test with the number of its runs; plan.csv has the runs in their order."""
+    """Print a table of the planned tests with the number of runs of each."""
     from bushfit.campaign.schema import SimulatedLoop
     from bushfit.planning.contract import motions
 
@@ -196,18 +196,18 @@ def _print_tests(output: Output, outcome: PlanOutput) -> None:
 
 
 def _listed(values: Sequence[float], factor: float) -> str:
-    """Few values in full, many as the first and the last."""
+    """Format values times a factor: up to six values in full, more as the first, the last and their number."""
     words = [number(factor * value, 3) for value in values]
     return ", ".join(words) if len(words) <= _MOST_VALUES else f"{words[0]} to {words[-1]} ({len(words)})"
 
 
 def _percents(rows: Mapping[str, Mapping[str, Any]], keys: Sequence[str]) -> list[tuple[str, ...]]:
-    """Rows of a table: each name with some of its values in percent."""
+    """Table rows: each name with the values of the given keys in percent."""
     return [(name, *(number(100.0 * row[key], 2) for key in keys)) for name, row in rows.items()]
 
 
 def _print_effects(output: Output, document: PlanFile) -> None:
-    """Print the smallest detectable amounts of effects, those first that the plan shows least well."""
+    """Print the smallest detectable amounts of effects with the plan and with the standard tests."""
 
     def ratio(amounts: Shown) -> float:
         return (amounts["standard"] or math.inf) / (amounts["planned"] or math.inf)
@@ -225,7 +225,7 @@ def _print_effects(output: Output, document: PlanFile) -> None:
 
 
 def _simulate_plan(output: Output, outcome: PlanOutput, count: int, seed: int) -> Check:
-    """Simulate the plan and print a table of predicted and observed standard errors."""
+    """Simulate and fit the planned tests `count` times, and print predicted and observed standard errors."""
     from bushfit.batch.executor import local_workers, run_rows
     from bushfit.planning.campaign import RelativeErrors, check
     from bushfit.progress import track

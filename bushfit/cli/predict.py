@@ -15,7 +15,7 @@ from bushfit.cli.shared_options import grid_values, kelvin, positive, prediction
 if TYPE_CHECKING:
     from bushfit.commands.predict import PredictionOutput
 
-#: Largest number of amplitudes of a direction that the terminal shows; the CSV has all.
+#: Maximum number of amplitudes per direction that the terminal shows; the CSV has all.
 _MOST_AMPLITUDES = 8
 
 
@@ -90,7 +90,7 @@ def command(
 
 
 def _print_summary(output: Output, predicted: PredictionOutput) -> None:
-    """Print what may be done with the prediction, and the range of stiffness and loss factor of each place."""
+    """Print the permitted use of the prediction, and the range of stiffness and loss factor for each direction."""
     from bushfit.prediction.caveats import by_importance, use_of
     from bushfit.units import format_range
 
@@ -112,7 +112,7 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
 
 
 def print_predictions(output: Output, predicted: PredictionOutput) -> None:
-    """Print the corners of each table, and the warnings."""
+    """Print the rows of each prediction table at the lowest and highest frequency, and collect its warnings."""
     from bushfit.report.tables import prediction_table, spread
     from bushfit.units import format_aligned, number
 

@@ -18,7 +18,7 @@ _MOST_TESTS = 8
 
 
 def print_step(output: Output, title: str, result: Result) -> None:
-    """Print a result with its warnings and, with -v, the files behind it."""
+    """Print a fit result with its warnings and, with -v, its equation and input files."""
     from bushfit.prediction.caveats import warnings_of
 
     print_result(output, title, result)
@@ -27,7 +27,7 @@ def print_step(output: Output, title: str, result: Result) -> None:
 
 
 def print_result(output: Output, title: str, result: Result) -> None:
-    """Print the parameters of a result, its quality, its tests, and strong correlations."""
+    """Print the parameters of a fit result, its quality, the misfit of its tests, and strong correlations."""
     print_parameters(output, title, result)
     if quality := result.quality:
         gain = quality.loop_gain_error
@@ -47,7 +47,7 @@ def print_result(output: Output, title: str, result: Result) -> None:
 
 
 def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Usable]) -> None:
-    """Print the misfit of each test, with -v of each of its runs, and the expected error of the model."""
+    """Print the misfit of each test, with -v also of each run, and the expected error of the model."""
     from bushfit.report.tables import DISPLAYS
 
     tests = [test for test in misfits if output.verbose or test.held is None]
@@ -75,7 +75,7 @@ def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Usab
 
 
 def print_origin(output: Output, result: Result) -> None:
-    """Print the equation of a model and the files behind it, with -v alone."""
+    """Print the equation of a model and its input files; nothing without -v."""
     if output.verbose:
         output.print(result.model.equation())
         for source in result.inputs:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from bushfit.reduction.resonance import Resonance
     from bushfit.reduction.result import Reduction, Step
 
-#: Lines an octave in which a resonance test is shown; chosen: a dozen lines for most tests.
+#: Number of printed lines per octave of a resonance test; chosen: a dozen lines for most tests.
 _LINES_AN_OCTAVE = 3
 
 
@@ -128,7 +128,7 @@ def _reduce_resonance(
     shaker: Mapping[str, str | None],
     levels: str | None,
 ) -> tuple[Resonance, str, str]:
-    """Reduce a resonance test. Returns the points, and the campaign key ("direction" or "specimen") and its value."""
+    """Reduce a resonance test to a sweep; return it with its campaign key ("direction" or "specimen") and value."""
     from bushfit.geometry import Direction
     from bushfit.inspection.opening import test_direction
     from bushfit.reading.resonance import read_resonance
@@ -169,7 +169,7 @@ def _reduce_resonance(
 
 
 def _read(files: Sequence[Path], test_options: Mapping[str, Any]) -> list[Loop]:
-    """Read histories of one direction; their names are their stems, or their paths if two stems are equal."""
+    """Read stepped-sine histories of one direction; each is named by its file without extension, or by its path."""
     from bushfit.inspection.gathering import TestSource, distribute_options
     from bushfit.inspection.opening import read_history
 
@@ -193,7 +193,7 @@ def _read(files: Sequence[Path], test_options: Mapping[str, Any]) -> list[Loop]:
 
 
 def _print_steps(output: Output, reduction: Reduction) -> None:
-    """Print one line per level and repeat; with -v one line per point."""
+    """Print the reduced points: one line per amplitude level and repeat, or with -v one line per point."""
     units = reduction.direction.display
     (unit, length), (stiffness_unit, factor) = units.displacement, units.stiffness
 
@@ -230,7 +230,7 @@ def _print_steps(output: Output, reduction: Reduction) -> None:
 
 
 def _print_resonance(output: Output, resonance: Resonance) -> None:
-    """Print one line per third of an octave; with -v one line per point."""
+    """Print a reduced resonance test: one line per third of an octave, or with -v one line per point."""
     import numpy as np
 
     from bushfit.geometry import TRANSLATION

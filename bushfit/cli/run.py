@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from bushfit.fitting.procedures import TwoStep
     from bushfit.model.result import Result
 
-#: Standard errors up to which two fits are said to agree.
+#: Largest difference between two fits that agree, in standard errors.
 _AGREED = 2
-#: Standard errors up to which a difference is counted; chosen: beyond, they disagree, by however many.
+#: Largest difference that is printed as a number, in standard errors; chosen.
 _COUNTED = 10.0
-#: Standard error over that of the joint fit from which a parameter is not determined at all; chosen.
+#: Ratio of the standard errors of two-step and joint fit above which a parameter is not determined; chosen.
 _OPEN = 100.0
 
 
@@ -55,13 +55,13 @@ def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | N
 
 
 def print_run(output: Output, name: str, outcome: RunOutput, action: str) -> None:
-    """Print the result, with -v the steps before it, and the procedure of the paper in one line.
+    """Print the result of `bushfit run`, with -v each step, and one line on the paper's two-step procedure.
 
     Args:
         output: output of the command.
         name: name of the campaign.
-        outcome: results of the whole chain.
-        action: what to do, below the verdict.
+        outcome: results of all steps.
+        action: next step for the user, printed below the verdict.
     """
     diagnosed, result = outcome.diagnosed, outcome.result
     if diagnosed:
@@ -88,7 +88,7 @@ def print_run(output: Output, name: str, outcome: RunOutput, action: str) -> Non
 
 
 def _model_description(outcome: RunOutput) -> str:
-    """Description of the model to use."""
+    """Phrase that describes the model that the user should use, and how it differs from the plain joint fit."""
     if outcome.diagnosed and outcome.added:
         effects = ", ".join(effect.label for effect in outcome.diagnosed.diagnosis.effects)
         return f"with {effects}; joint.json is the fit without"
@@ -98,7 +98,7 @@ def _model_description(outcome: RunOutput) -> str:
 
 
 def _print_range(output: Output, outcome: RunOutput) -> None:
-    """Print the tested range of each direction, whether or not its tests were fitted."""
+    """Print the tested range of frequency and amplitude for each direction, fitted or not."""
     measured = outcome.result.measured
     fitted = measured.directions if measured else ()
     output.console.print("tested range; outside this range the model extrapolates", style="bold")
@@ -119,7 +119,7 @@ def _print_range(output: Output, outcome: RunOutput) -> None:
 
 
 def two_step_line(two_step: TwoStep, joint: Result) -> str:
-    """Line that compares the two-step procedure with the joint fit; at a bound, errors do not count."""
+    """Sentence that compares the paper's two-step procedure with the joint fit, in standard errors."""
     found, difference, ratio = two_step.result, dict[str, float](), dict[str, float]()
     for name in joint.fitted:
         errors = found.covariance.stderr(name), joint.covariance.stderr(name)
@@ -149,7 +149,7 @@ def two_step_line(two_step: TwoStep, joint: Result) -> str:
 
 
 def _print_two_steps(output: Output, name: str, two_step: TwoStep, joint: Result) -> None:
-    """Print the passes of the two-step procedure, its result, and its values and errors beside the joint fit."""
+    """Print the parameters after each pass of the two-step procedure, and its result compared with the joint fit."""
     result, last = two_step.result, two_step.passes[-1]
     units = {name: display_unit(result.model.parameters[name].unit, 1.0, value) for name, value in last.items()}
     columns = [  # aligned from the last pass, whose decimals the others have

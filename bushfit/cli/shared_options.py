@@ -28,15 +28,15 @@ if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
     from bushfit.model.result import Result
 
-#: SI units of the options of a grid, by their keys.
+#: SI units of the grid options, by key.
 _UNITS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
 
 
 def campaign_options(soft_l1: str = "less weight on distant points, none on outliers") -> Parameter:
-    """Argument CAMPAIGN, as `campaigns`, and the options of every command that fits it.
+    """Create the argument CAMPAIGN (`campaigns`) and the options of all commands that fit a campaign.
 
     Args:
-        soft_l1: effect of the loss soft_l1, as the help states it.
+        soft_l1: help text on the loss function soft_l1.
     """
 
     def decorate(function: Function) -> Function:
@@ -64,11 +64,11 @@ def campaign_options(soft_l1: str = "less weight on distant points, none on outl
 
 
 def open_campaign(campaigns: Sequence[Path]) -> Campaign:
-    """Load the one campaign of a command line.
+    """Load the campaign of a command that takes exactly one.
 
     Raises:
-        UsageError: several campaigns.
-        CampaignError: test files in its place, or a campaign that cannot be used.
+        UsageError: several campaigns are given.
+        CampaignError: the files are test files, or the campaign is invalid.
     """
     from bushfit.campaign.campaign import load_campaign, refuse_tests
 
@@ -84,14 +84,14 @@ def open_campaign(campaigns: Sequence[Path]) -> Campaign:
 
 
 def exit_above(max_nrmse: float | None, result: Result) -> None:
-    """Exit with status 1 if the misfit of a result is above the limit of --max-nrmse."""
+    """Exit with status 1 if the misfit (NRMSE, 1 = 100 %) of a result exceeds the limit of --max-nrmse."""
     if max_nrmse is not None and result.quality and result.quality.nrmse > max_nrmse:
         click.echo(f"bushfit: NRMSE {result.quality.nrmse:.4g} is above --max-nrmse {max_nrmse:g}", err=True)
         click.get_current_context().exit(1)
 
 
 def grid_options(default: str) -> Parameter:
-    """Options of the grid of a prediction, by the keys of [predict]; `default` is the grid without them."""
+    """Create the options for the frequencies and amplitudes of a prediction; `default` is the default in the help."""
     return lambda function: add_parameters(
         function,
         option("--frequencies", "GRID", f'"5:155:10 Hz" or "20, 50 Hz" [{default}].'),
@@ -102,7 +102,7 @@ def grid_options(default: str) -> Parameter:
 
 
 def prediction_options(campaign: str) -> Parameter:
-    """Options of where, and at which temperature, a model is predicted; `campaign` is the help of --campaign."""
+    """Create the options for directions, grid and temperature of a prediction, and --campaign with a help text."""
     return under(
         "Range and conditions",
         place_option("axial, radial, torsion or a specimen; may be given again [axial and radial, and all specimens]."),
@@ -113,21 +113,21 @@ def prediction_options(campaign: str) -> Parameter:
 
 
 def grid_values(directions: Sequence[str], grids: Mapping[str, str | None]) -> dict[str, Any]:
-    """Directions, and the values of the options of a grid in SI, as keyword arguments; None for a default."""
+    """Convert the grid options to keyword arguments: directions, frequencies and amplitudes [SI]; None for a default."""
     axes = {key: parse_grid(grids[key], option_of(key), unit) for key, unit in _UNITS.items()}
     return {"directions": tuple(directions) or None, **axes}
 
 
 def positive(text: str | None, option: str, unit: str) -> float | None:
-    """Value of an option in SI, above zero; None if it was not given.
+    """Parse the value of an option to a positive number in SI units; None if the option was not given.
 
     Args:
         text: text of the option.
         option: name of the option, for errors.
-        unit: SI unit.
+        unit: SI unit of the result.
 
     Raises:
-        UnitError: no value with a unit, or one that is not positive.
+        UnitError: the text is not a value with a unit, or not positive.
     """
     if text is None:
         return None
@@ -139,7 +139,7 @@ def positive(text: str | None, option: str, unit: str) -> float | None:
 
 
 def kelvin(text: str | None) -> float | None:
-    """Value of --temperature [K]; None if it was not given."""
+    """Parse the text of --temperature, such as "40 degC", to kelvin; None if the option was not given."""
     from bushfit.units import parse_temperature
 
     with error_location(place="--temperature"):
@@ -147,15 +147,15 @@ def kelvin(text: str | None) -> float | None:
 
 
 def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | None:
-    """Values of an option such as "5:155:10 Hz" or "0.1, 0.2, 0.5 mm" in SI; None if it was not given.
+    """Parse a grid option such as "5:155:10 Hz" or "0.1, 0.2, 0.5 mm" to values in SI; None if it was not given.
 
     Args:
         text: text of the option.
         option: name of the option, for errors.
-        unit: SI unit.
+        unit: SI unit of the result.
 
     Raises:
-        UnitError: no numbers, no unit, or a unit of another dimension.
+        UnitError: the text has no numbers, no unit, or a unit of another dimension.
     """
     if text is None:
         return None
