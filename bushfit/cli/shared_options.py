@@ -113,7 +113,7 @@ def prediction_options(campaign: str) -> Parameter:
 
 
 def grid_values(directions: Sequence[str], grids: Mapping[str, str | None]) -> dict[str, Any]:
-    """Convert the grid options to keyword arguments: directions, frequencies and amplitudes [SI]; None for a default."""
+    """Convert grid options to keyword arguments: directions, frequencies and amplitudes [SI]; None for a default."""
     axes = {key: parse_grid(grids[key], option_of(key), unit) for key, unit in _UNITS.items()}
     return {"directions": tuple(directions) or None, **axes}
 
