@@ -1,1 +1,1 @@
-"""The report: tables and pictures of what was found, written to a folder whole or not at all."""
+"""Tables, figures and HTML pages of results, and the results folder that they are written to."""

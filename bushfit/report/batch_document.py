@@ -1,4 +1,4 @@
-"""The JSON file of a batch, `batch.json`, which `bushfit batch --json` prints too and from which the page is made."""
+"""Types of `batch.json`, the JSON file of a batch, which `bushfit batch --json` also prints."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

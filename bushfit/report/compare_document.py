@@ -1,4 +1,4 @@
-"""The JSON file of a comparison, `compare.json`, key by key; its JSON Schema is made from these types."""
+"""Types of `compare.json`, the JSON file of a comparison, from which its JSON Schema is made."""
 
 from typing import Annotated, Literal
 

@@ -1,4 +1,4 @@
-"""Tables and cells of a comparison: of two results at a place, and of compare.json."""
+"""Tables of the differences between results, computed or read from compare.json, and formatted cells."""
 
 from __future__ import annotations
 

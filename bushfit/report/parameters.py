@@ -1,4 +1,4 @@
-"""Parameters as texts: significant digits, common units, intervals."""
+"""Parameters as texts: significant digits, display units, intervals."""
 
 import math
 from collections.abc import Iterator

@@ -1,8 +1,8 @@
-"""Result files: their content, the formats they are written in, and the folder they go to.
+"""Result files: content, file formats, and writing into a results folder.
 
-A results folder is a plain folder. Each file is written under a temporary name beside its predecessor and then moved
-over it, so that a command that is killed leaves each file old or new, never torn. Nothing else in the folder is
-touched. bushfit replaces a file only if the record `.bushfit.sha256` of the folder lists its present content.
+A results folder is a plain folder. Each file is written under a temporary name in the same folder and then moved over
+its predecessor, so that a killed command leaves each file either old or new, never incomplete. Nothing else in the
+folder changes. bushfit replaces a file only if the record `.bushfit.sha256` of the folder lists its present content.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 #: File formats of a figure.
 Picture = Literal["png", "svg", "pdf"]
-#: Kinds of result file in the order in which they are written: numbers first, so that a failing picture loses none.
+#: Kinds of result file in the order of writing: numbers first, so that a figure that fails does not lose them.
 Kind = Literal["json", "raw", "table", "page", "figure"]
 _KINDS: tuple[Kind, ...] = ("json", "raw", "table", "page", "figure")
 #: Record of the files that bushfit wrote into a folder: lines of SHA-256 and name, as of the program sha256sum.
@@ -231,7 +231,7 @@ def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
             finally:
                 part.unlink(missing_ok=True)
     except OSError as error:
-        with suppress(OSError):  # a folder that holds nothing yet
+        with suppress(OSError):  # remove the folder if it is still empty
             folder.rmdir()
         raise unwritable(folder, error) from error
 

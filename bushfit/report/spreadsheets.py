@@ -17,13 +17,13 @@ _OF_ALL = ("parameters", "provenance")
 
 
 def csv(order: Order) -> Exported:
-    """Export a model as CSV files, one for each table."""
+    """Export the model of an order as CSV files, one for each table (predictions, parameters, provenance)."""
     written = {name: to_csv(table, decimal_comma=order.decimal_comma) for name, table in _tables(order).items()}
     return Exported({f"{name.replace(' ', '_')}.csv": file for name, file in written.items()}, (NO_LOOPS,))
 
 
 def xlsx(order: Order) -> Exported:
-    """Export a model as an Excel workbook, `bushing.xlsx`, with a sheet for each table."""
+    """Export the model of an order as an Excel workbook, `bushing.xlsx`, with a sheet for each table."""
     return Exported({"bushing.xlsx": to_xlsx(_tables(order))}, (NO_LOOPS,))
 
 

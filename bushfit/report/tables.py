@@ -1,4 +1,4 @@
-"""Tables for spreadsheets: units in every header, one row a point."""
+"""Tables for spreadsheets: units in every header, one row per point."""
 
 import re
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The page of a comparison: what differs, parameters side by side, stiffness and loss factor with their differences."""
+"""Content of the page of a comparison: parameters, stiffness and loss factor side by side, and their differences."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple

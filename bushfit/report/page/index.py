@@ -1,4 +1,4 @@
-"""The page of a batch, `index.html`: parts that fail or differ, what the batch can show, and a table of all parts."""
+"""Content of the page of a batch, `index.html`: parts that fail or differ, statistics, and a table of all parts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

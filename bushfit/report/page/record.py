@@ -1,4 +1,4 @@
-"""Everything that a report shows: the records of a result, from a run or from its folder."""
+"""Input of a report: model, diagnosis, tables and figures of a result, from a run or read from its folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The report of a result: what a customer reads first, then figures, parameters and tests, then an appendix."""
+"""Content of the report of a result: summary for the customer, figures, parameters, tests and appendix."""
 
 from __future__ import annotations
 

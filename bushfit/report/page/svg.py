@@ -1,4 +1,4 @@
-"""Charts as SVG inside a page."""
+"""Conversion of charts to compact SVG for HTML pages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Predicted stiffness and loss of a report as texts with units."""
+"""Predicted stiffness and loss factor as texts with units, for the report of a result."""
 
 import math
 from collections.abc import Iterator, Sequence

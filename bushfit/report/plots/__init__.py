@@ -1,8 +1,8 @@
 """Figures of results, one description for PNG, SVG, PDF and the pages.
 
-A figure is made from the tables of a result, so that a folder of results gives the same figure as the run itself.
-matplotlib is slow to import and only imported here: a file of this folder is imported when it is first used, as in
-`plots.gap.gap_figure`. Levels differ in colour (of scales that survive colour blindness and grey print), line style and
+Figures are made from the tables of a result, so that a results folder gives the same figures as the run itself.
+matplotlib is slow to import and only imported in this folder: a module is imported when it is first used, as in
+`plots.gap.gap_figure`. Levels differ in colour (of scales that suit colour blindness and grey print), line style and
 marker. Differences are measured minus model.
 """
 

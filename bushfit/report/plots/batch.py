@@ -1,4 +1,4 @@
-"""Pictures of many bushings: the scatter of a batch, its limits and who is out of them; and measured curves."""
+"""Figures of a batch: scatter of each quantity with limits and outliers, and measured stiffness curves."""
 
 import math
 import re
@@ -89,7 +89,7 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> s
     tick_names = [shortened(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
     lines = math.ceil(len(drawn) / _COLUMNS)
     height = style.ROW * (0.9 + 0.1 * bool(tick_names)) * lines
-    height += 0.12 * max(0, max(map(len, tick_names), default=0) - 16)  # there is room for 16 letters as it is
+    height += 0.12 * max(0, max(map(len, tick_names), default=0) - 16)  # 16 letters fit without more height
     figure = style.Chart(f"{title}: {len(names)} bushings", height)
     grid = figure.subplots(lines, _COLUMNS, sharex=True, squeeze=False)
     for axes in grid.flat[len(drawn) :]:
@@ -99,7 +99,7 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> s
         _name_outliers(axes, panel, names)
         lowest = index + _COLUMNS >= len(drawn)
         axes.tick_params(labelbottom=lowest)
-        axes.xaxis.set_in_layout(index // _COLUMNS == lines - 1)  # else its labels hang into the empty cell below
+        axes.xaxis.set_in_layout(index // _COLUMNS == lines - 1)  # its labels may extend into the empty cell below
         if tick_names:
             look = {"rotation": 90, "fontsize": style.SMALL - 1, "family": style.fonts(), "parse_math": False}
             axes.set_xticks(range(1, len(tick_names) + 1), tick_names, **look)

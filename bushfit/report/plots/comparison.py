@@ -1,4 +1,4 @@
-"""Results side by side: stiffness and loss factor of each, and their differences from the first."""
+"""Figure of a comparison: stiffness and loss factor of several results, and their differences from the first."""
 
 import numpy as np
 from matplotlib.lines import Line2D

@@ -1,4 +1,4 @@
-"""A fit beside its tests: sweeps and loops with the model and with measured minus model."""
+"""Figures of a fit: sweeps and loops, measured and modelled, with the residuals (measured minus model)."""
 
 from collections.abc import Sequence
 
@@ -210,7 +210,7 @@ def loops_figure(result: Result, table: pd.DataFrame, title: str) -> style.Chart
         Figure with two panels per direction or specimen.
     """
     places = list(loops_of(table, result))
-    figure = style.Chart(title, 1.25 * style.ROW * len(places))  # a hysteresis loop wants a square
+    figure = style.Chart(title, 1.25 * style.ROW * len(places))  # nearly square panels for hysteresis loops
     grid = figure.subplots(len(places), 2, squeeze=False, width_ratios=[1.15, 1.0])
     for (place, loops), (force_panel, phase_panel) in zip(places, grid, strict=True):
         looks = style.styles(len(loops), "loop")
@@ -249,7 +249,7 @@ def _draw_forces(axes: Axes, place: Place, loops: dict[str, pd.DataFrame], looks
         drawn = counted.iloc[_drawn_rows(counted)]
         modelled = scale * drawn[f"model {force}"].to_numpy()
         turns = drawn["time [s]"] * drawn["frequency [Hz]"]
-        modelled[1:][np.diff(turns) > 0.5] = np.nan  # between the first and the last cycles
+        modelled[1:][np.diff(turns) > 0.5] = np.nan  # no line from the first cycles to the last
         axes.plot(drawn[motion], scale * drawn[force], "o", color=look.color, alpha=0.5, **style.DOT)
         axes.plot(drawn[motion], modelled, color=style.INK, lw=0.8)
     rows = pd.concat(loops.values())

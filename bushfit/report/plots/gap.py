@@ -1,4 +1,4 @@
-"""Measured minus model before and after a diagnosis, in percent: maps of sweeps and curves of loops."""
+"""Figure of the gap, measured minus model in percent, before and after a diagnosis: maps of sweeps, curves of loops."""
 
 import math
 import textwrap

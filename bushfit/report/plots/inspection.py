@@ -1,4 +1,4 @@
-"""Test files as recorded (loops, sweeps, histories), and the reduction of raw histories and of resonance tests."""
+"""Figures of test files as recorded, and of the reduction of raw histories and resonance tests."""
 
 from collections import Counter
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Sweeps at several temperatures as one curve at 23 degC, their shift factors, and Maxwell arms for the springpot."""
+"""Figures of sweeps at several temperatures shifted to 23 degC, of their shift factors, and of Maxwell arms."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Measured points beside the model, grouped from the tables of results for drawing."""
+"""Measured points from the tables of results, grouped into the panels and curves of figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A plan and the standard programme: operating points by direction, and the expected errors of both."""
+"""Figure of a test plan and the standard programme: operating points by direction, and expected errors of both."""
 
 from collections import Counter
 

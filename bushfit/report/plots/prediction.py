@@ -1,4 +1,4 @@
-"""Predictions over frequency and amplitude as in the paper's Figs. 7 to 9, with measured points."""
+"""Figure of predictions over frequency and amplitude, as in Figs. 7 to 9 of the paper, with measured points."""
 
 from collections.abc import Sequence
 
@@ -162,7 +162,7 @@ def draw_prediction(
             if len(rows):
                 draw_points(axes, rows, x_header, header, from_table, look, chosen.size)
         style.label_axes(axes, x_header, label, x)
-        style.widen_span(axes, 0.04 * from_si * band.high.max() if name == "stiffness" else 0.01)  # flat looks flat
+        style.widen_span(axes, 0.04 * from_si * band.high.max() if name == "stiffness" else 0.01)  # flat curves look flat
     extra_lines: dict[str, Line2D | tuple[Line2D, ...]] = {}
     if (with_rig := bool(measured[chosen].any() and rig)) or prediction.if_rigs:
         extra_lines["bushing"] = Line2D([], [], color=style.INK, lw=_LINE)

@@ -1,4 +1,4 @@
-"""Charts: size, type, colours and legends of all figures, and their way to a file.
+"""Common style of all figures: size, fonts, colours and legends, and their encoding as image files.
 
 The user's matplotlibrc has no influence: `in_own_style` draws with matplotlib's defaults.
 """
@@ -74,12 +74,12 @@ _TITLE_LETTERS, _NOTE_LETTERS, _LABEL_LETTERS = 64, 112, 27
 _MOST_LETTERS = 600
 #: Fonts for names beyond Latin, Greek and Cyrillic, if they are installed.
 _WIDER_FONTS = {"Noto Sans CJK SC", "Noto Sans CJK JP", "WenQuanYi Zen Hei", "Microsoft YaHei", "SimHei", "PingFang SC"}
-#: Settings of all figures: matplotlib's defaults without those that choose a window system, and bushfit's own. A
-#: setting costs nothing; the same by a call for every panel makes its ticks anew.
+#: Settings of all figures: matplotlib's defaults without those that choose a window system, and bushfit's own. Settings
+#: are faster than calls for each panel, which rebuild its ticks.
 _SETTINGS: dict[Any, Any] = {
     key: value for key, value in rcParamsDefault.items() if key.partition(".")[0] not in ("backend", "interactive")
 } | {
-    "font.family": ["DejaVu Sans"],  # one font to look for, not the fourteen of sans-serif
+    "font.family": ["DejaVu Sans"],  # one font to search for, not the fourteen of "sans-serif"
     "axes.grid": True,
     "axes.axisbelow": True,
     "axes.labelsize": TEXT,
@@ -123,7 +123,7 @@ def in_own_style(make: Callable[_P, _Drawn]) -> Callable[_P, _Drawn]:
 
 
 class Chart(Figure):
-    """Figure as wide as a page, with a title above its panels and an explanation below them.
+    """Figure 16 cm wide, the text width of an A4 page, with a title above its panels and an explanation below them.
 
     Args:
         title: title of the figure.
@@ -207,7 +207,7 @@ def label_axes(axes: Axes, x_label: str, y_label: str, x: Array | None = None) -
         axes.locator_params("x", nbins=_MOST_TICKS)
     if axes.get_yscale() == "linear":
         axes.locator_params("y", nbins=_MOST_TICKS)
-    axes.spines[:].set_in_layout(False)  # ticks and labels need more room anyway
+    axes.spines[:].set_in_layout(False)  # ticks and labels determine the layout
     if x is not None and x.max() > _LOG_RATIO * x.min():
         logarithmic(axes, x)
 
