@@ -35,7 +35,7 @@ Picture = Literal["png", "svg", "pdf"]
 #: Kinds of result file in the order of writing: numbers first, so that a figure that fails does not lose them.
 Kind = Literal["json", "raw", "table", "page", "figure"]
 _KINDS: tuple[Kind, ...] = ("json", "raw", "table", "page", "figure")
-#: Record of the files that bushfit wrote into a folder: lines of SHA-256 and name, as of the program sha256sum.
+#: Record of the files that bushfit wrote into a folder: lines of SHA-256 and file name, in the format of sha256sum.
 _RECORD = ".bushfit.sha256"
 #: Control characters, other than line ends, that are escaped in a JSON document.
 _STEERING = re.compile(rf"(?!\n){CONTROL.pattern}")

@@ -111,7 +111,7 @@ def ellipses_figure(result: Result, title: str) -> style.Chart | None:
     axes.spines[:].set_visible(False)
     frames, ellipses = [], []
     ticks: dict[str, dict[float, str]] = {"x": {}, "y": {}}
-    # one panel for all pairs: a panel each takes ten times as long to draw
+    # one panel for all pairs: a panel for each takes ten times as long to draw
     for y, y_row in enumerate(rows[:0:-1]):
         for x, x_row in enumerate(rows[: len(rows) - 1 - y]):
             correlation = correlations.get(frozenset((x_row.name, y_row.name)), 0.0)

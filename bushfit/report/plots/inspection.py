@@ -22,7 +22,7 @@ from bushfit.units import display_unit, format_range
 
 #: Colour of a history.
 _COLOR = "#3b528b"
-#: Most rows of a loop that are drawn over the displacement.
+#: Largest number of rows of a loop that are drawn over the displacement.
 _MOST_ROWS = 6000
 #: Number of time bins of a long record in a figure: more than its width in pixels.
 _TIME_BINS = 1500
@@ -160,8 +160,8 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
     for row, history in enumerate(drawn):
         strip = figure.add_subplot(grid[row, :])
         _draw_strip(strip, history, reduction, looks)
-        if len(histories) > 1:  # the title names one
-            name = style.file_name(history.name, letters=100)  # as many as fit on a line
+        if len(histories) > 1:  # the title of the figure names a single history
+            name = style.file_name(history.name, letters=100)  # one line
             strip.set_title(name, fontsize=style.SMALL, loc="left", color=style.GREY, pad=2)
     points = [figure.add_subplot(grid[-2, column]) for column in range(2)]
     quality = [figure.add_subplot(grid[-1, column], sharex=points[0]) for column in range(2)]

@@ -162,7 +162,7 @@ def draw_prediction(
             if len(rows):
                 draw_points(axes, rows, x_header, header, from_table, look, chosen.size)
         style.label_axes(axes, x_header, label, x)
-        style.widen_span(axes, 0.04 * from_si * band.high.max() if name == "stiffness" else 0.01)  # flat curves look flat
+        style.widen_span(axes, 0.04 * from_si * band.high.max() if name == "stiffness" else 0.01)  # flat stays flat
     extra_lines: dict[str, Line2D | tuple[Line2D, ...]] = {}
     if (with_rig := bool(measured[chosen].any() and rig)) or prediction.if_rigs:
         extra_lines["bushing"] = Line2D([], [], color=style.INK, lw=_LINE)

@@ -35,7 +35,7 @@ _WIDTH = 16.0
 ROW = 5.4
 #: Height of a title and an explanation of two lines, and of a further line [cm].
 _FRAME, LINE = 2.0, 0.42
-#: Sizes of the labels of axes, and of ticks, legends and explanations [point]: the smallest that still reads in print.
+#: Sizes of the labels of axes, and of ticks, legends and explanations [point]: the smallest that is readable in print.
 TEXT, SMALL = 8.5, 7.5
 #: Marker options of a measured point, and of one of thousands of points.
 POINT: dict[str, Any] = {"ms": 4.2, "mec": "white", "mew": 0.4}
@@ -47,7 +47,7 @@ NAMES: dict[str, Any] = {"fontsize": TEXT, "color": INK}
 WORDS: dict[str, Any] = {"fontsize": SMALL, "color": INK}
 #: Resolution of a picture [dots per inch]: sharp in a report, and small enough to be mailed.
 _DPI = 150
-#: Effort of compressing a PNG: more takes longer and saves little.
+#: Compression level of a PNG: a higher level takes longer and saves little.
 _COMPRESSION = 3
 #: Metadata keys, by format, that are omitted: they would contain date and version.
 _UNSAID = {"png": ["Software"], "svg": ["Creator", "Date"], "pdf": ["Creator", "Producer", "CreationDate"]}
@@ -60,15 +60,15 @@ _SCALES = {
     "loop": ("plasma", 0.4, 0.85),
     "temperature": ("turbo", 0.05, 0.95),
 }
-#: Markers and dashes of levels, one after the other: eight and five, so that both together repeat after forty levels.
+#: Markers (eight) and line styles (five) of successive levels: their combinations repeat after forty levels.
 _MARKERS = "os^Dv<p>"
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1.2, 1.2)), (0, (9, 2)))
 #: Largest number of intervals between the ticks of an axis.
 _MOST_TICKS = 6
 #: Ratio of largest to smallest value above which an axis is logarithmic (about a decade and a half; a choice).
 _LOG_RATIO = 40.0
-#: Letters in a line of the title and of the explanation, as many as the width of a figure holds, and of the name of a
-#: panel at its left, as many as its height holds.
+#: Largest number of letters in a line of the title and of the explanation, by the width of a figure, and of the y label
+#: of a panel, by its height.
 _TITLE_LETTERS, _NOTE_LETTERS, _LABEL_LETTERS = 64, 112, 27
 #: Largest number of letters of the warnings below a figure: about five lines.
 _MOST_LETTERS = 600
