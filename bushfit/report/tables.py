@@ -328,7 +328,7 @@ def shift_factors_table(shifted_sweeps: Sequence[Shifted]) -> pd.DataFrame:
 
 
 def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """Table of all effects that a diagnosis tried as explanations of the gap.
+    """Table of the results of a diagnosis for every effect that could explain the gap.
 
     Returns:
         A row per effect: level, score, gain in chi-square, probability, fitted parameters, and reason for the result.

@@ -157,7 +157,7 @@ def sector_means(loop: pd.DataFrame, place: Place, header: str) -> tuple[Array, 
 
 
 def phase_after_turn(loop: pd.DataFrame, place: Place) -> Array:
-    """Phase of each row of a loop [deg], (n,), from 0 at the largest displacement (the upper turn) up to 360."""
+    """Phase of each row of a loop [deg], (n,), from 0 at the maximum of the motion (the upper turn) up to 360."""
     turns = (loop["time [s]"] * loop["frequency [Hz]"]).to_numpy()
     motion = loop[moved_of(place)].to_numpy()
     first_harmonic = np.mean((motion - motion.mean()) * np.exp(-2j * np.pi * turns))
