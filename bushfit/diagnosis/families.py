@@ -24,13 +24,13 @@ from bushfit.prediction.comparison import CHANCE
 from bushfit.progress import track
 from bushfit.units import number
 
-#: Laws of rate and of amplitude beside the paper's or in their place, of which families are made, each with each.
+#: Effects for rate and for amplitude that extend or replace the paper's branches; families are all combinations.
 _RATE = ("second_springpot", "fractional_zener", "maxwell")
 _AMPLITUDE = ("kraus", "sliders", "distributed_sliders", "coupled_breakdown", "intrinsic_time")
-#: Of all families that are known, those that are held out and shown beside the first: of these odds, and so many.
+#: Least probability, and largest number, of the families that are held out and reported next to the first.
 _LIKELY, _MOST = 0.01, 5
-#: Share by which a held-out error has to differ for two families not to count as alike, sure or not; chosen: no use
-#: of a bushing's model feels less.
+#: Relative difference of held-out errors below which two families are reported as alike, significant or not; chosen:
+#: smaller differences matter in no use of a bushing's model.
 _ALIKE = 0.01
 #: Standard error of a gain over that of the delta method; from 20 redraws of the noise of five pairs of families, where
 #: it was 1.3 to 2.2.
@@ -42,16 +42,16 @@ class FittedFamily:
     """A model family fitted to a campaign, compared with the first family.
 
     Args:
-        name: effects that the family adds, or puts in place of branches, joined by +; of the first family "paper" and
+        name: effects that the family adds or puts in place of branches, joined by +; for the first family, "paper" and
             its other effects.
         evidence: the fitted model and the tests.
-        held: root mean squares of the held-out parts, before for the first family and after for this one.
-        gain: reduction of the held-out mean square, in units of noise, over parts without common points, with its 95 %
-            interval; None if nothing is held out.
-        p: probability of a gain or loss this large if both families are equally good; None as for the gain.
-        log_evidence: log marginal likelihood of the tests, with a smooth error of the model if it raises the
-            likelihood.
-        probability: among all families fitted, with equal prior probabilities.
+        held: root mean squares of the held-out parts: `before` for the first family, `after` for this family.
+        gain: reduction of the held-out mean square relative to the first family, in squared units of noise, with the
+            ends of its 95 % interval; None for the first family, or if nothing is held out.
+        p: probability of a gain or loss this large if both families are equally good; None if `gain` is None.
+        log_evidence: natural log of the marginal likelihood of the tests, with a smooth error of the model if that
+            raises the likelihood.
+        probability: posterior probability among all fitted families, with equal prior probabilities.
     """
 
     name: str
@@ -78,17 +78,17 @@ class FittedFamily:
 
 
 def known_families(model: Model, data_sets: Sequence[MeasuredTest]) -> tuple[str, ...]:
-    """List the families that a model can take: each law of rate with each law of amplitude.
+    """List the model families that can replace a model: each effect of rate combined with each of amplitude.
 
-    The effect of temperature is added if the tests differ in temperature and the model has none. The combination of
-    both laws of the paper is the model itself and is left out.
+    The effect of temperature is added if the tests differ in temperature and the model has no such effect. The model
+    itself, with the paper's branches unchanged, is left out.
 
     Args:
-        model: the model at the start.
+        model: starting model.
         data_sets: the tests.
 
     Returns:
-        Names of families: effects joined by +.
+        Names of families: names of effects joined by +.
     """
     warm = ["temperature"] if apart_in_temperature(model, data_sets) else []
     rates, amplitudes = (["", *(name for name in laws if _fits(model, name))] for laws in (_RATE, _AMPLITUDE))
@@ -98,7 +98,7 @@ def known_families(model: Model, data_sets: Sequence[MeasuredTest]) -> tuple[str
 
 
 def _fits(model: Model, name: str) -> bool:
-    """True if a model lacks an effect and has the branch that it replaces."""
+    """True if a model lacks an effect and has the branch that the effect replaces, if any."""
     return name not in model.effects and get_effect(name).replaces in (None, *model.effects)
 
 
@@ -114,12 +114,13 @@ def fit_families(
     Args:
         model: the model at its starting values.
         data_sets: the tests.
-        names: families, each of effects joined by +; all known families if empty.
+        names: names of families, each of effects joined by +; all known families if empty.
         fixed: names of parameters that are not fitted.
         bounds: limits of parameters inside their general limits.
 
     Returns:
-        The first family and those named, or else the most probable, held out; and the probability of each other family.
+        The first family and the requested families (without a request, the most probable), with held-out errors; and
+        the probability of each family that is not reported.
 
     Raises:
         FitError: data that cannot support the fit of a family that is named.
@@ -150,7 +151,11 @@ def fit_families(
 def _chain(
     chains: Mapping[str, list[Evidence]], first: Evidence, name: str, fixed: Sequence[str], bounds: Bounds
 ) -> list[Evidence]:
-    """Fit the effects of a family one after the other, starting from the longest beginning already fitted."""
+    """Fit a family's effects one after the other; the first effects may be fitted already, in `chains` by name.
+
+    Returns:
+        Fits with no effect added, one effect, two effects, and so on.
+    """
     before, _, last = name.rpartition("+")
     chain = [first] if not before else chains.get(before) or _chain(chains, first, before, fixed, bounds)
     effect, present = get_effect(last), chain[-1].model.effects
@@ -164,7 +169,7 @@ def _chain(
 
 
 def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bounds) -> float:
-    """Log evidence of the last model of a chain, in which each model has one effect more; without common terms."""
+    """Natural log of the evidence for the last of a chain of fits, each with one more effect; up to a constant."""
     *before, last = chain
     found = with_model_error(last.estimate, bounds)[0]
     priors = [laplace(name, replace(last, solution=found), one) for name, one in zip(names, before, strict=True)]
@@ -175,7 +180,7 @@ def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bound
 def _gain(
     predictions: Mapping[str, Predicted], data_sets: Sequence[MeasuredTest]
 ) -> tuple[tuple[float, float, float] | None, float | None]:
-    """Reduction of the mean square held-out residual, with its 95 % interval and its probability.
+    """Reduction of the mean square held-out residual with the ends of its 95 % interval, and its p-value.
 
     Notes:
         By the delta method the variance of the gain is the sum, over the rows of all tests, of the squared derivative
@@ -195,7 +200,7 @@ def _gain(
 
 
 def _disjoint_parts(data_sets: Sequence[MeasuredTest], among: Collection[str]) -> Iterator[str]:
-    """Names of the parts that share no point with an earlier part."""
+    """Names of the held-out parts in `among` that share no point with an earlier part."""
     used_rows = np.zeros(sum(data_set.size for data_set in data_sets), dtype=bool)
     for part in parts(data_sets):
         rows = part.rows(data_sets)

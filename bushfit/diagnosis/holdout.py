@@ -27,9 +27,9 @@ from bushfit.fitting.problem import FitResult
 from bushfit.progress import track
 from bushfit.reading.measurement import Stepped
 
-#: Share of all sweep points, those of the highest steps, that is one part.
+#: Share of all sweep points, with the highest stepped values (frequencies or amplitudes), that forms one part.
 _TOP = 1.0 / 3.0
-#: By what is stepped in sweeps: what is held, and what the top third is of.
+#: Names of the constant axis and of the stepped values of a sweep, by its stepped axis.
 _NAMES: dict[Stepped | None, tuple[str, str]] = {
     "frequency": ("amplitude level", "frequencies"),
     "amplitude": ("frequency", "amplitudes"),
@@ -39,22 +39,22 @@ _NAMES: dict[Stepped | None, tuple[str, str]] = {
 
 @dataclass(frozen=True, eq=False)
 class HoldOutPart:
-    """Points that are held out together.
+    """Points of the tests that are held out together.
 
     Args:
-        name: of the part.
-        points: for each test a mask, (n,); loops are held out as a whole.
+        name: name of the part, for reports.
+        points: mask of the held-out points of each test, (n,); loops are held out as a whole.
     """
 
     name: str
     points: Sequence[Array]
 
     def rows(self, data_sets: Sequence[MeasuredTest]) -> Array:
-        """Mask of the residuals of the part among those of all tests, (n,)."""
+        """Mask of the rows of this part in the residual vector of all tests, (n,)."""
         return np.concatenate([np.tile(mask, data.parts) for data, mask in zip(data_sets, self.points, strict=True)])
 
     def rest(self, data_sets: Sequence[MeasuredTest]) -> list[MeasuredTest]:
-        """The tests without the part, with unchanged noise."""
+        """Tests without the points of this part, with unchanged noise; tests held out entirely are left out."""
         remaining = [(data, mask) for data, mask in zip(data_sets, self.points, strict=True) if not mask.all()]
         return [data.without(np.flatnonzero(mask)).with_weight() if mask.any() else data for data, mask in remaining]
 
@@ -65,9 +65,9 @@ class HeldOut:
 
     Args:
         part: description of the part.
-        before: without the added effects, in units of noise.
-        after: with the added effects, in units of noise.
-        whitened: before and after, in units of noise and of the error of the prediction.
+        before: value without the added effects, in units of noise.
+        after: value with the added effects, in units of noise.
+        whitened: values before and after, in units of noise and prediction error combined.
     """
 
     part: str
@@ -96,10 +96,11 @@ class HoldOut:
     """All parts held out in turn.
 
     Args:
-        parts: that were held out.
-        skipped: parts that were not.
-        before, after: root mean square over all parts, in units of noise; None if nothing can be held out.
-        whitened: the same in units of noise and of the error of the prediction.
+        parts: results of the parts that were held out.
+        skipped: parts that could not be held out.
+        before: root mean square residual without the added effects, in units of noise; None if nothing can be held out.
+        after: root mean square residual with the added effects, in units of noise; None if nothing can be held out.
+        whitened: before and after, in units of noise and prediction error combined.
     """
 
     parts: tuple[HeldOut, ...] = ()
@@ -110,7 +111,7 @@ class HoldOut:
 
     @classmethod
     def from_residuals(cls, residuals: Mapping[str, Array], skipped: Sequence[Skipped] = ()) -> HoldOut:
-        """Build the figures from predicted residuals by part, (models, plain and whitened, n)."""
+        """Compute root mean squares from predicted residuals by part, (2 models, 2: plain and whitened, n)."""
         residuals = {name: pair for name, pair in residuals.items() if pair.size}  # one frequency has no top third
         if not residuals:
             return cls((), tuple(skipped))
@@ -125,25 +126,25 @@ def hold_out(before: Evidence, after: Evidence, bounds: Bounds) -> HoldOut:
     Args:
         before: fit without the added effects.
         after: fit with the added effects.
-        bounds: limits of parameters, for a fit to the rest.
+        bounds: limits of parameters, for a fit to the remaining tests.
 
     Returns:
-        Root mean square errors of both models by part.
+        Root mean square errors of both models, by part and over all parts.
     """
     predictions, skipped = predicted_parts(before, after, bounds)
     return HoldOut.from_residuals({name: prediction.residuals for name, prediction in predictions.items()}, skipped)
 
 
 def predicted_parts(before: Evidence, after: Evidence, bounds: Bounds) -> tuple[dict[str, Predicted], list[Skipped]]:
-    """Predict each part from the rest by two models.
+    """Predict each part of the tests from the other parts by two models.
 
     Args:
         before: fit without the added effects.
         after: fit with the added effects.
-        bounds: limits of parameters, for a fit to the rest.
+        bounds: limits of parameters, for a fit to the remaining tests.
 
     Returns:
-        Predictions by the name of the part, and the parts that one model cannot predict.
+        Predictions by the name of the part, and the parts that at least one model cannot predict.
     """
     models = [(evidence, _leave_out(evidence.solution)) for evidence in dict.fromkeys((before, after))]
     predictions, skipped = dict[str, Predicted](), list[Skipped]()
@@ -159,7 +160,7 @@ def predicted_parts(before: Evidence, after: Evidence, bounds: Bounds) -> tuple[
 
 
 def _figures(pair: Array) -> tuple[float, float, tuple[float, float]]:
-    """Root mean squares before and after, plain, and both whitened, of residuals (2, 2, n)."""
+    """Root mean squares before, after, and (before, after) whitened, of residuals (2 models, 2: plain, whitened, n)."""
     (before, before_whitened), (after, after_whitened) = np.sqrt(np.mean(np.square(pair), axis=-1)).tolist()
     return before, after, (before_whitened, after_whitened)
 
@@ -168,9 +169,10 @@ class Predicted(NamedTuple):
     """Predictions of a held-out part by two models.
 
     Args:
-        residuals: of each model, plain and whitened by the error of the prediction, (2, 2, n).
-        pulls: derivative of half the sum of squares of the plain residuals by the noise of each row of all tests,
-            (2, all rows).
+        residuals: predicted residuals, in units of noise and whitened by the prediction error as well,
+            (2 models, 2, n).
+        pulls: derivatives of half the sum of squares of the plain residuals by the noise of each row of all tests,
+            (2 models, all rows); for the standard error of a comparison.
     """
 
     residuals: Array
@@ -185,17 +187,17 @@ def _leave_out(solution: FitResult) -> LeaveOut:
 def _predict(
     evidence: Evidence, leave_out: LeaveOut, part: HoldOutPart, bounds: Bounds
 ) -> tuple[Array, Array] | Skipped:
-    """Predict a part from the rest by one model, with a refit where one step is too long.
+    """Predict a part of the tests from the other parts by one model; refit if one Gauss-Newton step is too long.
 
     Args:
         evidence: fit to all tests.
-        leave_out: its leave-out formulas.
-        part: held out.
-        bounds: limits of parameters, for a fit to the rest.
+        leave_out: leave-out formulas of this fit.
+        part: part that is held out.
+        bounds: limits of parameters, for a fit to the remaining tests.
 
     Returns:
-        Residuals, plain and whitened by the error of the prediction, (2, n); and the derivative of half their sum of
-        squares by the noise of each row of all tests, (all rows,).
+        Residuals, plain and whitened by the prediction error, (2, n), with the derivatives of half the plain sum of
+        squares by the noise of each row, (all rows,); or the part as skipped, with the reason.
     """
     solution, data_sets = evidence.solution, evidence.data_sets
     rows, names = part.rows(data_sets), solution.coordinates.names
@@ -219,7 +221,7 @@ def _predict(
 
 
 def _clusters(data_sets: Sequence[MeasuredTest]) -> Array:
-    """Index of the line of a sweep, or of the loop, of each residual, (n,)."""
+    """Index of the sweep line or loop that each residual belongs to, (n,)."""
     numbers, first = list[Array](), 0
     for data_set in data_sets:
         line = np.zeros(data_set.size // data_set.parts, dtype=int)
@@ -231,16 +233,16 @@ def _clusters(data_sets: Sequence[MeasuredTest]) -> Array:
 
 
 def parts(data_sets: Sequence[MeasuredTest]) -> Iterator[HoldOutPart]:
-    """List the parts of the tests: lines, the top third of their steps, directions, loops.
+    """List the parts of the tests to hold out: lines, the top third of the steps, directions, and loops.
 
     Args:
         data_sets: the tests.
 
     Yields:
-        One part at a time.
+        Parts, which may overlap.
 
     Returns:
-        An iterator.
+        An iterator of parts.
     """
 
     def part(name: str, chosen: Mapping[MeasuredTest, Array]) -> HoldOutPart:

@@ -39,16 +39,16 @@ Measure = Literal["stiffness", "modulus", "gain"]
 #: A value and the ends of its 95 % interval.
 Interval = tuple[float, float, float]
 
-#: Logarithm of odds below which a size of the rig's errors does not count; chosen for time: a twentieth of the best.
+#: Natural log of the odds below the best at which a size of the rig's errors is left out (a twentieth); for time.
 _NEAR = 3.0
 #: Largest power, of either sign; chosen: beyond, a term acts at one end of the tests only.
 _LARGEST_POWER = 4.0
-#: Pairs of powers along an axis of the grid, and standard errors that it reaches to either side of the likeliest.
+#: Number of powers along each axis of the grid, and half width of the grid about the likeliest pair [standard errors].
 _GRID, _REACH = 13, 4.0
-#: Times at most that the grid is made anew about the likeliest pair and the parameters beside it, and the step of a
-#: power, in standard errors, with which both rest.
+#: Maximum number of iterations of the grid and the model's parameters, and the change of a power, in standard errors,
+#: below which the iteration has converged.
 _ROUNDS, _RESTS = 20, 0.1
-#: Longest step of a parameter between these, in coordinates, and how far inside its limits one stays: usual for fits.
+#: Longest step of a parameter in one iteration, and its least distance from its limits, in fitting coordinates.
 _LONGEST, _INSIDE = 1.0, 1e-6
 #: Dampings of a step, relative to the information on a parameter; usual for such methods.
 _DAMPINGS = (0.0, 0.03, 0.1, 0.3, 1.0, 3.0)
@@ -86,14 +86,14 @@ _QUARTERS = {
 
 @dataclass(frozen=True, eq=False)
 class PowerLaw:
-    """Power law A e^(i phi) (f/f0)^p (X/X0)^q, with 95 % intervals.
+    """Power law A e^(i phi) (f/f0)^p (X/X0)^q of the stiffness missing from a model, with 95 % intervals.
 
     Args:
-        measure: unit of the term with the highest evidence: stiffness, modulus or share of the stiffness.
+        measure: unit of A with the highest evidence: stiffness, modulus or share of the model's stiffness.
         alternatives: other units that the tests cannot distinguish; the intervals average over all by probability.
-        phase_deg: phi [deg].
-        frequency_power: p.
-        amplitude_power: q.
+        phase_deg: phase phi [deg], with the ends of its interval.
+        frequency_power: power p of frequency, with the ends of its interval.
+        amplitude_power: power q of amplitude, with the ends of its interval.
         is_likely: True if the evidence of the power law exceeds that of a smooth curve of any form.
     """
 
@@ -106,7 +106,7 @@ class PowerLaw:
 
     @property
     def determined(self) -> list[bool]:
-        """True for each of phase, frequency power and amplitude power that the tests determine."""
+        """True for phase, frequency power and amplitude power, in this order, if the tests determine the quantity."""
         widths = (_PHASE_WIDTH, _POWER_WIDTH, _POWER_WIDTH)
         intervals = (self.phase_deg, self.frequency_power, self.amplitude_power)
         return [high - low < 2.0 * width for (_, low, high), width in zip(intervals, widths, strict=True)]
@@ -147,11 +147,13 @@ class PowerLaw:
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """A stiffness beside the model's, at the operating points of tests of the bushing and specimens, without coupons.
+    """Complex stiffness added to a model's, at the p operating points of all tests except those of coupons.
+
+    Its values and shapes are complex numbers in the unit `measure`.
 
     Args:
         evidence: the fitted model and the tests.
-        measure: unit of the term.
+        measure: unit of the term: stiffness, modulus, or share of the model's stiffness.
     """
 
     evidence: Evidence
@@ -166,7 +168,7 @@ class Term:
 
     @property
     def has_one_meaning(self) -> bool:
-        """False without a test, and if one stiffness would be added to displacement and to rotation."""
+        """False without a test, or if the same stiffness would be added to both translations and rotations."""
         motions = {test.direction.motion for test, _ in self.tests}
         return len(motions) == 1 if self.measure == "stiffness" else bool(motions)
 
@@ -188,34 +190,34 @@ class Term:
         )
 
     def unit(self, model: Model) -> Array:
-        """Stiffness of one unit of the term at each point, (p,) [N/m or N m/rad]."""
+        """Stiffness [N/m or N m/rad] per unit of the term at each point, (p,)."""
         if self.measure == "gain":
             return self.stiffness(model)
         per_unit = model.stiffness_per_modulus if self.measure == "modulus" else lambda _: 1.0
         return np.concatenate([np.full(test.frequency.size, per_unit(test.direction)) for test, _ in self.tests])
 
     def scaled(self, shapes: Array, model: Model) -> Array:
-        """Scale shapes of the term, (c, p), so that the largest change of |K| is 100 %."""
+        """Scale c shapes of the term, (c, p), so that the largest relative change of |K| by each is 100 %."""
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
     def residual(self, value: Array, model: Model) -> Array:
-        """Whitened residuals of a model with the term of a value at the points, complex (p,), exact, (n,)."""
+        """Exact whitened residuals, (n,), of a model plus the term with complex values at the points, (p,)."""
         residuals, added = residual(model, self.evidence.data_sets), value * self.unit(model)
         for test, points in self.tests:
             residuals[self.evidence.place[test]] = test.residual_with(added[points], model)
         return residuals
 
     def linearised(self, model: Model, value: Array, shapes: Array) -> tuple[Array, Array, Array]:
-        """Linearise the residuals around a term.
+        """Linearise the whitened residuals around a model plus a term.
 
         Args:
-            model: at its parameters.
-            value: of the term at the points, complex (p,).
-            shapes: (c, p).
+            model: model at its current parameters.
+            value: complex values of the term at the points, (p,).
+            shapes: shapes of c terms at the points, (c, p).
 
         Returns:
-            Residuals without the term, (n,); derivatives by the coordinates of the parameters, (k, n); and by terms of
-            the given shapes, in phase and in quadrature, (c, 2, n).
+            Residuals extrapolated to no term, (n,); derivatives by the coordinates of the parameters, (k, n); and by
+            the amounts of each shape in phase and in quadrature, (c, 2, n).
         """
         names, place = self.evidence.solution.coordinates.names, self.evidence.place
         added, changes = value * self.unit(model), np.concatenate((shapes, 1j * shapes)) * self.unit(model)
@@ -273,13 +275,13 @@ def nearest_power_law(
 
 @dataclass(frozen=True, eq=False)
 class _Grid:
-    """Pairs of powers of frequency and amplitude with their evidence.
+    """Grid of g pairs of powers of frequency and amplitude, with their evidence.
 
     Args:
         measure: unit of the term.
-        linear: linear model with one group for each pair.
-        powers: of the pairs, (g, 2).
-        step: of the grid along each axis; 0 along an axis on which the tests do not differ, (2,).
+        linear: linear model with one group (in phase and in quadrature) for each pair.
+        powers: powers of frequency and amplitude, (g, 2).
+        step: spacing of the grid along each axis, (2,); 0 along an axis on which the tests do not differ.
     """
 
     measure: Measure
@@ -289,7 +291,7 @@ class _Grid:
 
     @cached_property
     def log_evidences(self) -> Array:
-        """Log evidence of each pair, (g,)."""
+        """Natural log of the evidence for each pair, (g,)."""
         return np.array([evidence.log_evidence for evidence in self.linear.group_evidence])
 
     @property
@@ -304,7 +306,7 @@ class _Grid:
         return float(logsumexp(self.log_evidences) + filled)
 
     def draws(self, count: int) -> Array:
-        """Phase [rad] and powers drawn from the posterior, (3, count)."""
+        """Draw phase [rad], frequency power and amplitude power from the posterior, (3, count)."""
         random = np.random.default_rng(0)
         chosen = random.choice(len(self.powers), count, p=self.share)
         width = np.where(self.step > 0.0, self.step, 2.0 * _LARGEST_POWER)  # an axis without a change is unknown
@@ -317,7 +319,7 @@ class _Grid:
 
 
 def _settled_grid(fitted: Evidence, term: Term, plain: LinearModel, model: Model, bounds: Bounds) -> _Grid | None:
-    """Grid about the most probable pair of powers, iterated with the parameters; None without convergence."""
+    """Iterate the grid of powers and the model's parameters about the most probable pair; None if not converged."""
     changes = np.ptp(term.points, axis=0) > 0.0
     # at first around the measured stiffness, by which a term of any size is linear
     value = np.concatenate([test.measured - test.noise_free(model).measured for test, _ in term.tests])
@@ -343,7 +345,11 @@ def _settled_grid(fitted: Evidence, term: Term, plain: LinearModel, model: Model
 
 
 def _stepped(term: Term, model: Model, value: Array, shape: Array, bounds: Bounds) -> tuple[Model, Array]:
-    """One damped Gauss-Newton step of the parameters and of the term of a shape."""
+    """Take one damped Gauss-Newton step of the model's parameters and of a term of one shape, (1, p).
+
+    Returns:
+        The model, and the complex values of the term at the points, (p,).
+    """
     shape = term.scaled(shape, model)
     residuals, rows, columns = term.linearised(model, value, shape)
     design, coordinates = np.concatenate((rows, columns[0])), term.evidence.solution.coordinates

@@ -29,7 +29,7 @@ from bushfit.validation import to_json_data
 
 #: Probability above which no further digits are shown.
 _NEARLY_ONE = 0.995
-#: Probability below which nothing is told of what may be else.
+#: Probability below which other explanations are not mentioned.
 _LEAST_TOLD = 0.01
 
 
@@ -38,10 +38,10 @@ class DiagnosisSettings:
     """Settings of a diagnosis.
 
     Args:
-        max_effects: maximum number of effects added in turn.
+        max_effects: maximum number of added effects.
         tolerance: share of |K| (or of half a loop's force range) below which gaps are ignored.
-        adopt: effects to add whatever the evidence.
-        without: effects not to consider, with their twins.
+        adopt: names of effects to add, and of mistakes to correct, whatever the evidence.
+        without: names of effects (with their twins) and mistakes not to consider.
         unresolved: effects of the starting model that earlier tests could not distinguish from a twin of the rig.
     """
 
@@ -59,11 +59,11 @@ class Where:
     Args:
         direction: direction or specimen.
         kind: "sweep" or "loop".
-        frequency: lowest and highest [Hz].
-        amplitude: lowest and highest, zero-to-peak [m or rad].
-        component: "storage", "loss" or "force".
+        frequency: lowest and highest frequency [Hz].
+        amplitude: lowest and highest amplitude, zero-to-peak [m or rad, or strain].
+        component: "storage" or "loss" stiffness of sweeps, or "force" of a loop.
         excess: root mean square of the smooth misfit, in units of its noise.
-        reading: the same as a sentence.
+        reading: description of the region as a sentence.
     """
 
     direction: Place
@@ -77,15 +77,15 @@ class Where:
 
 @dataclass(frozen=True)
 class Named:
-    """An effect that was added, or the first of a set of indistinguishable effects.
+    """Effect or mistake in the record that was named, or the first of a set that the tests cannot distinguish.
 
     Args:
-        name: of the effect or mistake.
-        evidence: why it is named.
-        alternatives: effects that these tests cannot distinguish from it.
-        test: for a mistake in the record, its test; None for other entries.
-        sentence: of a mistake, the statement of it; else "" for that of the effect.
-        correction: of a mistake, what to write into the campaign.
+        name: name of the effect or mistake.
+        evidence: reason why the effect or mistake is named.
+        alternatives: explanations that these tests cannot distinguish from this one.
+        test: name of the test with the mistake; None for an effect, or a mistake in [bushing].
+        sentence: statement of the mistake; "" for an effect, whose own sentence is then used.
+        correction: line to write into the campaign to correct the mistake; "" for an effect.
     """
 
     name: str
@@ -97,7 +97,7 @@ class Named:
 
     @property
     def label(self) -> str:
-        """The name as --adopt takes it."""
+        """Name in the form that the option --adopt accepts."""
         return labelled(self.name, self.test)
 
 
@@ -107,10 +107,10 @@ class Odds:
 
     Args:
         nothing: probability that nothing is missing beyond noise and tolerance.
-        explanations: in words with their probabilities if anything is missing; the most probable first.
-        models: fitted model of each explanation; None if it was not fitted.
+        explanations: text and probability (if anything is missing) of each explanation, the most probable first.
+        models: fitted model of each explanation; None for an explanation that was not fitted.
         labels: names of the parts of each explanation, joined by " + ".
-        apart: whether the tests cannot decide between the explanations, so that each is an alternative.
+        apart: True if the tests cannot decide between the explanations, so that each is an alternative.
     """
 
     nothing: float
@@ -147,15 +147,15 @@ class Odds:
 
 @dataclass(frozen=True)
 class CandidateResult:
-    """One candidate with its score, refit and probability, and the reason for the decision.
+    """Candidate effect or mistake with its score, refit and probability, and the reason for the decision.
 
     Args:
-        name: of the effect or mistake.
+        name: name of the effect or mistake.
         score: decrease of chi-square if the model were linear.
         gain: decrease of chi-square in a refit; None without a refit.
-        probability: that it is part of the explanation.
-        parameters: fitted values by name.
-        why: reason why it was added or not.
+        probability: probability that the candidate is part of the explanation.
+        parameters: fitted values [SI] by parameter name.
+        why: reason why the candidate was added or not.
     """
 
     name: str
@@ -171,14 +171,20 @@ class Diagnosis:
     """Result of a diagnosis.
 
     Args:
-        effects: effects that were added, or the first of indistinguishable sets.
-        where: regions of disagreement before anything was added, or else those that remain.
-        remainder: regions of disagreement of the model with its additions.
-        next_test: the measurement that would decide or confirm, or "".
-        before: the starting model, refitted to all tests.
-        after: the model with its additions; for a mistake in the record, fitted to the mended tests.
-        result: the model to use with its uncertainty: `after`, or `before` for a mistake in the record.
-        description: power law of a gap without a name; None if there is no such gap or no such law.
+        verdict: verdict in one word, such as "named".
+        summary: verdict as a sentence.
+        effects: effects or mistakes that were named, or the first of indistinguishable sets.
+        where: regions of disagreement between the starting model and the tests.
+        remainder: regions of disagreement that remain with the added effects.
+        holdout: errors of held-out parts of the tests, without and with the added effects.
+        next_test: measurement that would decide or confirm; "" without one.
+        candidates: all effects and mistakes considered, the highest score first.
+        before: starting model, refitted to all tests.
+        after: model with the added effects; for a mistake in the record, fitted to the corrected tests.
+        result: model to use, with its uncertainty: `after`, or `before` for a mistake in the record.
+        notes: warnings as sentences.
+        description: power law of a gap without a name; None without such a gap or law.
+        odds: reported explanations with their probabilities.
     """
 
     verdict: Verdict
@@ -198,23 +204,23 @@ class Diagnosis:
 
     @property
     def adopt(self) -> str:
-        """Command that diagnoses the campaign with the named effects and mistakes adopted; "" where none is named."""
+        """Command that diagnoses the campaign with the named effects and mistakes adopted; "" if none is named."""
         options = [f"--adopt {entry.label}" for entry in self.effects if entry.name != UNNAMED]
         return f"bushfit diagnose CAMPAIGN {' '.join(options)}" if options else ""
 
     @property
     def changed(self) -> bool:
-        """True if something was found that the model, or a warning with it, reports."""
+        """True if the fit after the diagnosis differs from the starting fit: effects added, or a record corrected."""
         return self.after is not self.before
 
     @property
     def added(self) -> bool:
-        """True if the model to use has more effects than the model at the start."""
+        """True if the model to use has other effects than the starting model."""
         return self.result.model.effects != self.before.model.effects
 
     @property
     def calibration(self) -> tuple[float, float]:
-        """Root mean square residual on the data fitted, in units of noise, before and after."""
+        """Root mean square residuals of the fits `before` and `after`, in units of noise."""
         return _rms(self.before), _rms(self.after)
 
     def to_document(self) -> DiagnosisFile:
@@ -325,16 +331,18 @@ def odds_in_words(found: Mapping[str, Any]) -> list[str]:
 
 
 def level_of(name: str) -> str:
-    """Level of an effect or mistake that is not in the model; "unresolved" if it has a twin in the rig or no name."""
+    """Level of an effect or mistake: material, component, instrument or record; "unresolved" with a twin in the rig."""
     candidate = get_candidate(name)
     return "unresolved" if candidate.twins or name == UNNAMED else str(candidate.level)
 
 
 def _rms(evidence: Evidence) -> float:
+    """Root mean square residual of a fit, in units of noise."""
     return float((evidence.chi_square / max(sum(data_set.counted for data_set in evidence.data_sets), 1)) ** 0.5)
 
 
 def _region_entry(region: Where) -> WhereEntry:
+    """Convert a region of disagreement to its entry in diagnosis.json, with amplitudes in display units."""
     unit, factor = region.direction.display.displacement
     entry = {
         "direction": str(region.direction),

@@ -21,11 +21,11 @@ from bushfit.fitting.solve import solve
 from bushfit.model.model import Model
 from bushfit.progress import track
 
-#: Chi-square beyond that of the best at which a refit is left on its way.
+#: Chi-square above that of the best refit at which a refit is abandoned before it has converged.
 _FAR = 60.0
-#: Fall of chi-square that a fit may yet make, over the fall that a linear model expects.
+#: Further decrease of chi-square that a fit may make, relative to the decrease that a linear model expects.
 _MOST_FALL = 4.0
-#: Evaluations of the model before which no refit is left: a model that the gap has bent needs some to unbend.
+#: Number of model evaluations before which no refit is abandoned: parameters that the gap has distorted recover slowly.
 _FIRST = 16
 
 
@@ -48,7 +48,7 @@ def refitted(
         columns: common errors of all tests, as residuals per standard deviation, (c, n); None without such errors.
 
     Returns:
-        Fits by the name of the effect, without those that cannot come near the best.
+        Fits by the name of the effect; fits far behind the best, and effects without a response, are left out.
     """
     fits: dict[str, Descent] = {}
     tests: Sequence[MeasuredTest] = evidence.data_sets
@@ -75,7 +75,7 @@ def refitted(
 
 
 def _descend(fits: dict[str, Descent]) -> Iterator[str]:
-    """Step fits side by side until each has ended or fallen behind, and give its name then."""
+    """Step all fits in turn, in place, until each has ended or fallen behind; yields the name of each that stops."""
     running = list(fits)
     while running:
         for name in running:
@@ -91,16 +91,16 @@ def _descend(fits: dict[str, Descent]) -> Iterator[str]:
 
 
 def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:
-    """Limit the shapes of effects to the range that the tests can show.
+    """Limit the shape parameters of effects to the range that the tests can show.
 
-    A stop that is always met is no stop, and a resonance far above all frequencies is a mass.
+    For example, a stop that is always in contact is a spring, and a resonance far above all frequencies is a mass.
 
     Args:
-        model: with the effects.
+        model: model with the effects.
         data_sets: the tests.
 
     Returns:
-        Lower and upper limit by the name of the parameter.
+        Lower and upper limit by parameter name.
     """
     shapes = [
         (qualified_name(effect, parameter), parameter)
@@ -115,12 +115,12 @@ def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:
 def refit_with_free_columns(
     evidence: Evidence, bare: Evidence, columns: Array, start: Mapping[str, float], bounds: Bounds
 ) -> Evidence:
-    """Fit a model with free residuals along some columns.
+    """Fit a model while the deviations of a faulty part of the tests are free, so that they do not distort it.
 
     Args:
         evidence: the fitted model and the tests.
         bare: the same fit with residuals in units of the scatter from point to point.
-        columns: whitened as in `bare`, (c, n).
+        columns: change of the residuals of `bare` per unit of each free deviation, (c, n).
         start: further starting values, by parameter.
         bounds: limits of parameters inside their general limits.
 
