@@ -51,8 +51,8 @@ from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood
 from bushfit.model.model import Model
 from bushfit.units import number
 
-#: Size of the process over that of the independent model error, at least and at most: parameters absorb some of what is
-#: smooth, and of many points no more.
+#: Smallest and largest size of the process over the size of the independent model error: fitted parameters absorb a
+#: part of a smooth error.
 _SMOOTH_RATIO = (1.0, 3.0)
 #: Points of a sweep at most that a process is made of; chosen for time.
 _ENOUGH = 600
@@ -71,16 +71,17 @@ _MAXIMUM_ROUNDS, _SETTLED = 12, 0.02
 def with_model_error(
     found: FitResult, bounds: Bounds, rig: RigSettings = UNSTATED, *, smooth: bool = False
 ) -> tuple[FitResult, Unnamed | None]:
-    """The closest fit and its discrepancy where the tests show a lack of fit; else the fit as it is, and None.
+    """Refit a model that misses its tests with a model error added to the noise; a model that fits is unchanged.
 
     Args:
-        found: least squares in the noise alone.
-        bounds: limits of parameters inside their own.
-        rig: the class of the rig, whose errors may explain a misfit.
+        found: least-squares fit with the noise alone.
+        bounds: limits of parameters [SI], inside their default limits.
+        rig: class of the rig, whose errors may explain a misfit.
         smooth: True to test for smooth discrepancies only.
 
     Returns:
-        The fit, and its discrepancy or None.
+        The fit, and the discrepancy as a correction of the stiffness; `found` and None without lack of fit, or if the
+        misfit is too large to be an error of this model.
     """
     if not found.names or not ((not smooth and _exceeds_noise(found, rig)) or _is_smooth(found, rig)):
         return found, None
@@ -107,12 +108,16 @@ def with_model_error(
 
 
 def closest_fit(found: FitResult, bounds: Bounds) -> tuple[FitResult, float]:
-    """Least squares with the noise and an independent model error, and the relative size of this.
+    """Fit by least squares with the noise and an independent model error, whose size is estimated as well.
 
-    Size and parameters follow each other: the size of the largest restricted likelihood, then the parameters.
+    Size (by restricted likelihood) and parameters are estimated in turn until the size converges.
+
+    Args:
+        found: least-squares fit with the noise alone.
+        bounds: limits of parameters [SI], inside their default limits.
 
     Returns:
-        The fit, and the relative size of the model error.
+        The fit, and the standard deviation of the model error relative to the stiffness.
     """
     tests, names, starts = found.minimised, found.names, [found.model]
     fixed = {name: value for name, value in found.model.values.items() if name not in names}
@@ -138,19 +143,19 @@ def closest_fit(found: FitResult, bounds: Bounds) -> tuple[FitResult, float]:
 
 
 def likeliest_size(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> float:
-    """Relative size of an independent model error of the largest restricted likelihood, the parameters near a model's.
+    """Size of the independent model error, relative to the stiffness, that maximises the restricted likelihood.
 
     Args:
-        model: model near the minimum.
+        model: model near the minimum, at which the residuals are linearised.
         data_sets: tests.
-        names: k fitted parameters.
+        names: names of the k fitted parameters.
 
     Returns:
-        Size relative to the stiffness.
+        Standard deviation of the model error relative to the stiffness.
 
     Notes:
-        The logarithm is -(ln|S| + r^T P r + ln|J S^-1 J^T|)/2 with S the covariance of noise and model error, J the
-        derivatives, (k, n), and P = S^-1 - S^-1 J^T (J S^-1 J^T)^-1 J S^-1.
+        The log likelihood is -(ln|S| + r^T P r + ln|J S^-1 J^T|)/2 with the covariance S of noise and model error, the
+        Jacobian J, (k, n), the residuals r, and P = S^-1 - S^-1 J^T (J S^-1 J^T)^-1 J S^-1.
     """
     parts = [data_set.error_products(model, names) for data_set in data_sets]
     scale = np.append(1.0, Coordinates.of_parameters(model, names).slopes(model.values))
@@ -159,14 +164,7 @@ def likeliest_size(model: Model, data_sets: Sequence[MeasuredTest], names: Seque
     variance = np.concatenate([part.variance for part in parts])
 
     def cost(log_size: float) -> float:
-        """Minus twice the log likelihood of a model error.
-
-        Args:
-            log_size: logarithm of its relative size.
-
-        Returns:
-            Minus twice the log likelihood, up to a constant.
-        """
+        """Compute -2 ln(restricted likelihood), up to a constant, for the natural log of a model error's size."""
         square = float(np.exp(2.0 * log_size))
         grown = 1.0 + square * variance
         both = products - components * (square / grown) @ components.T
@@ -183,16 +181,17 @@ def likeliest_size(model: Model, data_sets: Sequence[MeasuredTest], names: Seque
 
 
 def log_likelihood(found: FitResult, prior_precision: Mapping[str, float]) -> float:
-    """Logarithm of the restricted likelihood of a fit, the parameters that are at no bound integrated.
+    """Natural log of the likelihood of a fit, integrated over the parameters that are not at a bound.
 
-    If the model misses the tests, a Gaussian process is added to the noise, its sizes and lengths integrated out.
+    If the model misses the tests, a Gaussian process is added to the noise and its sizes and lengths are averaged over.
 
     Args:
-        found: the fit.
-        prior_precision: prior precision of parameters, by coordinate; of the others it is 0.
+        found: result of the fit.
+        prior_precision: precision (inverse variance) of the prior of each parameter's coordinate, by parameter name; 0
+            for the other parameters.
 
     Returns:
-        Natural logarithm of the likelihood.
+        Natural log of the likelihood, up to a constant that is the same for all models.
     """
     size = max(test.model_error for test in found.minimised)
     bare = [replace(test, model_error=0.0) for test in _thinned(found.minimised)]
@@ -219,7 +218,7 @@ def log_likelihood(found: FitResult, prior_precision: Mapping[str, float]) -> fl
 
 
 def model_error_warning(error: Unnamed) -> str:
-    """Warning about the misfit of a model."""
+    """Warning about the misfit of a model, with its typical size in per cent."""
     return (
         f"the model misses the tests by {number(100.0 * error.typical, 2)} %; parameters are the closest fit, and "
         "their intervals include this misfit"
@@ -227,7 +226,7 @@ def model_error_warning(error: Unnamed) -> str:
 
 
 def _exceeds_noise(found: FitResult, rig: RigSettings) -> bool:
-    """True if chi-square of all tests, or of one, exceeds what noise and a rig of the class make."""
+    """True if chi-square of all tests, or of one, exceeds that of noise and errors of a rig of the given class."""
     squares, counts = [], [test.counted for test in found.minimised]
     for test, rows in zip(found.minimised, rows_of(found.minimised), strict=True):
         whitened = CommonError(_errors_of_class(test, rig)).whiten(found.residual[rows])
@@ -238,7 +237,7 @@ def _exceeds_noise(found: FitResult, rig: RigSettings) -> bool:
 
 
 def _is_smooth(found: FitResult, rig: RigSettings) -> bool:
-    """True if a smooth discrepancy is more probable than noise and errors of a rig of the class alone."""
+    """True if a smooth discrepancy is more probable than noise and errors of a rig of the given class alone."""
     thinned = _thinned(found.minimised)
     solution = found.moved_to(found.model, thinned)
     tests = FittedTests(solution, [_errors_of_class(test, rig) for test in thinned])
@@ -253,8 +252,9 @@ def _is_smooth(found: FitResult, rig: RigSettings) -> bool:
 
 
 def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
-    """Whitened residuals by the errors of a rig of the class that the noise does not include: the gain of a loop, and
-    gain and phase of each level, (w, n).
+    """Change of the whitened residuals by one standard deviation of each rig error outside the noise, (w, n).
+
+    These are the gain error of a loop, or the gain and phase errors of each level of a sweep.
     """
     if isinstance(test, MeasuredLoop):
         gain = test.gain_error * test.unit_gain[None]
@@ -265,10 +265,10 @@ def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
 
 
 def _in_noise(solution: FitResult, tests: Sequence[MeasuredTest]) -> FittedTests:
-    """Fitted model with other weights of the tests, without errors of the rig."""
+    """Fitted model with the given (reweighted or thinned) tests, without errors of the rig."""
     return FittedTests(solution.moved_to(solution.model, tests), [np.empty((0, test.size)) for test in tests])
 
 
 def _thinned(tests: Sequence[MeasuredTest]) -> list[MeasuredTest]:
-    """Tests with evenly chosen points of dense sweeps, enough for smooth discrepancies."""
+    """Tests with dense sweeps reduced to at most 600 evenly chosen points, enough for smooth discrepancies."""
     return [test if isinstance(test, MeasuredLoop) else test.thinned(_ENOUGH) for test in tests]

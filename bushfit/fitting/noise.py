@@ -1,8 +1,8 @@
 """Measurement noise of sweeps: what scatters from point to point, and what a whole run shares.
 
-A run is what was recorded in one go: one of frequency and amplitude is stepped, the other held. Its points share a gain
-and a phase error. Runs that hold the same are repeats of one line. Everything is counted on ln K = ln|K| + i phase, so
-gain errors are real and phase errors imaginary, both relative to |K|.
+A run is one recording, in which frequency or amplitude is stepped and the other is held constant. Its points share a
+gain error and a phase error. A line, or level, is the set of runs with the same held value: its repeats. All errors are
+those of ln K = ln|K| + i phase, so gain errors are real and phase errors imaginary, both relative to |K|.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -17,21 +17,21 @@ from bushfit.fitting.repeats import FEWEST_SOUGHT, FLOOR, LineNoise, at_nominal,
 from bushfit.fitting.rig_class import class_words, largest_error, of_class, words_of
 from bushfit.reading.measurement import Sweep
 
-#: Degrees of freedom from which on repeats alone tell what a run shares; chosen: those of three repeats at two
-#: levels; with fewer, 95 % intervals were too narrow.
+#: Degrees of freedom from which on repeats alone determine the errors shared by a run; chosen: those of three repeats
+#: at two levels; with fewer, 95 % intervals were too narrow.
 _ENOUGH = 4
-#: Probability by chance below which variances count as unequal, and a scatter as one that grows along what is stepped.
+#: Probability by chance below which variances are taken to be unequal, or a scatter to grow along the stepped quantity.
 _BY_CHANCE = 1e-3
-#: Degrees of freedom from which on a line may have a scatter of its own, and phase another than gain: fewer tell it no
-#: better than within a quarter, and wrong weights cost a tenth of the accuracy.
+#: Degrees of freedom from which on a line may have a separate scatter, and phase a scatter different from gain: fewer
+#: determine it within a quarter only, and wrong weights cost a tenth of the accuracy.
 _OWN_SCATTER = 10
-#: Exponents of the variance along what is stepped at most, far beyond those of rigs.
+#: Largest exponent of the variance over the stepped quantity, far beyond those of rigs.
 _STEEPEST = 6.0
 #: Shared variance of an outlying pair of repeats over the median of all pairs: noise alone reaches it once in 500
 #: campaigns.
 _OUTLYING_PAIR = 100.0
 
-#: A line: the name of the sweep, and what its runs hold.
+#: Key of a line: name of the sweep, and held value of its runs (amplitude [m or rad], frequency [Hz] or run number).
 LineKey = tuple[str, float]
 _ORIGINS = {
     "repeats": "from repeats",
@@ -46,16 +46,16 @@ class SweepNoise:
     """Noise of all sweeps of a campaign.
 
     Args:
-        random: standard deviation from point to point of (ln|K|, phase), per line.
-        shared: standard deviation of what a run shares, (ln|K|, phase [rad]).
-        origin: "repeats", "stated" or "assumed": where it comes from.
-        freedom: degrees of freedom behind the shared part; 0 where it is not measured.
-        scatter_freedom: the same of the random part of each line; 0 where it is stated.
-        level: standard deviation of what all runs of a line share, (ln|K|, phase [rad]).
-        level_freedom: degrees of freedom behind it; 0 if it is known.
-        slopes: of sweeps whose random part grows along what is stepped, the exponent, and the step at which it is as
-            `random` has it.
-        beyond: sentence on each sweep whose runs differ by more than a rig of the class explains, by name.
+        random: standard deviation from point to point of (ln|K|, phase [rad]), by line.
+        shared: standard deviation of the errors shared by a run, (ln|K|, phase [rad]).
+        origin: source of the noise: "repeats", "stated" or "assumed".
+        freedom: degrees of freedom behind `shared`; 0 if it is not estimated from repeats.
+        scatter_freedom: degrees of freedom behind `random`; 0 if it is stated.
+        slopes: for each sweep, by name, whose scatter grows along the stepped quantity: exponent, and the step at which
+            the scatter is that of `random`.
+        level: standard deviation of the errors shared by all runs of a line, (ln|K|, phase [rad]).
+        level_freedom: degrees of freedom behind `level`; 0 if it is exact.
+        beyond: warning on each sweep whose runs differ by more than a rig of its class explains, by name.
     """
 
     random: dict[LineKey, tuple[float, float]]
@@ -72,16 +72,16 @@ class SweepNoise:
         """Standard deviation from point to point of gain and phase at points of a sweep, (2, n).
 
         Args:
-            name: of the sweep.
-            held_values: value held at each point, (n,).
-            step: value stepped at each point, (n,).
+            name: name of the sweep.
+            held_values: value held constant at each point, (n,).
+            step: value of the stepped quantity at each point, (n,).
         """
         of_lines = {line: self.random[name, float(line)] for line in np.unique(held_values)}
         exponent, reference = self.slopes.get(name, (0.0, 1.0))
         return np.array([of_lines[line] for line in held_values]).T * (step / reference) ** exponent
 
     def describe(self) -> str:
-        """One line for reports."""
+        """Describe the noise in one line for reports."""
         shared = f"{words_of(self.shared)} shared by a run"
         if any(self.level):
             shared += f", {words_of(self.level)} by all repeats of a level"
@@ -90,21 +90,21 @@ class SweepNoise:
 
 
 def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNoise:
-    """Noise of the sweeps of one rig, estimated from their repeats.
+    """Estimate the noise of the sweeps of one rig from their repeats.
 
-    Without repeats the random part is the scatter about a smooth curve in the logarithm of what is stepped, and the
-    shared part is what the rig's class states, else ASSUMED. With repeats, what is stated is an error of each level,
-    which they cannot show. A `noise` stated in the campaign, or in the file for each point, replaces the random part.
+    Without repeats the scatter is estimated about a smooth curve over the logarithm of the stepped quantity, and the
+    shared error is that of the rig's class, stated or assumed. With repeats, a stated class is an error of each level,
+    which repeats cannot reveal. A noise stated in the campaign, or for each point in the file, replaces the scatter.
 
     Returns:
         Noise of all sweeps together.
 
     Notes:
-        With D the difference of ln K between two repeats at one step, the mean square of what D changes by from one
-        step to the next is four times the random variance, whatever repeats differ by along the run (von Neumann,
-        1941), and the square of its mean estimates twice (shared variance + random variance / number of steps). Pairs
-        are pooled within a line and over lines; lines keep a random part of their own where Bartlett's test finds them
-        unequal. Where the squares of D grow along what is stepped, so does the random part.
+        Let D be the difference of ln K between two repeats at one step. The mean square of the change of D from one
+        step to the next is four times the random variance, even if D drifts along the run (von Neumann, 1941); the
+        square of the mean of D estimates twice (shared variance + random variance / number of steps). Pairs are pooled
+        within a line and over lines; lines keep separate variances if Bartlett's test finds them unequal. If the
+        squares of D grow along the stepped quantity, so does the scatter.
     """
     at_levels = [(sweep, at_nominal(sweep)) for sweep in sweeps]
 
@@ -161,11 +161,11 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
 
 
 def _slope(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
-    """Exponent of the growth of the scatter along what is stepped, and a middle step; None if repeats show no growth.
+    """Exponent of the growth of the scatter along the stepped quantity, and a middle step; None without growth.
 
     Notes:
-        Squares of the deviations over their line's mean are regressed on ln(step); the test is that of Koenker (1981),
-        whose scale is the squares' own scatter, so that heavy tails make no slope. The exponent is that of greatest
+        Squares of the deviations over their line's mean are regressed on ln(step) and tested by Koenker (1981), whose
+        scale is the scatter of the squares, so that heavy tails do not produce a slope. The exponent has the largest
         likelihood.
     """
     squares, logs = [], []
@@ -197,7 +197,7 @@ def _slope(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
 def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -> tuple[dict[LineKey, Array], int]:
     """Variance of gain and phase of each line, (2,), pooled over lines that agree, and its degrees of freedom.
 
-    Of few degrees of freedom gain and phase have one, unless they deny it.
+    With few degrees of freedom gain and phase share one variance, unless they differ significantly.
     """
     if not measured:
         return {key: line.variance for key, line in lines.items()}, round(min(line.freedom for line in lines.values()))
@@ -221,9 +221,9 @@ def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -
 
 
 def _shared(lines: Sequence[LineNoise], rig: RigSettings) -> Array:
-    """Standard deviation of the errors that a run shares, in gain and phase, (2,), without outlying pairs of repeats.
+    """Standard deviation of the errors shared by a run, in gain and phase, (2,), without outlying pairs of repeats.
 
-    Few repeats often show none by chance: what they lack to _ENOUGH degrees of freedom, the rig's class makes up.
+    Few repeats often agree by chance: below _ENOUGH degrees of freedom the variance is averaged with the rig's class.
     """
     pairs, freedom = np.concatenate([line.shared for line in lines]), sum(line.shared_freedom for line in lines)
     usual = np.abs(pairs) <= _OUTLYING_PAIR * np.median(np.abs(pairs), axis=0) if len(pairs) else np.empty((0, 2), bool)
@@ -234,13 +234,13 @@ def _shared(lines: Sequence[LineNoise], rig: RigSettings) -> Array:
 
 
 def _pair(values: Array) -> tuple[float, float]:
-    """Gain and phase, (2,), as plain numbers."""
+    """Convert an array of gain and phase, (2,), to a tuple of floats."""
     gain, phase = values.tolist()
     return gain, phase
 
 
 def _unequal(lines: Sequence[LineNoise]) -> bool:
-    """Bartlett's test (1937) of the variances of lines, each with as many degrees of freedom in gain as in phase."""
+    """True if Bartlett's test (1937) finds the variances of lines unequal; gain and phase are averaged."""
     variance = np.array([line.variance.mean() for line in lines])
     freedom = np.array([2.0 * line.freedom for line in lines])
     if variance.size < 2 or not variance.all():

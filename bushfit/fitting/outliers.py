@@ -1,7 +1,7 @@
 """Outliers: rows that stand out from a smooth curve or a model, and from their own neighbours as well.
 
-Physics that a model lacks misses whole stretches of a test and leaves neighbours alike; only a fault of the record
-puts one row far from the rows beside it. So a misfit, however large, makes no outliers.
+Physics missing from a model makes whole stretches of a test miss by similar amounts; only a fault of the record makes
+one row differ from the rows next to it. A misfit, however large, is therefore not an outlier.
 """
 
 from collections.abc import Callable
@@ -17,12 +17,12 @@ from bushfit.reduction.arrays import MEDIAN_TO_SIGMA, median
 _CHANCE = 0.01
 #: Rows over which the median of neighbours is taken; chosen: wider than a burst, narrower than a bend of the motion.
 NEIGHBOURS = 11
-#: Rows of the median that is tried where the motion turns within NEIGHBOURS rows; and points of a block that count as
-#: neighbours of one where a model was taken off, since stiffness that the model misses bends with frequency.
+#: Rows of the median for motions that turn within NEIGHBOURS rows, and of the median of a sweep's deviations from a
+#: model, which may curve over frequency.
 _FEW_NEIGHBOURS = 5
 #: Equal values in a row from which on a channel may be stuck.
 _STUCK = 4
-#: Rows of a burst of outliers at most; longer runs far off are a misfit.
+#: Largest number of rows of a burst of outliers; a longer run of distant rows is a misfit.
 _LONGEST_BURST = 8
 #: Rows from which the noise of a channel is estimated: enough for a median, whatever the length of the record.
 _NOISE_ROWS = 100_000
@@ -30,41 +30,37 @@ _NOISE_ROWS = 100_000
 _LEAST_NOISE = 1e-4
 #: Distance of a gross outlier from the median of its neighbours, relative to half the range of these medians.
 _GROSS = 0.3
-#: Share of all rows up to which rows so far off are outliers; more of them are the motion itself.
+#: Largest share of all rows that gross outliers may have; more distant rows belong to the motion itself.
 _MOST_GROSS = 0.1
 #: Degrees of freedom of a noise that is as good as known.
 _KNOWN = 1e6
-#: Difference of two points from which on they are no repeats, relative to |K|: no noise of a rig goes that far.
+#: Difference of two repeats, relative to |K|, from which on they contradict each other: more than the noise of any rig.
 _UNLIKE = 0.1
-#: Least distance relative to the median distance, so that no point takes all the weight.
+#: Smallest distance relative to the median distance, so that no point takes all the weight.
 _LEAST_DISTANCE = 1e-3
 
 
 def outlier_limit(rows: int, parts: int, freedom: float) -> float:
-    """Distance in units of noise that noise alone exceeds in one of a hundred tests.
-
-    A row has so many `parts`: 1 for a force, 2 for a complex stiffness. Infinite freedom is a noise that is known.
+    """Distance, in units of noise, that the farthest row exceeds by noise alone in one of a hundred tests.
 
     Args:
         rows: number of rows of the test.
-        parts: numbers that make up a row.
-        freedom: degrees of freedom behind the noise.
+        parts: number of components of a row: 1 for a force, 2 for a complex stiffness.
+        freedom: degrees of freedom behind the noise; infinite if the noise is known.
     """
     return float(np.sqrt(parts * fdtri(parts, min(freedom, _KNOWN), 1.0 - _CHANCE / max(rows, 1))))
 
 
 def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
-    """Mask of rows that are far from a curve and from their neighbours, or stuck, (n,).
-
-    A short run of such rows has to lie as far off the rows before and after the run.
+    """Mask of the rows that are far from a curve and also far from their neighbours, or stuck.
 
     Args:
-        residual: distance from the curve, (n,).
-        recorded: values of the channel, (n,).
-        limit: in the unit of the residual.
+        residual: distance of each row from the curve, (n,).
+        recorded: recorded values of the channel, (n,).
+        limit: distance from which on a row is far, in the unit of the residual.
 
     Returns:
-        Mask, (n,).
+        Mask of the outliers, (n,).
     """
     far = np.abs(residual) > limit
     if not far.any():
@@ -83,14 +79,14 @@ def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
 
 
 def are_stuck(recorded: Array) -> Array:
-    """Mask of rows in which a channel that has noise repeats one value, (n,).
+    """Mask of the rows in which a noisy channel repeats the value of the row before in an improbably long run.
 
     Returns:
-        Mask, (n,).
+        Mask of the stuck rows, (n,).
 
     Notes:
-        The chance that two neighbours are equal, by the resolution of the record, is counted outside such runs. A run
-        of r repeats somewhere in n rows then has the probability n chance^r.
+        The probability p that neighbouring values are equal, due to the resolution of the record, is estimated outside
+        long runs. A run of r repeats somewhere in n rows then has the probability n p^r.
     """
     equal = recorded[1:] == recorded[:-1]
     runs = _run_lengths(equal)
@@ -104,12 +100,12 @@ def are_stuck(recorded: Array) -> Array:
 
 
 def gross_rows(values: Array) -> Array:
-    """Rows of a periodic motion, of unknown period, that are far from the median of their neighbours, (k,).
+    """Find rows of a periodic motion, of unknown period, that are far from the median of their neighbours.
 
-    None where these are many, even with a median over few rows: then the motion turns within so few rows.
+    Many such rows mean that the motion turns within the width of the median; then no row is returned.
 
     Returns:
-        Row numbers, (k,).
+        Row indices, (k,).
     """
     from scipy.ndimage import median_filter
 
@@ -122,7 +118,7 @@ def gross_rows(values: Array) -> Array:
 
 
 def _run_lengths(mask: Array) -> Array:
-    """Length of the run of true entries that each entry belongs to, 0 for false ones, (n,)."""
+    """Length of the run of consecutive true entries around each entry, (n,); 0 for false entries."""
     edges = np.flatnonzero(np.concatenate(([True], mask[1:] != mask[:-1], [True])))
     return np.where(mask, np.repeat(np.diff(edges), np.diff(edges)), 0)
 
@@ -130,22 +126,22 @@ def _run_lengths(mask: Array) -> Array:
 def outlying_points(
     deviation: Array, distance_of: Callable[..., Array], starts: Array, points: Array, freedom: float
 ) -> Array:
-    """Points of a sweep that are farther from the model than noise explains, and as far from their neighbours, by
-    number, (k,).
+    """Find points of a sweep that are farther from the model and from their neighbours than noise explains.
 
-    A point that was repeated must stand out from its repeats as well: what all of them do is no fault of one row.
-    Where two repeats or more agree against it that is enough, so that neither outliers side by side nor a misfit of
-    the model hide it; of those repeats, the one farthest out need not be far off the model.
+    A repeated point must also differ from its repeats. If two or more repeats agree and the point differs from them,
+    its neighbours are not compared, so that neither adjacent outliers nor a misfit of the model hide it; the farthest
+    such point of an operating point is an outlier even if it is near the model.
 
     Args:
-        deviation: of each point from the model, gain and phase, complex (n,).
-        distance_of: function for the length of deviations in units of noise; `shared=False` keeps the blocks' errors.
+        deviation: deviation of each point from the model, gain + i phase, complex (n,).
+        distance_of: function from deviations to distances in units of noise; with `shared=False` the errors shared by a
+            block are not subtracted.
         starts: index of the first point of each block.
-        points: frequency and amplitude, (2, n); where both agree, points are repeats.
-        freedom: degrees of freedom behind the noise; inf where it is known.
+        points: frequency and amplitude of each point, (2, n); points with equal values are repeats.
+        freedom: degrees of freedom behind the noise; inf if the noise is known.
 
     Returns:
-        Point numbers, (k,).
+        Indices of the outliers, (k,).
     """
     distance = distance_of(deviation)
     by_noise = outlier_limit(deviation.size, 2, freedom)
@@ -169,14 +165,15 @@ def outlying_points(
 
 
 def contradictions(stiffness: Array, place: Array) -> list[tuple[float, int, int]]:
-    """For each operating point, the two repeats that differ most, if they differ by _UNLIKE or more; the worst first.
+    """Find operating points whose repeats contradict each other: they differ by 10 % of |K| or more.
 
     Args:
-        stiffness: of the points, complex (n,).
-        place: number of the operating point of each point, (n,).
+        stiffness: stiffness of the points, complex (n,).
+        place: index of the operating point of each point, (n,).
 
     Returns:
-        For each contradiction the distance relative to |K| and two point numbers.
+        For each such operating point, the largest first: difference relative to |K|, and indices of the two points that
+        differ most.
     """
     value, ends, worst = np.log(stiffness), np.cumsum(np.bincount(place)), dict[int, tuple[float, int, int]]()
     for part in (value.real, value.imag):
@@ -190,14 +187,19 @@ def contradictions(stiffness: Array, place: Array) -> list[tuple[float, int, int
 
 
 def misfit_scale(distance: Array, parts: int) -> float:
-    """Median distance from the model over that of noise alone; at least 1."""
+    """Median distance of points from the model, relative to the median by noise alone; at least 1.
+
+    Args:
+        distance: distance of each point in units of noise, (n,).
+        parts: number of components of a point: 1 for a force, 2 for a complex stiffness.
+    """
     if not distance.size:
         return 1.0
     return max(1.0, float(np.median(distance) / np.sqrt(chdtri(parts, 0.5))))
 
 
 def _from_neighbours(values: Array, starts: Array, window: int) -> Array:
-    """Distance of each point from the median of those around it in its block, complex (n,)."""
+    """Difference of each point from the median of the `window` points around it in its block, complex (n,)."""
     sizes, local = np.diff(starts, append=values.size), np.zeros_like(values)
     for width in np.unique(np.minimum(sizes, window)).tolist():  # mostly one: blocks are longer
         chosen = np.minimum(sizes, window) == width
@@ -209,9 +211,9 @@ def _from_neighbours(values: Array, starts: Array, window: int) -> Array:
 
 
 def _from_repeats(values: Array, place: Array) -> tuple[Array, Array]:
-    """Number of other repeats of each point, (n,), and its distance from their median, complex (n,); 0 without repeats.
+    """Number of other repeats of each point, (n,), and its difference from their median, complex (n,); 0 without any.
 
-    Points of one `place`, (n,), are repeats.
+    Points with the same index in `place`, (n,), are repeats.
     """
     counts = np.bincount(place)
     repeats, distances = counts[place] - 1, []
@@ -228,14 +230,12 @@ def _from_repeats(values: Array, place: Array) -> tuple[Array, Array]:
 
 
 def least_absolute(basis: Array, values: Array, smallest: float) -> Array:
-    """Fit a curve with the least sum of absolute distances, (n, k), (n, m) -> (k, m).
-
-    It hardly follows outliers. Distances of less than the relative one of the median and `smallest` count alike.
+    """Fit a curve with the least sum of absolute distances, which hardly follows outliers: coefficients (k, m).
 
     Args:
-        basis: functions at the points, (n, k).
-        values: points, (n, m).
-        smallest: distance below which points count alike.
+        basis: values of k functions at the points, (n, k).
+        values: values to fit, m per point, (n, m).
+        smallest: distance, in the unit of `values`, below which all points have about the same weight.
     """
     root_weight = np.ones((len(values), 1))
     for _ in range(25):  # chosen: nine of ten curves have then come within a third of the noise of where they end

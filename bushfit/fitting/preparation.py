@@ -34,7 +34,7 @@ __all__ = [
 #: Relative difference of two loops' amplitudes, or frequencies, up to which one repeats the other; chosen: rigs come
 #: back to an amplitude within it.
 _SAME_LOOP = 0.02
-#: Step in temperature up to which tests count as made at one [K].
+#: Step in temperature [K] up to which tests belong to the same temperature.
 _SAME_KELVIN = 1.0
 
 #: One measured test with its noise, see `data_set.MeasuredBase`.
@@ -51,7 +51,7 @@ def prepare_loops(
     Args:
         loops: measured loops.
         rig: class of the rig.
-        without_outliers: True to give outlying rows no weight.
+        without_outliers: True to give rows whose force is an outlier no weight.
     """
     drives = [drive_of(loop, without_outliers=without_outliers) for loop in loops]
     found = [MeasuredLoop(drive).weighted(np.array(drive.loop.weight)) for drive in drives]
@@ -60,11 +60,11 @@ def prepare_loops(
 
 
 def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[MeasuredLoop]:
-    """Loops with the gain error that a rig of the class makes, stated or assumed.
+    """Loops with the gain error of the rig's class, stated or assumed.
 
     Notes:
-        All repeats of a loop share it. Independent errors larger by the root of their number leave the mean of the
-        repeats, which alone describes the bushing, with the same error.
+        All n repeats of a loop share the gain error. It is represented by independent errors that are larger by
+        sqrt(n), which give the mean of the repeats the same error.
     """
     errors = of_class(rig)[0] * np.sqrt(np.count_nonzero(repeats_of(loops), axis=1))
     weighs = rig.stiffness_errors[0] is not None
@@ -74,19 +74,19 @@ def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[Me
 
 
 def with_gains(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> list[MeasuredTest]:
-    """Tests with the gain errors of loops included in their noise, or not."""
+    """Tests whose loops have the gain error included in the noise that weights the residuals (`weigh`), or not."""
     return [replace(test, gain_weighs=weigh) if isinstance(test, MeasuredLoop) else test for test in data_sets]
 
 
 def repeats_of(loops: Sequence[MeasuredLoop]) -> Array:
-    """Mask of the pairs of loops that repeat one another, (n, n)."""
+    """Mask of the pairs of loops that are repeats (same direction, amplitude and frequency within 2 %), (n, n)."""
     conditions = np.log([(loop.drive.amplitude, loop.drive.frequency) for loop in loops]).reshape(-1, 2)
     place = np.array([str(loop.direction) for loop in loops])
     return np.all(np.abs(conditions[:, None] - conditions) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
 
 
 def group_repeats(loops: Sequence[MeasuredLoop]) -> list[list[MeasuredLoop]]:
-    """Group loops that repeat one another."""
+    """Group loops that are repeats: same direction, amplitude and frequency within 2 %."""
     if not loops:
         return []
     first = np.argmax(repeats_of(loops), axis=1)
@@ -96,11 +96,13 @@ def group_repeats(loops: Sequence[MeasuredLoop]) -> list[list[MeasuredLoop]]:
 def prepare_sweeps(
     sweeps: Sequence[Sweep], residuals: Residuals = "complex", rig: RigSettings = UNSTATED
 ) -> list[MeasuredSweep]:
-    """Prepare sweeps for a fit; the noise of those of one rig, the bushing's or a specimen's, is estimated together.
+    """Prepare sweeps for a fit, each with its noise.
+
+    The noise is estimated once for all sweeps of the bushing, and once for those of each specimen.
 
     Args:
         sweeps: measured sweeps.
-        residuals: definition of the residuals, complex or magnitude and loss factor.
+        residuals: definition of the residuals: complex, or magnitude and loss factor.
         rig: class of the rig.
 
     Returns:
@@ -118,10 +120,10 @@ def prepare_sweeps(
 
 
 def _with_contradictions(found: Sequence[_Kind], conditions: Sequence[Array]) -> list[_Kind]:
-    """Mark each test that contradicts an earlier one with a sentence on the pair of points that differs most.
+    """Mark each test that contradicts an earlier test with a sentence on the pair of points that differs most.
 
-    Points repeat one another where all conditions, (n,) each over all operating points, and their temperatures are the
-    same.
+    Points of different tests are repeats if all conditions, (n,) each over the points of all tests, and temperatures
+    are equal.
     """
     if len(found) < 2:
         return list(found)
@@ -161,13 +163,13 @@ def split_by_kind(data_sets: Iterable[MeasuredTest]) -> tuple[list[MeasuredLoop]
 
 
 def rows_of(data_sets: Iterable[MeasuredTest]) -> list[slice]:
-    """Slice of the residuals of each test among those of all tests."""
+    """Slice of each test's residuals in the array of the residuals of all tests."""
     ends = accumulate((test.size for test in data_sets), initial=0)
     return [slice(*pair) for pair in pairwise(ends)]
 
 
 def operating_conditions(bushing: Bushing | None, data_sets: Iterable[MeasuredTest]) -> tuple[Array, Array]:
-    """Frequencies [Hz] and equivalent strains of all operating points, loops included, (n,) each."""
+    """Frequencies [Hz] and equivalent strain amplitudes of all operating points, one per loop, (n,) each."""
     tests = list(data_sets)
     strains = [test.amplitude * unit_strain(bushing, test.direction) for test in tests]
     return np.concatenate([test.frequency for test in tests]), np.concatenate(strains)
@@ -179,7 +181,7 @@ def log_slopes(model: Model, data_set: MeasuredTest, names: Sequence[str]) -> Ar
     Args:
         model: model at whose values the derivatives are taken.
         data_set: test of n operating points.
-        names: parameters.
+        names: names of the parameters.
     """
     test = data_set.direction, data_set.frequency, data_set.amplitude
     stiffness, slopes = stiffness_and_slopes(model, *test, names, data_set.kind, data_set.circumstances)
@@ -187,7 +189,7 @@ def log_slopes(model: Model, data_set: MeasuredTest, names: Sequence[str]) -> Ar
 
 
 def sources(data_sets: Iterable[MeasuredTest]) -> tuple[Source, ...]:
-    """Files of tests, each once, because a record may contain several loops."""
+    """Source files of tests, each listed once, because a record may contain several loops."""
     found = list[Source]()
     for test in data_sets:
         if test.source is not None and test.source not in found:
@@ -206,15 +208,20 @@ def new_loop(
     rows: int,
     from_rest: bool = False,
 ) -> MeasuredLoop:
-    """Build a sinusoidal loop of a test that was not made.
+    """Build a sinusoidal loop of a planned test, with the force of a model.
 
     Args:
-        frequency: [Hz].
-        amplitude: zero-to-peak [m or rad].
+        model: model that gives the force.
+        place: direction or specimen of the test.
+        frequency: frequency [Hz].
+        amplitude: zero-to-peak displacement [m or rad].
         noise: standard deviation of one row, relative to half the force range.
+        cycles: number of cycles.
+        rows: number of rows.
+        from_rest: True if the loop begins at rest, False if it is settled.
 
     Returns:
-        Loop without noise in its force, with the standard deviation `noise`.
+        Loop whose force has no noise, but whose residuals are in units of `noise`.
     """
     phase, nil = cycles * np.arange(rows) / rows, np.zeros(rows)
     motion = amplitude * np.sin(2.0 * np.pi * phase)
@@ -241,10 +248,15 @@ def new_sweep(
     scatter: tuple[float, float],
     shared: tuple[float, float],
 ) -> MeasuredSweep:
-    """Build a sweep that was not made, with one run for each amplitude.
+    """Build a sweep of a planned test, with one run for each amplitude and the stiffness of a model.
 
     Args:
-        scatter, shared: standard deviations of gain and phase, from point to point and of a run.
+        model: model that gives the stiffness.
+        place: direction or specimen of the test.
+        frequency: frequency of each point [Hz], (n,).
+        amplitude: zero-to-peak amplitude of each point [m or rad], (n,).
+        scatter: standard deviations of gain and phase [rad] from point to point.
+        shared: standard deviations of the gain and phase errors [rad] shared by a run.
     """
     noise = SweepNoise({("new", float(x)): scatter for x in np.unique(amplitude)}, shared, "stated", 0)
     return MeasuredSweep(Sweep("new", place, frequency, amplitude, model.stiffness(place, frequency, amplitude)), noise)

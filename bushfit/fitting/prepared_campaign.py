@@ -38,7 +38,14 @@ _Kind = TypeVar("_Kind", MeasuredLoop, MeasuredSweep, MeasuredLoop | MeasuredSwe
 
 @dataclass(frozen=True, eq=False)
 class PreparedCampaign:
-    """A campaign ready to fit: its loops and sweeps with their noise, and the bounds of [fit]."""
+    """A campaign ready to fit.
+
+    Args:
+        campaign: campaign as read from its file.
+        loops: measured loops with their noise.
+        sweeps: measured sweeps with their noise.
+        bounds: limits of parameters from [fit] [SI], by name.
+    """
 
     campaign: Campaign
     loops: tuple[MeasuredLoop, ...]
@@ -53,8 +60,8 @@ class PreparedCampaign:
             The campaign with its measured tests.
 
         Raises:
-            FitError: a loop is not one whole cycle or more, lacks rows, or gives energy; a strain that no rubber bears.
-            ModelError: [fit] effects has an unknown effect, or one twice.
+            FitError: a loop has no whole cycle, lacks rows or releases energy, or a test strains rubber impossibly.
+            ModelError: [fit] effects contains an unknown effect, or the same effect twice.
         """
         with error_location(campaign.path, place="[fit] effects"):
             Model.with_defaults(None, with_base(campaign.fit.effects), {})
@@ -81,7 +88,7 @@ class PreparedCampaign:
 
     @property
     def notes(self) -> list[str]:
-        """Warnings about the tests themselves."""
+        """Warnings about the recorded data of the tests, and about mixed specimens or preloads."""
         of_tests = [f"{test.name}: {note}" for test in self.data_sets for note in test.notes]
         return [*of_tests, *mixed_conditions(self.data_sets)]
 
@@ -100,7 +107,7 @@ class PreparedCampaign:
 
     @property
     def robust(self) -> bool:
-        """True if outliers are left out."""
+        """True if the fit is robust (loss soft_l1), which leaves outliers out."""
         return self.campaign.fit.loss != "linear"
 
     def require_tests(
@@ -110,16 +117,16 @@ class PreparedCampaign:
 
         Args:
             tests: loops or sweeps.
-            message: of the error.
+            message: message of the error.
             hint: next step for the user.
-            found: what the campaign has instead.
+            found: text on the tests that the campaign has instead.
         """
         if not tests:
             raise FitError(message, file=self.campaign.path, found=found, hint=hint)
         return tests
 
     def without(self, outliers: Sequence[Outlier]) -> "PreparedCampaign":
-        """Data without weight on these outliers of the sweeps; those of loops have none where `robust`."""
+        """Campaign with weight 0 on the given outliers of sweeps; those of loops have weight 0 already if `robust`."""
         sweeps = []
         for data_set in self.sweeps:
             rows = [outlier.row - 1 for outlier in outliers if outlier.test == data_set.name]
@@ -137,25 +144,26 @@ class PreparedCampaign:
 
     @property
     def given_values(self) -> dict[str, float]:
-        """Values the campaign gives, to start from or to keep fixed."""
+        """Parameter values given in [fit] of the campaign [SI], as start values or fixed values, by name."""
         settings = self.campaign.fit.parameters
         return {name: setting.value for name, setting in settings.items() if setting.value is not None}
 
     def start_values(self, data_sets: Sequence[MeasuredTest], fixed: Mapping[str, float]) -> dict[str, float]:
-        """Start values of the paper's parameters for a fit of some tests, with what the campaign gives."""
+        """Start values of the paper's parameters [SI] by name: fixed, else as in the campaign, else from the tests."""
         with error_location(self.campaign.path):
             return start_values(self.campaign.bushing, data_sets, {**self.given_values, **fixed})
 
     def starting_model(
         self, effects: Sequence[str], data_sets: Sequence[MeasuredTest], stage_fixed: Mapping[str, float]
     ) -> Model:
-        """A model to fit to some tests: at the start values that the campaign gives, or at values read off the tests if
-        these meet the tests better.
+        """Build the model that a fit starts from.
+
+        Its values are those given in the campaign, or estimated from the tests if these give a lower chi-square.
 
         Args:
             effects: names of the model's effects.
             data_sets: tests to fit.
-            stage_fixed: values of parameters that this stage keeps fixed [SI].
+            stage_fixed: values of parameters that this fit keeps fixed, by name [SI].
 
         Returns:
             Model with start values.
@@ -185,20 +193,22 @@ class PreparedCampaign:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """The model that [fit] asks for: the paper's three branches and the effects that it adds."""
+        """Names of the effects of the model in [fit]: the paper's three branches and the added effects."""
         return with_base(self.campaign.fit.effects)
 
     def select_tests(self, places: Sequence[str] | None) -> list[MeasuredTest]:
-        """Select the tests of some directions and specimens, by default the axial ones, as in the paper, and specimens.
+        """Select the tests of some directions and specimens.
 
-        Where no loop of the bushing is axial, all loops are taken by default, and so with sweeps.
+        Args:
+            places: names of directions or specimens. None: all specimens, and the axial tests as in the paper; without
+                axial loops, all loops, and without axial sweeps, all sweeps.
 
         Returns:
             Loops, then sweeps.
 
         Raises:
-            FitError: there is none.
-            ModelError: a name that is neither a direction nor a specimen of the campaign.
+            FitError: no test is selected.
+            ModelError: a name is neither a direction nor a specimen of the campaign.
         """
         hint = "add measured tests, or simulate some with bushfit simulate"
         data_sets = self.require_tests(self.data_sets, "there is nothing to fit", hint)
@@ -222,19 +232,19 @@ class PreparedCampaign:
         return chosen
 
     def static_loops(self) -> list[MeasuredLoop]:
-        """The loops `fit-static` uses: the axial ones, else those of the bushing, else all."""
+        """Loops that `fit-static` uses: the axial ones, else all loops of the bushing, else all loops."""
         hint = "add a quasi-static loop, or run bushfit fit for the sweeps alone"
         return _preferred(self.require_tests(self.loops, "fit-static needs a loop", hint, "no [[loops]]"))
 
     @cached_property
     def smallest_sweep(self) -> MeasuredSweep:
-        """The sweep levels `fit-dynamic` uses: those the campaign names, else the smallest axial one.
+        """Sweep that `fit-dynamic` uses, reduced to the amplitudes of the campaign, else to the smallest amplitude.
 
-        Sweeps of the frequency go first, then those of the bushing. Of a sweep of the amplitude it takes the smallest
-        at each frequency, and of one that holds neither all points.
+        Frequency sweeps are preferred to others, then axial sweeps, then sweeps of the bushing. An amplitude sweep is
+        reduced to the smallest amplitude at each frequency; a sweep in which neither is held keeps all points.
 
         Raises:
-            FitError: no sweep, or none at the amplitudes named.
+            FitError: the campaign has no sweep, or none at the amplitudes that it names.
         """
         hint = "add a stepped-sine file, or run bushfit fit-static for the loops alone"
         available = self.require_tests(self.sweeps, "fit-dynamic needs a sweep", hint, "no [[sweeps]]")
@@ -263,7 +273,7 @@ class PreparedCampaign:
 
 
 def _chi_square(model: Model, data_sets: Sequence[MeasuredTest]) -> float:
-    """chi-square of a model; infinite where there is no response."""
+    """Chi-square of a model; infinite if the model has no finite response."""
     with suppress(ModelError), np.errstate(all="ignore"):
         chi_square = float(np.sum(np.square(residual(model, data_sets))))
         return chi_square if np.isfinite(chi_square) else np.inf
@@ -271,6 +281,6 @@ def _chi_square(model: Model, data_sets: Sequence[MeasuredTest]) -> float:
 
 
 def _preferred(data_sets: Sequence[_Kind]) -> list[_Kind]:
-    """The axial tests, else those of the bushing, else all."""
+    """Return the axial tests, else those of the bushing, else all."""
     axial = [test for test in data_sets if test.direction is Direction.AXIAL]
     return axial or [test for test in data_sets if not isinstance(test.direction, Specimen)] or list(data_sets)

@@ -16,7 +16,7 @@ from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import End, Outlier
 
-#: Distance of the start values from the bounds at the least, relative to the room between the bounds: the conversion
+#: Smallest distance of the start values from the bounds, relative to the distance between the bounds: the conversion
 #: between values and coordinates rounds.
 _INSIDE = 1e-12
 #: Distance from a bound, in coordinates, up to which a parameter is at the bound.
@@ -30,8 +30,8 @@ class FitProblem:
     Args:
         model: model with the start values.
         tests: tests with their noise.
-        names: k free parameters.
-        bounds: limits inside the parameters' own [SI].
+        names: names of the k free parameters.
+        bounds: limits of parameters [SI] by name, inside their default limits.
     """
 
     model: Model
@@ -43,13 +43,13 @@ class FitProblem:
     def with_fixed(
         cls, model: Model, tests: Sequence[MeasuredTest], fixed: Collection[str], bounds: Bounds
     ) -> FitProblem:
-        """The problem in which all parameters of the model are free except those that are fixed.
+        """Build the problem in which all parameters of the model are free except the fixed ones.
 
         Args:
             model: model with the start values.
             tests: tests with their noise.
             fixed: names of the fixed parameters.
-            bounds: limits inside the parameters' own [SI].
+            bounds: limits of parameters [SI] by name, inside their default limits.
         """
         return cls(model, tests, [name for name in model.parameters if name not in fixed], bounds)
 
@@ -70,7 +70,7 @@ class FitProblem:
         """Coordinates of the start values, moved inside the bounds, (k,).
 
         Raises:
-            FitError: not more residuals than parameters.
+            FitError: there are not more residuals than parameters.
         """
         points = sum(test.size for test in self.tests)
         if points <= len(self.names):
@@ -80,7 +80,7 @@ class FitProblem:
         return np.clip(self.coordinates.point(values), *self.limits)
 
     def at_bound(self, point: Array) -> dict[str, End]:
-        """Parameters that are at a bound at a point, (k,), and at which bound."""
+        """Names of the parameters that are at a bound, with the bound ("min" or "max"), from the coordinates, (k,)."""
         low, high = self.limits
         near = _AT_BOUND * np.minimum(high - low, 1.0)
         rooms: dict[End, Array] = {"min": point - low, "max": high - point}
@@ -91,11 +91,12 @@ class FitProblem:
 
 @dataclass(frozen=True, eq=False)
 class Process:
-    """A Gaussian process of the relative error of a model, as a part of the covariance of its residuals.
+    """Smooth relative error of a model (a Gaussian process), to be added to the covariance of fitted parameters.
 
     Args:
-        shapes: one standard deviation of each amount at the operating points of all tests, complex (q, p).
-        freedom: degrees of freedom that determine its size.
+        shapes: relative change of the stiffness by one standard deviation of each of q independent patterns, at the p
+            operating points of all tests, complex (q, p).
+        freedom: degrees of freedom that determine the size of the process.
     """
 
     shapes: Array
@@ -107,10 +108,10 @@ class Process:
         Args:
             model: fitted model.
             tests: tests.
-            influence: of each whitened residual on the parameters, (k, n).
+            influence: change of each parameter by a unit of each whitened residual, (k, n).
 
         Returns:
-            Covariance in the coordinates of the influence, (k, k).
+            Covariance of the parameters, in the units of the influence, (k, k).
         """
         first, changes = 0, np.zeros((len(influence), len(self.shapes)))
         for test, rows in zip(tests, rows_of(tests), strict=True):
@@ -123,20 +124,21 @@ class Process:
 
 @dataclass(frozen=True, eq=False)
 class FitResult:
-    """Minimum of a least-squares problem.
+    """Result of a least-squares fit.
 
     Args:
-        problem: the problem; its tests have the weights of the minimum.
+        problem: least-squares problem; its tests have the weights at which the sum of squares is minimal.
         model: fitted model.
-        residual: whitened residuals, model less measured, (n,).
-        jacobian: their derivatives by coordinate, (k, n).
-        evaluations: of the model.
-        at_bound: parameters that ended at a bound, and at which.
+        residual: whitened residuals, model minus measured, (n,).
+        jacobian: derivatives of the residuals by coordinate, (k, n).
+        evaluations: number of model evaluations.
+        at_bound: names of the parameters that ended at a bound, with the bound ("min" or "max").
         stopped: True if the fit was stopped before it converged.
-        weighed: tests with the weights that give the covariance, if these differ from the problem's.
-        unsoftened: tests with the weights of their noise alone, if these differ; outliers left out have none.
-        outliers: by file and row.
-        process: error of the model, where the model misses the tests.
+        weighed: tests with the weights for the covariance of the parameters; empty if these are the problem's.
+        unsoftened: tests with the weights of their noise alone, excluded outliers having weight 0; empty if these are
+            the problem's.
+        outliers: outliers by file and row.
+        process: smooth error of the model, if the model misses the tests by more than their noise; else None.
     """
 
     problem: FitProblem
@@ -153,7 +155,7 @@ class FitResult:
 
     @property
     def names(self) -> Sequence[str]:
-        """Fitted parameters."""
+        """Names of the fitted parameters."""
         return self.problem.names
 
     @property
@@ -163,17 +165,17 @@ class FitResult:
 
     @property
     def minimised(self) -> Sequence[MeasuredTest]:
-        """Tests with the weights at which the fit is the least sum of squares."""
+        """Tests with the weights at which the fit minimises the sum of squares."""
         return self.problem.tests
 
     @property
     def data_sets(self) -> Sequence[MeasuredTest]:
-        """Tests with the weights of their noise alone; outliers left out have none."""
+        """Tests with the weights of their noise alone; excluded outliers have weight 0."""
         return self.unsoftened or self.problem.tests
 
     @property
     def chi_square(self) -> float:
-        """Sum of the squared residuals."""
+        """Sum of the squared whitened residuals."""
         return float(self.residual @ self.residual)
 
     @property
@@ -183,25 +185,25 @@ class FitResult:
 
     @property
     def flat(self) -> bool:
-        """True if the next step would lower chi-square by less than chance does."""
+        """True if one more Gauss-Newton step would lower chi-square by no more than chance explains."""
         return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
 
     def gain(self, fixed: Collection[str]) -> float:
-        """Fall of chi-square by one Gauss-Newton step with some parameters fixed."""
+        """Fall of chi-square expected from one Gauss-Newton step, with the named parameters fixed."""
         free = [i for i, name in enumerate(self.names) if name not in fixed]
         left_vectors, values, _ = np.linalg.svd(self.jacobian[free].T, full_matrices=False)
         significant = values > ROUNDING * values.max(initial=0.0)
         return float(np.sum(np.square(left_vectors[:, significant].T @ self.residual)))
 
     def moved_to(self, model: Model, tests: Sequence[MeasuredTest]) -> FitResult:
-        """Move the result to the values of another model, with the residuals of other tests.
+        """Evaluate residuals and Jacobian again for other parameter values or other tests, without a fit.
 
         Args:
             model: model with the same parameters.
             tests: tests.
 
         Returns:
-            The result there, with the outliers and bounds of this one.
+            Result with the new residuals and Jacobian; outliers and bounds are those of this result.
         """
         problem = replace(self.problem, tests=tests)
         return replace(
