@@ -41,22 +41,27 @@ from bushfit.units import display_unit, number
 STATIC = ("mu", "sigma_fmax", "eps_half")
 DYNAMIC = ("m", "alpha")
 
-#: Share of the largest error of a level from which on a fit takes it for a gap of the model: rounding aside, all.
+#: Share of the largest level error of a rig from which on the error is attributed to the model: all but rounding.
 _AT_LIMIT = 0.99
 #: Passes of the two-step procedure agree when no parameter moves by more than this, relative.
 _AGREED = 1e-5
 _MOST_PASSES = 50
 #: Least and largest factor by which an accelerated pass extrapolates the last change.
 _STRIDES = (-0.5, 5.0)
-#: A filled natural rubber, to say what leaving the springpot out may do: m/mu [s^alpha] and alpha.
+#: Springpot of a typical filled natural rubber, m/mu [s^alpha] and alpha, to estimate the effect of leaving it out.
 _TYPICAL_SPRINGPOT = (0.18, 0.24)
-#: What to do about a model that does not fit, until it is done.
+#: Advice at the end of warnings about a model that does not fit.
 NEXT = "; bushfit diagnose looks for what is missing"
 
 
 @dataclass(frozen=True, eq=False)
 class TwoStep:
-    """The paper's procedure, repeated: the values after each pass, and the result of the last."""
+    """Result of the paper's procedure, repeated until static and dynamic fit agree.
+
+    Args:
+        passes: parameter values by name [SI] after each pass.
+        result: result of the last pass.
+    """
 
     passes: tuple[Mapping[str, float], ...]
     result: Result
@@ -72,8 +77,8 @@ def fit_joint(
     """Fit all parameters of a model together, to loops and sweeps.
 
     Args:
-        data: the campaign.
-        effects: of the model; default the paper's three branches and the effects that [fit] adds to them.
+        data: prepared campaign.
+        effects: names of the effects of the model; None: the paper's three branches and the added effects of [fit].
         directions: directions and specimens whose tests to use; see `PreparedCampaign.select_tests`.
         profile: True to add 95 % intervals by profile likelihood.
 
@@ -81,7 +86,7 @@ def fit_joint(
         The fitted model with its uncertainty and quality.
 
     Raises:
-        FitError: no test in those directions, or data that cannot support the fit.
+        FitError: there is no test in the given directions, or the data cannot support the fit.
     """
     for effect in map(get_effect, effects or ()):
         if effect.corrects:
@@ -115,18 +120,18 @@ def fit_joint(
 def fit_static(data: PreparedCampaign, springpot: Result | None = None) -> Result:
     """Fit mu, sigma_fmax and eps_half to the loops, with the springpot fixed (paper, section 4.1).
 
-    m and alpha come from the result given, or else from the campaign's [fit] where both have values; failing that the
-    springpot is left out, and a warning says what this does.
+    m and alpha are those of `springpot`, or else of the campaign's [fit] if it gives both. Otherwise the springpot is
+    left out, and a warning states the effect.
 
     Args:
-        data: the campaign.
-        springpot: result with m and alpha.
+        data: prepared campaign.
+        springpot: result of an earlier fit with m and alpha; None without one.
 
     Returns:
         The fitted model with its uncertainty and quality.
 
     Raises:
-        FitError: no loop, or data that cannot support the fit.
+        FitError: there is no loop, or the data cannot support the fit.
     """
     loops, uncertainty, notes = data.static_loops(), None, []
     fixed = {name: data.given_values[name] for name in DYNAMIC if name in data.given_values}
@@ -142,9 +147,9 @@ def fit_static(data: PreparedCampaign, springpot: Result | None = None) -> Resul
 
 
 def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
-    """Fit m and alpha to the smallest-amplitude sweep, the rest fixed at the static result (paper, section 4.2).
+    """Fit m and alpha to the smallest-amplitude sweep, with the static parameters fixed (paper, section 4.2).
 
-    The static parameters' own errors are carried into those of m and alpha.
+    The errors of the static parameters are propagated into those of m and alpha.
     """
     fixed = {name: static.model.values[name] for name in STATIC}
     found = _fit_step(data, [data.smallest_sweep], BASE, fixed)
@@ -152,7 +157,7 @@ def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
 
 
 def given_static(data: PreparedCampaign) -> Result | None:
-    """mu, sigma_fmax and eps_half as the campaign's [fit] fixes them; None if it does not fix all three."""
+    """Static result with mu, sigma_fmax and eps_half as fixed in the campaign's [fit]; None if one is not fixed."""
     free = data.free(STATIC)
     fixed = {name: value for name, value in data.given_values.items() if name in STATIC and name not in free}
     if len(fixed) < len(STATIC):
@@ -168,11 +173,11 @@ def fit_two_step(data: PreparedCampaign) -> TwoStep:
         Values after each pass, and the last result.
 
     Raises:
-        FitError: a test is missing, or the passes do not settle.
+        FitError: a loop or a sweep is missing, or the passes do not converge.
 
     Notes:
-        Plain passes gain little each, or swing to and fro, so the springpot of the next is extrapolated from the last
-        two (Anderson, 1965).
+        Plain passes converge slowly or oscillate, so the springpot of the next pass is extrapolated from the last two
+        (Anderson, 1965).
     """
     loops, sweep = data.static_loops(), data.smallest_sweep
     springpot, passes = dict[str, float](), list[Mapping[str, float]]()
@@ -205,7 +210,7 @@ def fit_two_step(data: PreparedCampaign) -> TwoStep:
 
 
 def _without_springpot(data: PreparedCampaign, static: FitResult) -> str:
-    """Warning that states how leaving the springpot out changed the static parameters, in per cent."""
+    """Warning that states by how many per cent leaving the springpot out changed the static parameters."""
     values = static.model.values
     try:
         better, source = fit_two_step(data).result.model.values, "with m and alpha from this campaign's sweep"
@@ -225,7 +230,7 @@ def _without_springpot(data: PreparedCampaign, static: FitResult) -> str:
 def _problem(
     data: PreparedCampaign, tests: Sequence[MeasuredTest], effects: Sequence[str], fixed: Mapping[str, float]
 ) -> FitProblem:
-    """Fit of the free parameters of a model, from start values of the campaign or of the tests."""
+    """Build the least-squares problem of a model's free parameters, with start values of the campaign or the tests."""
     model = data.starting_model(effects, tests, fixed)
     names = [name for name in data.free(tuple(model.parameters)) if name not in fixed]
     return FitProblem(model, tests, names, data.bounds)
@@ -245,7 +250,7 @@ def _result(
     notes: Sequence[str] = (),
     unused: Sequence[MeasuredTest] = (),
 ) -> Result:
-    """Collect the result of the steps of a procedure: the last model, with the uncertainty of all of them."""
+    """Assemble the result of a procedure: the model of the last step, with uncertainty and warnings of all steps."""
     model, tests = steps[-1].model, [test for step in steps for test in step.data_sets]
     # beside a model error, a parameter at a bound is fixed
     stages = []
@@ -279,14 +284,14 @@ def _result(
 
 
 def cautions(model: Model, step: FitResult, bounds: Bounds, covariance: Covariance, advice: str = "") -> list[str]:
-    """Warnings about the tests of a fit, and about what they do not determine: bounds met, what stays open, a misfit.
+    """Warnings about the tests of a fit, parameters at bounds, parameters not determined, and a misfit.
 
     Args:
         model: fitted model.
-        step: fit of one stage.
-        bounds: limits that the campaign gives [SI].
-        covariance: of the fitted parameters.
-        advice: end of the sentence on a misfit.
+        step: result of the fit, one step of a procedure.
+        bounds: limits of parameters that the campaign gives, by name [SI].
+        covariance: covariance of the fitted parameters.
+        advice: text to append to the sentence on a misfit.
 
     Returns:
         Sentences for the user.

@@ -1,7 +1,8 @@
 """Profile likelihood: how far one parameter can go when all others follow it.
 
-A standard error takes the misfit for a parabola. The profile asks the data: it moves one parameter, fits the others
-anew, and looks where chi-square has risen too far. The two differ where a parameter is barely determined.
+A standard error assumes that chi-square is a parabola. The profile does not: one parameter is moved in steps, the
+others are fitted again at each step, and the interval ends where chi-square has risen by the allowed amount. Standard
+error and profile differ if a parameter is barely determined.
 """
 
 from collections.abc import Mapping
@@ -24,19 +25,19 @@ _LONGEST_STEP = 0.5
 _BLIND_STEP = 4.0 * _LONGEST_STEP
 #: First step of the search over the distance at which a parabola would end: the first step then passes most ends.
 _FIRST_REACH = 1.1
-#: Steps of the search to either side at most: beyond a hundred factors e a side counts as open.
+#: Largest number of steps of the search to either side: a side without end within a hundred factors e is open.
 _MOST_STEPS = 200
-#: How closely an end is found, in steps: far closer than the three digits that are printed.
+#: Accuracy of an end, in steps: far better than the three digits that are printed.
 _PRECISION = 1e-4
 #: Noise that was itself estimated widens an interval by no more than this factor (Student's t of two degrees of
 #: freedom).
 _WIDEST = 2.2
-#: Share of the allowed rise that is due to the bounds of others from which on these may be what holds an end: chosen.
+#: Share of the allowed rise from which on bounds of other parameters, not the data, may determine an end: chosen.
 _HELD_BY_OTHERS = 0.1
-#: Distance of such an end from the best value, in coordinates, from which on it is open: a factor e.
+#: Distance of such an end from the best value, in coordinates, from which on that side is open: a factor e.
 _FAR = 1.0
 
-#: Standard deviations beyond which one in twenty lies on one side.
+#: One-sided 95 % quantile of the normal distribution, in standard deviations.
 _ONE_SIDED = 1.6448536269514722
 
 Interval = tuple[float | None, float | None]
@@ -44,19 +45,25 @@ Interval = tuple[float | None, float | None]
 
 @dataclass(frozen=True, eq=False)
 class _Profile:
-    """Profile of chi-square over one parameter, with the other parameters fitted."""
+    """Profile of chi-square over one parameter, with the other parameters fitted at each value.
+
+    Args:
+        name: name of the parameter.
+        best: fit of all parameters.
+        known: cache of fits of the others, by the coordinate of the parameter.
+    """
 
     name: str
     best: FitResult
     known: dict[float, FitResult]
 
     def value(self, coordinate: float) -> float:
-        """Value of the parameter at a coordinate."""
+        """Value of the parameter [SI] at a coordinate."""
         (value,) = Coordinates.of_parameters(self.best.model, [self.name]).values([coordinate]).values()
         return float(np.clip(value, *self.best.model.parameters[self.name].bounds))  # exp(log(bound)) may lie beyond it
 
     def fitted(self, coordinate: float) -> FitResult:
-        """The fit of the others, with the parameter fixed at a coordinate."""
+        """Fit the other parameters, with this parameter fixed at a coordinate."""
         if coordinate not in self.known:
             near = self.known[min(self.known, key=lambda known: abs(known - coordinate))].model
             problem = replace(
@@ -69,11 +76,18 @@ class _Profile:
         return self.known[coordinate]
 
     def root_rise(self, coordinate: float) -> float:
-        """Square root of the rise of chi-square above its minimum."""
+        """Square root of the rise of chi-square above its minimum, with the parameter fixed at a coordinate."""
         return float(np.sqrt(max(self.fitted(coordinate).chi_square - self.best.chi_square, 0.0)))
 
     def end(self, start: float, bound: float, step: float, allowed: float) -> float | None:
-        """Value at which the square root of the rise reaches the allowed one; None if it does not."""
+        """Find the value [SI] at which the root of the rise of chi-square reaches `allowed`; None if that side is open.
+
+        Args:
+            start: coordinate of the best value.
+            bound: coordinate of the bound to search towards.
+            step: step of the search, in coordinates.
+            allowed: allowed square root of the rise of chi-square.
+        """
         from scipy.optimize import brentq
 
         steps = start + np.copysign(step, bound - start) * np.arange(_MOST_STEPS + 1)
@@ -92,18 +106,18 @@ class _Profile:
 def profile95(best: FitResult, covariance: Covariance) -> Mapping[str, Interval]:
     """95 % intervals of the fitted parameters by profile likelihood.
 
-    The residuals are in units of a known noise, so the rise of chi-square itself is the measure, 3.84 for 95 %, and not
-    an F-test that takes its scale from the misfit. What the covariance counts beyond that (noise that was itself
-    estimated, a model that misses the data) widens the profile by the same factor as the symmetric interval:
-    chi-square may rise to the square of that interval's half width over the linear standard error.
+    Residuals are in units of noise, so the allowed rise of chi-square is 3.84 for 95 %, without an F-test. Errors that
+    only the covariance includes (of an estimated noise, of a model that misses the data) widen the profile by the same
+    factor as the symmetric interval: chi-square may rise by the square of half that interval's width over the linear
+    standard error.
 
     Args:
-        best: the fit.
-        covariance: of the fitted parameters.
+        best: result of the fit.
+        covariance: covariance of the fitted parameters.
 
     Returns:
-        Lower and upper end by name; None where the data leave that side open up to the bound, or
-        hold it only far away, by another parameter's bound.
+        Lower and upper end [SI] by name; None for a side that the data leave open up to the bound, or limit only far
+        away and by a bound of another parameter.
 
     Raises:
         FitError: fewer than two parameters were fitted.
@@ -133,9 +147,13 @@ def profile95(best: FitResult, covariance: Covariance) -> Mapping[str, Interval]
 
 
 def limit95(best: FitResult, name: str) -> float | None:
-    """One-sided 95 % limit of a parameter that ended at a bound; None if the data set no limit.
+    """One-sided 95 % limit [SI] of a parameter that ended at a bound; None if the data set no limit.
 
-    A model that misses the data may miss them by as much more.
+    If the model misses the data, the allowed rise of chi-square is multiplied by the reduced chi-square.
+
+    Args:
+        best: result of the fit.
+        name: name of the parameter.
     """
     i = list(best.names).index(name)
     start, inward = best.coordinates.point(best.model.values)[i], int(best.at_bound[name] == "min")
@@ -144,5 +162,5 @@ def limit95(best: FitResult, name: str) -> float | None:
 
 
 def _excess(best: FitResult) -> float:
-    """Reduced chi-square, 1 at the least."""
+    """Reduced chi-square of a fit, at least 1."""
     return max(reduced(best.model, best.minimised, len(best.names))[0], 1.0)

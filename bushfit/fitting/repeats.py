@@ -1,7 +1,8 @@
 """Noise that one line of a sweep shows: by what repeats differ in, or about a smooth curve without repeats.
 
-A line is what was stepped through while one of frequency and amplitude was held. All is counted on ln K = ln|K| +
-i phase, so gain errors are real and phase errors imaginary, both relative to |K|.
+A line is the set of points, repeats included, at one held amplitude (frequency is stepped) or one held frequency
+(amplitude is stepped). Errors are those of ln K = ln|K| + i phase, so gain errors are real and phase errors imaginary,
+both relative to |K|.
 """
 
 from collections import defaultdict
@@ -21,18 +22,18 @@ from bushfit.reduction.arrays import MEDIAN_TO_SIGMA, median
 
 #: Least noise of any rig, relative to the largest force or to |K|.
 FLOOR = 1e-4
-#: Degree, in the logarithm of what is stepped, of the smooth curve that stands in for repeats; chosen: it follows
+#: Degree, in the logarithm of the stepped quantity, of the smooth curve that replaces repeats; chosen: it follows
 #: stiffness over two decades.
 _SMOOTH_DEGREE = 4
-#: Degrees in ln f and ln X of the smooth surface that carries points to the amplitude of their level; chosen: it need
-#: only follow the slope over ln X.
+#: Degrees in ln f and ln X of the smooth surface that corrects points to the nominal amplitude of their level; chosen:
+#: it need only follow the slope over ln X.
 _SURFACE_DEGREES = (1, 3)
-#: Common steps of two repeats from which on their difference tells a variance and a mean.
+#: Fewest common steps of two repeats that determine a variance and a mean of their difference.
 FEWEST_STEPS = 3
-#: Differences from which on outliers are sought among them: of fewer, the median tells no scale.
+#: Fewest differences among which outliers are sought: the median of fewer is no reliable scale.
 FEWEST_SOUGHT = 6
-#: Probability by chance of a scatter of many lines at one step, below which something disturbs them there; small, as
-#: the scatter elsewhere is known by some points only.
+#: Probability by chance of the scatter of many lines at one step, below which the step is disturbed; small, as the
+#: scatter at other steps is estimated from few points.
 _DISTURBED = 1e-9
 #: Distance of an outlier from the other points [robust standard deviations]: noise alone reaches it once in 1e9.
 _OUTLIER = 6.0
@@ -40,17 +41,17 @@ _OUTLIER = 6.0
 
 @dataclass(frozen=True)
 class LineNoise:
-    """Noise of one line of a sweep, estimated from its repeats.
+    """Noise of one line of a sweep, estimated from its repeats, or about a smooth curve without repeats.
 
     Args:
-        scatter: deviations of gain and phase from point to point, (k, 2).
-        freedom: degrees of freedom behind their sum of squares.
-        shared: variances of gain and phase that each pair of repeats shares, (pairs, 2).
-        shared_freedom: degrees of freedom behind their mean; 0 without repeats.
-        calmer: without repeats, the scatter less the point that adds most to it, (k - 1, 2).
-        steps: of repeats, what was stepped at each deviation, (k,).
-        squared_distances: without repeats, squared distance of the point at each step from the smooth curve, in units
-            of the robust scatter.
+        scatter: relative deviations of gain and phase [rad] from point to point, (k, 2).
+        freedom: degrees of freedom of the sum of squares of `scatter`.
+        shared: variances of the gain and phase errors shared by a run, estimated from each pair of repeats, (pairs, 2).
+        shared_freedom: degrees of freedom of the mean of `shared`; 0 without repeats.
+        calmer: scatter without the point that contributes most, (k - 1, 2); None with repeats or too few points.
+        steps: frequency [Hz] or amplitude [m or rad] of each deviation, (k,); empty without repeats.
+        squared_distances: squared distance of the point at each step from the smooth curve, in units of the robust
+            scatter; empty with repeats.
     """
 
     scatter: Array
@@ -72,9 +73,9 @@ def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed:
 
     Args:
         sweep: measured sweep.
-        log_stiffness: ln K of its points, complex (n,).
-        held_value: value that the line holds.
-        disturbed: steps to leave out.
+        log_stiffness: ln K of the sweep's points, complex (n,).
+        held_value: value held constant along the line: amplitude [m or rad], frequency [Hz] or number of the run.
+        disturbed: frequencies or amplitudes to leave out, see `disturbed`.
 
     Returns:
         Noise of the line.
@@ -105,14 +106,14 @@ def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed:
 
 
 def free_of(steps: int) -> float:
-    """Degrees of freedom of the mean square of successive differences."""
+    """Effective degrees of freedom of the mean square of `steps` successive differences."""
     return 2.0 * steps**2 / (3.0 * steps - 1.0)
 
 
 def _usual(difference: Array, log_step: Array) -> Array:
-    """Mask of steps at which two repeats differ as they do at other steps, (n,).
+    """Mask of the steps at which the difference of two repeats, complex (n,), is no outlier, (n,).
 
-    Elsewhere is all along the run, and nearby where differences grow along it: by Theil's (1950) median slope.
+    The limit is constant, or grows along the run if the differences grow, by Theil's (1950) median slope.
     """
     usual = ~np.isnan(difference)
     if np.count_nonzero(usual) < FEWEST_SOUGHT:
@@ -128,7 +129,7 @@ def _usual(difference: Array, log_step: Array) -> Array:
 
 
 def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
-    """Noise of a line without repeats: its scatter about a smooth curve; assumed if the line has one or two points."""
+    """Noise of a line without repeats: scatter of ln K about a smooth curve; assumed if there are one or two points."""
     degree = min(_SMOOTH_DEGREE, steps.size - 2)
     if degree < 1:
         return LineNoise(np.full((1, 2), ASSUMED[0]), 1, np.empty((0, 2)))
@@ -150,7 +151,7 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
 
 
 def disturbed(lines: Iterable[LineNoise]) -> list[float]:
-    """Steps at which lines without repeats scatter far more than elsewhere, such as frequencies near that of the mains.
+    """Find steps at which lines without repeats scatter far more than at others, such as near the mains frequency.
 
     Returns:
         Frequencies [Hz] or amplitudes [m or rad].
@@ -167,27 +168,27 @@ def disturbed(lines: Iterable[LineNoise]) -> list[float]:
 
 
 def unit(values: Array) -> Array:
-    """Scale values to -1 ... 1, (n,); all -1 if they are equal."""
+    """Scale values linearly to the interval from -1 to 1, (n,); all -1 if they are equal."""
     return 2.0 * (values - values.min()) / max(float(np.ptp(values)), np.finfo(float).tiny) - 1.0
 
 
 def _freed(basis: Array, values: Array) -> Array:
-    """Independent residuals of values about a curve, (n, k), (n, m) -> (n - k, m), in orthonormal coordinates."""
+    """Project values, (n, m), orthogonally to the k functions of a curve, (n, k): independent residuals, (n - k, m)."""
     (reflections, factors), _ = qr(basis, mode="raw")
     turned, *_ = lapack.dormqr("L", "T", reflections, factors, values, lwork=values.shape[1])
     return np.asarray(turned[basis.shape[1] :])
 
 
 def _parts(values: Array) -> Array:
-    """Gain and phase of ln K, complex (n,) -> (n, 2)."""
+    """Split ln K, complex (n,), into gain and phase, (n, 2)."""
     return np.stack([np.real(values), np.imag(values)], axis=-1)
 
 
 def at_nominal(sweep: Sweep) -> Array:
     """Logarithm of the stiffness of each point, corrected to the nominal amplitude of its level, complex (n,).
 
-    From the amplitude that was reached it is carried there along a smooth surface over ln f and ln X, which tells how K
-    goes with amplitude; without two levels or more there is none.
+    The correction from the reached to the nominal amplitude follows a smooth surface fitted to ln K over ln f and ln X.
+    With fewer than two levels there is no correction.
 
     Returns:
         ln K, complex (n,).

@@ -4,15 +4,14 @@ import numpy as np
 
 from bushfit.campaign.schema import RigSettings
 
-#: Class of a rig that states none, relative gain and phase [rad]; chosen: that of most rigs.
+#: Class of a rig without stated class: relative gain error and phase error [rad]; chosen: that of most rigs.
 ASSUMED = (5e-3, float(np.radians(0.25)))
-#: Error, in units of the rig's class, up to which it counts as one of the rig, whatever the tests seem to tell of it;
-#: chosen: as for outliers of normal errors.
+#: Largest error, in units of the rig's class, that is attributed to the rig; chosen: as for outliers of normal errors.
 _MOST_CLASSES = 3.0
 
 
 def of_class(rig: RigSettings, unstated: tuple[float, float] = ASSUMED) -> tuple[float, float]:
-    """Gain and phase error [rad] of the class of a rig, as stated or by default."""
+    """Relative gain error and phase error [rad] of a rig, as stated in [rig], else those of `unstated`."""
     gain, phase = (default if one is None else one for one, default in zip(rig.stiffness_errors, unstated, strict=True))
     return gain, phase
 
@@ -24,7 +23,7 @@ def largest_error(rig: RigSettings) -> tuple[float, float]:
 
 
 def words_of(error: tuple[float, float]) -> str:
-    """Gain and phase error [rad] as text."""
+    """Format a relative gain error and a phase error [rad] as text, such as "0.5 % gain and 0.25 deg phase"."""
     return f"{100.0 * error[0]:.2g} % gain and {np.degrees(error[1]):.2g} deg phase"
 
 

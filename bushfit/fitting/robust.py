@@ -1,9 +1,9 @@
 """Robust fits: the loss soft_l1, and outliers left out and listed.
 
 Notes:
-    A complex point is one observation: an outlier is one in gain and phase together. The loss acts on each point's own
-    error, beside what its block shares, so that an outlier does not pull its block along. That is why the fit is
-    reweighted, sqrt-weights into the noise of each point, and the loss not put on whitened residuals one by one.
+    A complex point is one observation: an outlier is judged by gain and phase together. The loss acts on the error of
+    each point after the error shared by its block is subtracted, so that an outlier does not affect its block. The fit
+    is therefore reweighted, with weights on the noise of each point, instead of a loss on single whitened residuals.
 """
 
 from collections import defaultdict
@@ -35,12 +35,12 @@ _MOST_NAMED = 8
 def outliers_at(
     model: Model, data_sets: Sequence[MeasuredTest], outlying: Sequence[Array] | None = None
 ) -> tuple[Outlier, ...]:
-    """Outliers of tests by file and row.
+    """List the outliers of tests by file and row.
 
     Args:
         model: fitted model.
         data_sets: tests.
-        outlying: numbers of the outlying points of each test; None to find them with the model.
+        outlying: indices of the outliers of each test, (k,) each; None to find them with the model.
     """
     numbers = outlying or [data_set.outlying(model) for data_set in data_sets]
     pairs = zip(data_sets, numbers, strict=True)
@@ -53,19 +53,19 @@ def estimate(
     """Fit by least squares, or robustly by the loss soft_l1 without the outliers of sweeps.
 
     soft_l1 minimises the sum of 2 C^2 (sqrt(1 + (z/C)^2) - 1) over the distances z of the points in units of noise.
-    The covariance is that of least squares with all weights at (E psi')^2/E psi^2 of normal noise, psi the loss's
-    slope. Outliers of loops have no weight from the start, see `drive`.
+    The covariance is that of least squares with all weights equal to (E psi')^2/E psi^2 for normal noise, where psi is
+    the derivative of the loss. Outliers of loops already have weight 0, see `drive`.
 
     Args:
         problem: parameters to fit, tests and bounds.
         robust: True for soft_l1.
-        solver: function that minimises the sum of squares.
+        solver: function that minimises the sum of squares of a problem.
 
     Returns:
-        The fit, with its outliers.
+        Result of the fit, with its outliers.
 
     Raises:
-        FitError: the robust fit does not converge, or as of the solver.
+        FitError: the robust fit does not converge, or the solver fails.
     """
     if not robust:
         found = solver(problem)
@@ -95,7 +95,7 @@ def estimate(
 
 @lru_cache(maxsize=4)
 def _efficiency(parts: int) -> float:
-    """Efficiency (E psi')^2/E psi^2 of soft_l1 under normal noise, for points of one or two components."""
+    """Efficiency (E psi')^2/E psi^2 of soft_l1 under normal noise, for points with `parts` (1 or 2) components."""
     z = np.linspace(0.0, 12.0, 4001)[1:]
     density = z ** (parts - 1) * np.exp(-(z**2) / 2.0)
     density /= density.sum()
@@ -106,9 +106,13 @@ def _efficiency(parts: int) -> float:
 
 
 def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
-    """Warnings about the outliers that the fit follows and those left out, the first of each test by row.
+    """Warnings about the outliers that the fit includes and those that it leaves out, with the first rows of each test.
 
-    A displacement that is an outlier is never followed, see `drive`.
+    Outliers of the displacement are always left out, see `drive`.
+
+    Args:
+        outliers: outliers of all tests.
+        robust: True if the fit left the outliers out.
 
     Returns:
         At most two sentences.

@@ -1,7 +1,8 @@
 """How the noise of a loop's rows depends from row to row: an autoregressive model, estimated where no physics is.
 
-A load cell's amplifier filters its noise, so that neighbouring rows err alike. A prediction-error filter, which takes
-from each row what the rows before it tell, turns such noise into independent numbers of unit variance.
+A load cell's amplifier filters its noise, so that the errors of neighbouring rows are correlated. A prediction-error
+filter, which subtracts from each row its prediction from the rows before, turns such noise into independent numbers of
+unit variance.
 
 Notes:
     The model is fitted by the likelihood of the periodogram (Whittle 1953, Brockwell and Davis 1991, eq. 10.8.9) at
@@ -24,18 +25,18 @@ _ORDERS = (0, 1, 2, 3, 4, 6, 8)
 #: Floor under the spectrum, over the noise's variance; chosen: without it the whitening of noise that a filter has
 #: taken away at high frequency would magnify what the model and its interpolation err there.
 _FLOOR = 3e-4
-#: Frequencies behind each coefficient of the model at least.
+#: Fewest frequencies per coefficient of the model.
 _FEWEST = 4
 #: Orders in a row that do not better the model, after which no higher one is tried.
 _IN_VAIN = 2
-#: Lowest frequencies seen whose power is where filling in those below begins.
+#: Number of the lowest observed frequencies whose mean power is the first guess of the power below them.
 _LOWEST = 3
 #: Harmonics of one cycle up to which cycles may differ by settling or drift, and so not by noise alone.
 _SLOW = 3.5
-#: Power between these harmonics up to which it counts as noise, over the most that a filter of one pole makes there.
+#: Largest power between these harmonics that is taken for noise, relative to the largest of a filter with one pole.
 _MOST_SLOW = 4.0
-#: First even harmonic of a lone cycle that counts as noise; chosen: what resists alike both ways makes odd ones only,
-#: and what does not shows in the second.
+#: First even harmonic of a lone cycle that is taken for noise; chosen: a bushing that is equally stiff both ways has
+#: odd harmonics only, and an uneven one mainly adds the second.
 _FIRST_EVEN = 4
 
 
@@ -44,14 +45,14 @@ class RowNoise:
     """Correlated noise of the rows of a loop, of unit variance, as an autoregressive model.
 
     Args:
-        filter: prediction-error filter b, (p + 1,): sum of b_k times the k-th row before is white of unit variance.
-        starts: what turns the first p rows, correlated as they are, into independent numbers, (p, p).
-        error: standard errors of the logarithm of the variance, and of b_k/b_0, as independent columns, (p + 1, p + 1);
-            None where they are not estimated.
-        share: of the whitened rows' variance that is there; the rest is the floor under the spectrum.
-        size: standard deviation of a row of unit weight over the noise of a recorded row, which is above 1 for bins
-            of rows that depend on one another.
-        breaks: rows, but the first, that tell nothing of the row before them: there begin the means over other cycles.
+        filter: prediction-error filter b, (p + 1,): the sum of b_k times the k-th row before is white with variance 1.
+        starts: matrix that whitens the first p rows, which have no p rows before them, (p, p).
+        error: standard errors of the log of the variance, and of b_k/b_0, as independent columns, (p + 1, p + 1); None
+            if not estimated.
+        share: share of the variance of the whitened rows that is observed; the rest is the floor under the spectrum.
+        size: standard deviation of a row of unit weight over the noise of a recorded row; above 1 for bins of
+            correlated rows.
+        breaks: indices of rows that do not depend on the row before: starts of bins averaged over other cycles.
     """
 
     filter: Array = field(default_factory=lambda: np.ones(1))
@@ -68,11 +69,11 @@ class RowNoise:
 
     @property
     def rows_as_one(self) -> float:
-        """Number of correlated rows with the information of one independent row on slow changes, at least 1."""
+        """Number of correlated rows with as much information on slow changes as one independent row, at least 1."""
         return max(1.0 / float(np.sum(self.filter)) ** 2, 1.0)
 
     def counting(self, weight: Array) -> Array:
-        """Mask of the whitened rows that have weight and whose preceding rows have weight, (n,).
+        """Mask of the whitened rows to use: the row and all preceding rows in its filter have weight, (n,).
 
         Returns:
             Mask, (n,).
@@ -87,7 +88,7 @@ class RowNoise:
         return counting
 
     def whiten(self, rows: Array) -> Array:
-        """Rows in units of noise, (..., n), as independent numbers of unit variance.
+        """Whiten rows in units of noise, (..., n): their noise becomes uncorrelated with unit variance.
 
         Returns:
             Whitened rows, (..., n).
@@ -102,13 +103,16 @@ class RowNoise:
         return white
 
     def unsure(self, influence: Array) -> list[Array]:
-        """Reactions of an estimator to each parameter of the noise, (k, n) each, as `MeasuredTest.unsure`.
+        """Sensitivity of k parameter estimates to the error of each noise parameter, see `MeasuredLoop.unsure`.
+
+        Args:
+            influence: weight of each whitened row in the estimates, (k, n).
 
         Returns:
-            One array (k, n) for each parameter of the noise.
+            One array (k, n) for each parameter of the noise; empty if their errors are not estimated.
 
         Notes:
-            Of V = L^-1 L^-T, L the filter, the whitened derivative is -(G + G^T) with G = dL L^-1.
+            For V = L^-1 L^-T with the filter L, the whitened derivative is -(G + G^T) with G = dL L^-1.
         """
         if self.error is None:
             return []
@@ -119,7 +123,7 @@ class RowNoise:
         return list(np.tensordot(self.error.T, np.array(moves), axes=1))
 
     def _coloured(self, rows: Array, delay: int) -> Array:
-        """Correlated noise, over b_0, from independent numbers, delayed by some rows, (..., n)."""
+        """Apply the inverse filter, times b_0, to rows delayed by `delay` rows, (..., n)."""
         late = np.zeros((rows.shape[-1], rows[..., 0].size))  # a banded system: no module of filters is loaded
         late[delay:] = rows.reshape(late.shape[::-1])[:, : len(late) - delay].T
         band = np.repeat((self.filter / self.filter[0])[:, None], len(late), axis=1)
@@ -133,7 +137,7 @@ class _Model(NamedTuple):
     correlations: Array
 
     def spectrum(self, waves: Array) -> Array:
-        """Power spectrum at frequencies given by their waves, (lags, m) -> (m,)."""
+        """Power spectrum at m frequencies, (m,), from their complex exponentials exp(-i omega lag), (lags, m)."""
         variance = self.polynomial @ self.correlations
         return variance / np.abs(self.polynomial @ waves[: self.polynomial.size]) ** 2
 
@@ -142,12 +146,13 @@ def row_noise(residual: Array, settled: Array, cycles: int) -> tuple[RowNoise, f
     """Estimate the noise of the rows of a loop.
 
     Args:
-        residual: force less its harmonics; of a lone cycle less its mean, its first three and all odd ones, (n,).
-        settled: the same less what changes slowly from one cycle to the next, (n,).
-        cycles: whole cycles that the rows make up.
+        residual: force without its harmonics [N or N m], (n,); for a lone cycle without mean, first three and all odd
+            harmonics.
+        settled: residual without slow changes from one cycle to the next [N or N m], (n,).
+        cycles: number of whole cycles in the rows.
 
     Returns:
-        Noise of unit variance, and the standard deviation of one row [N or N m].
+        Correlated noise of unit variance, and the standard deviation of one row [N or N m].
     """
     number = np.arange(residual.size // 2 + 1)
     between = number % cycles > 0 if cycles > 1 else of_a_lone_cycle(number)
@@ -174,7 +179,7 @@ def row_noise(residual: Array, settled: Array, cycles: int) -> tuple[RowNoise, f
 
 
 def of_a_lone_cycle(number: Array) -> Array:
-    """Mask of the harmonics of a lone cycle that are noise, (n,)."""
+    """Mask of the harmonics, given by number, (n,), of a lone cycle that are taken for noise, (n,)."""
     return (number % 2 == 0) & (number >= _FIRST_EVEN)
 
 
@@ -184,7 +189,7 @@ def _periodogram(rows: Array) -> Array:
 
 
 def _fitted(power: Array, waves: Array, used: Array) -> _Model:
-    """Fit an autoregressive model to a periodogram, with the order of Schwarz's criterion."""
+    """Fit an autoregressive model to the frequencies `used` of a periodogram, with the order of Schwarz's criterion."""
     ends = np.ones(power.size)
     ends[[0, -1]] = 0.5
     cosines, used_numbers = waves.real * (ends / ends.sum()), np.flatnonzero(used)

@@ -17,27 +17,27 @@ from bushfit.model.model import Model
 if TYPE_CHECKING:
     import lmfit
 
-#: Evaluations of the model at most, ten to forty being the rule; and relative change of chi-square, or of the point, at
-#: which a fit stops: far below what noise lets one see.
+#: Largest number of model evaluations (ten to forty are usual), and relative change of chi-square, or of the point, at
+#: which a fit stops: far below the effect of noise.
 _EVALUATIONS, _TOLERANCE = 400, 1e-9
 
 
 def solve(
     problem: FitProblem, *, evaluations: int = _EVALUATIONS, tolerance: float = _TOLERANCE, strict: bool = True
 ) -> FitResult:
-    """Minimise the sum of squares from the start values; a parameter may come to rest on a bound.
+    """Minimise the sum of squared residuals from the start values, within bounds.
 
     Args:
-        problem: parameters to fit, tests and bounds; without parameters the model is evaluated alone.
-        evaluations: of the model at most.
-        tolerance: relative change of chi-square at which the fit stops.
-        strict: True if a fit that has used up its evaluations is an error, unless chi-square is flat where it is.
+        problem: parameters to fit, tests and bounds; without parameters the residuals are only evaluated.
+        evaluations: largest number of model evaluations.
+        tolerance: expected relative fall of chi-square at which the fit stops.
+        strict: True to raise an error if the fit uses up its evaluations and chi-square is not yet flat.
 
     Returns:
-        The minimum.
+        Result at the minimum, at which parameters may be at a bound.
 
     Raises:
-        FitError: fewer data than parameters, no finite response, or no convergence.
+        FitError: there are fewer data than parameters, the response is not finite, or the fit does not converge.
     """
     if not problem.names:
         misfit = residual(problem.model, problem.tests)
@@ -53,24 +53,24 @@ def solve(
 
 
 class _OutOfBoundsError(Exception):
-    """A step leaves the bounds."""
+    """Exception that ends a fit by lmfit when a step leaves the bounds."""
 
 
 def solve_with_lmfit(problem: FitProblem) -> FitResult:
-    """Minimise by lmfit's MINPACK, as in the paper's procedure of static and dynamic fits in turn.
+    """Minimise the sum of squared residuals by MINPACK through lmfit, as the paper's static and dynamic fits do.
 
     Args:
         problem: parameters to fit, tests and bounds.
 
     Returns:
-        The minimum.
+        Result at the minimum.
 
     Raises:
-        FitError: as of `solve`, which goes on where a step leaves the bounds or MINPACK comes to no end.
+        FitError: see `solve`, which replaces MINPACK if a step leaves the bounds or the fit does not converge.
 
     Notes:
-        Two roads to one minimum: on the campaigns in configs/ and data/practice they end 1e-8 apart in the parameters.
-        All other fits take `solve`, which needs 0.4 to 0.9 of the time and keeps to bounds.
+        Both methods find the same minimum: on the campaigns in configs/ and data/practice parameters differ by 1e-8.
+        All other fits use `solve`, which needs 0.4 to 0.9 of the time and supports bounds.
     """
     if not problem.names:
         return solve(problem)
@@ -114,7 +114,7 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
 
 @cache
 def _blank_parameters(count: int) -> lmfit.Parameters:
-    """lmfit's parameters, kept for one fit after the other: to make them takes as long as to evaluate a model."""
+    """Unnamed lmfit parameters, reused by all fits with `count` parameters, because creating them takes long."""
     import lmfit
 
     parameters = lmfit.Parameters()

@@ -1,7 +1,7 @@
 """Start values of a fit, read off the data: secant slope, loop area, slope over log f.
 
-They need only be of the right order: from starts up to ten times too small or too large, 94 of 100 fits end at one
-minimum; the others, all far too stiff, lose a branch and say so.
+Start values need only have the right order of magnitude: from values up to ten times too small or too large, 94 of 100
+fits end at the same minimum; the others, all far too stiff, lose a branch, which a warning reports.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,20 +18,20 @@ from bushfit.geometry import Bushing, stiffness_per_modulus
 
 #: Strain amplitude of the largest test over eps_half, before anything is known; chosen: the fit finds the rest.
 _SCALED_STRAIN = 3.0
-#: Share of a modulus, or of a loss, that a start leaves to a branch, whatever the other branches claim.
+#: Smallest share of a modulus, or of a loss, that the start values assign to a branch.
 _LEAST_SHARE = 0.1
-#: Least loss relative to |K|, and least growth of K' with ln omega relative to mu, where the tests show no more.
+#: Smallest loss relative to |K|, and smallest growth of K' with ln omega relative to mu, of the start values.
 _LEAST = 1e-3
-#: Frequency over the slowest up to which a test counts as slow.
+#: Largest frequency, relative to the lowest one, of a slow test.
 _SLOW = 1.5
-#: Strain over the smallest of the sweeps up to which a point counts as of their smallest level: amplitudes that were
-#: stepped are reached within some per cent.
+#: Largest strain, relative to the smallest of the sweeps, of a point of their smallest level: rigs reach an amplitude
+#: within some per cent.
 _SMALLEST = 1.2
-#: Range of ln omega from which on it tells a slope.
+#: Smallest range of ln omega that determines a slope.
 _LEAST_RANGE = 0.1
-#: m over mu, and alpha, of a usual filled rubber: the start where the data tell no slope.
+#: m over mu, and alpha, of a usual filled rubber: start values if the data do not determine a slope.
 _USUAL = (0.2, 0.25)
-#: Start of alpha at least and at most: slopes that filled rubbers have.
+#: Smallest and largest start value of alpha: slopes of filled rubbers.
 _ALPHA_RANGE = (0.1, 0.6)
 
 
@@ -40,18 +40,18 @@ def start_values(
 ) -> dict[str, float]:
     """Determine start values of mu, m, alpha, sigma_fmax and eps_half from tests.
 
-    What lies beyond the bounds of its parameter is moved to them.
+    Values beyond the bounds of a parameter are moved to the bound.
 
     Args:
-        bushing: None for specimens alone.
+        bushing: geometry of the bushing; None if all tests are of specimens.
         data_sets: tests.
-        fixed: known values, kept as they are [SI].
+        fixed: known values by parameter name, returned unchanged [SI].
 
     Returns:
         Values by parameter name [SI].
 
     Raises:
-        FitError: it lies there, and the moduli of the tests are those of no rubber.
+        FitError: a value is beyond the bounds, and the tests have a shear modulus that no rubber has.
 
     Notes:
         - eps_half from the largest strain reached;

@@ -1,17 +1,18 @@
 """Covariance of a sweep's deviations: scatter from point to point, and errors that a block or a line shares.
 
-Beside the noise a model error may count, independent from operating point to operating point; repeats share it.
+A block is a run: the points of one recording at one held amplitude or frequency. A line is the set of the runs with the
+same held value. A model error may be added to the noise: independent between operating points, shared by repeats.
 
 Notes:
-    Within a block of points with random parts s_i and a shared part t the covariance is V = diag(s_i^2) + t^2 1 1^T.
-    All runs of a line may share an error besides, u^2 1 1^T over the line. With a_i = 1/s_i, divided by s_i and less
-    the share 1 - 1/sqrt(1 + t^2 sum a_i^2) of what lies along a, a deviation is white; of what all runs of a line share
-    then, as much is taken out in the same way. A point of weight w has s_i^2 = s^2/w; without weight it is not there,
-    for shared errors either. Gains and phases are independent: deviations are real, (..., 2 n), all gains first.
+    Within a block of points with scatter s_i and a shared error t the covariance is V = diag(s_i^2) + t^2 1 1^T. All
+    runs of a line may also share an error, u^2 1 1^T over the line. Let a_i = 1/s_i. A deviation is whitened by
+    dividing it by s_i and subtracting the share 1 - 1/sqrt(1 + t^2 sum a_i^2) of its component along a; then the error
+    shared by a line is removed in the same way. A point of weight w has s_i^2 = s^2/w; a point of weight 0 has no
+    effect, on shared errors either. Gains and phases are independent: deviations are real, (..., 2 n), gains first.
 
-    Beside a model error of standard deviation e the covariance that whitens is diag(s_i^2) + e^2 R R^T, R = 1 where a
-    row repeats an operating point. What runs and lines share stays out of these weights: the model's own error differs
-    from level to level as well, and a level must not count less for an error of the rig that is smaller.
+    With a model error of standard deviation e the whitening covariance is diag(s_i^2) + e^2 R R^T, where R = 1 if a row
+    belongs to an operating point. Errors shared by runs and lines are not part of these weights: the model's error
+    also differs from level to level, and a level must not lose weight because of a smaller error of the rig.
 """
 
 from collections.abc import Hashable
@@ -27,12 +28,12 @@ from bushfit.fitting.noise import SweepNoise
 
 @dataclass(frozen=True, eq=False)
 class SharedError:
-    """An error that all deviations of a group share, beside independent noise.
+    """Error shared by all deviations of a group (run, line or operating point), in addition to independent noise.
 
     Args:
         starts: index of the first deviation of each group, (g,).
-        unit: change of each deviation, in units of noise, by a unit of the error, (m,).
-        variance: of the error of each group, (g,).
+        unit: change of each deviation, in units of noise, by an error of 1, (m,).
+        variance: variance of the shared error of each group, (g,).
     """
 
     starts: Array
@@ -41,25 +42,25 @@ class SharedError:
 
     @cached_property
     def group(self) -> Array:
-        """Number of the group that each deviation belongs to, (m,)."""
+        """Index of the group of each deviation, (m,)."""
         return np.repeat(np.arange(self.starts.size), np.diff(self.starts, append=self.unit.size))
 
     @cached_property
     def weight(self) -> Array:
-        """Sum of the squares of the unit error of each group, (g,)."""
+        """Sum of the squares of `unit` over each group, (g,)."""
         return np.maximum(np.add.reduceat(self.unit**2, self.starts), np.finfo(float).tiny)
 
     @cached_property
     def share(self) -> Array:
-        """Share of the component along the unit error of a group that is taken out, (g,)."""
+        """Share of the component along `unit` that whitening subtracts in each group, (g,)."""
         return 1.0 - 1.0 / np.sqrt(1.0 + self.variance * self.weight)
 
     def components(self, rows: Array) -> Array:
-        """Components along the unit error of each group, (..., m) -> (..., g)."""
+        """Sum of the products of deviations with `unit` over each group, (..., m) -> (..., g)."""
         return np.add.reduceat(rows * self.unit, self.starts, axis=-1)
 
     def whiten(self, rows: Array) -> Array:
-        """White deviations, (..., m): less the share of their component along the unit error."""
+        """Whiten deviations in units of noise, (..., m), by subtracting the share of their component along `unit`."""
         if not self.variance.any():
             return rows
         return rows - (self.components(rows) / self.weight * self.share)[..., self.group] * self.unit
@@ -67,17 +68,17 @@ class SharedError:
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """Covariance of the deviations of a sweep, block by block.
+    """Covariance of the deviations (residuals in gain and phase) of a sweep, to whiten them.
 
     Args:
         starts: index of the first point of each block, (blocks,).
-        lines: index of the first point of each line, whose blocks stand side by side, (lines,).
-        random: standard deviation of each point's gain and phase, as if it had all its weight, (2, n).
-        noise: of the campaign's sweeps: its shared part, and how well either part is known.
-        weights: share of its weight that each point has, (n,).
-        points: number of the operating point of each row, from 0, (n,).
+        lines: index of the first point of each line, whose blocks are adjacent, (lines,).
+        random: standard deviation of the gain and phase of each point at full weight, (2, n).
+        noise: noise of the campaign's sweeps: shared errors, and degrees of freedom of the estimates.
+        weights: weight of each point, 0 to 1, (n,).
+        points: index of the operating point of each point, from 0, (n,).
         model_error: standard deviation of the relative error of the model at each operating point, in phase and in
-            quadrature; 0 where noise is all that counts.
+            quadrature; 0 for noise alone.
     """
 
     starts: Array
@@ -89,18 +90,19 @@ class Whitening:
     model_error: float = 0.0
 
     def whiten(self, deviation: Array) -> Array:
-        """Deviations in units of noise, shared errors taken out, complex (..., n) -> (..., 2 n)."""
+        """Whiten deviations by scatter and shared errors, complex (..., n) -> (..., 2 n), gains, then phases."""
         rows = np.concatenate((deviation.real, deviation.imag), axis=-1) * self._block.unit
         return self._less_points(rows) if self.model_error else self._line.whiten(self._block.whiten(rows))
 
     def uncounted(self, influence: Array) -> Array:
-        """Covariance that the noise adds to an estimate beside what is counted with a model error in the weights.
+        """Covariance of estimates that the weights of the residuals do not include if there is a model error.
 
         Args:
-            influence: of each whitened residual, (k, 2 n).
+            influence: weight of each whitened residual in the k estimates, (k, 2 n).
 
         Returns:
-            Effect of the errors that runs and lines share, less that of the independent model error, (k, k).
+            Covariance by the errors shared by runs and lines, minus that of the independent model error, which the
+            Gaussian process of the model error already includes, (k, k).
         """
         rows = self._less_points(influence) * self._block.unit
         order, starts = self._by_point
@@ -114,7 +116,7 @@ class Whitening:
         return added
 
     def error_products(self, deviation: Array) -> ErrorProducts:
-        """Inner products of deviations, complex (m, n), in noise that no run shares, with a model error."""
+        """Inner products of m deviations, complex (m, n), in units of scatter, to estimate the model error's size."""
         unit, (order, starts) = self._block.unit, self._by_point
         rows = np.concatenate((deviation.real, deviation.imag), axis=-1) * unit
         components = np.add.reduceat((rows * unit)[:, order], starts, axis=-1)
@@ -122,18 +124,18 @@ class Whitening:
 
     @property
     def log_size(self) -> float:
-        """Natural log of the determinant of the covariance beside a model error, over that of the random noise."""
+        """Natural log of the determinant of the covariance with model error, relative to that of the scatter alone."""
         return float(np.sum(np.log1p(self._point.variance * self._point.weight)))
 
     def scaled(self, deviation: Array, *, shared: bool = True) -> Array:
-        """Deviations in units of the random noise.
+        """Scale deviations by the scatter of each point, without whitening.
 
         Args:
-            deviation: complex (n,).
-            shared: True to take out the likeliest error of each block.
+            deviation: deviations, complex (n,).
+            shared: True to subtract the likeliest shared error of each block.
 
         Returns:
-            Gain and phase of each point, (2, n).
+            Gain and phase of each point in units of the scatter, (2, n).
         """
         rows, block = np.concatenate((deviation.real, deviation.imag)), self._block
         if shared:
@@ -144,15 +146,18 @@ class Whitening:
         return rows.reshape(2, -1) / self.random
 
     def unsure(self, influence: Array) -> dict[Hashable, Array]:
-        """Reaction of an estimator to each estimated variance of the noise, (k, 2 n) each.
+        """Sensitivity of k parameter estimates to the error of each estimated noise variance.
+
+        Args:
+            influence: weight of each whitened residual in the estimates, (k, 2 n).
 
         Returns:
-            Reactions by variance, (k, 2 n) each.
+            Sensitivity by identifier of the noise variance, (k, 2 n) each; see `MeasuredLoop.unsure`.
 
         Notes:
             Within a block V has the derivatives I by s^2 and 1 1^T by t^2, whitened W^2 and (W 1)(W 1)^T. The estimate
-            of t^2 is a mean of `freedom` squares that expect t^2 + s^2/n, and scatters no further down than to 0. So
-            with what lines share.
+            of t^2 is a mean of `freedom` squares with expectation t^2 + s^2/n; its error is limited to t^2. The same
+            applies to errors shared by lines.
         """
         block, line, noise = self._block, self._line, self.noise
         rows, reactions = line.whiten(influence), {}
@@ -175,28 +180,28 @@ class Whitening:
 
     @cached_property
     def _block(self) -> SharedError:
-        """Error that the points of a block share, in units of their noise."""
+        """Error shared by the points of a block, in units of their noise."""
         unit = (np.sqrt(self.weights) / self.random).ravel()
         starts = np.concatenate((self.starts, self.starts + self.weights.size))
         return SharedError(starts, unit, np.repeat(np.square(self.noise.shared), self.starts.size))
 
     @cached_property
     def _line(self) -> SharedError:
-        """Error that the blocks of a line share, less what is taken out of each block."""
+        """Error shared by the blocks of a line, as changed by the whitening of each block."""
         starts = np.concatenate((self.lines, self.lines + self.weights.size))
         unit = (1.0 - self._block.share)[self._block.group] * self._block.unit
         return SharedError(starts, unit, np.repeat(np.square(self.noise.level), self.lines.size))
 
     @cached_property
     def _by_point(self) -> tuple[Array, Array]:
-        """Deviations ordered by operating point, gains first, (2 n,), and the place where each point begins."""
+        """Indices that sort deviations by operating point, gains first, (2 n,), and the start of each point."""
         labels = np.concatenate((self.points, self.points + self.points.max() + 1))
         order = np.argsort(labels, kind="stable")
         return order, np.concatenate(([0], 1 + np.flatnonzero(np.diff(labels[order]))))
 
     @cached_property
     def _point(self) -> SharedError:
-        """Error that the rows of an operating point share, in their order, in units of their noise."""
+        """Model error shared by the points of an operating point, in the order of `_by_point`, in units of noise."""
         order, starts = self._by_point
         return SharedError(starts, self._block.unit[order], np.full(starts.size, self.model_error**2))
 
