@@ -60,7 +60,7 @@ PAIRS = (
 _ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsation", "角频率")
 #: Channel of a test rig in brackets: "Load(Linear:Load) (kN)".
 _CHANNEL = re.compile(r"\([^()]*[:|][^()]*\)")
-#: Loss factor written as a function, with brackets that hold no unit.
+#: Loss factor written as a function, with brackets that do not contain a unit.
 _TAN = re.compile(r"(?i)\btan\s*\(\s*(delta|d|δ)\s*\)")
 #: Logarithm of a quantity: "log10 f [Hz]", "lg(G') [Pa]", "log f". The base of a plain log is not known.
 _LOGARITHM = re.compile(r"\s*(?P<kind>log[\s_]?10|lg|ln|log)(?=[\s_(])[\s_]*(?:\((?P<inner>[^()]*)\))?", re.IGNORECASE)
@@ -242,7 +242,7 @@ class Vocabulary:
             name, unit = units.split_header(without)
             counting = "peak-to-peak" if plain(name) in _PEAK_TO_PEAK_NAMES else convention
             return Heading(self._stated[plain(header)], unit, counting, logarithm)
-        # or with the words of its convention
+        # try the header without, then with the words of its convention
         without, convention = split_convention(text)
         for name, unit, certain in (split for form in dict.fromkeys((without, text)) for split in _splits(form)):
             if unit is None and name.endswith(("%", "‰", "°")):

@@ -184,7 +184,7 @@ def _refuse_complex(channels: Sequence[Channel]) -> None:
     """Refuse complex values that have no meaning: of a time, frequency or amplitude, or of a channel over time.
 
     Raises:
-        MeasurementError: there is such a channel.
+        MeasurementError: a channel has complex values without a meaning.
     """
     roles = {channel.name: heading.role for channel in channels if (heading := _REAL.heading(channel.name))}
     for channel in channels:

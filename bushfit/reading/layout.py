@@ -222,7 +222,7 @@ def is_row(cells: Sequence[str]) -> bool:
 def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> tuple[int, Sequence[str]]:
     """Index of the first of three consecutive rows of numbers, and the delimiters that split them into numbers.
 
-    Without such rows: the number of lines, and all delimiters.
+    Without three rows of numbers: the number of lines, and all delimiters.
     """
     last = deque[int](maxlen=3)
     for index in (index for index, line in enumerate(lines) if not is_comment(line.content, ";")):

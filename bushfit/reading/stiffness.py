@@ -63,7 +63,7 @@ def refuse_ambiguous_damping(table: Table) -> None:
     """Raise an error if a table with a stiffness or a force has a column "damping" that may be a factor or a ratio.
 
     Raises:
-        MeasurementError: there is such a column.
+        MeasurementError: the table has an ambiguous damping.
     """
     damping = next((header for header in table.headers if header and _DAMPING.heading(header)), None)
     if damping and {"stiffness", "storage_stiffness", "force_amplitude"} & set(table.roles):

@@ -19,7 +19,7 @@ from bushfit.reading.stated import SweepFile
 from bushfit.reading.stiffness import check_stiffness, complex_stiffness, stiffness_pair, with_positive_loss
 from bushfit.reading.table import Table
 
-#: Columns whose values must be positive.
+#: Roles whose values must be positive.
 _POSITIVE = (
     *("frequency", "amplitude", "amplitude_reached", "stiffness", "storage_stiffness", "force_amplitude"),
     "relative_error",
@@ -190,7 +190,7 @@ def _rows_at_temperature(
 ) -> tuple[NDArray[np.intp], float | None, Floats | float | None]:
     """Indices of the rows at the stated temperature, temperature of the test, and temperature of each of these rows.
 
-    Temperatures are in K, and None if unknown; that of the test is the stated one, or else the mean.
+    Temperatures are in K, and None if unknown; the temperature of the test is the stated one, or else the mean.
 
     Raises:
         MeasurementError: the file has several temperatures and none is stated, or too few rows are near the stated one.

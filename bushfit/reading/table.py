@@ -88,7 +88,7 @@ class Table(Cells):
             Table with its columns by role.
 
         Raises:
-            MeasurementError: no such file, no table, no header, no such rows, or unclear roles of columns.
+            MeasurementError: the file, its table, the header or the selected rows are missing, or roles are unclear.
             UnitError: two different units for one column.
         """
         opened = file if isinstance(file, OpenedFile) else open_file(file, file_format or FileFormat())
@@ -304,7 +304,7 @@ class Table(Cells):
             values: values in SI by role, (n,) each.
 
         Raises:
-            MeasurementError: there is such a value.
+            MeasurementError: a value is not positive or too small.
         """
         for role in roles:
             if role in values:

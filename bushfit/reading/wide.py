@@ -53,7 +53,7 @@ _Row = tuple[int, list[str | float]]
 
 @dataclass(frozen=True)
 class _Meaning:
-    """Meaning of a header cell, or of all header cells of a column, of a wide table; None for what is not stated.
+    """Meaning of one header cell, or of all header cells of a column, of a wide table; None for unstated parts.
 
     Args:
         role: quantity in the column, such as "stiffness".
@@ -230,7 +230,7 @@ def _role_of_unit(unit: str | None) -> str | None:
 def _long_table(
     series: Sequence[_Series], source: RowSource, file: Path, vocabulary: Vocabulary
 ) -> tuple[RowSource, Layout]:
-    """Long table with the values of the columns of all blocks, and its layout.
+    """Long table with the values from all blocks of a wide table, and its layout.
 
     Raises:
         MeasurementError: a block does not state its quantity, blocks differ in their frequencies or amplitudes, or a
