@@ -225,7 +225,7 @@ def named_direction(texts: Iterable[str], *, short: bool = False) -> Direction |
 
 
 def direction_of_file(file: Path, headers: Iterable[str], *, turns: bool, sheet: str | None = None) -> Direction | None:
-    """Return the direction named by a sheet, else by its file, else by the headers; None if none of them names one.
+    """Return the direction named by a sheet, else by its file, else by the headers; None if there is none.
 
     Args:
         file: path of the test file.
