@@ -1,4 +1,4 @@
-"""Prediction against measurement: how well a model meets each test and run, and within what it is usable.
+"""Prediction against measurement: misfit of a model in each test and run, and its expected error in each direction.
 
 Each test and each run has its own figures, so that the thousands of rows of a loop do not hide a sweep that is missed.
 """
@@ -16,17 +16,16 @@ from bushfit.model.model import Model
 from bushfit.model.result import Misfit, Usable
 from bushfit.reading.measurement import loss_factor
 
-#: A part without which some parameter's variance would grow by more than this factor is not held out: what is left does
-#: not determine that parameter, so a prediction would say nothing.
+#: Largest growth of a parameter's variance when a part of the rows is held out: beyond it the other rows do not
+#: determine the parameter, and the part is not predicted.
 _MOST_GROWTH = 100.0
-#: Singular value, relative to the largest, below which what is left of the derivatives is their rounding.
+#: Singular value of the Jacobian, relative to the largest, below which it is rounding error.
 _LEAST_SEEN = 1e-7
-#: Step of a parameter, in coordinates, which are of order one, beyond which one Gauss-Newton step tells nothing of a
-#: refit: chosen, a third of its value.
+#: Longest Gauss-Newton step of a parameter, in coordinates, that predicts a refit: chosen, a third of its value.
 _LONGEST_STEP = 0.3
-#: Share of the points, those that lie nearest, that a model is usable within: chosen, as of all intervals.
+#: Share of the points whose error is below the expected error: chosen, as of all intervals.
 _SHARE = 0.95
-#: Share of the points of a place that have to be held out for these to speak for it.
+#: Smallest share of the points of a direction that must be predicted for the expected error to use these alone.
 _ENOUGH = 0.5
 
 

@@ -1,4 +1,4 @@
-"""Errors that residuals have in common, so that these are independent only when whitened together."""
+"""Errors shared by several residuals, which make them correlated: the residuals must be whitened together."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Coordinates in which a fit moves, and the residuals of tests and their derivatives in these coordinates.
+"""Dimensionless coordinates of fitted parameters, and residuals of tests with their derivatives in these coordinates.
 
 A fit moves the logarithm of strictly positive parameters and the others in units of their typical size, so that every
 coordinate is of order one.

@@ -1,4 +1,4 @@
-"""A least-squares fit that goes step by step: several can go side by side, and one that cannot win be stopped.
+"""Least-squares fit that can be run step by step, so that several fits can be compared and stopped early.
 
 All fits use this method except the paper's own procedure, which uses lmfit, see `solve`.
 
@@ -39,8 +39,8 @@ _SAME_WAY = 0.8
 #: Share of a step's length that its bend may have, both in units of noise; chosen: further on the way bends otherwise,
 #: and nearly all steps fail.
 _MOST_BENT = 0.2
-#: A step that is expected to lower chi-square by less is the last, unless told otherwise: a tenth of a standard error,
-#: however large the misfit, as it is in units of noise that models are compared.
+#: Expected fall of chi-square below which a step is the last, by default: a tenth of a standard error, however large
+#: the misfit, because models are compared in units of noise.
 _LEAST_FALL = 0.01
 #: Least squared norm of a parameter's derivatives, in units of noise, with which it moves: the shape of an effect of
 #: no amount stays.

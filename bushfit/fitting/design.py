@@ -1,4 +1,4 @@
-"""Fits of effects that are added: from a small design of their shapes, as one start may lie in another valley.
+"""Fits of added effects, from several start values of their shapes, as one start may end in a local minimum.
 
 The shape parameters of an effect are its times, gaps, orders and frequencies; a valley is a local minimum.
 """
@@ -31,9 +31,9 @@ _FACTORS = (0.25, 4.0)
 _FIRST = 12
 #: Starts that are fitted to their end.
 _BEST = 2
-#: Fall of chi-square by which an end has to lie lower to be another: a tenth of what one standard error makes.
+#: Smallest difference in chi-square of two distinct minima: a tenth of the change by one standard error.
 _LOWER = 0.1
-#: Evaluations of the model in one fit at most.
+#: Largest number of model evaluations in one fit.
 _MOST = 200
 
 

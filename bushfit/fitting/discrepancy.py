@@ -24,9 +24,9 @@ from bushfit.fitting.problem import FitResult
 from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood, coordinates, in_lengths, patterns
 from bushfit.model.covariance import Z95
 
-#: Sizes tried, relative to |K|: from what the best rigs repeat to what no one calls a fit.
+#: Candidate sizes, relative to |K|: from the repeatability of the best rigs to far beyond any acceptable fit.
 SIZES = np.geomspace(1e-3, 0.4, 25)
-#: Lengths tried, in ln frequency and in ln strain: from next points apart to a decade.
+#: Candidate lengths, in ln frequency and in ln strain: from the distance of neighbouring points to a decade.
 OVER_FREQUENCY, OVER_STRAIN = (0.15, 0.4, 0.9, 2.0), (0.4, 0.9, 2.0)
 #: Smallest likelihood, relative to the largest, of a process that enters the average; chosen for time.
 _COUNTS = 0.05

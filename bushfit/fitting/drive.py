@@ -1,4 +1,4 @@
-"""Motion that drives the model in a loop: the measured displacement, cleared of its noise.
+"""Motion that drives the model in a loop: the measured displacement without its noise.
 
 A loop's displacement is periodic. It is written as the harmonics that rise above its noise, found by least
 squares at the samples as they are (any number of cycles, sine or triangle, evenly sampled or not), so the

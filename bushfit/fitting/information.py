@@ -18,7 +18,7 @@ from bushfit.model.model import Model
 
 #: Least size of a parameter, relative to its typical value, that a relative change is counted from.
 _LEAST_SIZE = 0.05
-#: Relative standard error beyond which a figure tells nothing more.
+#: Relative standard error beyond which only "beyond 1000 %" is printed.
 _BEYOND = 10.0
 #: Rate of a proposed loop where there is none [Hz]: quasi-static on most rigs.
 _NEW_RATE = 0.1
@@ -30,9 +30,9 @@ _NEW_BAND = (5.0, 150.0)
 _SLOW = 2.0
 #: Strain that a bushing can be asked to bear in a test.
 _BEARABLE = 0.5
-#: Worst standard error after a test over that before, up to which the test is worth its time.
+#: Largest ratio of the worst standard error after a test to the one before, for a test to be proposed.
 _LEAST_GAIN_RATIO = 0.8
-#: Relative standard error after a test from which on it is not worth its time, whatever it was before.
+#: Largest worst relative standard error after a test, for a test to be proposed.
 _HOPELESS = 10.0
 
 

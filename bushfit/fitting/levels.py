@@ -1,4 +1,4 @@
-"""Errors that all runs of a level share: repeats do not show them, what a fitted model leaves of the levels does."""
+"""Errors shared by all runs of a level, which repeats cannot reveal: estimated from the residuals of a fit."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""The cycles of a loop: the steady ones, their frequency and number, and the course of the motion, in words.
+"""The cycles of a loop: the steady ones, their frequency and number, and the name of the waveform.
 
 A motion is steady where it repeats itself one period later. The longest steady stretch is kept; a record that is steady
 throughout is unchanged, so it may start and end anywhere in its cycle. Of a record with a hole (missing rows) only the
@@ -31,7 +31,7 @@ _SETTLED, _LARGEST_STEP = 1e-12, 0.05
 #: Distance between the ends of a record, as a share of its range, from which on it holds no whole cycle: more than
 #: any noise.
 _OPEN = 0.1
-#: Distance between the ends of a closed cycle at most, as a share of it or of its amplitude.
+#: Largest distance between the ends of a closed cycle, relative to the cycle or to its amplitude.
 _CLOSED = 0.04
 #: Cycles, counted by one stroke, from which on a record is no single closed one, and where the ends of the record meet
 #: all the same: standing still at an extreme they may, and a motion may take longer one way than the other.
@@ -39,7 +39,7 @@ _MORE_THAN_ONE, _MORE_THAN_ONE_THAT_MEETS = 1.01, 1.1
 #: Root mean square by which what comes after one cycle may differ from its start, relative to the amplitude, or in
 #: units of the scatter of neighbouring rows where that is more.
 _REPEATS, _REPEATS_SCATTER = 0.02, 6.0
-#: Difference of a motion's third harmonic over its first up to which it is called by a name: a rounded triangle has it.
+#: Largest difference of the ratio of third to first harmonic from that of a sine or triangle, to name a motion so.
 _LIKE = 0.03
 #: Share of the amplitude beyond which rows are counted.
 _OUTER = 0.9

@@ -1,4 +1,4 @@
-"""The harmonics of a loop: its displacement cleared of noise, the noise of its force, and the outliers of both.
+"""The harmonics of a loop: its displacement without noise, the noise of its force, and the outliers of both.
 
 Harmonics are fitted by least squares at the recorded rows, without outliers.
 """

@@ -1,4 +1,4 @@
-"""Measurement noise of sweeps: what scatters from point to point, and what a whole run shares.
+"""Measurement noise of sweeps: scatter from point to point, and errors shared by a whole run.
 
 A run is one recording, in which frequency or amplitude is stepped and the other is held constant. Its points share a
 gain error and a phase error. A line, or level, is the set of runs with the same held value: its repeats. All errors are

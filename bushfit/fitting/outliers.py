@@ -1,4 +1,4 @@
-"""Outliers: rows that stand out from a smooth curve or a model, and from their own neighbours as well.
+"""Outliers: rows that are far from a smooth curve or a model, and from their neighbours as well.
 
 Physics missing from a model makes whole stretches of a test miss by similar amounts; only a fault of the record makes
 one row differ from the rows next to it. A misfit, however large, is therefore not an outlier.

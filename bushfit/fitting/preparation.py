@@ -1,4 +1,4 @@
-"""Data sets of a campaign, one per measured loop, one per sweep; and of tests that are not made yet."""
+"""Tests of a campaign prepared for a fit, one per measured loop and one per sweep; and simulated tests not made yet."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Profile likelihood: how far one parameter can go when all others follow it.
+"""Profile likelihood: 95 % interval of one parameter, with the other parameters fitted again at each of its values.
 
 A standard error assumes that chi-square is a parabola. The profile does not: one parameter is moved in steps, the
 others are fitted again at each step, and the interval ends where chi-square has risen by the allowed amount. Standard

@@ -1,4 +1,4 @@
-"""Noise that one line of a sweep shows: by what repeats differ in, or about a smooth curve without repeats.
+"""Noise of one line of a sweep, from the differences of repeats, or about a smooth curve without repeats.
 
 A line is the set of points, repeats included, at one held amplitude (frequency is stepped) or one held frequency
 (amplitude is stepped). Errors are those of ln K = ln|K| + i phase, so gain errors are real and phase errors imaginary,

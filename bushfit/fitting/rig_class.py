@@ -1,4 +1,4 @@
-"""The class of a rig: how large the errors are that a whole test shares, as [rig] states it or as it is assumed."""
+"""The class of a rig: size of the errors shared by a whole test, as stated in [rig] or as assumed."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Robust fits: the loss soft_l1, and outliers left out and listed.
+"""Robust fits: loss soft_l1, with outliers left out and listed.
 
 Notes:
     A complex point is one observation: an outlier is judged by gain and phase together. The loss acts on the error of

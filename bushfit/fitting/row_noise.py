@@ -1,4 +1,4 @@
-"""How the noise of a loop's rows depends from row to row: an autoregressive model, estimated where no physics is.
+"""Correlation of the noise of a loop's rows: an autoregressive model, estimated at frequencies without physics.
 
 A load cell's amplifier filters its noise, so that the errors of neighbouring rows are correlated. A prediction-error
 filter, which subtracts from each row its prediction from the rows before, turns such noise into independent numbers of

@@ -1,4 +1,4 @@
-"""Start values of a fit, read off the data: secant slope, loop area, slope over log f.
+"""Start values of a fit, estimated from the tests: secant slope, loop area, slope over log f.
 
 Start values need only have the right order of magnitude: from values up to ten times too small or too large, 94 of 100
 fits end at the same minimum; the others, all far too stiff, lose a branch, which a warning reports.

@@ -1,4 +1,4 @@
-"""Covariance of a sweep's deviations: scatter from point to point, and errors that a block or a line shares.
+"""Covariance of a sweep's deviations: scatter from point to point, and errors shared by a block or a line.
 
 A block is a run: the points of one recording at one held amplitude or frequency. A line is the set of the runs with the
 same held value. A model error may be added to the noise: independent between operating points, shared by repeats.
