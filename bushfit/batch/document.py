@@ -11,7 +11,7 @@ from bushfit.diagnosis import document
 from bushfit.model.covariance import Z95
 from bushfit.model.result import End
 
-#: Value of the key `schema`, which names the layout of the file; a row of another layout is done again.
+#: Value of the key `schema`, which names the layout of the file; a row with another layout is evaluated again.
 ROW_SCHEMA: Literal["bushfit/row/3"] = "bushfit/row/3"
 
 

@@ -26,16 +26,16 @@ from bushfit.errors import BatchError
 Task = TypeVar("Task")
 Outcome = TypeVar("Outcome")
 
-#: Rows handed out per worker: one to work on and one to go on with.
+#: Number of rows submitted per worker: one that is evaluated and the next one.
 _ROWS_PER_WORKER = 2
-#: Times that a row is tried before it is given up: once with others, then alone.
+#: Maximum number of attempts to evaluate a row: the first along with other rows, the next ones alone.
 _ATTEMPTS = 3
-#: Seconds between two looks at the workers, and for which a cluster may be without any.
+#: Time between two counts of the workers [s], and maximum time that a cluster may have no worker [s].
 _LOOK_SECONDS, NO_WORKER_SECONDS = 2.0, 30.0
-#: Seconds in which a scheduler has to answer.
+#: Maximum time for an answer of a scheduler [s].
 _ANSWER_SECONDS = 4.0
-#: Environment of local workers. The first keeps the current folder off their path. Below the other two numbers of bytes
-#: glibc keeps freed memory for the next row, which saves a tenth of the time.
+#: Environment of local workers. The first variable keeps the current folder off their import path. The other two make
+#: glibc keep up to this number of bytes of freed memory for the next row, which saves a tenth of the time.
 _ENVIRONMENT = {"PYTHONSAFEPATH": "1", "MALLOC_TRIM_THRESHOLD_": "134217728", "MALLOC_MMAP_THRESHOLD_": "33554432"}
 
 
@@ -118,6 +118,7 @@ def dask_workers(address: str) -> Workers:
         raise BatchError(problem, place="--scheduler", found=found, expected=expected, hint=hint) from None
 
     def count() -> int:
+        """Return the number of worker threads of the cluster."""
         try:
             if client.status == "running":
                 return sum(client.nthreads().values())

@@ -45,10 +45,10 @@ from bushfit.validation import ParameterValue, Share, converter, table, text
 
 #: Results in the order from good to bad.
 RESULTS: Sequence[LimitResult] = ("pass", "conditional pass", "not judged", "conditional fail", "fail")
-#: NRMSE above which a fit that misses its tests by more than noise is no basis for a limit, unless the limits file
-#: states another with `nrmse`. Chosen: half of the tolerance that drawings usually give a stiffness.
+#: NRMSE above which a fit that misses its tests by more than noise is poor, unless the limits file states another value
+#: with `nrmse`. Chosen: half of the usual tolerance of a stiffness in drawings.
 POOR_FIT = 0.05
-#: Reduced chi-square from which a misfit is not noise alone.
+#: Reduced chi-square from which noise alone does not explain a misfit.
 _BEYOND_NOISE = 2.0
 
 

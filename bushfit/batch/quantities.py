@@ -17,7 +17,7 @@ from bushfit.reading.measurement import Sweep
 from bushfit.units import display_unit, is_compatible, parse_quantity
 from bushfit.validation import converter
 
-#: A direction or a specimen, a frequency and an amplitude, each number with its unit.
+#: Text of an operating point: direction or specimen, frequency and amplitude, each number with its unit.
 _POINT = re.compile(r"\s*(\S.*?)[\s,]+([-+\d.eE]+\s*[A-Za-z]+)[\s,]+([-+\d.eE]+\s*[^\d\s.]+)\s*")
 #: Relative distance in frequency and in amplitude within which a measured point matches a requested one. Chosen: rigs
 #: miss their set points by less, and the stiffness of filled rubber changes by less than 1 % over it.
@@ -101,6 +101,7 @@ class PartQuantity:
 
     @property
     def header(self) -> str:
+        """Column header: name and unit, such as "mu [MPa]"."""
         return f"{self.name} [{self.unit}]"
 
 

@@ -29,7 +29,7 @@ from bushfit.reading.measurement import Loop, Sweep
 from bushfit.report.results import Formats, encode_all
 from bushfit.version import __version__
 
-#: Share of a parameter's typical value up to which the amount of an added effect is zero.
+#: Amount of an added effect, relative to the typical value of its parameter, up to which the effect is zero.
 _ZERO = 1e-3
 
 

@@ -1,8 +1,8 @@
 """Folder of a row: its result files and `row.json`, whose hashes say whether they still hold.
 
 Notes:
-    A folder is written beside its place and renamed: a process that is killed leaves a whole folder or none. A file
-    that a crash of the machine damages no longer has its hash, and the row is done again.
+    A folder is written under a temporary name and renamed, so a killed process leaves a complete folder or none. If a
+    crash of the machine damages a file, its hash no longer matches, and the row is evaluated again.
 """
 
 import contextlib
@@ -24,11 +24,11 @@ from bushfit.report.results import Formats
 from bushfit.validation import to_json_data, validate_tables
 from bushfit.version import __version__
 
-#: Record of a row, in its folder.
+#: Name of the record in the folder of a row.
 ROW_FILE = "row.json"
-#: Folder of the rows' folders, in that of the batch.
+#: Name of the folder in the batch folder that contains the folders of the rows.
 ROWS_FOLDER = "bushings"
-#: Folder in which files are prepared, in that of the batch; removed when the batch ends.
+#: Name of the folder in the batch folder in which files are prepared; removed when the batch ends.
 STAGE = ".aside"
 
 

@@ -32,12 +32,12 @@ from bushfit.validation import to_json_data
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Endings of the columns of a quantity, with the row of `BatchResult.figures` that they show.
+#: Suffixes of the column headers of a quantity, and the row of `BatchResult.figures` in each column.
 _PARAMETER_COLUMNS = {"": 0, ", std error": 3, ", low": 1, ", high": 2}
 _POINT_COLUMNS = {"": 0, ", low": 1, ", high": 2}
-#: Name of the measured curve among the quantities that are compared.
+#: Name of the measured curve among the compared quantities.
 _CURVE = "measured stiffness"
-#: Names listed in a sentence at most.
+#: Maximum number of names in a sentence.
 _NAMES_LISTED = 10
 
 

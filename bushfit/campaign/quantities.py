@@ -16,19 +16,19 @@ from bushfit.reading.files import view_bytes
 from bushfit.units import check_size, parse_quantity
 from bushfit.validation import LARGEST_NUMBER, Name, converter, text, unknown_key
 
-#: The second to the power of alpha, at the end of the unit of m.
+#: The factor s^alpha at the end of the unit of the parameter m.
 _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
 #: Polymers whose density is known, by the names that rubber engineers use; NR is natural rubber.
 Polymer = Literal["natural", "SBR", "EPDM", "NBR", "CR", "IIR"]
-#: Hardness between which Gent's relation is used [Shore A]: outside of it a durometer hardly tells rubbers apart.
+#: Range of hardness in which Gent's relation is used [Shore A]; a durometer hardly distinguishes rubbers outside.
 _HARDNESS = (20.0, 90.0)
 #: Unit of the filler.
 _PHR = r"phr(?:\s+(?:of\s+)?carbon[\s-]black)?"
-#: Carbon black at most [phr]: more is not mixed into rubber that is to move.
+#: Maximum carbon black [phr]; no rubber for moving parts contains more.
 _MOST_FILLER = 120.0
-#: A logo at most [bytes]: it stands in every model file of its campaign.
+#: Maximum size of a logo [bytes]; every model file of the campaign contains the logo.
 LARGEST_LOGO = 64_000
-#: How a PNG file begins, and what the head of an SVG file holds; such a head at most [bytes].
+#: First bytes of a PNG file, bytes in the head of an SVG file, and maximum length of this head [bytes].
 _PNG, _SVG, _HEAD = b"\x89PNG\r\n\x1a\n", b"<svg", 4096
 
 
@@ -129,7 +129,7 @@ def _plain_number(quantity: str, unit: str, example: str, largest: float, smalle
     pattern = re.compile(rf"\s*(\d{{1,4}}(?:\.\d{{1,6}})?)\s*(?:{unit})\s*", re.ASCII | re.IGNORECASE)
 
     def convert(raw: object, _: object) -> float:
-        """Number in a text, in the unit of the text."""
+        """Return the number in a text, in the unit of the text."""
         match = pattern.fullmatch(raw) if isinstance(raw, str) else None
         if not match:
             raise UnitError(f"this is not {quantity}", found=str(raw), expected=f'"{example}"')

@@ -40,9 +40,9 @@ from bushfit.validation import (
     unknown_key,
 )
 
-#: What a sweep's residuals compare: real and imaginary part, or |K| and loss factor.
+#: Residuals of a sweep: differences of real and imaginary part, or of |K| and loss factor.
 Residuals = Literal["complex", "magnitude_loss_factor"]
-#: What is summed over the residuals: their squares, or soft_l1 with outliers left out.
+#: Loss function of the residuals: squares, or soft_l1 with outliers left out.
 Loss = Literal["linear", "soft_l1"]
 
 
@@ -54,7 +54,7 @@ def _fit_table(raw: dict[str, Any]) -> dict[str, Any]:
     return {**settings, "parameters": {key: value for key, value in raw.items() if key not in settings}}
 
 
-#: Puts the direction or specimen itself into each test of [simulate].
+#: Validator that replaces the name of a direction or specimen in each test of [simulate] by the object.
 _SIMULATED_PLACES = converter(
     lambda raw, info: with_places(raw, [Specimen(**vars(table)) for table in info.data.get("specimens", ())])
 )
@@ -177,7 +177,7 @@ class RigSettings:
         return float(np.linalg.norm(gains)) if gains else None, self.phase_error
 
 
-#: The class of a rig of which nothing is stated.
+#: Settings of a rig if the campaign states nothing.
 UNSTATED = RigSettings()
 
 

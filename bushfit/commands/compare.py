@@ -36,7 +36,7 @@ from bushfit.units import format_range, number
 from bushfit.validation import to_json_data
 from bushfit.version import __version__
 
-#: Largest number of results: the colours of a figure, and the columns of a table.
+#: Maximum number of results, limited by the colours of a figure and the columns of a table.
 MOST = 8
 #: Specimen whose modulus over strain is compared if the results have no direction in common.
 _COMPOUND = Specimen("compound", "modulus")
@@ -44,7 +44,7 @@ _COMPOUND = Specimen("compound", "modulus")
 _LIKELY = 0.05
 #: Relative difference of moduli below which families agree: the scatter of bushings of one batch.
 _AGREED = 0.05
-#: Factor beyond the tested range over which families are compared, and number of points there.
+#: Factor by which the comparison of families extends the tested range, and number of points in it.
 _BEYOND, _POINTS = 10.0, 400
 #: `asdict` for records whose type the type checker does not know.
 _plain: Callable[[Any], Any] = asdict

@@ -13,12 +13,12 @@ from bushfit.reading.sweeps import ONE_TEST
 from bushfit.reading.table import Table
 from bushfit.units import parse_quantity
 
-#: Conditions of a test, which a campaign carries on, in words.
+#: Conditions of a test that a campaign states, with their names in sentences.
 _CONDITIONS = {key: key for key in ("temperature", "preload", "date", "operator")} | {"specimen_number": "specimen"}
-#: What a sweep may hold, by the key that states it.
+#: Constant quantity of a sweep, by the campaign key that states its value.
 _HELD_ROLES = {"at_amplitude": "amplitude", "at_frequency": "frequency"}
 
-#: Relative difference up to which a file contains what its name states; chosen: rigs miss a level by that much.
+#: Relative difference up to which a measured value agrees with the name of the file; chosen: rigs miss levels by it.
 _AGREEMENT = 0.03
 
 

@@ -19,37 +19,37 @@ from bushfit.reduction.steps import reduce
 from bushfit.reduction.turning_points import least_prominence
 from bushfit.units import display_unit, format_aligned, number
 
-#: Usual steps of the clock that make a gap; chosen: a clock that stutters takes fewer.
+#: Minimum duration of a gap in units of the median time step; chosen: jitter of the clock is shorter.
 _GAP_STEPS = 5.0
-#: Widest steps of an uneven clock that make a gap; chosen: rows kept at random leave no such holes.
+#: Minimum duration of a gap in units of the 99 % quantile of the time steps; chosen: random rows leave no such gap.
 _GAP_WIDEST_STEPS = 3.0
-#: Share of its usual step by which the steps of an even clock differ; chosen: times are rounded in files.
+#: Maximum range of the time steps of an even clock, relative to the median step; chosen: files round times.
 _EVEN_CLOCK = 0.02
-#: Rows that a stuck recorder repeats; chosen: a converter repeats fewer where the motion turns.
+#: Minimum number of equal rows of a stuck recorder; chosen: a converter repeats fewer at the ends of the motion.
 _STUCK_ROWS = 5
-#: Share of its range by which the motion goes on meanwhile; chosen: a motion that stands still goes on by less.
+#: Minimum motion during the equal rows, relative to the range of the motion; chosen: a resting motion changes by less.
 _STUCK_MOTION = 0.02
-#: Rows that hold the very same extreme where a top is cut off; chosen: noise makes fewer alike.
+#: Minimum number of rows with exactly the extreme value of a clipped channel; chosen: noise makes fewer equal.
 _FLAT_ROWS = 8
-#: Such rows to one that lies just below the extreme; chosen: a top that is not cut off has more of the latter.
+#: Minimum ratio of these rows to rows just below the extreme; chosen: the ratio is smaller without clipping.
 _FLAT_RATIO = 5.0
-#: Share of the range within which values lie just below the extreme, or else one step of the converter.
+#: Distance from the extreme, relative to the range, of values just below it; at least one step of the converter.
 _JUST_BELOW = 2e-3
-#: Standard errors beyond which cycles differ; chosen: noise does not go that far in any of many tests.
+#: Minimum change between cycles in standard errors; chosen: noise does not reach it in any of many tests.
 _REAL_CHANGE = 6.0
-#: Share of half the force's range beyond which cycles differ; chosen: less does not matter to a fit.
+#: Minimum change between cycles, relative to half the range of the force; chosen: less does not matter to a fit.
 _SMALLEST_CHANGE = 2e-3
-#: Share of half its range by which a loop's zero is off; chosen: less does not matter to a fit. A preload is more.
+#: Minimum offset of a loop's zero, relative to half the range; chosen: less does not matter to a fit; preloads are more.
 _SMALLEST_OFFSET = 0.02
-#: Cycles that are looked at from either end of a loop; chosen: what settles shows in them.
+#: Maximum number of cycles that are compared at each end of a loop; chosen: enough to show settling.
 _MOST_END_CYCLES = 6
-#: Harmonics of a motion, but of a triangle, beyond which a line is a ripple; chosen: rigs' waveforms have fewer.
+#: Harmonic of the motion above which a spectral line is a ripple, unless a triangle; chosen: waveforms have fewer.
 _RIPPLE_ORDER = 20
-#: Share of the amplitude, and multiple of the median line, from which on a ripple is told; chosen: below it is noise.
+#: Minimum ripple relative to the amplitude, and relative to the median spectral line; chosen: less is noise.
 _SMALLEST_RIPPLE, _RIPPLE_LINE = 3e-4, 10.0
-#: Rows whose spectrum tells a line from noise.
+#: Minimum number of rows whose spectrum distinguishes a line from noise.
 _FEWEST_RIPPLE_ROWS = 200
-#: [s] A cycle that takes longer is in doubt; chosen: quasi-static tests take minutes.
+#: Duration of a cycle [s] above which the time column is in doubt; chosen: quasi-static tests take minutes.
 _LONGEST_CYCLE = 3000.0
 
 

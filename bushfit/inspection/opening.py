@@ -35,7 +35,7 @@ from bushfit.reduction.programme import programme
 from bushfit.reduction.steps import steady_sines
 from bushfit.validation import validate_tables
 
-#: Sizes of a block in shear, as [[specimens]] has them.
+#: Keys of [[specimens]] for the sizes of a block in shear.
 BLOCK_KEYS = ("area", "thickness", "elements")
 #: Headers of a bar in tension: E', |E*|, "storage modulus E'", "tensile strain".
 _TENSILE = re.compile(r"(?<![^\W_])E(?![^\W_])|young|tensile|tension|traction|zug", re.IGNORECASE)

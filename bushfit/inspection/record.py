@@ -21,9 +21,9 @@ from bushfit.validation import to_json_data
 
 #: A hysteresis loop, a sweep, or the raw history of a stepped sine.
 Kind = Literal["loop", "sweep", "history"]
-#: What the content of a file tells: facts in words, by label, and a sentence for each unusual finding.
+#: Findings in the content of a file: facts as texts by label, and a sentence for each oddity.
 Findings = tuple[dict[str, str], list[str]]
-#: For each kind of test the array of tables that lists it in a campaign.
+#: Name of the array of tables that lists each kind of test in a campaign.
 _TABLES = {"loop": "loops", "sweep": "sweeps"}
 
 

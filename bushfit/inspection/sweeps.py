@@ -21,26 +21,26 @@ from bushfit.reduction.arrays import MEDIAN_TO_SIGMA
 from bushfit.reduction.result import MISSED_LEVEL
 from bushfit.units import number
 
-#: Standard deviations from which a point, or a block of points, is an outlier; chosen: no noise goes that far.
+#: Number of standard deviations from which a point or a block is an outlier; chosen: no noise reaches it.
 _FAR = 8.0
-#: Distance of ln K from its repeats, and from the smooth curve of its run, from which a point is an outlier; chosen:
-#: less does not matter to a fit, and a parabola follows rubber to a few per cent.
+#: Minimum distance of an outlier in ln K from its repeats, and from the smooth curve of its run; chosen: less does not
+#: matter to a fit, and a parabola follows rubber to a few per cent.
 _SMALLEST_OUTLIER, _SMALLEST_FROM_CURVE = 0.01, 0.1
-#: Points of a run that show an outlier, and up to which the curve is a line.
+#: Minimum number of points of a run that is checked for outliers, and maximum number for which the curve is a line.
 _FEWEST_POINTS, _FEW_POINTS = 5, 8
-#: Distance of ln |K| from the other repeats from which a block is an outlier; chosen: mountings differ by less.
+#: Minimum distance in ln |K| of an outlying block from the other repeats; chosen: mountings differ by less.
 _SMALLEST_BLOCK_OFFSET = 0.02
-#: Blocks whose scatter can be judged.
+#: Minimum number of blocks whose scatter can be judged.
 _FEWEST_BLOCKS = 5
-#: Probability of chance below which equal points are copies, and |K| drifts over the repeats; chosen.
+#: Probability below which equal points, or a drift of |K| over the repeats, are not due to chance; chosen.
 _CHANCE = 1e-4
-#: Change of ln |K| from the first repeat to the last that is reported; chosen: less does not matter to a fit.
+#: Minimum reported change of ln |K| from the first to the last repeat; chosen: less does not matter to a fit.
 _SMALLEST_DRIFT = 5e-3
-#: Smallest probability that two phases are equal; chosen: some files have them in few digits.
+#: Smallest assumed probability that two phases are equal; chosen: some files contain phases in few digits.
 _SAME_PHASE_P = 0.05
-#: Step in ln X from one level to the next below which they may be repeats of one; chosen: nobody sets finer levels.
+#: Step in ln amplitude between levels below which they may be repeats of one level; chosen: no test has finer levels.
 _SMALLEST_STEP = 0.02
-#: Points or frequencies, and levels, that are listed one by one; chosen: they make a sentence, and a line.
+#: Maximum number of listed points or frequencies, and of listed levels; chosen: the length of a sentence or line.
 _MOST_LISTED, _MOST_LEVELS = 4, 8
 
 
