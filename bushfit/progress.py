@@ -13,7 +13,7 @@ _LISTENER = ContextVar[Listener]("_LISTENER", default=lambda *_: None)
 
 @contextmanager
 def report_progress_to(listener: Listener) -> Iterator[None]:
-    """Context in which `track` calls the listener."""
+    """Context in which `track` reports progress by calls of the listener."""
     token = _LISTENER.set(listener)
     try:
         yield
@@ -28,7 +28,7 @@ def track(description: str, items: Iterable[Item], total: int = 0, remark: Calla
         description: name of the work, such as "loops simulated".
         items: items to iterate over.
         total: number of items if they have no length, such as a generator.
-        remark: called after each item; returns a short text about the state of the work.
+        remark: function that is called after each item and returns a short text about the state of the work.
 
     Yields:
         The items; an item is finished when the next one is requested.

@@ -225,7 +225,7 @@ def format_aligned(values: Sequence[float], digits: int, minimum_digits: int = 0
     """Format numbers with equal decimals, as many as the first needs: 1.4530, 1.4488.
 
     Args:
-        values: at least one; the first determines the decimals.
+        values: one or more numbers; the first determines the decimals.
         digits: number of significant digits of the first value.
         minimum_digits: minimum number of significant digits of the others; with 0, values too small to show become "0".
 

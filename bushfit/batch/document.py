@@ -43,7 +43,7 @@ class Estimate:
 
     @classmethod
     def normal(cls, value: float, stderr: float, unit: str) -> "Estimate":
-        """Make an estimate with normal errors.
+        """Make an estimate with a normally distributed error from its standard error.
 
         Args:
             value: the value, in `unit`.

@@ -173,7 +173,7 @@ class Limits:
 
     @property
     def bounds(self) -> dict[str, Bounds]:
-        """Limits by the name of the quantity."""
+        """All limits of the file by the name of the quantity, such as "stiffness axial 25 Hz 0.1 mm"."""
         bounds: dict[str, Bounds] = {**self.parameters}
         bounds |= {f"{STIFFNESS} {stiffness.at}": stiffness for stiffness in self.stiffness}
         bounds |= {f"{LOSS_FACTOR} {loss_factor.at}": loss_factor for loss_factor in self.loss_factor}
@@ -245,7 +245,7 @@ def describe_poor_fit(record: RowFile, limits: Limits | None) -> str:
 def judge_part(
     record: RowFile, limits: Limits, allowed: Mapping[str, tuple[float, float]], quantities: Mapping[str, PartQuantity]
 ) -> tuple[LimitResult, dict[str, str], dict[str, str]]:
-    """Judge a part by the limits.
+    """Compare the results of a part with the limits.
 
     Args:
         record: results of the part.

@@ -48,7 +48,7 @@ def _check_name(lookup: Callable[[str], Effect], raw: object, _: object) -> obje
 
 
 def _split_words(raw: object) -> object:
-    """Split the text of a CSV cell, such as "fit; predict"; a list of TOML stays as it is."""
+    """Split the text of a CSV cell, such as "fit; predict", into words; return lists from TOML unchanged."""
     return tuple(word for word in re.split(r"[;,\s]+", raw) if word) if isinstance(raw, str) else raw
 
 
@@ -91,7 +91,7 @@ class RowSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class Entry(RowSettings):
-    """[[bushings]], or a line of a CSV manifest.
+    """[[bushings]]: one or several parts in a TOML manifest, or a line of a CSV manifest.
 
     Args:
         campaign: campaign file, or a pattern of campaign files, relative to the manifest.
@@ -142,7 +142,7 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Manifest:
-    """All rows in order, the operating points that the manifest asks for, and its title."""
+    """Title and rows of a batch in order, and the operating points for stiffness and loss factor."""
 
     title: str
     rows: Sequence[Row]

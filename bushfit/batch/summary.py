@@ -126,7 +126,7 @@ class BatchResult:
 
     @cached_property
     def curve_deviation(self) -> Array:
-        """Relative deviation of each measured curve from the median, geometric mean over its points, (n,)."""
+        """Relative deviation of each part's measured |K| from the median of the batch, geometric mean, (n,)."""
         if not self.curves:
             return np.full(len(self.records), np.nan)
         logarithms = np.log([*self.curves.values()])

@@ -80,7 +80,7 @@ def export(
     decimal_comma: bool = False,
     **grid: Any,
 ) -> ExportOutput:
-    """Write a fitted model in the formats of other programs.
+    """Convert a fitted model to files for other programs.
 
     Args:
         model: model file.

@@ -41,7 +41,7 @@ _COLUMNS = (
 
 @dataclass(frozen=True, eq=False)
 class PlanOutput:
-    """Results of a plan.
+    """Plan of the next tests, with its result files.
 
     Args:
         plan: planned tests with their expected results.

@@ -46,7 +46,7 @@ _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PredictionOutput:
-    """Prediction of a model.
+    """Predicted stiffness and loss factor of a fitted model, with tables and figures.
 
     Args:
         result: the model with its uncertainty.

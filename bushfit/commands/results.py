@@ -61,7 +61,7 @@ def save(
     pictures: bool = True,
     force: bool = False,
 ) -> Path:
-    """Write an output into a folder, as the command would.
+    """Write the result files of an output into a folder, as the command would.
 
     Args:
         output: output of a command.

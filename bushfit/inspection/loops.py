@@ -39,7 +39,7 @@ _JUST_BELOW = 2e-3
 _REAL_CHANGE = 6.0
 #: Minimum change between cycles, relative to half the range of the force; chosen: less does not matter to a fit.
 _SMALLEST_CHANGE = 2e-3
-#: Minimum offset of a loop's zero, relative to half the range; chosen: less does not matter to a fit; preloads are more.
+#: Minimum offset of a loop's zero, relative to half the range; chosen: less does not matter; preloads are more.
 _SMALLEST_OFFSET = 0.02
 #: Maximum number of cycles that are compared at each end of a loop; chosen: enough to show settling.
 _MOST_END_CYCLES = 6
@@ -77,7 +77,7 @@ class RecordedChannel(NamedTuple):
     values: Floats
 
     def format_row(self, row: int) -> str:
-        """Value of a row in the display unit, as text."""
+        """Format the value of a row (index from 0) in the display unit, without the unit."""
         return number(self.factor * self.values[row], 4)
 
 
@@ -338,7 +338,7 @@ def changing_cycles(drive: Drive) -> list[str]:
 
 
 def ripple(drive: Drive) -> list[str]:
-    """Find a fast sine on the motion: hum, a hunting servo, a flickering sensor.
+    """Find a fast sine superposed on the motion of a loop: mains hum, servo oscillation or sensor noise.
 
     Returns:
         One sentence on the ripple; empty without one.

@@ -216,7 +216,7 @@ def open_table(
 
 
 def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = NO_LABELS) -> Inspection:
-    """Recognize a test file, and describe its contents and what is odd about them.
+    """Recognize a test file, read the test, and describe its contents and oddities.
 
     Args:
         file: test file.
@@ -392,7 +392,7 @@ def classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tuple
 
 
 def seen_columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
-    """List the columns of a file.
+    """Describe the columns of a test file: header, role, unit and range.
 
     Returns:
         The columns in order, with the range of their values in the unit of the file.

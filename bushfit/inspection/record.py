@@ -68,7 +68,7 @@ class InspectedFile(TypedDict):
 
 
 class InspectionDocument(TypedDict):
-    """Contents of test files."""
+    """Result of the inspection of several test files, as JSON."""
 
     files: Annotated[list[InspectedFile], Doc("that can be used.")]
     left_out: Annotated[list[str], Doc("a sentence for each file or sheet that holds no test.")]
