@@ -23,28 +23,28 @@ from bushfit.reading.measurement import Loop, Sweep
 
 #: Values of alpha that are tried before any fit: those of all rubbers.
 _ALPHA = np.linspace(0.05, 0.6, 10)
-#: Values of eps_half that are tried before any fit: those of all filled rubbers, with room for amplitudes 2 times off.
+#: Values of eps_half that are tried before any fit: those of all filled rubbers, with a margin of a factor of 2.
 _EPS_HALF = np.geomspace(2e-4, 0.2, 24)
-#: Least relative error of a point that is tried before any fit: what the grid of values misses by.
+#: Least relative error of a point before any fit: the error of the grid of values.
 _COARSE = 1e-3
-#: Points of a test that are tried before any fit at most: they show its shape.
+#: Maximum number of points of a test that are used before any fit: enough to show the shape of its curves.
 _MOST_POINTS = 60
-#: Misfit of a claim over that of the tests as they are, before any fit, up to which it is worth a fit: the grid misses
-#: what is small.
+#: Misfit with a claim corrected, relative to the misfit of the tests as recorded, up to which the claim is fitted; above
+#: 1 because the grid is coarse.
 _WORTH_A_FIT = 1.3
-#: Share by which a claim changes the misfit at least; one that does not has a twin among the parameters.
+#: Least relative change of the misfit by a claim; a claim that changes less is equivalent to a change of parameters.
 _LEAST_CHANGE = 1e-6
-#: Share of mu in a modulus that keeps three columns from being one.
+#: Relative term on the diagonal of the normal equations that keeps three similar columns solvable.
 _RIDGE = 1e-12
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One mistake, made alike in some tests.
+    """Claim that the record of a campaign contains one mistake, the same in one or several tests.
 
     Args:
-        mistake: the mistake.
-        tests: indices of the tests, loops before sweeps; empty for a mistake in [bushing].
+        mistake: kind of mistake, such as a wrong unit, with its correction.
+        tests: indices of the affected tests, loops before sweeps; empty for a mistake in [bushing].
     """
 
     mistake: Mistake
@@ -52,43 +52,43 @@ class Claim:
 
     @property
     def key(self) -> tuple[str, tuple[int, ...]]:
-        """Identity of the claim."""
+        """Name of the mistake and indices of the affected tests, which identify the claim."""
         return self.mistake.name, self.tests
 
     @property
     def single_tests(self) -> list[Claim]:
-        """Claims about each of the tests alone."""
+        """Separate claims of the same mistake for each affected test; the claim itself for [bushing]."""
         return [Claim(self.mistake, (place,)) for place in self.tests] or [self]
 
     def test(self, data: PreparedCampaign) -> str | None:
-        """Name of the only test of the claim; None for [bushing]."""
+        """Name of the first affected test; None for a mistake in [bushing]."""
         return [*data.loops, *data.sweeps][self.tests[0]].name if self.tests else None
 
     def labels(self, data: PreparedCampaign) -> tuple[str, ...]:
-        """The mistake with each of its tests, as --adopt takes it."""
+        """Values of the option --adopt that correct the mistake, "mistake:test" for each affected test."""
         return tuple(labelled(self.mistake.name, claim.test(data)) for claim in self.single_tests)
 
     def words(self, data: PreparedCampaign) -> str:
-        """Sentence that states the mistake."""
+        """Sentence that states the mistake, with the files of the affected tests."""
         data_sets = [*data.loops, *data.sweeps]
         files = [file_or_name(data_sets[place].test) for place in self.tests]
         return self.mistake.sentence.format(files=" and ".join(filter(None, (", ".join(files[:-1]), *files[-1:]))))
 
     def corrections(self, data: PreparedCampaign) -> tuple[str, ...]:
-        """Lines to write into the campaign, one for each test."""
+        """Lines to write into the campaign file to correct the mistake, one for each affected test."""
         data_sets = [*data.loops, *data.sweeps]
         return tuple(self.mistake.corrected(data_sets[place].test) for place in self.tests) or (
             self.mistake.corrected(None),
         )
 
     def mended(self, data: PreparedCampaign) -> PreparedCampaign:
-        """Campaign as it was measured if the mistake was made.
+        """Correct the mistake in a campaign.
 
         Args:
             data: the campaign as it was read.
 
         Returns:
-            The campaign with the tests, or the bushing, corrected.
+            The campaign with corrected tests, or corrected dimensions of the bushing.
         """
         campaign = data.campaign
         if not self.tests:
@@ -108,14 +108,14 @@ class Claim:
 
 
 def adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[PreparedCampaign, list[str]]:
-    """Mend the mistakes that the user adopts.
+    """Correct the mistakes that the user adopts with the option --adopt.
 
     Args:
         data: the campaign as it was read.
-        names: mistakes as --adopt takes them, "mistake:test".
+        names: values of --adopt, "mistake:test" or "mistake".
 
     Returns:
-        The mended campaign, and one sentence for each mistake.
+        The corrected campaign, and one sentence for each mistake.
 
     Raises:
         ModelError: a mistake that was not made in the test named, or no such test.
@@ -129,7 +129,7 @@ def adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[PreparedCam
 
 
 def _claimed(data: PreparedCampaign, name: str) -> Claim:
-    """Claim that one --adopt option makes."""
+    """Convert one value of --adopt to a claim; a ModelError if the mistake is not possible in the test."""
     mistake, test = get_mistake(name), name.partition(SEPARATOR)[2]
     data_sets: list[MeasuredTest] = [*data.loops, *data.sweeps]
     possible = [place for place, one in enumerate(data_sets) if mistake and _is_possible(mistake, one, data)]
@@ -145,7 +145,7 @@ def _claimed(data: PreparedCampaign, name: str) -> Claim:
 
 
 def _is_possible(mistake: Mistake, data_set: MeasuredTest, data: PreparedCampaign) -> bool:
-    """True if a mistake is possible in a test, judged by its columns and by the modulus that it implies."""
+    """True if a mistake is possible in a test, judged by the columns of its file and by the modulus it implies."""
     bushing, place = data.campaign.bushing, data_set.direction
     modulus = float(np.median(np.abs(data_set.measured))) / stiffness_per_modulus(bushing, place)
     strain = float(np.max(data_set.amplitude)) * unit_strain(bushing, place)
@@ -153,11 +153,11 @@ def _is_possible(mistake: Mistake, data_set: MeasuredTest, data: PreparedCampaig
 
 
 def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
-    """List every mistake that may have been made: in one test, in all of a kind or of a direction, or in all.
+    """List all possible mistakes in a record, each in one test, in all tests of a kind or direction, or in all tests.
 
     Args:
         data: the campaign as it was read.
-        without: names of mistakes not to consider, also "mistake:test".
+        without: mistakes not to consider, "mistake" or "mistake:test".
 
     Returns:
         Claims without duplicates.
@@ -185,11 +185,14 @@ def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
 
 @dataclass(frozen=True, eq=False)
 class Screen:
-    """Misfit of the plain model under each claim, before any fit.
+    """Fast comparison of claims by the misfit of the paper's model to the corrected tests, before any fit.
+
+    Args:
+        data: the campaign as it was read.
 
     Notes:
         The stiffness is linear in mu, m and sigma_fmax; alpha and eps_half are tried on a grid. The normal equations
-        are sums over tests, so that each test is evaluated once for each mistake.
+        are sums over tests, so each test is evaluated once for each mistake.
     """
 
     data: PreparedCampaign
@@ -204,7 +207,7 @@ class Screen:
             limit: maximum number of claims.
 
         Returns:
-            Claims that change the misfit and may lower it in a fit, the best first.
+            Claims that change the misfit and may lower it in a fit, the smallest misfit first.
         """
         before, misfits = self.misfit(None), np.array([self.misfit(claim) for claim in found])
         changed = np.abs(misfits - before) > _LEAST_CHANGE * before
@@ -212,13 +215,13 @@ class Screen:
         return [found[place] for place in order if changed[place] and misfits[place] < _WORTH_A_FIT * before][:limit]
 
     def misfit(self, claim: Claim | None) -> float:
-        """Least sum of squares over the grid of alpha and eps_half.
+        """Compute the least sum of squares of the model's residuals over the grid of alpha and eps_half.
 
         Args:
-            claim: the mistake that is mended before; None for the tests as they are.
+            claim: mistake that is corrected first; None for the tests as recorded.
 
         Returns:
-            Sum of squares in units of a coarse noise; infinite if no model has a response.
+            Sum of squares in units of a coarse noise; infinite if the model has no response.
         """
         bushing = self.data.campaign.bushing
         if claim and not claim.tests and bushing:
@@ -237,7 +240,7 @@ class Screen:
         return max(_paraboloid_minimum((total - explained).reshape(_EPS_HALF.size, _ALPHA.size)), 0.0)
 
     def _part(self, place: int, data_set: MeasuredTest, mistake: Mistake | None, bushing: Bushing | None) -> Array:
-        """Inner products of three columns and the target of a test at each point of the grid, (g, 4, 4)."""
+        """Inner products of a test's three model columns and its target at each of g grid points, (g, 4, 4)."""
         key = (place, mistake.name if mistake else "", bushing)
         if key not in self._known:
             direction, frequency, amplitude, stiffness, error = _points(data_set, mistake)
@@ -249,7 +252,7 @@ class Screen:
         return self._known[key]
 
     def _columns(self, bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
-        """Columns of `_columns`, computed once for all mistakes that leave the operating points unchanged."""
+        """Result of the function `_columns`, cached for mistakes that leave the operating points unchanged."""
         key = (bushing, direction, frequency.tobytes(), amplitude.tobytes())
         if key not in self._responses:
             self._responses[key] = _columns(bushing, direction, frequency, amplitude)
@@ -257,7 +260,7 @@ class Screen:
 
 
 def _paraboloid_minimum(misfit: Array) -> float:
-    """Minimum between the points of a grid, of a paraboloid through the smallest value and its neighbours."""
+    """Minimum of a misfit given on a grid, (rows, columns), from a paraboloid about the smallest grid value."""
     row, column = (
         int(np.clip(i, 1, n - 2))
         for i, n in zip(np.unravel_index(int(np.argmin(misfit)), misfit.shape), misfit.shape, strict=True)
@@ -274,7 +277,7 @@ def _paraboloid_minimum(misfit: Array) -> float:
 
 
 def _columns(bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
-    """Stiffness for each unit of mu, m and sigma_fmax at every alpha and eps_half of the grid, (g, 3, n)."""
+    """Complex stiffness per unit of mu, m and sigma_fmax at the g grid values of alpha and eps_half, (g, 3, n)."""
     names = ("mu", "m", "sigma_fmax")
     alpha, eps_half = (axis.reshape(-1, 1) for axis in np.meshgrid(_ALPHA, _EPS_HALF))
     model = Model.with_defaults(bushing, BASE, {})
@@ -289,7 +292,10 @@ def _columns(bushing: Bushing | None, direction: Place, frequency: Array, amplit
 
 
 def _points(data_set: MeasuredTest, mistake: Mistake | None) -> tuple[Place, Array, Array, Array, Array]:
-    """Direction, frequency, amplitude, stiffness and relative error of a test's points, (n,) each, as mended."""
+    """Direction, and frequency, amplitude, stiffness and relative error, (n,) each, of a test with a mistake corrected.
+
+    Repeated points are averaged, and at most `_MOST_POINTS` points are kept.
+    """
     if isinstance(data_set, MeasuredSweep):
         sweep, noise = data_set.sweep, np.hypot(data_set.relative_noise, max(data_set.noise.shared))
         mended = (mistake and mistake.mended(sweep)) or sweep

@@ -11,11 +11,11 @@ from bushfit.fitting.line_misfit import LineMisfit
 from bushfit.fitting.preparation import split_by_kind
 from bushfit.units import number
 
-#: Smooth misfit, in units of the noise of its root mean square, from which a region is worth a line.
+#: Smallest smooth misfit (root mean square, in units of its noise) of a region that is listed.
 _WORTH_A_LINE = 2.5
-#: Regions listed at most, the worst first: more is nothing that a reader takes in.
+#: Maximum number of regions listed, the worst first.
 _MOST_LINES = 6
-#: Smooth misfit, relative to |K| or to half a loop's force range, below which a region has no line whatever the noise.
+#: Smooth misfit, relative to |K| or to half a loop's force range, below which a region is not listed.
 _LEAST = 1e-3
 #: Share of the strongest misfit from which a level, or a frequency, belongs to the region.
 _STRONG = 0.5
@@ -24,7 +24,7 @@ _FLAT = 0.2
 #: Share of the largest mean by which the means of the levels must differ to be said to rise or fall with amplitude.
 _CHANGES = 0.5
 _PARTS = ("storage", "loss")
-#: What the harmonics of a loop's misfit mean, by order.
+#: Meaning of the harmonics of a loop's misfit, by order.
 _HARMONICS = {
     0: "a constant force",
     1: "its first harmonic (slope or area)",
@@ -34,14 +34,14 @@ _HARMONICS = {
 
 
 def locate(evidence: Evidence) -> tuple[Where, ...]:
-    """Regions of smooth misfit, the worst first."""
+    """Find the regions of frequency and amplitude where a fitted model and the tests disagree, the worst first."""
     found = [*_sweep_regions(evidence), *_loop_regions(evidence)]
     worth = [region for region in found if region.excess > _WORTH_A_LINE]
     return tuple(sorted(worth, key=lambda region: -region.excess)[:_MOST_LINES])
 
 
 def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
-    """Per direction, where the storage and the loss stiffness of its sweeps depart smoothly from the model."""
+    """Regions of smooth misfit of storage and of loss stiffness, one each for the sweeps of a direction."""
     _, sweeps = split_by_kind(evidence.data_sets)
     lines = [line for sweep in sweeps for line in sweep.lines(evidence.model)]
     for direction, stepped in dict.fromkeys((line.direction, line.stepped) for line in lines):
@@ -73,13 +73,14 @@ def _read_sweep(
     touched: Sequence[int],
     spans: tuple[tuple[float, float], tuple[float, float]],
 ) -> str:
-    """A sentence: which way, how much, how it goes along the lines and from line to line.
+    """Sentence on the sign and size of a smooth misfit, and its trends along each line and between lines.
 
     Args:
-        part: storage or loss.
-        lines, pieces: of one direction, and the smooth misfit along each, (n,).
-        touched: numbers of the lines that belong to the region.
-        spans: least and largest frequency [Hz] and amplitude [m or rad] of the region.
+        part: "storage" or "loss".
+        lines: lines of the sweeps of one direction.
+        pieces: smooth misfit along each line, relative to |K|, (n,) each.
+        touched: indices of the lines that belong to the region.
+        spans: lowest and highest frequency [Hz], and amplitude [m or rad], of the region.
     """
     quantity = "stiffness" if part == "storage" else "loss"
     worst = max(touched, key=lambda i: float(np.abs(pieces[i]).max()))
@@ -112,7 +113,7 @@ def _read_sweep(
 
 
 def _trend(stepped: str, step: Array, misfit: Array) -> str:
-    """Sentence on the misfit along a line: flat, or with the axis that gives the highest correlation."""
+    """Phrase on the trend of a misfit along a line: constant, or with the power of the step that correlates best."""
     if np.var(misfit) < _FLAT * np.mean(np.square(misfit)):
         return f"nearly constant over {stepped}"
     shapes = {
@@ -125,14 +126,14 @@ def _trend(stepped: str, step: Array, misfit: Array) -> str:
 
 
 def _way(first: float, last: float) -> str:
-    """Word for a misfit that grows, fades or changes sides from its first to its last value."""
+    """Word for a misfit that grows, fades or changes sign from its first to its last value."""
     if first * last < 0.0 and min(abs(first), abs(last)) > _FLAT * max(abs(first), abs(last)):
         return f"going from {'above to below' if first > 0.0 else 'below to above'}"
     return "growing" if abs(last) > abs(first) else "fading"
 
 
 def _loop_regions(evidence: Evidence) -> Iterator[Where]:
-    """Per loop, the harmonic in which its force departs most from the model."""
+    """Regions for loops: each with the harmonic in which its force deviates most from the model."""
     loops, _ = split_by_kind(evidence.data_sets)
     for data_set in loops:
         columns, amplitude = data_set.contrasts(), data_set.drive.amplitude

@@ -1,6 +1,7 @@
 """Sets of explanations, grown one at a time from the most probable: each weighed by the evidence of the tests.
 
-Effects are refitted with all parameters and counted by Laplace's method; places and curves without a name stay linear.
+The evidence of effects comes from refits of all parameters, by Laplace's method; that of faulty places and of curves
+without a name comes from a linear model.
 """
 
 from __future__ import annotations
@@ -25,20 +26,20 @@ from bushfit.diagnosis.verdict import judged
 from bushfit.errors import FitError, ModelError
 from bushfit.progress import track
 
-#: Refits at most of what is probable by a linear count alone. For time.
+#: Maximum number of refits of hypotheses that are probable by the linear model alone; for time.
 _SETTLED = 8
-#: Claims that are fitted, those first under which the tests could agree best; places added to a state. For time.
+#: Number of mistakes that are fitted, the most promising first; number of faulty places added to a state; for time.
 _CLAIMS, _PLACES = 4, 2
-#: Logarithm of odds behind its state within which an effect is refitted; for time.
+#: Natural log of the odds below its state within which an effect is refitted; for time.
 _SLIGHT = 3.0
-#: Quantities of each point that a record states.
+#: Attributes of a test that a record determines at each point.
 _RECORDED = ("measured", "amplitude", "frequency")
-#: Reduced chi-square beyond which a model has bent its parameters too far for a refit to start from its values.
+#: Reduced chi-square above which the gap has distorted the parameters too much to start a refit from their values.
 _BENT = 1.5
 
 
 class Search:
-    """A beam search over sets of explanations."""
+    """Beam search over sets of explanations of the gap between a fitted model and the tests."""
 
     def __init__(self, request: DiagnosisRequest) -> None:
         self.request = request
@@ -51,7 +52,7 @@ class Search:
         self._meeting_odds = log(ODDS["place"] / max(len(families), 1)) - tests.log_prior
 
     def run(self) -> list[Hypothesis]:
-        """Search sets of explanations.
+        """Run the search: extend the most probable sets of explanations by one more, for a few rounds.
 
         Returns:
             All hypotheses that were compared, the most probable first.
@@ -79,17 +80,18 @@ class Search:
         return self._ordered()
 
     def _ordered(self) -> list[Hypothesis]:
+        """All hypotheses noted so far, the most probable first."""
         return sorted(self._known.values(), key=lambda hypothesis: -hypothesis.log_posterior)
 
     def _is_sure(self) -> bool:
-        """True if one explanation has nearly all of the probability, was refitted and fits the tests."""
+        """True if the search can stop: one explanation, or none missing, is nearly certain and fits the tests."""
         finding = judged(self._ordered(), self.request.tolerance)
         if finding.verdict == "consistent":
             return finding.nothing >= NAMED and self.root.linear.chance() >= DOES_NOT_FIT
         return finding.verdict == "named" and finding.reported[0].best.refitted
 
     def _settle(self) -> None:
-        """Refit hypotheses that only a linear count promises, as long as they are among the most probable."""
+        """Refit the most probable hypotheses whose evidence still comes from the linear model alone."""
         for _ in range(_SETTLED):
             ordered = self._ordered()
             share = np.exp([hypothesis.log_posterior - ordered[0].log_posterior for hypothesis in ordered])
@@ -102,22 +104,24 @@ class Search:
                 del self._known[linear.key]  # no response with it, or far behind
 
     def _log_prior(self, explanation: Explanation) -> float:
-        """Log of the prior odds; an explanation that only applies beside another has the least of its kind."""
+        """Natural log of the prior odds; the lowest of its kind for an explanation that another one made possible."""
         key = explanation.kind, explanation.name
         if key not in self._log_priors:
             self._log_priors[key] = min(odds for (kind, _), odds in self._log_priors.items() if kind == key[0])
         return self._log_priors[key]
 
     def _register(self, state: State) -> State:
-        """Mark a state as visited and note its hypotheses."""
+        """Mark a state as visited, note its hypotheses, and return the state."""
         self._visited.add(state.key)
         for hypothesis in state.hypotheses:
             self._note(hypothesis)
         return state
 
     def _note(self, hypothesis: Hypothesis) -> None:
-        """Keep the better of two ways to the same hypothesis, a refitted one before a linear one; also with each
-        frequency at which outliers meet beside it."""
+        """Record a hypothesis, alone and with each frequency at which outliers meet.
+
+        Of two fits of the same set of explanations, a refitted one replaces a linear one; else the more probable stays.
+        """
         for candidate in (hypothesis, *(self._with_meeting(hypothesis, place) for place in self.request.meetings)):
             before = self._known.get(candidate.key)
             rank = candidate.refitted, candidate.log_posterior
@@ -125,7 +129,7 @@ class Search:
                 self._known[candidate.key] = candidate
 
     def _with_meeting(self, hypothesis: Hypothesis, place: Meeting) -> Hypothesis:
-        """The hypothesis beside a disturbance at the frequency where points without weight meet."""
+        """Add to a hypothesis a disturbance at a frequency where several outliers were left out."""
         log_posterior = hypothesis.log_posterior + self._meeting_odds + place.log_odds
         if hypothesis.change > self.request.tolerance:
             change = max(hypothesis.change, place.size)
@@ -135,8 +139,10 @@ class Search:
         return replace(plain, places=(place,), log_posterior=log_posterior, change=place.size, last_change=place.size)
 
     def _grow(self, state: State, depth: int) -> Iterator[State]:
-        """The state with each of its most promising effects, refitted, and places; and without an effect that may only
-        have led the way."""
+        """Extend a state by each of its most promising effects (refitted) and faulty places.
+
+        States without one of the earlier effects follow each extension, because the last effect may make it unnecessary.
+        """
         by_evidence, by_score = REFITS[1 if depth else 2 if state.evidence.reduced > _BENT else 0]
         for grown in self._with_effects(state, self._promising(state, by_evidence, by_score), depth):
             yield grown
@@ -144,8 +150,13 @@ class Search:
         yield from self._with_places(state, depth)
 
     def _promising(self, state: State, by_evidence: int, by_score: int) -> list[str]:
-        """Effects to refit: those with the most evidence as far as they are linear, and those that take most off
-        chi-square, which says more where the gap is large."""
+        """Names of the effects to refit next to a state.
+
+        Args:
+            state: state that the effects are added to.
+            by_evidence: number of effects with the highest evidence in the linear model.
+            by_score: number of effects with the largest expected decrease of chi-square, the better guide to large gaps.
+        """
         scores = {p.name: p.score for p in state.proposals if state.key | {p.name} not in self._visited}
         prior = {p.name: self._log_prior(p) for p in state.proposals}
         base = state.log_prior + state.log_density - state.log_posterior
@@ -156,8 +167,11 @@ class Search:
         return list(dict.fromkeys([*(name for name in first if gains[name] > -_SLIGHT), *second]))
 
     def _with_effects(self, state: State, names: Sequence[str], depth: int) -> list[State]:
-        """The state with each of some effects, refitted: beside the compound's likeliest deviation, and by noise alone
-        where nothing of the deviation is left beside the effect."""
+        """Extend a state by each of the named effects, refitted with all parameters.
+
+        Each effect is refitted with the compound's likeliest deviation left free, and without a deviation if none
+        remains with the effect; the more probable fit is kept.
+        """
         request = self.request
         if not names or len(state.effects) >= request.max_effects:
             return []
@@ -177,7 +191,7 @@ class Search:
         return list(grown.values())
 
     def _with_effect(self, state: State, name: str, evidence: Evidence, depth: int) -> State:
-        """The state with an effect, whose fit is given."""
+        """Add an effect to a state, with the fit `evidence` of the model that has the effect; `depth` lowers the prior."""
         log_density, precision, change = laplace(name, evidence, state.evidence)
         return replace(
             state,
@@ -190,7 +204,7 @@ class Search:
         )
 
     def _with_places(self, state: State, depth: int) -> Iterator[State]:
-        """The state with each of its likeliest places, as a shift or with an error of every point."""
+        """Extend a state by each of its likeliest faulty places, with a common shift or an error of every point."""
         places = [(e, evidence) for e, evidence in state.weighed if isinstance(e, FaultyPlace)]
         places.sort(key=lambda pair: -(self._log_prior(pair[0]) + pair[1].total))
         for place, shifted in places[:_PLACES]:
@@ -216,7 +230,7 @@ class Search:
             yield self._register(grown)
 
     def _without_earlier(self, state: State) -> Iterator[State]:
-        """A state without each of the effects before its last, refitted: they may only have led the way."""
+        """Remove each effect before the last from a state and refit: the last effect may make it unnecessary."""
         if state.places:
             return
         data_sets, request = state.evidence.data_sets, self.request
@@ -234,7 +248,7 @@ class Search:
                 yield self._register(shorter)
 
     def _corrected_records(self) -> Iterator[State]:
-        """The most promising mistakes in the record, the starting model fitted to the tests with each corrected."""
+        """States of the starting model fitted to the tests with one mistake in the record corrected, the best first."""
         data, base = self.request.data, self.request.base
         possible = claims(data, self.request.without)
         for claim in track("mistakes put right", list(Screen(data).best(possible, _CLAIMS))):
@@ -247,8 +261,10 @@ class Search:
 
 
 def _record_change(base: Evidence, mended: Evidence) -> float:
-    """Largest relative change of what a record says: of a stiffness, an amplitude, a frequency; other dimensions of
-    the bushing, or another direction of a test, change all."""
+    """Largest relative change of a recorded stiffness, amplitude or frequency by a correction of the record.
+
+    The value is 1 if the dimensions of the bushing or the direction of a test are corrected.
+    """
     pairs = list(zip(base.data_sets, mended.data_sets, strict=True))
     if base.model.bushing != mended.model.bushing or any(
         before.direction != after.direction for before, after in pairs
@@ -259,16 +275,17 @@ def _record_change(base: Evidence, mended: Evidence) -> float:
 
 
 def prior_odds(explanations: Sequence[Explanation]) -> dict[tuple[str, str], float]:
-    """Natural log of the prior odds of explanations, by kind and name.
+    """Compute the natural log of the prior odds of each explanation.
 
-    A kind's odds are shared by its families; in a family of effects the one that acts everywhere has half, those of
-    single places the other half; in a family of places each has the same.
+    The odds of a kind, in `priors.ODDS`, are divided equally among its families. In a family of effects, the effect
+    that acts in all directions has half, and those in single directions share the other half; in a family of faulty
+    places, all have equal odds.
 
     Args:
-        explanations: all that are considered.
+        explanations: all explanations considered.
 
     Returns:
-        Log odds of each.
+        Log odds by (kind, name).
     """
     members = Counter((explanation.kind, explanation.family) for explanation in explanations)
     families = Counter(kind for kind, _ in members)

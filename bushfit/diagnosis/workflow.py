@@ -24,7 +24,7 @@ from bushfit.fitting.robust import estimate, outlier_warnings, outliers_at
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 
-#: Rounds of looking for wild points at most: each may uncover others beside those left out.
+#: Maximum number of rounds of outlier rejection: each may uncover further outliers.
 _MAXIMUM_ROUNDS = 4
 
 
@@ -34,13 +34,13 @@ def diagnose(
     """Find regions where model and measurement disagree, and name and add missing effects.
 
     Args:
-        data: the campaign; all directions are used.
-        model: starting model; by default the paper's three branches and the effects of [fit]. Its effects are kept, its
-            values are refitted.
-        settings: limits, and effects to adopt or to leave out.
+        data: campaign with prepared tests; all directions are used.
+        model: starting model, whose effects are kept and whose values are refitted; None for the paper's three branches
+            and the effects of [fit].
+        settings: limits, and effects to adopt or to leave out; None for the defaults.
 
     Returns:
-        The verdict with its reasons, the gap before and after, and the model to use.
+        The verdict with its reasons, the misfit before and after, and the model to use.
 
     Raises:
         FitError: no test, or data that cannot support the fit.
@@ -105,7 +105,7 @@ class InitialFit:
 
     Args:
         evidence: the fit.
-        start: starting values read from the data.
+        start: starting values read from the data, by parameter.
         fixed: names of parameters that are not fitted.
         outliers: points that a robust fit left out.
     """
@@ -117,7 +117,7 @@ class InitialFit:
 
 
 def _initial_fit(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> InitialFit:
-    """Fit the starting model with the adopted effects; gains of loops are errors of a stated or assumed class."""
+    """Fit the starting model with the adopted effects; gain errors of loops have the stated or an assumed class."""
     hint = "add measured tests to the campaign"
     data_sets = data.require_tests(data.data_sets, "there is nothing to diagnose", hint)
     fixed = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
