@@ -29,8 +29,8 @@ _EPS_HALF = np.geomspace(2e-4, 0.2, 24)
 _COARSE = 1e-3
 #: Maximum number of points of a test that are used before any fit: enough to show the shape of its curves.
 _MOST_POINTS = 60
-#: Misfit with a claim corrected, relative to the misfit of the tests as recorded, up to which the claim is fitted; above
-#: 1 because the grid is coarse.
+#: Misfit with a claim corrected, relative to the misfit of the tests as recorded, up to which the claim is fitted;
+#: above 1 because the grid is coarse.
 _WORTH_A_FIT = 1.3
 #: Least relative change of the misfit by a claim; a claim that changes less is equivalent to a change of parameters.
 _LEAST_CHANGE = 1e-6

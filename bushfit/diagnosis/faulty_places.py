@@ -12,22 +12,24 @@ from bushfit.diagnosis.groups import Group
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
 
-#: Neighbouring frequencies that one disturbance covers at most: mains hum and its sidebands.
+#: Maximum number of neighbouring frequencies that one disturbance covers: mains hum and its sidebands.
 _WIDEST = 3
-#: Frequencies that a campaign has at least before one of them can be a suspect.
+#: Minimum number of frequencies in a campaign for one of them to be a suspect.
 _FEWEST_FREQUENCIES = 5
-#: Suspects of one frequency at most; of more frequencies neighbours count as one. Chosen for time.
+#: Maximum number of single-frequency suspects; neighbours of more frequencies are joined. Chosen for time.
 _MOST_FREQUENCIES = 100
 
 
 def faulty_places(evidence: Evidence) -> list[FaultyPlace]:
-    """List the places whose points may deviate together, in gain and phase; levels and repeats also with a slope.
+    """List the parts of the tests whose points may all be wrong together: the suspects of a faulty measurement.
+
+    The points of a part share an error of gain and phase; levels and repeats also share a slope of both.
 
     Args:
         evidence: the fitted model and the tests.
 
     Returns:
-        Frequencies, levels, repeats and, beside sweeps, loops. Their columns do not depend on the model.
+        Frequencies, levels, repeats and, if there are sweeps too, loops. Their columns do not depend on the model.
     """
     loops, sweeps = split_by_kind(evidence.data_sets)
     places = [*_frequencies(evidence, sweeps), *_levels(evidence, sweeps), *_repeats(evidence, sweeps)]
@@ -44,7 +46,7 @@ def faulty_places(evidence: Evidence) -> list[FaultyPlace]:
 
 
 def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPlace]:
-    """Each level of a direction that has several, and each repeat of a level."""
+    """Suspects: each level of a direction with several levels, and each repeat of a level with over two repeats."""
     for sweep in sweeps:
         levels_of_direction = [np.unique(member.held) for member in sweeps if member.direction == sweep.direction]
         levels = np.concatenate(levels_of_direction)
@@ -61,7 +63,7 @@ def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fau
 
 
 def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPlace]:
-    """A repeat as a whole, of one direction or of all."""
+    """Suspects: all points of one repeat, in one sweep, in all sweeps of a direction, or in all sweeps."""
     for _, label, members in _scopes(sweeps):
         if not all(np.unique(sweep.repeat).size > 1 for sweep in members):
             continue
@@ -72,7 +74,7 @@ def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fa
 
 
 def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPlace]:
-    """A disturbance at one frequency or a few neighbours, in one direction or in all."""
+    """Suspects: a disturbance at one frequency or a few neighbours, in one sweep, one direction or all sweeps."""
     steps = np.unique(np.concatenate([sweep.frequency for sweep in sweeps])) if sweeps else np.empty(0)
     if steps.size < _FEWEST_FREQUENCIES:
         return
@@ -93,10 +95,10 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterato
 
 
 def _scopes(sweeps: Sequence[MeasuredSweep]) -> Iterator[tuple[str, str, Sequence[MeasuredSweep]]]:
-    """Groups of sweeps that may deviate together: one sweep, all sweeps of a direction, and all.
+    """Groups of sweeps that may have a common fault: each sweep, all sweeps of a direction, and all sweeps.
 
     Yields:
-        The location and the sweeps in words, and the sweeps.
+        Text on the direction or file, text on the sweeps, and the sweeps.
     """
 
     def direction_of(sweep: MeasuredSweep) -> str:
@@ -123,7 +125,7 @@ def _shifted(
     *,
     sloping: bool = False,
 ) -> FaultyPlace:
-    """Points of sweeps, (n,) bool each, with a common error of gain and phase and, if `sloping`, of their slopes."""
+    """Suspect of a common error of gain and phase, and of their slopes if `sloping`; `chosen`: a mask per sweep."""
     ends = np.array([[1.0, 1.0], [1.0, -1.0]])[: 1 + sloping]
     unit = np.kron(ends, np.array([[1.0], [1.0j]]))
     return _place(evidence, family, name, sweeps, chosen, _shift_columns(evidence, sweeps, chosen, sloping), unit)
@@ -138,7 +140,7 @@ def _place(
     columns: Array,
     unit: Array,
 ) -> FaultyPlace:
-    """Points of sweeps as a place at fault, with its columns and the relative change by a unit of each."""
+    """Suspect made of the sweep points in `chosen` (one mask per sweep), with its residual columns and their units."""
     frequency, amplitude = (
         np.concatenate([getattr(sweep, axis)[mask] for sweep, mask in zip(sweeps, chosen, strict=True)])
         for axis in ("frequency", "amplitude")
@@ -151,7 +153,7 @@ def _place(
 def _shift_columns(
     evidence: Evidence, sweeps: Sequence[MeasuredSweep], chosen: Sequence[Array], sloping: bool = False
 ) -> Array:
-    """Residuals of a common error of some points of sweeps, (2 or 4, rows): gain, phase, and their slopes."""
+    """Change of the residuals by a common error of points in gain, phase and, if sloping, slopes, (2 or 4, rows)."""
     rows = _rows(evidence, sweeps)
     columns = np.zeros((2 + 2 * sloping, rows.stop - rows.start))
     for sweep, mask in zip(sweeps, chosen, strict=True):
@@ -166,6 +168,6 @@ def _shift_columns(
 
 
 def _rows(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> slice:
-    """Slice from the first row of some sweeps to their last."""
+    """Slice of the residual vector from the first to the last row of the given sweeps."""
     places = [evidence.place[sweep] for sweep in sweeps]
     return slice(min(place.start for place in places), max(place.stop for place in places))

@@ -22,24 +22,25 @@ from bushfit.fitting.design import fit_from, probes
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.model.model import Model
 
-#: Share of a unit sensitivity that the model's own parameters must leave for it to count as visible.
+#: Smallest share of a sensitivity vector, after projection on the model's parameters, at which an effect is visible.
 _LEFT = 1e-4
-#: Amount at which a sensitivity is taken, relative to the typical one: small enough to be a derivative, large enough to
-#: keep seven digits of the difference.
+#: Amount of an effect in the difference quotient of the sensitivity, relative to the typical amount: small enough for a
+#: derivative, large enough to keep seven digits of the difference.
 _STEP = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
 class Proposal(Explanation):
-    """An effect of the library as an explanation, with its expected gain before any refit.
+    """Effect of the library that the model lacks, with its expected decrease of chi-square before any refit.
 
-    Its group has one column for each shape tried; an effect that replaces a branch has none.
+    The group has one column for each set of shape parameters tried; it is None if the effect replaces a branch.
 
     Args:
-        model: model with the effect in its best shape at no amount; at the suggested amount if that is fitted in its
-            logarithm. An effect that replaces a branch has the starting values that the branch suggests.
+        model: model with the effect at the best shape parameters and zero amount (or the suggested amount if the amount
+            is fitted in its logarithm), as a start for a refit. An effect that replaces a branch starts from values
+            that the branch suggests.
         score: decrease of chi-square if the model were linear.
-        visible: whether these tests could show the effect beside the model's parameters.
+        visible: True if the tests could distinguish the effect from a change of the model's parameters.
     """
 
     model: Model
@@ -52,11 +53,11 @@ def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str
 
     Args:
         evidence: the fitted model and the tests.
-        excluded: effects not to consider, with their twins.
+        excluded: names of effects not to consider, with their twins.
         fixed: names of parameters that are not fitted.
 
     Returns:
-        One proposal for each effect in its best shape, the highest score first.
+        One proposal for each effect, at its best shape parameters, the highest score first.
     """
     relative_noise = np.empty(evidence.residual.size)
     for test, place in evidence.place.items():
@@ -87,15 +88,15 @@ def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str
 
 
 def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
-    """Score test of columns, beside the parameters of the model.
+    """Score columns by the decrease of chi-square that each would make together with the model's parameters.
 
     Args:
         evidence: the fitted model and the tests.
-        columns: whitened sensitivities, (c, n).
+        columns: changes of the whitened residuals per unit amount, (c, n).
 
     Returns:
-        Decrease of chi-square by each column, its amount, and whether the tests show it, (c,) each; 0 for columns that
-        the tests do not show.
+        Decrease of chi-square, best amount, and True for columns that are visible, (c,) each. Decrease and amount are 0
+        for columns that the model's parameters absorb.
     """
     lengths = np.linalg.norm(columns, axis=1)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
@@ -108,20 +109,20 @@ def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
 
 
 def has_what_it_uses(effect: Effect, model: Model) -> bool:
-    """True if a model has the parameters of other effects that an effect reads."""
+    """True if a model has all parameters of other effects that an effect uses."""
     return not (isinstance(effect, Branch) and {*effect.uses} - {*model.values})
 
 
 def missing_effects(model: Model, places: Collection[str], excluded: Collection[str] = ()) -> list[Effect]:
-    """List the effects of the library that a model lacks and that tests at some places could show.
+    """List the effects of the library that a model lacks and that tests in given directions could show.
 
     Args:
         model: the model.
-        places: directions, or specimens by name.
+        places: directions tested, or names of specimens.
         excluded: names of effects not to consider, with their twins.
 
     Returns:
-        Effects; of twins only that of the bushing.
+        Effects; of twins (the same response from bushing and rig) only the effect of the bushing.
     """
     present = (None, *model.effects)
     excluded_names = {name for member in (*model.effects, *excluded) for name in twins_of(member)}
@@ -138,8 +139,11 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
 
 
 def _replacement(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> tuple[Model, float] | None:
-    """Model with an effect in place of a branch, from the start that promises most after one linear step, and the
-    decrease of chi-square; None if the effect has no response."""
+    """Replace a branch of the model by an effect, at the starting values with the smallest chi-square after one step.
+
+    Returns:
+        The model at these values, and the expected decrease of chi-square; None if the effect has no response.
+    """
     ends = list[tuple[float, Model]]()
     for start in evidence.model.starts(effect):
         with suppress(FitError, ModelError):  # no response from there
@@ -154,9 +158,9 @@ def _replacement(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> tu
 def sensitivity(
     model: Model, data_sets: Sequence[MeasuredTest], effect: Effect
 ) -> tuple[list[dict[str, float]], Array]:
-    """Sensitivity of the tests to an effect on a grid of its shapes.
+    """Compute the sensitivity of the tests to a missing effect on a grid of its shape parameters.
 
-    The derivative is a difference between a small amount and none in the same call, so that iterative solutions have
+    The derivative is the difference between a small amount and none in the same call, so that iterative solutions have
     the same error in both. Shapes without a finite response, as within free play, are left out.
 
     Args:
@@ -165,7 +169,8 @@ def sensitivity(
         effect: the missing effect.
 
     Returns:
-        Shapes, and the whitened sensitivity per typical amount in each, (shapes, n).
+        Values of the shape parameters by name, and the change of the whitened residuals per typical amount of the
+        effect at each of them, (shapes, n).
     """
     bare, model = model, model.with_effect(effect.name)
     axes = {
@@ -178,7 +183,7 @@ def sensitivity(
     none = model.values[amount]
 
     def residuals_of(shapes: Sequence[Mapping[str, float]]) -> Array:
-        """Residuals with a small amount of the effect in each shape.
+        """Whitened residuals with a small amount of the effect at each shape.
 
         Returns:
             Residuals, (shapes + 1, n); the last row is without the effect.

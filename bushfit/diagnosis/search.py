@@ -141,7 +141,7 @@ class Search:
     def _grow(self, state: State, depth: int) -> Iterator[State]:
         """Extend a state by each of its most promising effects (refitted) and faulty places.
 
-        States without one of the earlier effects follow each extension, because the last effect may make it unnecessary.
+        States without one of the earlier effects follow each extension: the last effect may make that one unnecessary.
         """
         by_evidence, by_score = REFITS[1 if depth else 2 if state.evidence.reduced > _BENT else 0]
         for grown in self._with_effects(state, self._promising(state, by_evidence, by_score), depth):
@@ -155,7 +155,7 @@ class Search:
         Args:
             state: state that the effects are added to.
             by_evidence: number of effects with the highest evidence in the linear model.
-            by_score: number of effects with the largest expected decrease of chi-square, the better guide to large gaps.
+            by_score: number of effects with the largest expected decrease of chi-square, better for large gaps.
         """
         scores = {p.name: p.score for p in state.proposals if state.key | {p.name} not in self._visited}
         prior = {p.name: self._log_prior(p) for p in state.proposals}
@@ -191,7 +191,7 @@ class Search:
         return list(grown.values())
 
     def _with_effect(self, state: State, name: str, evidence: Evidence, depth: int) -> State:
-        """Add an effect to a state, with the fit `evidence` of the model that has the effect; `depth` lowers the prior."""
+        """Add an effect to a state, given the fit `evidence` of the model with the effect; `depth` lowers the prior."""
         log_density, precision, change = laplace(name, evidence, state.evidence)
         return replace(
             state,

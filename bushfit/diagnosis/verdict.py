@@ -21,14 +21,14 @@ from bushfit.effects.contract import Level
 
 @dataclass(frozen=True, eq=False)
 class Composition:
-    """Set of parts that explains a gap, over all hypotheses that have these parts.
+    """Explanation of a gap: a set of effects, faults and mistakes, merged over all hypotheses with these parts.
 
     Args:
-        probability: if anything is missing.
-        best: the likeliest hypothesis of these parts.
-        names: effects that are part of it. Beside a deviation of the compound these are none of the rubber: such a law
-            is part of the deviation.
-        unnamed: True if something without a name is beside them, a deviation of the compound among them.
+        probability: probability of these parts if anything is missing.
+        best: most probable hypothesis with these parts.
+        names: effects in the set; with a deviation of the compound no effects of the rubber, which the deviation
+            includes.
+        unnamed: True if a curve without a name, or a deviation of the compound, is part of the explanation.
     """
 
     probability: float
@@ -38,12 +38,12 @@ class Composition:
 
     @property
     def places(self) -> tuple[FaultyPlace, ...]:
-        """Places at fault; none where they form a pattern, which is something without a name."""
+        """Faulty parts of the tests; empty if they form a pattern that may be physics without a name."""
         return () if is_pattern(self.best.places) else self.best.places
 
     @property
     def parts(self) -> frozenset[str]:
-        """Names of its effects, kinds of places and other parts."""
+        """Names of the effects, kinds of faulty places and other parts."""
         best = self.best
         marks = [f"place: {place.family}" for place in self.places] + ["levels"] * best.levels
         marks += ["unnamed"] * self.unnamed + ([str(best.claim.mistake.name)] if best.claim else [])
@@ -51,22 +51,24 @@ class Composition:
 
     @property
     def may_mislead(self) -> bool:
-        """True if the places at fault may bend the effects beside them, as a fault of a level, a repeat or a frequency
-        does. A loop is a test of its own, and points that were left out have no weight."""
+        """True if faulty places may distort the effects: faults of a level, a repeat or a frequency.
+
+        A faulty loop is a separate test, and points that were left out have no weight, so they distort no effect.
+        """
         faults = [place for place in self.places if not isinstance(place, Meeting)]
         return bool(self.places) and (not self.names or any(place.family != "loop" for place in faults))
 
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """The verdict, with the probabilities that it stands on.
+    """Verdict on the gap between model and tests, with its probabilities.
 
     Args:
-        verdict: the verdict in one word.
+        verdict: verdict in one word.
         nothing: probability that nothing is missing beyond noise and tolerance.
-        reported: explanations of the gap that are reported, the most probable first, or the one that is nearly sure.
-        leads: effects that help, but are no explanation; beside a name what may be there too.
-        names: effects that are named.
+        reported: explanations to report, the nearly certain one or the most probable first; empty if consistent.
+        leads: names of effects that reduce the gap but do not explain it.
+        names: names of effects that are reported as the explanation or part of it.
     """
 
     verdict: Verdict
@@ -77,11 +79,11 @@ class Finding:
 
 
 def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
-    """Verdict on hypotheses.
+    """Decide the verdict from the probabilities of hypotheses.
 
     Args:
         hypotheses: all hypotheses that were compared, the most probable first.
-        tolerance: relative change of |K| below which an explanation counts as nothing.
+        tolerance: relative change of |K| below which an explanation is neglected.
 
     Returns:
         Verdict, probability that nothing is missing, and the explanations behind the verdict.
@@ -121,7 +123,7 @@ def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
 
 
 def _single(first: Composition, nothing: float, leads: Sequence[str]) -> Finding:
-    """The verdict where one composition is nearly sure."""
+    """Decide the verdict if one composition, `first`, is nearly certain."""
     best, names = first.best, first.names
     leads = tuple(dict.fromkeys((*names, *leads)))
     if first.may_mislead or not (names or best.claim or first.unnamed):
@@ -134,7 +136,7 @@ def _single(first: Composition, nothing: float, leads: Sequence[str]) -> Finding
 
 
 def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
-    """Effects that nearly all probable hypotheses have in common."""
+    """Effects of the most probable hypothesis that nearly all other hypotheses, by probability, have as well."""
     share: dict[str, float] = defaultdict(float)
     for hypothesis, weight in pairs:
         for name in hypothesis.effects:
@@ -144,8 +146,14 @@ def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
 
 
 class _Parts(NamedTuple):
-    """Parts of a hypothesis: effects, places by kind and name, whether something without a name is all that there is,
-    and the claim on a record."""
+    """Parts of a hypothesis, the key by which hypotheses are merged to compositions.
+
+    Args:
+        effects: names of the effects.
+        places: faulty places as "kind:name".
+        only_unnamed: True if a curve without a name, or a pattern of places, is the only part.
+        claim: key of the mistake in the record; None without a mistake.
+    """
 
     effects: frozenset[str]
     places: frozenset[str]
@@ -154,7 +162,7 @@ class _Parts(NamedTuple):
 
     @classmethod
     def of_hypothesis(cls, hypothesis: Hypothesis) -> _Parts:
-        """The parts of a hypothesis; beside a deviation of the compound without laws of the rubber."""
+        """List the parts of a hypothesis; effects of the rubber are left out if the compound deviates."""
         effects = frozenset(
             name for name in hypothesis.effects if not (hypothesis.bent and get_effect(name).level == Level.MATERIAL)
         )
@@ -166,27 +174,28 @@ class _Parts(NamedTuple):
         return cls(effects, frozenset(places), only_unnamed, claim)
 
     def simpler(self) -> set[_Parts]:
-        """These parts with some, but not all, left out; and with each effect that has a limit replaced by its limit."""
+        """All simpler sets: subsets of these parts that are not empty, and the effects replaced by their limits."""
         reduced = product(_subsets(self.effects), _subsets(self.places), [False], {None, self.claim})
         limit = self._replace(effects=frozenset(get_effect(name).limit or name for name in self.effects))
         return {parts for parts in (*map(_Parts._make, reduced), limit) if any(parts)} - {self}
 
 
 def _subsets(names: frozenset[str]) -> list[frozenset[str]]:
+    """All subsets of a set of names, from the empty set to the set itself."""
     return [frozenset(chosen) for count in range(len(names) + 1) for chosen in combinations(names, count)]
 
 
 def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
-    """Join hypotheses of the same parts, with a deviation of the compound beside them or without.
+    """Merge hypotheses with the same parts, with or without a deviation of the compound, to compositions.
 
-    A part without which a composition does better is not shown by these tests, and it counts with the simpler one; so
-    does an effect that has another as its limit. Places that overlap are one.
+    A set of parts that is less probable than a simpler set is merged with the simpler set; so is an effect with the
+    effect that is its limit. Faulty places of the same kinds are merged.
 
     Args:
-        pairs: hypotheses and their weights, the most probable first.
+        pairs: hypotheses and their posterior weights, the most probable first.
 
     Returns:
-        Compositions, the most probable first.
+        Compositions, the most probable first, whose probabilities sum to one.
     """
     best: dict[_Parts, Hypothesis] = {}
     total: dict[_Parts, float] = defaultdict(float)
