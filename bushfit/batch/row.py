@@ -1,4 +1,4 @@
-"""One row, as a worker does it: the commands on a campaign, and a record of their results."""
+"""Evaluation of one row by a worker: the commands on a campaign, and a record of their results."""
 
 import time
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""A whole batch: rows to the workers, their records to the disk, then table, picture, summary and page."""
+"""Run of a whole batch: workers evaluate the rows and save their records; then table, picture and page are written."""
 
 from __future__ import annotations
 

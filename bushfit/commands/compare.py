@@ -1,4 +1,4 @@
-"""compare: several results beside the first, or model families on one campaign."""
+"""compare: several results compared with the first, or model families on one campaign."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace

@@ -1,4 +1,4 @@
-"""Models and campaigns as a user names them: a model file, a results folder, or a campaign file."""
+"""Loading of models and campaigns from a model file, a results folder, or a campaign file."""
 
 from pathlib import Path
 from typing import Protocol

@@ -1,4 +1,4 @@
-"""simulate: a model on the virtual rig, as a campaign of raw tests."""
+"""simulate: tests of a model on the virtual rig, written as a campaign of raw test files."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Test files looked at before a campaign names them: what they hold, how it was understood, and what is odd."""
+"""Inspection of test files before a campaign lists them: their contents, how bushfit reads them, and oddities."""
