@@ -294,7 +294,7 @@ class Questions:
         return cls(output, enabled)
 
     def complete(self, options: Mapping[str, Any], read: Callable[[Mapping[str, Any]], _Read]) -> _Read:
-        """Call a function with options, and ask for those that its errors name until it succeeds.
+        """Call a function with options; ask for the options that its errors name, until it succeeds.
 
         Args:
             options: options of the command line.

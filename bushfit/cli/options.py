@@ -99,7 +99,7 @@ def option(names: str, metavar: str | None, words: str | None = None, **more: An
 
 
 def flag(names: str, words: str | None = None, **more: Any) -> Parameter:
-    """Create an option without a value (True if given); the arguments are those of `option`."""
+    """Create an option without a value (True if given); with the arguments of `option`."""
     return option(names, None, words, is_flag=True, **more)
 
 

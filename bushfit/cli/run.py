@@ -119,7 +119,12 @@ def _print_range(output: Output, outcome: RunOutput) -> None:
 
 
 def two_step_line(two_step: TwoStep, joint: Result) -> str:
-    """Sentence that compares the paper's two-step procedure with the joint fit, in standard errors."""
+    """Sentence that compares the paper's two-step procedure with the joint fit, in standard errors.
+
+    Args:
+        two_step: result of the two-step procedure, with its passes.
+        joint: result of the joint fit.
+    """
     found, difference, ratio = two_step.result, dict[str, float](), dict[str, float]()
     for name in joint.fitted:
         errors = found.covariance.stderr(name), joint.covariance.stderr(name)

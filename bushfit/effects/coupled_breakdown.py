@@ -6,7 +6,11 @@ from bushfit.effects.contract import REFERENCE_STRAIN, Condition, Value, Values,
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """Springpot coefficient m (e0/0.01)^(-q) [Pa s^alpha] at the strain amplitudes e0 of the condition.
+    """Springpot coefficient m (e0/0.01)^(-q) [Pa s^alpha] at the strain amplitude e0.
+
+    Args:
+        p: parameter values by name, with m [Pa s^alpha], q [1].
+        condition: operating condition, with the strain amplitude.
 
     >>> model = paper.with_effect("coupled_breakdown", {"coupled_breakdown.q": 0.1})
     >>> [round(model.values_at("axial", 25.0, x)["m"]) for x in (1e-4, 1e-3)]

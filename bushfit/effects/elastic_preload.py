@@ -6,6 +6,10 @@ from bushfit.effects.contract import Condition, Value, Values, scaled_values
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
     """Static shear modulus mu [Pa] times the factor of the preload.
 
+    Args:
+        p: parameter values by name, with mu [Pa], factor [1].
+        condition: operating condition, not used.
+
     >>> adjust({"mu": 1e6, "m": 2e5, "factor": 1.1}, None)
     {'mu': 1100000.0}
     """

@@ -8,6 +8,10 @@ from bushfit.effects.contract import Condition, Value, Values, scaled_values
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
     """Friction stress sigma_fmax [Pa], reduced after a larger strain amplitude and recovering with time.
 
+    Args:
+        p: parameter values by name, with sigma_fmax [Pa], share [1], tau (share of the session).
+        condition: operating condition, with the strain amplitude e0 and the history of the test.
+
     Returns:
         sigma_fmax (1 - share (1 - (e0/e_l)^2) exp(-t/tau)), t the time since the last strain amplitude e_l larger than
         e0; empty if the history of the test is unknown.

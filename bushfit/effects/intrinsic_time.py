@@ -6,7 +6,11 @@ from bushfit.effects.contract import REFERENCE_STRAIN, Condition, Value, Values,
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """Springpot coefficient m (1 + d e0/0.01)^(-alpha) [Pa s^alpha] at the strain amplitudes e0 of the condition.
+    """Springpot coefficient m (1 + d e0/0.01)^(-alpha) [Pa s^alpha] at the strain amplitude e0.
+
+    Args:
+        p: parameter values by name, with m [Pa s^alpha], alpha [1], d [1].
+        condition: operating condition, with the strain amplitude.
 
     Notes: the rate is relative to an intrinsic time z with dz/dt = 1 + d e0/0.01.
 

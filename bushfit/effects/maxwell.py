@@ -53,6 +53,10 @@ def relax(rate: Value, values: Array, step: Value) -> Array:
 def recursion(ratio: complex, added: Array) -> Array:
     """Solve the recursion y_n = ratio y_{n-1} + added_n from y = 0, (n,) -> (n,).
 
+    Args:
+        ratio: factor of the previous value.
+        added: terms to add, (n,).
+
     >>> recursion(0.5, np.array([1.0, 0.0, 0.0]))
     array([1.  , 0.5 , 0.25])
     """

@@ -9,6 +9,10 @@ from bushfit.effects.contract import Condition, Value, Values, scaled_values
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
     """Moduli and stresses [Pa] times 1 - share erf(1 - (e0/e_max)^2), with e_max the largest strain amplitude so far.
 
+    Args:
+        p: parameter values by name, with all moduli and stresses [Pa], share [1].
+        condition: operating condition, with the strain amplitude e0 and the history of the test.
+
     Returns:
         The changed values by name; empty if the history of the test is unknown.
 

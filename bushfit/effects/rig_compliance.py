@@ -42,7 +42,7 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     compliance = p["compliance"]
 
     def excess(v: Array, inside: Array) -> Array:
-        """v + ln|1 + c K|."""
+        """Residual v + ln|1 + c K| of the equation for the logarithm v of the amplitude ratio."""
         relative = compliance * inside
         return v + 0.5 * np.log1p(2.0 * relative.real + relative.real**2 + relative.imag**2)
 

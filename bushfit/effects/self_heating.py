@@ -10,6 +10,10 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
 
     In torsion X is the rotation [rad] and K'' the loss stiffness [N m/rad].
 
+    Args:
+        p: parameter values by name, with all moduli and stresses [Pa], beta [1/W].
+        condition: operating condition, with frequency, displacement amplitude and stiffness.
+
     >>> model = paper.with_effect("self_heating", {"self_heating.beta": 0.01})
     >>> [round(model.values_at("axial", 100.0, x)["mu"]) for x in (1e-4, 1e-3)]
     [1086921, 859815]

@@ -10,7 +10,7 @@ _ORDER_STEP = 1e-5
 
 
 def power_of_rate(alpha: Array, omega: Array) -> Array:
-    """(i omega)^alpha = omega^alpha exp(i pi alpha / 2); 0 at omega = 0."""
+    """Transfer function (i omega)^alpha of a fractional derivative of order alpha, at omega [rad/s]; 0 at omega = 0."""
     return np.power(omega, alpha) * np.exp(0.5j * np.pi * alpha)
 
 
@@ -53,6 +53,10 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
 
 def grunwald_letnikov_weights(alpha: Value, count: int) -> Array:
     """Weights of a fractional difference: w_0 = 1, w_j = w_{j-1} (j - 1 - alpha)/j (Eq. 3), (count,).
+
+    Args:
+        alpha: order of the derivative.
+        count: number of weights.
 
     >>> grunwald_letnikov_weights(0.5, 4)
     array([ 1.    , -0.5   , -0.125 , -0.0625])

@@ -14,6 +14,10 @@ _C1, _C2 = 17.44, 51.6
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
     """Moduli and stresses [Pa] at the temperature of the test.
 
+    Args:
+        p: parameter values by name, with all moduli and stresses [Pa], softening [1/K].
+        condition: operating condition, with the temperature T.
+
     Returns:
         mu times T/T0, and all other moduli and stresses times exp(-softening dT), with dT = T - T0 and T0 = 23 degC;
         empty if the temperature is unknown.

@@ -161,7 +161,7 @@ def model_arms(
 
 
 def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float]]:
-    """Rows of the arms: effect name, modulus [Pa] and relaxation time [s]; the elastic spring is first, with time nan.
+    """Rows of a table of Maxwell arms: effect name, modulus [Pa], relaxation time [s]; first the elastic spring (nan).
 
     >>> [row[0] for row in arm_rows(paper, model_arms(paper, (5.0, 155.0)))]
     ['elastic', 'springpot', 'springpot', 'springpot', 'springpot']

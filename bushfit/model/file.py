@@ -42,19 +42,19 @@ _KINDS = {list: "a list", str: "a text", bool: "true or false", int: "a number",
 
 
 def load_result(file: Path) -> Result:
-    """Read a model file.
+    """Read a model file (JSON) as a fit result.
 
     Raises:
-        ModelError: a file that is missing, too large or not JSON, of another schema, or with an invalid key or value.
+        ModelError: the file is missing, too large or not JSON, has another schema, or an invalid key or value.
     """
     return from_document(_read_json(file), file)
 
 
 def read_document(file: Path) -> dict[str, Any]:
-    """Read the JSON object of a result file of any schema.
+    """Read a result file of any schema as a dictionary.
 
     Raises:
-        ModelError: a file that is missing, too large or not a JSON object.
+        ModelError: the file is missing, too large or not a JSON object.
     """
     return _require_object(_read_json(file), file, "a result")
 
@@ -64,13 +64,13 @@ def from_document(document: object, file: Path | None = None) -> Result:
 
     Args:
         document: parsed JSON.
-        file: for error messages.
+        file: path of the model file, for error messages.
 
     Returns:
-        The result, with its model checked.
+        The result, with a valid model.
 
     Raises:
-        ModelError: another schema, a key that is missing or invalid, or values that are not a valid model.
+        ModelError: the schema is another one, a key is missing or invalid, or the values are not a valid model.
     """
     content = _require_object(document, file, "a model")
     hint = "use a file written by bushfit fit-static, fit-dynamic, fit or diagnose"
@@ -171,18 +171,18 @@ def to_document(result: Result) -> dict[str, Any]:
 
 
 def model_document(model: Model) -> dict[str, Any]:
-    """JSON data of the keys of a model file that describe the model alone, without a fit."""
+    """Convert a model without a fit to JSON data: the keys bushing, effects, parameters, unnamed of a model file."""
     document = to_document(Result(model))
     return {key: document[key] for key in ("bushing", "effects", "parameters", UNNAMED)}
 
 
 def require_schema(document: Mapping[str, Any], file: Path | None, kind: str, *schemas: str, hint: str) -> None:
-    """Refuse a document of another schema.
+    """Raise an error if a document does not have one of the valid schemas.
 
     Args:
         document: parsed JSON object.
-        file: for the error message.
-        kind: of document, such as "a model".
+        file: path of the document, for the error message.
+        kind: name of the expected document for the error message, such as "a model".
         schemas: valid values of the key "schema".
         hint: next step for the user.
 
@@ -202,7 +202,7 @@ def require_schema(document: Mapping[str, Any], file: Path | None, kind: str, *s
 
 @cache
 def versions() -> dict[str, str]:
-    """Versions of the packages that determine the numbers; cached, because reading them is slow."""
+    """Versions of the numerical packages by name, for the provenance of a model file; cached."""
     return {name: importlib.metadata.version(name) for name in _PACKAGES}
 
 
@@ -214,7 +214,7 @@ def _require_object(document: object, file: Path | None, kind: str) -> dict[str,
 
 
 def _read_json(file: Path) -> Any:
-    """Parsed JSON of a file; invalid JSON in any form is a ModelError."""
+    """Read and parse a JSON file; raise a ModelError for invalid JSON, repeated keys, NaN and infinity."""
     data = read_utf8(file, ModelError, largest=_LARGEST_BYTES, hint="bushfit fit writes a model.json")
     place, found = None, "brackets in brackets, too deep"
     try:

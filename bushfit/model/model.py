@@ -241,8 +241,8 @@ class Model:
             frequency: frequency [Hz], broadcast with amplitude.
             amplitude: zero-to-peak displacement [m] or rotation [rad].
             kind: kind of test, "loop" or "sweep"; only effects of the instrument differ between them.
-            values: parameter values in place of the model's own; arrays whose last axis has length 1 add
-                leading axes to the result.
+            values: parameter values [SI] in place of those of the model; arrays whose last axis has
+                length 1 add leading axes to the result.
             under: temperature and history of the rubber in the test.
 
         Returns:
@@ -289,7 +289,7 @@ class Model:
             direction: direction or specimen, or the name of a direction.
             displacement: history of displacement [m] or rotation [rad], (..., n).
             kind: kind of test, "loop" or "sweep"; only effects of the instrument differ between them.
-            values: parameter values [SI] in place of the model's own.
+            values: parameter values [SI] in place of those of the model.
             under: test conditions, such as the temperature.
 
         Returns:
@@ -349,7 +349,7 @@ class Model:
         return {name: float(np.asarray(value).item()) for name, value in found.items()}
 
     def shift_factor(self, under: Circumstances, values: Values | None = None) -> Value:
-        """Time-temperature shift factor a_T under given test conditions: ratio of reduced to actual frequency."""
+        """Time-temperature shift factor a_T at the temperature of a test: ratio of reduced to actual frequency."""
         values = self.values if values is None else values
         shifts = ((modifier, modifier.shift_factor) for modifier in self.structure.modifiers)
         return prod(shift(seen_by(modifier, values), under) for modifier, shift in shifts if shift)

@@ -55,7 +55,7 @@ def layered_stiffness(
             Args:
                 omega: angular frequencies [rad/s], (..., k).
                 motion: displacement [m] or rotation [rad] over a cycle, (..., k, n).
-                points: index of the operating points among those of the test.
+                points: numpy index of these k operating points in the test.
             """
             cycles = replace(setting, under=setting.under.select(points).select((..., None)))
             force = stack_force(model, cycles, per_sample, [layer for group in groups[:count] for layer in group])
