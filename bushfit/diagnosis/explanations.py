@@ -2,8 +2,8 @@
 
 Smooth curves without a name and the compound's own deviation are Gaussian processes over ln frequency and ln strain
 (Kennedy and O'Hagan, 2001). No rubber follows a few parameters exactly. The deviation of the compound is the same
-function in every direction and on every specimen, while errors of a rig differ between them. So it is part of every
-hypothesis, at sizes that `priors.COMPOUND` weighs, and nothing is named for what it explains as well.
+function in every direction and on every specimen, while errors of a rig differ between them. So the deviation is part
+of every hypothesis, with the sizes and weights of `priors.COMPOUND`, and no effect is named for a gap that it explains.
 """
 
 from __future__ import annotations
@@ -30,17 +30,16 @@ from bushfit.reading.measurement import SAME_TEMPERATURE
 
 #: Name of the compound's own deviation among explanations without a name.
 COMPOUND = "compound"
-#: Lengths in ln frequency and ln strain over which the compound's deviation changes: relaxation takes decades of
-#: frequency, and breakdown more than one of strain. And its patterns: on plans of three to five levels more gain
-#: nothing.
+#: Correlation lengths of the compound's deviation in ln frequency and ln strain: relaxation takes decades of frequency,
+#: and breakdown more than one of strain. Number of its patterns: with three to five levels more improve nothing.
 _COMPOUND_LENGTHS, _COMPOUND_PATTERNS = (8.0, 3.0), 12
-#: Lengths over which a curve without a name changes: smooth, and rough.
+#: Correlation lengths of a curve without a name in ln frequency and ln strain: smooth, and rough.
 _CURVE_LENGTHS = {"smooth": (1.5, 1.2), "rough": (0.5, 0.5)}
-#: Points that a curve is made of at most, its patterns at most, and the least variance of one relative to the largest.
+#: Limits of a curve: number of its nodes and patterns, and least variance of a pattern relative to the largest.
 _CURVE_PATTERNS = {"nodes": 150, "count": 16, "minimum": 1e-4}
-#: Phases of a cycle at which harmonics are summed up: six a wave of the fastest.
+#: Number of phases of a cycle at which harmonics are summed: about six per period of the highest harmonic.
 _PHASES = 32
-#: First of the rows of `MeasuredLoop.contrasts` that the stiffness at the loop's frequency does not make.
+#: Index of the first row of `MeasuredLoop.contrasts` that belongs to an overtone of the loop's frequency.
 _OVERTONES = 3
 
 
@@ -49,10 +48,12 @@ class Explanation:
     """One explanation of a gap.
 
     Args:
-        kind: "effect", "place", "unnamed" or "record"; each kind has a prior probability.
-        family: group that shares the prior probability: an effect in all places, or a kind of place.
+        kind: "effect", "place" (a faulty part of the tests), "unnamed" (a curve) or "record" (a mistake); each kind
+            has a prior probability.
+        family: explanations that share a prior probability: an effect in all directions, or a kind of faulty part.
         name: name of the explanation.
-        group: its columns in the residuals; None for an effect that replaces a branch, which has to be refitted.
+        group: columns of the explanation in the residuals; None for an explanation without columns, such as an effect
+            that replaces a branch and has to be refitted.
     """
 
     kind: str
@@ -63,13 +64,13 @@ class Explanation:
 
 @dataclass(frozen=True, eq=False)
 class FaultyPlace(Explanation):
-    """Points of the tests that deviate together.
+    """Faulty part of the tests, as an explanation: a frequency, level, repeat or loop whose points deviate together.
 
     Args:
-        direction: direction of the first test.
-        frequency: lowest and highest [Hz].
-        amplitude: lowest and highest, zero-to-peak [m or rad].
-        extreme: True for the smallest or largest level of its direction, where a law of amplitude does the same.
+        direction: direction or specimen of the first test.
+        frequency: lowest and highest frequency [Hz].
+        amplitude: lowest and highest amplitude, zero-to-peak [m or rad].
+        extreme: True for the smallest or largest level of a direction, where an effect of amplitude would look alike.
     """
 
     direction: Place
@@ -79,12 +80,16 @@ class FaultyPlace(Explanation):
 
     @property
     def columns(self) -> Array:
-        """Whitened residuals that a unit deviation of each kind makes, (c, n)."""
+        """Change of the whitened residuals by a unit deviation of each kind (gain, phase, slopes), (c, n)."""
         assert self.group is not None
         return self.group.whole
 
     def point_by_point(self) -> FaultyPlace:
-        """The place with an independent error of every point, for faults other than a shift or a slope."""
+        """Convert the place to one with an independent error of every point, for faults other than a shift or slope.
+
+        Returns:
+            The converted place; a loop is returned unchanged.
+        """
         if self.family == "loop":
             return self
         size = np.abs(self.columns).max(axis=0)
@@ -94,7 +99,7 @@ class FaultyPlace(Explanation):
         return replace(self, group=Group(columns, np.eye(rows.size), together=True))
 
     def distance(self, residual: Array) -> float:
-        """Root mean square deviation along the columns of the place, in units of noise, from residuals (n,)."""
+        """Root mean square deviation of the faulty points, in units of noise, from whitened residuals, (n,)."""
         columns = self.columns
         amounts = columns @ residual / np.maximum(np.linalg.norm(columns, axis=1), 1e-300)
         return float(np.sqrt(np.mean(amounts**2)))
@@ -102,12 +107,12 @@ class FaultyPlace(Explanation):
 
 @dataclass(frozen=True, eq=False)
 class Meeting(FaultyPlace):
-    """Points that were left out as outliers, all at one frequency.
+    """Several outliers at one frequency, which were left out of the fit, as a sign of a disturbance there.
 
     Args:
         outlier_distance: root mean square distance of the points, in units of noise.
         size: largest distance of a point, relative to |K|.
-        log_odds: log of the odds of a disturbance at the frequency over single rows that meet by chance.
+        log_odds: natural log of the odds of a disturbance, compared with single wrong rows that coincide by chance.
     """
 
     outlier_distance: float
@@ -119,13 +124,13 @@ class Meeting(FaultyPlace):
 
 
 def is_pattern(places: Sequence[FaultyPlace]) -> bool:
-    """True if places together may be physics: several frequencies, as of a resonance or a ripple, or a level at an end
-    of the range, as of a contact or a law of amplitude."""
+    """True if faulty places may be physics: several frequencies, as at a resonance, or an extreme level, as of a contact
+    or a dependence on amplitude."""
     return sum(place.family == "frequency" for place in places) > 1 or any(place.extreme for place in places)
 
 
 def meetings(outliers: Sequence[Outlier], sweeps: Sequence[MeasuredSweep], model: Model) -> list[Meeting]:
-    """Find frequencies at which several outliers lie: a disturbance there, and no rows that went wrong singly.
+    """Find frequencies at which several outliers lie, as signs of a disturbance and not of single wrong rows.
 
     Args:
         outliers: points that were left out.
@@ -136,8 +141,8 @@ def meetings(outliers: Sequence[Outlier], sweeps: Sequence[MeasuredSweep], model
         One explanation for each frequency with two or more outliers.
 
     Notes:
-        Single wrong rows meet at a frequency by chance: of n such rows, k lie at the frequency of one of them with the
-        binomial probability of k - 1 or more among the n - 1 others, each with one over the number of frequencies.
+        Single wrong rows may coincide by chance. For n such rows, the probability of k at the frequency of one of them
+        is that of k - 1 or more among the other n - 1 (binomial, with p = 1 / number of frequencies).
     """
     distances = {(outlier.test, outlier.row): outlier.distance for outlier in outliers}
     points_by_frequency: dict[float, list[tuple[MeasuredSweep, int, float]]] = defaultdict(list)
@@ -172,14 +177,16 @@ def meetings(outliers: Sequence[Outlier], sweeps: Sequence[MeasuredSweep], model
 
 
 def compound(evidence: Evidence) -> Group | None:
-    """Smooth relative deviation of the compound's modulus, the same in all directions and specimens.
+    """Build the smooth deviation of the compound's modulus from the model's laws, as a group of residual columns.
+
+    The relative deviation is the same function of frequency and strain in all directions and specimens.
 
     Args:
         evidence: fitted model and tests.
 
     Returns:
-        Columns (c, n) and relative changes of |K| (c, points), where the deviation has unit variance at each operating
-        point; the h-th harmonic of a loop has 1/h of it. None without an operating point.
+        Group with columns (c, n) and relative changes of stiffness (c, points), of unit variance at each operating
+        point; the h-th harmonic of a loop has 1/h of this deviation. None without tests.
     """
     if not evidence.data_sets:
         return None
@@ -194,15 +201,16 @@ def compound(evidence: Evidence) -> Group | None:
 
 
 def unnamed(evidence: Evidence) -> list[Explanation]:
-    """List smooth curves as explanations.
+    """List smooth curves without a name as explanations of a gap that no effect of the library explains.
 
-    Sweeps of one direction and temperature share a curve, however many files they come in.
+    All sweeps of one direction and temperature share a curve.
 
     Args:
         evidence: the fitted model and the tests.
 
     Returns:
-        A smooth and a rough Gaussian process for each direction, a rough one for all, and the harmonics of the loops.
+        A smooth and a rough Gaussian process for each direction, a rough one for all directions together, and one
+        explanation for the harmonics of all loops.
     """
     loops, sweeps = split_by_kind(evidence.data_sets)
     groups: dict[str, Group] = {}
@@ -236,11 +244,11 @@ def _process(
         evidence: fitted model and all tests.
         tests: tests that share the process.
         lengths: correlation lengths in ln frequency and ln strain.
-        limits: of `patterns`.
+        limits: limits of the number of patterns, passed to `gaussian_process.patterns`.
 
     Returns:
-        Whitened residuals of independent amounts, in phase and in quadrature, (2 q, n), and their relative changes at
-        the points of the tests, (2 q, points).
+        Changes of the whitened residuals by q independent patterns in phase and in quadrature, (2 q, n), and their
+        complex relative changes of stiffness at the points of the tests, (2 q, points).
     """
     model = evidence.model
     points = [coordinates(test.frequency, test.amplitude * model.unit_strain(test.direction)) for test in tests]
@@ -256,7 +264,7 @@ def _process(
 def _restricted(
     evidence: Evidence, tests: Sequence[MeasuredTest], chosen: Sequence[MeasuredTest], columns: Array, share: Array
 ) -> tuple[Array, Array]:
-    """Columns and relative changes of a process that only some of the tests take part in."""
+    """Restrict the columns and relative changes of a process over `tests` to the `chosen` tests; 0 elsewhere."""
     rows = np.zeros(columns.shape[-1], dtype=bool)
     for test in chosen:
         rows[evidence.place[test]] = True
@@ -265,7 +273,7 @@ def _restricted(
 
 
 def _harmonics(evidence: Evidence, loops: Sequence[MeasuredLoop]) -> Array:
-    """Columns of the harmonics that repeated loops share, (c, n)."""
+    """Change of the whitened residuals by unit amounts of c harmonics that repeated loops share, (c, n)."""
     columns = np.zeros((len(loops[0].contrasts()), evidence.residual.size))
     for loop in loops:
         columns[:, evidence.place[loop]] = loop.contrasts()
@@ -273,6 +281,6 @@ def _harmonics(evidence: Evidence, loops: Sequence[MeasuredLoop]) -> Array:
 
 
 def _temperature_step(sweep: MeasuredSweep) -> int | None:
-    """Temperature of a sweep in steps of `SAME_TEMPERATURE`; None if it is not known."""
+    """Mean temperature of a sweep, rounded to a whole number of `SAME_TEMPERATURE` steps; None if not known."""
     kelvin = sweep.sweep.temperature
     return None if kelvin is None else round(float(np.mean(kelvin)) / SAME_TEMPERATURE)

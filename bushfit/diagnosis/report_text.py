@@ -26,7 +26,7 @@ from bushfit.fitting.preparation import split_by_kind, with_gains
 from bushfit.model.result import Result
 from bushfit.units import display_unit, format_aligned, number
 
-#: Reason for a candidate that is no part of the explanation, and summary where there is no gap.
+#: Reason for a candidate that is not part of the explanation; and summary if there is no gap.
 _LESS_LIKELY = "another explanation is more probable"
 _NOTHING = "nothing is missing beyond noise and tolerance"
 _NAMELESS = "something without a name"
@@ -39,12 +39,12 @@ _ONE_DIRECTION = (
 
 @dataclass(frozen=True, eq=False)
 class DiagnosisWriter:
-    """Writer of the texts of a diagnosis.
+    """Builder of the reported diagnosis (texts, regions, models) from a verdict.
 
     Args:
-        search: the search with the data.
-        finding: its verdict.
-        hypotheses: all hypotheses weighed, the most probable first.
+        search: completed search, with the tests.
+        finding: verdict on the hypotheses.
+        hypotheses: all hypotheses that were compared, the most probable first.
         unresolved: effects of the starting model that earlier tests could not distinguish from a twin of the rig.
     """
 
@@ -55,12 +55,12 @@ class DiagnosisWriter:
 
     @property
     def request(self) -> DiagnosisRequest:
-        """The request, with the data and the starting model fitted to them."""
+        """Input of the search, with the tests and the starting model fitted to them."""
         return self.search.request
 
     @property
     def first(self) -> Composition | None:
-        """The first explanation that is reported."""
+        """First of the reported explanations; None if nothing is missing."""
         return self.finding.reported[0] if self.finding.reported else None
 
     def diagnosis(self) -> Diagnosis:
@@ -79,7 +79,7 @@ class DiagnosisWriter:
         return self._without_name()
 
     def _named(self, first: Composition) -> Diagnosis:
-        """Names that explain the gap; or part of it, with the rest described where a correction stands."""
+        """Diagnosis in which named effects explain the gap, or part of it with a description of the rest."""
         request, names = self.request, self.finding.names
         states = [h.state for h in self.hypotheses if h.refitted and set(h.effects) >= set(names)]
         state = min(states, key=lambda state: len(state.effects) > len(names))
@@ -113,7 +113,7 @@ class DiagnosisWriter:
         return self._finished("partly", summary, gap.after if gap else after, entries, places=first.best, gap=gap)
 
     def _described(self, evidence: Evidence) -> GapDescription | None:
-        """Description of the gap of a fit, if effects may be added and a correction stands."""
+        """Describe the gap of a fit by a smooth correction; None if effects are excluded or no correction is valid."""
         request = self.request
         if not request.max_effects:
             return None
@@ -121,7 +121,7 @@ class DiagnosisWriter:
         return describe(fitted, request.data.campaign.rig, request.start, request.fixed, request.bounds)
 
     def _mistaken_record(self, first: Composition) -> Diagnosis:
-        """Diagnosis of a mistake in the record; the model stays as it was."""
+        """Diagnosis in which a mistake in the record explains the gap; the model to use is unchanged."""
         data, best, claim = self.request.data, first.best, first.best.claim
         assert claim is not None
         command = " ".join(["bushfit diagnose CAMPAIGN", *(f"--adopt {name}" for name in claim.labels(data))])
@@ -143,7 +143,7 @@ class DiagnosisWriter:
         )
 
     def _claim_entries(self, composition: Composition, alternatives: tuple[str, ...] = ()) -> list[Named]:
-        """An entry for each test of a claim."""
+        """Entries for the mistake of a composition, one for each affected test."""
         data, claim = self.request.data, composition.best.claim
         gain = self.request.base.chi_square - composition.best.state.evidence.chi_square
         why = f"lowers chi-square by {gain:.0f} without a new parameter; {self._probability(composition)}"
@@ -160,7 +160,7 @@ class DiagnosisWriter:
         ]
 
     def _ambiguous(self) -> Diagnosis:
-        """Explanations that the tests cannot distinguish, and the test that would."""
+        """Diagnosis in which the tests cannot distinguish several explanations, with the test that would."""
         request, compositions = self.request, self.finding.reported
         leader = next((c for c in compositions if c.names or c.best.claim), None)
         alternatives = tuple(self.label(composition) for composition in compositions if composition is not leader)
@@ -180,7 +180,7 @@ class DiagnosisWriter:
         return self._finished("ambiguous", summary, request.base, entries, places=places, next_test=advice)
 
     def _without_name(self) -> Diagnosis:
-        """A gap that is described where a correction stands, else unexplained, with the place at fault if one is."""
+        """Diagnosis without a named effect: described by a correction, or unexplained, or with a faulty test."""
         finding, best = self.finding, self.first.best if self.first else None
         leads = f"; leads: {' and '.join(finding.leads)}" if finding.leads else ""
         at_fault = " and ".join(place.name for place in best.places) if best else ""
@@ -206,7 +206,7 @@ class DiagnosisWriter:
 
     @cached_property
     def odds(self) -> Odds:
-        """Explanations that are reported, the most probable first."""
+        """Reported explanations with texts, probabilities and fitted models, the most probable first."""
         compositions = sorted(self.finding.reported, key=lambda composition: -composition.probability)
         sentences, models = [], []
         for composition in compositions:
@@ -223,7 +223,7 @@ class DiagnosisWriter:
         return Odds(self.finding.nothing, pairs, tuple(models), labels, exclusive)
 
     def _probability(self, composition: Composition) -> str:
-        """Probability of a composition and of the next one."""
+        """Text with the probability of a composition and of its strongest rival."""
         rivals = [rival for rival in self.finding.reported if rival is not composition][:1]
         following = [f"next {self.label(rival)} {format_probability(rival.probability)}" for rival in rivals]
         return ", ".join([f"probability {format_probability(composition.probability)}", *following])
@@ -239,7 +239,17 @@ class DiagnosisWriter:
         next_test: str = "",
         gap: GapDescription | None = None,
     ) -> Diagnosis:
-        """The diagnosis with regions, hold-out, candidates and the model to use."""
+        """Assemble the diagnosis with regions, hold-out, candidates and the model to use.
+
+        Args:
+            verdict: verdict in one word.
+            summary: verdict as a sentence.
+            after: fit with the additions, or the starting fit.
+            entries: named effects or mistakes.
+            places: hypothesis whose faulty parts of the tests are reported; None without any.
+            next_test: advice on the next test; "" for the usual confirmation of the first entry.
+            gap: description of a gap without a name; None without one.
+        """
         base, after, bounds = (
             self._with_free_gains(self.request.base),
             self._with_free_gains(after),
@@ -278,7 +288,7 @@ class DiagnosisWriter:
         )
 
     def _with_free_gains(self, evidence: Evidence) -> Evidence:
-        """Fit of the same model with free gains of loops, unless the class of the gain is stated."""
+        """Refit a model with free gains of the loops, unless the class of the rig's gain is stated; cached."""
         loops = split_by_kind(evidence.data_sets)[0]
         gain_is_stated = self.request.data.campaign.rig.stiffness_errors[0] is not None
         if gain_is_stated or not any(loop.gain_weighs for loop in loops):
@@ -293,8 +303,8 @@ class DiagnosisWriter:
         return {}
 
     def _candidates(self) -> list[CandidateResult]:
-        """Every effect of the library beside the starting model, and every mistake in the record weighed: its score,
-        its refit and its probability; by score."""
+        """All effects that the starting model lacks, and all mistakes that were fitted, with score, refit and
+        probability; the highest score first."""
         base, data, first = self.request.base, self.request.data, self.first
         log_posteriors = np.array([hypothesis.log_posterior for hypothesis in self.hypotheses])
         weights = np.exp(log_posteriors - log_posteriors[0])
@@ -325,7 +335,7 @@ class DiagnosisWriter:
         return sorted(candidates, key=lambda candidate: -candidate.score)
 
     def _notes(self) -> list[str]:
-        """Sentences on the effects, and on the kinds of fault, that these tests cannot show."""
+        """Sentences on the effects and kinds of fault that these tests cannot show."""
         unseen = [proposal.name for proposal in self.search.root.proposals if not proposal.visible]
         unseen = [name for name in unseen if not get_effect(name).under]  # not those that need a stated condition
         notes = [f"not identifiable from these tests: {', '.join(unseen)}"] if unseen else []
@@ -334,7 +344,14 @@ class DiagnosisWriter:
 
 
 def _doubt(before: Evidence, after: Evidence, names: Sequence[str], bounds: Bounds) -> str:
-    """Reason why names that are nearly sure do not explain the whole gap; "" if they do."""
+    """Reason to doubt that the named effects explain the whole gap; "" without doubt.
+
+    Args:
+        before: fit without the effects.
+        after: fit with the effects.
+        names: names of the effects.
+        bounds: limits of parameters inside their general limits.
+    """
     holdout = hold_out(before, after, bounds)
     if holdout.after is not None and holdout.after > MOST_LEFT:
         return f"a held-out gap of {number(holdout.after, 3)} times the noise"
@@ -349,7 +366,7 @@ def _doubt(before: Evidence, after: Evidence, names: Sequence[str], bounds: Boun
 
 
 def _format_amount(name: str, result: Result) -> str:
-    """Amount of an effect in a model, with its 95 % interval; "" if the model has no such amount."""
+    """Text on the amount of an effect in a model, with unit and 95 % interval; "" if the model has no such amount."""
     if name == UNNAMED or name not in result.model.effects or (effect := get_effect(name)).replaces is not None:
         return ""
     amount, parameter = effect.amount, qualified_name(effect, effect.amount)
@@ -361,5 +378,5 @@ def _format_amount(name: str, result: Result) -> str:
 
 
 def _nameless(composition: Composition) -> list[str]:
-    """Parts of a composition beside effects, places and mistakes."""
+    """Texts for the parts of a composition without a name: level errors, and unknown curves or deviations."""
     return [_LEVELS] * composition.best.levels + [_NAMELESS] * composition.unnamed

@@ -16,22 +16,23 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, group_repeats, split_by_kind, with_gains
 from bushfit.fitting.rig_class import ASSUMED, of_class
 
-#: Kinds of errors, by their place in `Node.errors`.
+#: Kinds of errors of the rig; the values are indices of `Node.errors`.
 _RUN, _LEVEL, _WAVE, _LOOP = range(4)
-#: Points of a run, from which on it can wander.
+#: Minimum number of points of a run that can drift.
 _FEWEST = 4
 
 
 @dataclass(frozen=True)
 class Node:
-    """One size of each of the rig's errors, with its prior weight.
+    """Combination of sizes of all random errors, with its prior weight; the evidence is averaged over nodes.
 
     Args:
-        scatter: standard deviation of a sweep's point, relative to the one that counts.
-        errors: standard deviations by kind of error, in units of the rig's class.
+        scatter: standard deviation of a sweep's point, relative to the estimated point-to-point noise.
+        errors: standard deviations of errors of a run, a level, drift along a run, and a loop, in units of the rig's
+            class.
         log_weight: natural log of the prior weight.
-        wide: True if errors of levels are larger than the class allows.
-        compound: size of the compound's own deviation from the model's laws, relative to |K|.
+        wide: True if errors of levels are larger than the class of the rig allows.
+        compound: standard deviation of the compound's deviation from the model's laws, relative to |K|.
     """
 
     scatter: float
@@ -43,13 +44,13 @@ class Node:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Rows of the tests that share errors of the rig, and no others.
+    """Rows of the residuals that share errors of the rig with each other and with no other rows.
 
     Args:
-        rows: indices of the rows, (n,).
-        columns: whitened residuals that an error of the class causes, (w, n).
-        kinds: kind of each error, (w,).
-        scatters: True if the rows scatter as sweeps' points do, which nodes change.
+        rows: indices of the rows in the residual vector, (n,).
+        columns: change of the whitened residuals by each of w errors at the size of the rig's class, (w, n).
+        kinds: kind of each error (run, level, drift or loop), (w,).
+        scatters: True for points of sweeps, whose scatter differs between nodes; False for loops.
     """
 
     rows: Array
@@ -60,28 +61,33 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class RigErrors:
-    """Errors of the rig in some tests; independent of the model."""
+    """Errors of the rig in a set of tests, independent of the model.
+
+    Args:
+        blocks: blocks of residual rows with their shared errors.
+        nodes: combinations of sizes of the errors, over which the evidence is averaged.
+    """
 
     blocks: Sequence[Block]
     nodes: Sequence[Node]
 
     @cached_property
     def combinations(self) -> tuple[Array, Array]:
-        """Distinct sizes of scatter and errors, (combinations, 1 + kinds), and the index of each node's, (nodes,)."""
+        """Distinct (scatter, *errors) of nodes, (combinations, 1 + kinds), and the index of each node, (nodes,)."""
         sizes = np.array([(node.scatter, *node.errors) for node in self.nodes])
         distinct, index = np.unique(sizes, axis=0, return_inverse=True)
         return distinct, index.ravel()
 
     @cached_property
     def roots(self) -> tuple[Array, Array]:
-        """Factors of the covariance of the errors at every combination.
+        """Factors of the covariance of the rig's errors for every combination of sizes.
 
         Returns:
-            L^-1 D of S = 1 + D W W^T D = L L^T, (combinations, blocks, w, w), and ln|S|, (combinations,).
+            L^-1 D of S = 1 + D W W^T D = L L^T, (combinations, blocks, w, w), with the errors' columns W and sizes D;
+            and ln|S|, (combinations,).
 
         Notes:
-            The squared product of the factor with the products of errors and rows is subtracted from the products of
-            rows.
+            For rows R, the whitened inner products are R R^T - (L^-1 D W R^T)^T (L^-1 D W R^T).
         """
         sizes, _ = self.combinations
         width = max((len(block.kinds) for block in self.blocks), default=0)
@@ -102,8 +108,8 @@ class RigErrors:
 def scattering_alone(evidence: Evidence) -> Evidence:
     """Express the residuals of a fit in units of the scatter from point to point, without errors that points share.
 
-    Residuals of sweeps are in ln K for every fit: relative to the measurement, noise would shrink where a model is
-    wrong.
+    Residuals of sweeps are differences of ln K: relative to the measurement, noise would seem smaller where
+    the model is wrong.
 
     Args:
         evidence: the fitted model and the tests.
@@ -121,20 +127,20 @@ def scattering_alone(evidence: Evidence) -> Evidence:
 
 
 def rig_errors(evidence: Evidence, rig: RigSettings) -> RigErrors:
-    """Errors of the rig in the tests that a model was fitted to."""
+    """Build the errors of a rig of a stated class, for the tests that a model was fitted to."""
     return RigErrors(list(blocks(evidence, rig)), nodes(evidence))
 
 
 def nodes(evidence: Evidence) -> list[Node]:
-    """List sizes of the rig's errors with their prior weights.
+    """List the combinations of sizes of the rig's errors and the compound's deviation, with their prior weights.
 
-    The scatter has several sizes if few repeats determine it.
+    The point-to-point scatter has several sizes if it was estimated from few repeats.
 
     Args:
         evidence: the fitted model and the tests.
 
     Returns:
-        Nodes whose weights sum to one.
+        Nodes, whose weights sum to one.
     """
     sweeps = split_by_kind(evidence.data_sets)[1]
     freedom = max((sweep.noise.scatter_freedom for sweep in sweeps), default=0)
@@ -151,7 +157,7 @@ def nodes(evidence: Evidence) -> list[Node]:
 
 
 def blocks(evidence: Evidence, rig: RigSettings) -> Iterator[Block]:
-    """List blocks of rows that share errors: gains and phases of each level of a sweep, and repeated loops.
+    """List blocks of residual rows that share errors: gains and phases of each level of a sweep, and repeated loops.
 
     Args:
         evidence: the fitted model and the tests.
@@ -179,7 +185,7 @@ def blocks(evidence: Evidence, rig: RigSettings) -> Iterator[Block]:
 
 
 def _shared_errors(count: int, runs: Sequence[Array]) -> tuple[Array, Array]:
-    """Columns of the rig's errors in the points of a line, (w, n), and the kind of each, (w,)."""
+    """Unit errors shared by the n points of a line: columns of its level, runs and drift, (w, n), and kinds, (w,)."""
     columns, kinds = [np.ones(count)], [_LEVEL]
     for run in runs:
         orders = np.arange(1, WAVES + 1)[:, None] if run.size >= _FEWEST else np.empty((0, 1))
