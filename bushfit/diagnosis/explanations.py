@@ -124,8 +124,8 @@ class Meeting(FaultyPlace):
 
 
 def is_pattern(places: Sequence[FaultyPlace]) -> bool:
-    """True if faulty places may be physics: several frequencies, as at a resonance, or an extreme level, as of a contact
-    or a dependence on amplitude."""
+    """True if faulty places may be physics: several frequencies, as at a resonance, or an extreme level, as of a
+    contact or a dependence on amplitude."""
     return sum(place.family == "frequency" for place in places) > 1 or any(place.extreme for place in places)
 
 
