@@ -3,8 +3,10 @@
 Warnings of Python and its packages are hidden unless Python was started with -W.
 """
 
+import _thread
 import gc
 import sys
+import time
 import warnings
 
 #: Number of new objects before the first garbage collection. Imports create as many objects without reference cycles;
@@ -12,11 +14,26 @@ import warnings
 _OBJECTS = 50_000
 
 
+def repeat_interrupt(unraisable: "sys.UnraisableHookArgs") -> None:
+    """Repeat a Ctrl-C that Python ignores, because it came during a callback of an import; a `sys.unraisablehook`."""
+    if issubclass(unraisable.exc_type, KeyboardInterrupt):
+        _thread.start_new_thread(_interrupt_soon, ())
+    else:
+        sys.__unraisablehook__(unraisable)
+
+
+def _interrupt_soon() -> None:
+    """Interrupt the main thread once the callback has ended."""
+    time.sleep(0.01)
+    _thread.interrupt_main()
+
+
 def main() -> None:
     """Run the command line; Ctrl-C prints one line and exits with status 2."""
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # they are for programmers, who ask for them: python -W default -m bushfit
     gc.set_threshold(_OBJECTS)
+    sys.unraisablehook = repeat_interrupt
     try:
         from bushfit.cli import main as command
 

@@ -265,6 +265,21 @@ def test_json_is_utf8_in_any_code_page_and_no_text_steers_the_terminal(folder: P
     assert not any(sign in done.stderr.decode() for sign in "\x1b\x9b\u202e")
 
 
+def test_ctrl_c_in_a_callback_of_an_import_is_not_lost() -> None:
+    """Python ignores what a callback of a weak reference raises, and imports have such callbacks."""
+    code = (
+        "import signal, sys, time, weakref; from bushfit.__main__ import repeat_interrupt\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler); sys.unraisablehook = repeat_interrupt\n"
+        "class Lock: pass\n"
+        "lock = Lock(); reference = weakref.ref(lock, lambda _: signal.raise_signal(signal.SIGINT)); del lock\n"
+        "time.sleep(20)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert done.stderr.splitlines()[-1] == "KeyboardInterrupt"
+    assert "ignored" not in done.stderr
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signal")
 @pytest.mark.parametrize(("after", "sent"), [(0.1, signal.SIGINT), (0.5, signal.SIGINT), (1.5, signal.SIGTERM)])
 def test_an_early_ctrl_c_and_a_request_to_end(after: float, sent: signal.Signals, folder: Path) -> None:
