@@ -34,7 +34,7 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
         "EFFECT",
         (
             "Add this effect, such as inertia, or correct this mistake in the record of a test, such as "
-            "peak_to_peak:sweep_axial; may be given again. A wrong EFFECT lists all."
+            "peak_to_peak:sweep_axial; may be given again. An unknown EFFECT prints the list."
         ),
         multiple=True,
         shell_complete=explanations,

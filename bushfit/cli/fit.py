@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @command_called("fit-static", "configs/cmp_15961.toml")
-@under("Fit", file_option("--dynamic", "Fix m and alpha at the values in this dynamic.json."))
+@under("Fit", file_option("--dynamic", "Keep the parameters m and alpha fixed at their values in this dynamic.json."))
 @campaign_options()
 @with_output("results/<campaign name>", "tables", "pictures")
 def static(
@@ -74,7 +74,7 @@ def dynamic(
         "Fit the tests in this direction (axial, radial, torsion) or of this specimen; may be given again "
         "[axial, and all specimens]."
     ),
-    effect_option("Add an effect to the model, such as inertia; may be given again. A wrong NAME lists all."),
+    effect_option("Add an effect to the model, such as inertia; may be given again. An unknown NAME prints the list."),
     flag("--profile", "Add 95 % intervals by profile likelihood (some seconds)."),
 )
 @campaign_options()

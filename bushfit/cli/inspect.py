@@ -36,9 +36,9 @@ def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Ou
 
     FILE may be a folder, or a workbook with several tests. For each test, the command lists every column with its
     meaning and unit; cycles, noise, frequencies, amplitudes; and anything unusual: gaps, outliers, drift, clipped
-    peaks, copied rows, repeats that disagree. Rows count from 1 below the header. The text for the campaign goes to
-    standard output. If a file cannot be used, the others are shown, nothing is written, and the exit status is 2.
-    Writes inspect.png; for more than five files also inspect_2.png and so on.
+    peaks, copied rows, repeats that disagree. Rows are numbered from 1, starting below the header. The text
+    for the campaign goes to standard output. If a file cannot be used, the others are shown, nothing is written, and
+    the exit status is 2. Writes inspect.png; for more than five files also inspect_2.png and so on.
     """
     from bushfit.inspection.gathering import gather, with_contradictions
     from bushfit.inspection.record import pasted_text, with_specimens_named

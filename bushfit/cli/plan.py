@@ -59,8 +59,13 @@ _MOST_VALUES = 6
         multiple=True,
     ),
     option("--parameters", "NAME,...", "Parameters to determine, with --for parameters [all]."),
-    option("--rivals", "NAME,...", "Effects to distinguish [those that diagnose cannot].", shell_complete=effect_lists),
-    file_option("--campaign", "With MODEL.json: use [rig] and [predict] of this."),
+    option(
+        "--rivals",
+        "NAME,...",
+        "Effects to distinguish [those that diagnose cannot distinguish].",
+        shell_complete=effect_lists,
+    ),
+    file_option("--campaign", "With MODEL.json: use [rig] and [predict] of this campaign."),
 )
 @under("Range of later predictions", grid_options("the campaign's"))
 @under(

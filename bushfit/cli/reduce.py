@@ -40,7 +40,9 @@ _LINES_AN_OCTAVE = 3
 @under(
     "Raw histories",
     option("--levels", "GRID", 'Nominal amplitudes, "0.1, 0.2 mm" [detected].'),
-    option("--cycles", "N", "Smallest number of steady cycles [3].", type=click.IntRange(3, 1000), default=3),
+    option(
+        "--cycles", "N", "Leave out steps with fewer than N steady cycles [3].", type=click.IntRange(3, 1000), default=3
+    ),
 )
 @under(
     "Resonance test",
