@@ -33,7 +33,7 @@ from bushfit.batch.quantities import (
     Point,
     PointText,
 )
-from bushfit.campaign.quantities import with_sizes
+from bushfit.campaign.quantities import convert_limits
 from bushfit.campaign.toml import read_toml
 from bushfit.diagnosis import document
 from bushfit.effects.contract import Array
@@ -106,7 +106,7 @@ Stiffness = Annotated[
 
 
 @dataclass(frozen=True, kw_only=True)
-class AtPoint:
+class PointLimits:
     """Operating point of limits; the last base class, so that pydantic reads the point before the values with units.
 
     Args:
@@ -117,7 +117,7 @@ class AtPoint:
 
 
 @dataclass(frozen=True, kw_only=True)
-class StiffnessBounds(Bounds, AtPoint):
+class StiffnessBounds(Bounds, PointLimits):
     """[[stiffness]]: limits of the dynamic stiffness |K| at an operating point."""
 
     min: Stiffness | None = None
@@ -126,7 +126,7 @@ class StiffnessBounds(Bounds, AtPoint):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LossFactorBounds(Bounds, AtPoint):
+class LossFactorBounds(Bounds, PointLimits):
     """[[loss_factor]]: limits of the loss factor at an operating point."""
 
     min: Ratio | None = None
@@ -148,7 +148,7 @@ class Limits:
 
     __pydantic_config__ = ConfigDict(extra="forbid")
 
-    parameters: Annotated[Mapping[str, Bounds], table(partial(with_sizes, keys=("min", "max", "nominal")))] = field(
+    parameters: Annotated[Mapping[str, Bounds], table(partial(convert_limits, keys=("min", "max", "nominal")))] = field(
         default_factory=dict
     )
     stiffness: tuple[StiffnessBounds, ...] = ()

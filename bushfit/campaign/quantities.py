@@ -73,7 +73,7 @@ def effect_values(raw: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def with_sizes(raw: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
+def convert_limits(raw: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
     """Convert the values of the given keys, such as "min", in tables by parameter name to SI.
 
     Pydantic checks entries that are not tables.
@@ -101,7 +101,7 @@ def parameter_settings(raw: dict[str, Any]) -> dict[str, Any]:
         CampaignError: min, value and max that are not increasing, or outside the bounds of the parameter.
     """
     keys = ("min", "value", "max")
-    settings = with_sizes(raw, keys)
+    settings = convert_limits(raw, keys)
     for name, table in settings.items():
         if isinstance(table, dict):
             ordered = [table[key] for key in keys if key in table]

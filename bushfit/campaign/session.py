@@ -15,7 +15,7 @@ from bushfit.reading.measurement import Loop, Sweep
 _LEVEL_STEP = 0.15
 
 
-class Visit(NamedTuple):
+class SessionTest(NamedTuple):
     """One test of a session: a sequence of tests on one body.
 
     Args:
@@ -42,10 +42,10 @@ def measured_session(bushing: Bushing | None, tests: Sequence[Loop | Sweep]) -> 
         Circumstances of each test: one entry per row of a sweep, one entry for a loop.
     """
 
-    def visit(test: Loop | Sweep) -> Visit:
+    def visit(test: Loop | Sweep) -> SessionTest:
         order = test.source.conditions.get("order") if test.source else None
         reached = test.amplitude_reached if isinstance(test, Sweep) else np.array([np.ptp(test.displacement) / 2.0])
-        return Visit(test.direction, reached, test.temperature, None if order is None else float(order))
+        return SessionTest(test.direction, reached, test.temperature, None if order is None else float(order))
 
     return session(bushing, [visit(test) for test in tests])
 
@@ -70,10 +70,10 @@ def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], rep
         assert isinstance(test, SimulatedResonance)
         return np.zeros(repeats * len(test.frequencies))
 
-    return session(bushing, [Visit(test.direction, amplitudes(test), test.temperature) for test in tests])
+    return session(bushing, [SessionTest(test.direction, amplitudes(test), test.temperature) for test in tests])
 
 
-def session(bushing: Bushing | None, visits: Sequence[Visit]) -> list[Circumstances]:
+def session(bushing: Bushing | None, visits: Sequence[SessionTest]) -> list[Circumstances]:
     """Circumstances of the tests of a session. Each body has a session of its own.
 
     Args:

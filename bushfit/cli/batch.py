@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.options import command_called, effect_option, file_option, flag, option, place_option, under
+from bushfit.cli.options import command_called, direction_option, effect_option, file_option, flag, option, under
 from bushfit.cli.output import Output, with_output
 from bushfit.errors import error_location
 from bushfit.units import format_aligned, number, split_header
@@ -33,7 +33,7 @@ _MOST_SHOWN = 10
         type=click.Choice(["run", "fit", "diagnose", "predict"]),
         multiple=True,
     ),
-    place_option("Tests to fit, as in `bushfit fit`."),
+    direction_option("Tests to fit, as in `bushfit fit`."),
     effect_option("Add an effect, as in `bushfit fit`."),
     option(
         "--at operating_points",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.options import FILE, command_called, effect_lists, option, place_option, under
+from bushfit.cli.options import FILE, command_called, direction_option, effect_lists, option, under
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import grid_options, grid_values
 from bushfit.errors import error_location, quote_path
@@ -28,7 +28,7 @@ _CHANCE = 0.05
 @click.argument("sources", metavar="A [B]...", nargs=-1, required=True, type=FILE)
 @under(
     "Range of the comparison",
-    place_option(
+    direction_option(
         "axial, radial, torsion or a specimen, also for the fit of a campaign; may be given again [where all "
         "were fitted]."
     ),
@@ -77,12 +77,12 @@ def command(
                 all(map(get_effect, name.split("+")))
         campaign = load_campaign(sources[0])
         name = campaign.name
-        folder = output.free_folder(name, "compare.json", form="{} families")
+        folder = output.checked_folder(name, "compare.json", form="{} families")
         compared = compare(campaign, families=names, **settings)
     else:
         entries = [_entry(source, directions) for source in track("results fitted", sources)]
         name = " and ".join(entry.name for entry in entries)
-        folder = output.free_folder(name, "compare.json")
+        folder = output.checked_folder(name, "compare.json")
         compared = compare(*entries, **settings)
     _print_comparison(output, name, compared)
     inputs = [source if source.suffix == ".toml" else model_file(source) for source in sources]
@@ -102,7 +102,7 @@ def _entry(source: Path, directions: tuple[str, ...]) -> ComparedResult:
 
 def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> None:
     """Print which results differ by more than chance, the next step, the sources of the results, and tables."""
-    from bushfit.report.compared import FAMILY_HEADS, SideBySide, chance, parameter_cells
+    from bushfit.report.compared import FAMILY_HEADS, ComparisonDocument, chance, parameter_cells
 
     first, *labels = compared.labels
     if compared.families:
@@ -140,5 +140,5 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
             output.print(f"all {count} together, with correlations: p {chance(p)}")
     if compared.families:
         title = "families; held out: root mean square in units of noise (1: noise alone)"
-        output.print_table(title, FAMILY_HEADS, SideBySide.from_document(compared.document).family_cells())
+        output.print_table(title, FAMILY_HEADS, ComparisonDocument.from_document(compared.document).family_cells())
     output.warn(line for line in compared.warnings if line not in compared.notes)

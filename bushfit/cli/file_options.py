@@ -60,7 +60,7 @@ _PAIRED = re.compile(r"(column|unit)s = \{([^}]*)\}")
 _ENTRY = re.compile(r'(\w+) = "([^"]*)"')
 
 
-def with_stated(*, sweeps: bool = True) -> Parameter:
+def metadata_options(*, sweeps: bool = True) -> Parameter:
     """Decorator that adds the argument `files` and the metadata options to a command, which receives `test_options`.
 
     Args:

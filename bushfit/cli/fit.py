@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bushfit.cli.options import command_called, effect_option, file_option, flag, place_option, under
+from bushfit.cli.options import command_called, direction_option, effect_option, file_option, flag, under
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.printing import print_step
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
@@ -36,7 +36,7 @@ def static(
     from bushfit.commands.loading import load_model
 
     campaign, start = open_campaign(campaigns), load_model(dynamic) if dynamic else None
-    folder = output.free_folder(campaign.name, "static.json")
+    folder = output.checked_folder(campaign.name, "static.json")
     _finish(output, folder, fit_static(campaign, dynamic=start, loss=loss), dynamic, max_nrmse)
 
 
@@ -63,14 +63,14 @@ def dynamic(
     from bushfit.commands.loading import load_model
 
     campaign, start = open_campaign(campaigns), load_model(static) if static else None
-    folder = output.free_folder(campaign.name, "dynamic.json")
+    folder = output.checked_folder(campaign.name, "dynamic.json")
     _finish(output, folder, fit_dynamic(campaign, static=start, loss=loss), static, max_nrmse)
 
 
 @command_called("fit", "configs/arm_bushing.toml --direction axial --direction radial --profile")
 @under(
     "Tests and model",
-    place_option(
+    direction_option(
         "Fit the tests in this direction (axial, radial, torsion) or of this specimen; may be given again "
         "[axial, and all specimens]."
     ),
@@ -100,7 +100,7 @@ def fit(
     from bushfit.commands.fit import fit as fit_campaign
 
     campaign = open_campaign(campaigns)
-    folder = output.free_folder(campaign.name, "model.json")
+    folder = output.checked_folder(campaign.name, "model.json")
     result = fit_campaign(campaign, directions=directions, effects=effects, profile=profile, loss=loss)
     _finish(output, folder, result, None, max_nrmse)
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from bushfit.cli.file_options import STATED, TYPES, direction_error, options_named, with_stated
+from bushfit.cli.file_options import STATED, TYPES, direction_error, metadata_options, options_named
 from bushfit.cli.inspect import print_left_out
 from bushfit.cli.options import command_called, flag, option, option_of, under
 from bushfit.cli.output import Output, with_output
@@ -67,7 +67,7 @@ _Read = TypeVar("_Read")
     option("--length", "LENGTH", 'Mean of inside and outside, such as "34 mm".'),
     option("--name", "NAME", "Name [that of the folder of the first file]."),
 )
-@with_stated()
+@metadata_options()
 @under("Output", flag("--no-input", "Ask nothing: what is missing is an error."))
 @with_output("results/<bushing name>")
 def command(
@@ -256,7 +256,7 @@ def inspect_source(
         return inspection
     if inspection.direction is None:
         raise direction_error(source.file, source.sheet)
-    if is_asking and inspection.is_counting_open:
+    if is_asking and inspection.amplitude_convention_unknown:
         raise MeasurementError(
             "the headers do not state how amplitudes are counted", file=source.file, hint="--amplitude"
         )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
-from bushfit.cli.file_options import options_named, with_stated
+from bushfit.cli.file_options import metadata_options, options_named
 from bushfit.cli.options import command_called
 from bushfit.cli.output import Output, with_output
 from bushfit.errors import BushfitError
@@ -29,7 +29,7 @@ _FILES_A_PICTURE = 5
 
 
 @command_called("inspect", "data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_radial.csv")
-@with_stated()
+@metadata_options()
 @with_output("results/<first file>", "pictures")
 def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Output) -> None:
     """Show how bushfit reads test files, before a campaign exists: loops, sweeps, raw histories.

@@ -199,7 +199,7 @@ def option_of(key: str) -> str:
     return "--" + key.replace("_", "-")
 
 
-def place_option(words: str) -> Parameter:
+def direction_option(words: str) -> Parameter:
     """Create the option --direction for names of directions or specimens, with the help text `words`."""
 
     def check(ctx: click.Context, parameter: click.Parameter, places: tuple[str, ...]) -> tuple[str, ...]:

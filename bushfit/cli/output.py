@@ -106,7 +106,7 @@ class Output:
         """Folder for results: --output, or results/<name>; `form` is a template of the name, such as "plan {}"."""
         return self.output or Path("results") / form.format(folder_name(name))
 
-    def free_folder(self, name: str, *files: str, form: str = "{}") -> Path:
+    def checked_folder(self, name: str, *files: str, form: str = "{}") -> Path:
         """Folder for results, after a check that it is writable and that the files do not exist yet (unless --force).
 
         Args:
@@ -140,7 +140,7 @@ class Output:
         """Print the most important collected warnings, one of each kind; with -v all."""
         if not self._warnings:
             return
-        from bushfit.prediction.caveats import by_importance, use_of
+        from bushfit.prediction.caveats import by_importance, consequence_of
 
         warnings = by_importance(self._warnings)
         if not self.verbose:
@@ -151,7 +151,7 @@ class Output:
         printed = warnings if self.verbose else [*distinct.values()][:_MOST_WARNINGS]
         for warning in printed:
             self.console.print(f"[yellow]warning:[/yellow] {escape(warning)}")
-            if (use := use_of(warning)) != use_of(""):  # which is said of warnings of no known kind
+            if (use := consequence_of(warning)) != consequence_of(""):  # which is said of warnings of no known kind
                 self.print(f"  {use}")
         if remaining := len(warnings) - len(printed):
             self.print(f"{remaining} more warning{'s' * (remaining > 1)}: -v prints all; the result files contain them")

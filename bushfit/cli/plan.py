@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.options import FILE, Size, command_called, effect_lists, file_option, option, place_option, under
+from bushfit.cli.options import FILE, Size, command_called, direction_option, effect_lists, file_option, option, under
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import grid_options, grid_values, positive
 from bushfit.errors import error_location
@@ -21,7 +21,7 @@ from bushfit.units import display_unit, number
 if TYPE_CHECKING:
     from bushfit.commands.plan import PlanOutput
     from bushfit.planning.campaign import Check
-    from bushfit.planning.document import PlanFile, Shown
+    from bushfit.planning.document import DetectableEntry, PlanFile
 
 #: Maximum of --hours; larger values are typing errors.
 _MOST_HOURS = 2000.0
@@ -48,7 +48,7 @@ _MOST_VALUES = 6
         "parameters, predictions or rivals: what the tests shall determine best [predictions].",
         type=click.Choice(["parameters", "predictions", "rivals"]),
     ),
-    place_option(
+    direction_option(
         "Directions (axial, radial, torsion) or specimens that the rig can test; may be given again [axial and "
         "radial, or all specimens]."
     ),
@@ -118,7 +118,7 @@ def command(
     opened, settings_campaign = load_source(source), load_campaign(campaign) if campaign else None
     if settings_campaign and isinstance(opened, Campaign):
         raise click.UsageError("'--campaign' goes with MODEL.json.")
-    folder = output.free_folder(opened.name, "plan.json", form="plan {}")
+    folder = output.checked_folder(opened.name, "plan.json", form="plan {}")
     with error_location(source):
         outcome = plan(opened, settings_campaign, **settings)
     _print_plan(output, outcome)
@@ -214,7 +214,7 @@ def _percents(rows: Mapping[str, Mapping[str, Any]], keys: Sequence[str]) -> lis
 def _print_effects(output: Output, document: PlanFile) -> None:
     """Print the smallest detectable amounts of effects with the plan and with the standard tests."""
 
-    def ratio(amounts: Shown) -> float:
+    def ratio(amounts: DetectableEntry) -> float:
         return (amounts["standard"] or math.inf) / (amounts["planned"] or math.inf)
 
     ranked = sorted(document["visible"].items(), key=lambda item: ratio(item[1]))

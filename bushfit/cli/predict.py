@@ -91,7 +91,7 @@ def command(
 
 def _print_summary(output: Output, predicted: PredictionOutput) -> None:
     """Print the permitted use of the prediction, and the range of stiffness and loss factor for each direction."""
-    from bushfit.prediction.caveats import by_importance, use_of
+    from bushfit.prediction.caveats import by_importance, consequence_of
     from bushfit.units import format_range
 
     places = [str(prediction.direction) for prediction in predicted.predictions]
@@ -99,7 +99,7 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
     if warnings := by_importance(predicted.warnings):
         verdict += f", with {len(warnings)} warning{'s' * (len(warnings) > 1)}"
         place, colon, _ = warnings[0].partition(": ")
-        action = f"{place}{colon}{use_of(warnings[0])}" if place in places else use_of(warnings[0])
+        action = f"{place}{colon}{consequence_of(warnings[0])}" if place in places else consequence_of(warnings[0])
     output.print_headline(predicted.result.name, verdict, action)
     for prediction in predicted.predictions:
         force, loss = prediction.direction.display.stiffness, prediction.loss_factor.value

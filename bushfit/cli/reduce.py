@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.file_options import direction_error, options_named, with_stated
+from bushfit.cli.file_options import direction_error, metadata_options, options_named
 from bushfit.cli.options import command_called, option, under
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import parse_grid, positive
@@ -36,7 +36,7 @@ _LINES_AN_OCTAVE = 3
     "data/cmp_15961_raw/stepped_sine_axial.csv",
     'data/measured/epdm_70/shaker_1g_573g.csv --mass "0.5878 kg" --specimen mount',
 )
-@with_stated(sweeps=False)
+@metadata_options(sweeps=False)
 @under(
     "Raw histories",
     option("--levels", "GRID", 'Nominal amplitudes, "0.1, 0.2 mm" [detected].'),
@@ -71,7 +71,7 @@ def command(
     from bushfit.reduction.steps import reduce
     from bushfit.report.reduced import reduced_table, resonance_table
 
-    folder = output.free_folder(files[0].stem, output.formats.table("sweep"))
+    folder = output.checked_folder(files[0].stem, output.formats.table("sweep"))
     table = _resonance_table(files[0], test_options, shaker)
     document: dict[str, Any] = {}
     if table is not None:

@@ -45,7 +45,7 @@ def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | N
     from bushfit.commands.run import run
 
     campaign = open_campaign(campaigns)
-    folder = output.free_folder(campaign.name, "model.json", "diagnosis.json")
+    folder = output.checked_folder(campaign.name, "model.json", "diagnosis.json")
     data = prepare_tests(campaign, loss)
     output.warn(data.notes)
     outcome = run(data)

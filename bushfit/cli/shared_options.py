@@ -15,10 +15,10 @@ from bushfit.cli.options import (
     Parameter,
     Size,
     add_parameters,
+    direction_option,
     file_option,
     option,
     option_of,
-    place_option,
     under,
 )
 from bushfit.errors import UnitError, error_location
@@ -105,7 +105,9 @@ def prediction_options(campaign: str) -> Parameter:
     """Create the options for directions, grid and temperature of a prediction, and --campaign with a help text."""
     return under(
         "Range and conditions",
-        place_option("axial, radial, torsion or a specimen; may be given again [axial and radial, and all specimens]."),
+        direction_option(
+            "axial, radial, torsion or a specimen; may be given again [axial and radial, and all specimens]."
+        ),
         grid_options("the campaign's"),
         option("--temperature", "TEMP", 'Such as "40 degC", if the model has an effect of temperature [23 degC].'),
         file_option("--campaign", campaign),

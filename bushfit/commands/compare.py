@@ -29,7 +29,7 @@ from bushfit.prediction.grid import common_grid, requested_grid
 from bushfit.reading.measurement import Source, Sweep
 from bushfit.report import plots
 from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFile, FamilyEntry
-from bushfit.report.compared import SideBySide, contrast_table
+from bushfit.report.compared import ComparisonDocument, contrast_table
 from bushfit.report.page import comparison_page
 from bushfit.report.results import ResultFile, figure_file, json_file, page_file, table_file
 from bushfit.units import format_range, number
@@ -228,7 +228,7 @@ def _compared(
         "command": command,
         "versions": {"bushfit": __version__, **versions()},
     }
-    side_by_side = SideBySide.from_document(document)
+    side_by_side = ComparisonDocument.from_document(document)
     names = ("parameters", *(["families"] if families else []), "differences")
     files = [json_file("compare", document)]
     files += [table_file(name, partial(lambda name: side_by_side.tables()[name], name)) for name in names]

@@ -18,7 +18,7 @@ from bushfit.effects import Level
 from bushfit.effects.contract import Array, Circumstances
 from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError
-from bushfit.fitting.agreement import met_within, misfits
+from bushfit.fitting.agreement import expected_error_without_refits, misfits
 from bushfit.fitting.preparation import MeasuredSweep, prepare_sweeps
 from bushfit.geometry import Bushing, Direction, Place, Specimen, get_place
 from bushfit.model.arms import Arms, model_arms
@@ -75,7 +75,9 @@ class PredictionOutput:
         """Content of `predict --json`."""
         document: dict[str, Any] = {str(p.direction): table_columns(prediction_table(p)) for p in self.predictions}
         for resonance in self.resonances:
-            document[f"{resonance.place}_resonance"] = tables.shaken_table(resonance).to_dict(orient="list")
+            document[f"{resonance.place}_resonance"] = tables.predicted_resonance_table(resonance).to_dict(
+                orient="list"
+            )
         if self.arms:
             document["arms"] = [
                 {
@@ -104,7 +106,7 @@ class PredictionOutput:
     @cached_property
     def usable(self) -> tuple[Usable, ...]:
         """Expected error of the prediction at each direction or specimen, from the measured sweeps."""
-        return met_within(self.result.model, *split_by_fit(self.result, self.measured))
+        return expected_error_without_refits(self.result.model, *split_by_fit(self.result, self.measured))
 
 
 def predict(
@@ -248,7 +250,7 @@ def _files(
         measured = [sweep for sweep in drawn_sweeps if sweep.direction == place]
         table = tables.sweeps_table(result.model, measured) if measured else None
         title = result.name if isinstance(place, Direction) else str(place)
-        note = plots.style.first_sentences(warnings_of(result, [], (*prediction.warnings, *output.notes)))
+        note = plots.style.warnings_note(warnings_of(result, [], (*prediction.warnings, *output.notes)))
         return plots.prediction.prediction_figure(result, prediction, table, title, note, temperature)
 
     def measured_table() -> pd.DataFrame:
@@ -264,7 +266,7 @@ def _files(
     files += arms_files(result, output.arms, places)
     suffixes: list[tuple[str, Callable[[Any], pd.DataFrame], Sequence[Any]]] = [
         ("wide", tables.wide_table, output.predictions if wide else ()),
-        ("resonance", tables.shaken_table, output.resonances),
+        ("resonance", tables.predicted_resonance_table, output.resonances),
     ]
     for suffix, make, parts in suffixes:
         for name, part in zip(names, parts, strict=False):

@@ -122,13 +122,13 @@ def adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[PreparedCam
     """
     messages = []
     for name in names:
-        claim = _claimed(data, name)
+        claim = _parse_claim(data, name)
         messages.append(f"corrected by --adopt {name}: read as if {claim.words(data)}; {claim.corrections(data)[0]}")
         data = claim.mended(data)
     return data, messages
 
 
-def _claimed(data: PreparedCampaign, name: str) -> Claim:
+def _parse_claim(data: PreparedCampaign, name: str) -> Claim:
     """Convert one value of --adopt to a claim; a ModelError if the mistake is not possible in the test."""
     mistake, test = get_mistake(name), name.partition(SEPARATOR)[2]
     data_sets: list[MeasuredTest] = [*data.loops, *data.sweeps]

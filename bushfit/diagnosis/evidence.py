@@ -8,8 +8,8 @@ import numpy as np
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
-from bushfit.fitting.agreement import met_within, misfits, usable
-from bushfit.fitting.assess import FitStage, apart_in_temperature, covariance, measured_range, quality
+from bushfit.fitting.agreement import expected_error_without_refits, misfits, usable
+from bushfit.fitting.assess import FitStage, covariance, measured_range, quality, temperature_warning
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.design import fit_from
 from bushfit.fitting.model_error import model_error_warning, with_model_error
@@ -152,14 +152,14 @@ def result_of(
         (
             *([_CORRECTED] if corrected else []),
             *([model_error_warning(error)] if error else []),
-            *apart_in_temperature(model, tests),
+            *temperature_warning(model, tests),
             *cautions(solution.model, found, bounds, cov),
         ),
         sources(tests),
         at_bound=solution.at_bound,
         tests=misfits(model, tests),
         # a correction has seen every run
-        usable=met_within(model, tests, ()) if corrected else usable(solution),
+        usable=expected_error_without_refits(model, tests, ()) if corrected else usable(solution),
         model_error=error,
         unresolved=tuple(effect.name for effect in model.records if effect.twins and effect.name not in resolved),
     )

@@ -63,7 +63,7 @@ class Explanation:
 
 
 @dataclass(frozen=True, eq=False)
-class FaultyPlace(Explanation):
+class FaultyPart(Explanation):
     """Faulty part of the tests, as an explanation: a frequency, level, repeat or loop whose points deviate together.
 
     Args:
@@ -84,7 +84,7 @@ class FaultyPlace(Explanation):
         assert self.group is not None
         return self.group.whole
 
-    def point_by_point(self) -> FaultyPlace:
+    def point_by_point(self) -> FaultyPart:
         """Convert the place to one with an independent error of every point, for faults other than a shift or slope.
 
         Returns:
@@ -106,7 +106,7 @@ class FaultyPlace(Explanation):
 
 
 @dataclass(frozen=True, eq=False)
-class Meeting(FaultyPlace):
+class OutlierCluster(FaultyPart):
     """Several outliers at one frequency, which were left out of the fit, as a sign of a disturbance there.
 
     Args:
@@ -123,13 +123,13 @@ class Meeting(FaultyPlace):
         return self.outlier_distance
 
 
-def is_pattern(places: Sequence[FaultyPlace]) -> bool:
+def is_pattern(places: Sequence[FaultyPart]) -> bool:
     """True if faulty places may be physics: several frequencies, as at a resonance, or an extreme level, as of a
     contact or a dependence on amplitude."""
     return sum(place.family == "frequency" for place in places) > 1 or any(place.extreme for place in places)
 
 
-def meetings(outliers: Sequence[Outlier], sweeps: Sequence[MeasuredSweep], model: Model) -> list[Meeting]:
+def meetings(outliers: Sequence[Outlier], sweeps: Sequence[MeasuredSweep], model: Model) -> list[OutlierCluster]:
     """Find frequencies at which several outliers lie, as signs of a disturbance and not of single wrong rows.
 
     Args:
@@ -160,7 +160,7 @@ def meetings(outliers: Sequence[Outlier], sweeps: Sequence[MeasuredSweep], model
         location = "several directions" if len(directions) > 1 else next(iter(directions))
         amplitudes = [float(sweep.amplitude[point]) for sweep, point, _ in points]
         found.append(
-            Meeting(
+            OutlierCluster(
                 "place",
                 "frequency",
                 f"{frequency:.4g} Hz in {location} ({len(points)} points left out)",

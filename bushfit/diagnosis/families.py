@@ -13,7 +13,7 @@ from bushfit.diagnosis.holdout import HoldOut, Predicted, parts, predicted_parts
 from bushfit.diagnosis.laplace import laplace
 from bushfit.effects import BASE, get_effect
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.assess import apart_in_temperature
+from bushfit.fitting.assess import temperature_warning
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.design import with_effect
 from bushfit.fitting.model_error import log_likelihood, with_model_error
@@ -90,7 +90,7 @@ def known_families(model: Model, data_sets: Sequence[MeasuredTest]) -> tuple[str
     Returns:
         Names of families: names of effects joined by +.
     """
-    warm = ["temperature"] if apart_in_temperature(model, data_sets) else []
+    warm = ["temperature"] if temperature_warning(model, data_sets) else []
     rates, amplitudes = (["", *(name for name in laws if _fits(model, name))] for laws in (_RATE, _AMPLITUDE))
     found = [[*warm, *filter(None, pair)] for pair in product(rates, amplitudes)]
     possible = [names for names in found if not any({*get_effect(name).never_with} & {*names} for name in names)]

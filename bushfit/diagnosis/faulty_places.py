@@ -7,7 +7,7 @@ from itertools import groupby
 import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import FaultyPlace
+from bushfit.diagnosis.explanations import FaultyPart
 from bushfit.diagnosis.groups import Group
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
@@ -20,7 +20,7 @@ _FEWEST_FREQUENCIES = 5
 _MOST_FREQUENCIES = 100
 
 
-def faulty_places(evidence: Evidence) -> list[FaultyPlace]:
+def faulty_places(evidence: Evidence) -> list[FaultyPart]:
     """List the parts of the tests whose points may all be wrong together: the suspects of a faulty measurement.
 
     The points of a part share an error of gain and phase; levels and repeats also share a slope of both.
@@ -41,11 +41,11 @@ def faulty_places(evidence: Evidence) -> list[FaultyPlace]:
             among=(evidence.place[loop], evidence.residual.size),
         )
         ends = (loop.drive.frequency,) * 2, (loop.drive.amplitude,) * 2
-        places.append(FaultyPlace("place", "loop", f"the loop {loop.name}", group, loop.direction, *ends))
+        places.append(FaultyPart("place", "loop", f"the loop {loop.name}", group, loop.direction, *ends))
     return places
 
 
-def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPlace]:
+def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
     """Suspects: each level of a direction with several levels, and each repeat of a level with over two repeats."""
     for sweep in sweeps:
         levels_of_direction = [np.unique(member.held) for member in sweeps if member.direction == sweep.direction]
@@ -62,7 +62,7 @@ def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fau
                 yield _shifted(evidence, "repeat", f"repeat {number} of {label}", [sweep], [repeat])
 
 
-def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPlace]:
+def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
     """Suspects: all points of one repeat, in one sweep, in all sweeps of a direction, or in all sweeps."""
     for _, label, members in _scopes(sweeps):
         if not all(np.unique(sweep.repeat).size > 1 for sweep in members):
@@ -73,7 +73,7 @@ def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fa
                 yield _shifted(evidence, "repeat", f"repeat {number} of {label}", members, chosen, sloping=True)
 
 
-def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPlace]:
+def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
     """Suspects: a disturbance at one frequency or a few neighbours, in one sweep, one direction or all sweeps."""
     steps = np.unique(np.concatenate([sweep.frequency for sweep in sweeps])) if sweeps else np.empty(0)
     if steps.size < _FEWEST_FREQUENCIES:
@@ -124,7 +124,7 @@ def _shifted(
     chosen: Sequence[Array],
     *,
     sloping: bool = False,
-) -> FaultyPlace:
+) -> FaultyPart:
     """Suspect of a common error of gain and phase, and of their slopes if `sloping`; `chosen`: a mask per sweep."""
     ends = np.array([[1.0, 1.0], [1.0, -1.0]])[: 1 + sloping]
     unit = np.kron(ends, np.array([[1.0], [1.0j]]))
@@ -139,7 +139,7 @@ def _place(
     chosen: Sequence[Array],
     columns: Array,
     unit: Array,
-) -> FaultyPlace:
+) -> FaultyPart:
     """Suspect made of the sweep points in `chosen` (one mask per sweep), with its residual columns and their units."""
     frequency, amplitude = (
         np.concatenate([getattr(sweep, axis)[mask] for sweep, mask in zip(sweeps, chosen, strict=True)])
@@ -147,7 +147,7 @@ def _place(
     )
     ends = (float(frequency.min()), float(frequency.max())), (float(amplitude.min()), float(amplitude.max()))
     group = Group(columns, unit, together=True, among=(_rows(evidence, sweeps), evidence.residual.size))
-    return FaultyPlace("place", family, name, group, sweeps[0].direction, *ends)
+    return FaultyPart("place", family, name, group, sweeps[0].direction, *ends)
 
 
 def _shift_columns(
@@ -162,7 +162,7 @@ def _shift_columns(
         shapes = [mask.astype(float), *([mask * slope] if sloping else [])]
         place = evidence.place[sweep]
         columns[:, place.start - rows.start : place.stop - rows.start] = [
-            column for shape in shapes for column in sweep.moved_together(shape)
+            column for shape in shapes for column in sweep.shared_error_columns(shape)
         ]
     return columns
 

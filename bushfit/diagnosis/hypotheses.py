@@ -11,7 +11,7 @@ import numpy as np
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPlace, Meeting, compound, unnamed
+from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart, OutlierCluster, compound, unnamed
 from bushfit.diagnosis.faulty_places import faulty_places
 from bushfit.diagnosis.groups import Group, GroupEvidence
 from bushfit.diagnosis.linear_model import LinearModel
@@ -52,7 +52,7 @@ class DiagnosisRequest:
     max_effects: int
     tolerance: float
     start: Mapping[str, float]
-    meetings: Sequence[Meeting]
+    meetings: Sequence[OutlierCluster]
     fixed: Sequence[str]
     bounds: Bounds
 
@@ -76,7 +76,7 @@ class Hypothesis:
 
     effects: tuple[str, ...]
     claim: Claim | None
-    places: tuple[FaultyPlace, ...]
+    places: tuple[FaultyPart, ...]
     unnamed: str
     levels: bool
     log_posterior: float
@@ -141,10 +141,10 @@ class Tests:
         return compound(self.base)
 
     @cached_property
-    def _places_in_fits(self) -> dict[str, FaultyPlace]:
+    def _places_in_fits(self) -> dict[str, FaultyPart]:
         return {place.name: place for place in faulty_places(self.base)}
 
-    def in_fits(self, place: FaultyPlace) -> FaultyPlace:
+    def in_fits(self, place: FaultyPart) -> FaultyPart:
         """Convert a faulty place from columns of the residuals of `bare` to those of `base`, used in refits."""
         fitted = self._places_in_fits[place.name]
         return fitted if len(fitted.columns) == len(place.columns) else fitted.point_by_point()
@@ -179,7 +179,7 @@ class State:
     evidence: Evidence
     log_prior: float
     effects: tuple[str, ...] = ()
-    places: tuple[FaultyPlace, ...] = ()
+    places: tuple[FaultyPart, ...] = ()
     precision: Mapping[str, float] = field(default_factory=dict)
     log_density: float = 0.0
     amounts: tuple[float, ...] = ()
@@ -277,7 +277,7 @@ class State:
         plain = self.hypotheses[0]
         if explanation.kind == "effect":
             plain = replace(plain, effects=(*plain.effects, explanation.name))
-        elif isinstance(explanation, FaultyPlace):
+        elif isinstance(explanation, FaultyPart):
             plain = replace(plain, places=(*plain.places, explanation))
         else:
             plain = replace(plain, unnamed=explanation.name)

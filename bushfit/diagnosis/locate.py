@@ -92,7 +92,7 @@ def _read_sweep(
     means = [float(np.mean(piece)) for piece in pieces]
     level = f"at every {fixed_axis}"
     if len(means) > 1 and np.ptp(means) >= _CHANGES * max(abs(mean) for mean in means):
-        level += f", {_way(means[0], means[-1])} with {fixed_axis}"
+        level += f", {_trend_word(means[0], means[-1])} with {fixed_axis}"
     if len(touched) < len(lines):
         level = "at " + ", ".join(lines[i].words for i in touched)
     unit, factor = ("Hz", 1.0) if line.stepped != "amplitude" else line.direction.display.displacement
@@ -122,10 +122,10 @@ def _trend(stepped: str, step: Array, misfit: Array) -> str:
         f"with the square of {stepped}": step**2,
     }
     shape = max(shapes, key=lambda words: abs(float(np.corrcoef(shapes[words], misfit)[0, 1])))
-    return f"{_way(float(misfit[np.argmin(step)]), float(misfit[np.argmax(step)]))} {shape}"
+    return f"{_trend_word(float(misfit[np.argmin(step)]), float(misfit[np.argmax(step)]))} {shape}"
 
 
-def _way(first: float, last: float) -> str:
+def _trend_word(first: float, last: float) -> str:
     """Word for a misfit that grows, fades or changes sign from its first to its last value."""
     if first * last < 0.0 and min(abs(first), abs(last)) > _FLAT * max(abs(first), abs(last)):
         return f"going from {'above to below' if first > 0.0 else 'below to above'}"

@@ -24,7 +24,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import unnamed
 from bushfit.diagnosis.groups import Group
 from bushfit.diagnosis.linear_model import LinearModel
-from bushfit.diagnosis.priors import TELLS
+from bushfit.diagnosis.priors import DECISIVE_CHI_SQUARE
 from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Bounds, Coordinates, coordinate_bounds, jacobian, residual
@@ -259,7 +259,9 @@ def nearest_power_law(
         return None
     log_ratios = np.array([grid.log_evidence - grids[0].log_evidence for grid in grids])
     alternatives = tuple(
-        grid.measure for grid, log_ratio in zip(grids[1:], log_ratios[1:], strict=True) if -log_ratio < 0.5 * TELLS
+        grid.measure
+        for grid, log_ratio in zip(grids[1:], log_ratios[1:], strict=True)
+        if -log_ratio < 0.5 * DECISIVE_CHI_SQUARE
     )
     counts = np.round(_DRAWS * np.exp(log_ratios)).astype(int).tolist()
     draws = np.concatenate([grid.draws(count) for grid, count in zip(grids, counts, strict=True)], axis=-1)

@@ -26,7 +26,7 @@ WAVES = 4
 #: Degrees of freedom of the estimated scatter above which the scatter is treated as known.
 KNOWN = 30
 #: Natural log of the odds below the best at which a state of the search is abandoned.
-FAR = 12.0
+LOG_ODDS_CUTOFF = 12.0
 #: Number of states of the search that are kept, in the first round and later; and number of rounds.
 BEAM, ROUNDS = (4, 3), 3
 #: Numbers of effects that are refitted, by highest linear evidence and by largest decrease of chi-square: in the first
@@ -37,10 +37,10 @@ NOTHING = 0.15
 #: Least probability of an explanation, or of a set of explanations, that is reported; and largest size of the set.
 NAMED, MOST_REPORTED = 0.97, 4
 #: Difference of chi-square between two explanations at which the better one has the probability `NAMED`.
-TELLS = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))
+DECISIVE_CHI_SQUARE = 2.0 * float(np.log(NAMED / (1.0 - NAMED)))
 #: Least share of a gap, by change of |K|, that named effects explain next to a curve without a name: `partly`.
-MOSTLY = 0.9
+LEAST_NAMED_SHARE = 0.9
 #: Probability of a misfit as large as that of the best explanation, below which the explanation does not fit.
 DOES_NOT_FIT = 0.002
 #: Largest held-out root mean square residual, in units of noise, of a closed gap: noise alone gives 1.1.
-MOST_LEFT = 1.2
+LARGEST_CLOSED_GAP = 1.2

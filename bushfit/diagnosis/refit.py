@@ -11,7 +11,7 @@ from bushfit.diagnosis.propose import Proposal
 from bushfit.effects import qualified_name
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.common_error import CommonError, Joined
+from bushfit.fitting.common_error import CommonError, CorrelatedTests
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.design import fit_from, probes
@@ -53,7 +53,7 @@ def refitted(
     fits: dict[str, Descent] = {}
     tests: Sequence[MeasuredTest] = evidence.data_sets
     if columns is not None:
-        tests = Joined(evidence.data_sets, CommonError(columns))
+        tests = CorrelatedTests(evidence.data_sets, CommonError(columns))
     for proposal in proposed:
         limits = {**within_reach(proposal.model, evidence.data_sets), **bounds}
         start_values = {name: value for name, value in start.items() if name in proposal.model.values}
@@ -128,7 +128,7 @@ def refit_with_free_columns(
         The better of the fits from the values of `evidence` and from `start`.
     """
     names = evidence.solution.coordinates.names
-    tests = Joined(bare.data_sets, CommonError(columns))
+    tests = CorrelatedTests(bare.data_sets, CommonError(columns))
     start_values = {name: value for name, value in start.items() if name in names}
     starts = [evidence.model, *([evidence.model.with_values(start_values)] if start_values else [])]
     fits = [solve(FitProblem(model, tests, names, bounds), strict=False) for model in starts]

@@ -15,14 +15,14 @@ from bushfit.diagnosis.holdout import hold_out
 from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.next_test import deciding_test
-from bushfit.diagnosis.priors import MOST_LEFT
+from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP
 from bushfit.diagnosis.record import CandidateResult, Diagnosis, Named, Odds, Where, format_probability
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Composition, Finding
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.coordinates import Bounds
-from bushfit.fitting.preparation import split_by_kind, with_gains
+from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
 from bushfit.model.result import Result
 from bushfit.units import display_unit, format_aligned, number
 
@@ -294,7 +294,7 @@ class DiagnosisWriter:
         if gain_is_stated or not any(loop.gain_weighs for loop in loops):
             return evidence
         if evidence not in self._refitted:
-            data_sets = with_gains(evidence.data_sets, weigh=False)
+            data_sets = with_gain_weighting(evidence.data_sets, weigh=False)
             self._refitted[evidence] = fit(evidence.model, data_sets, self.request.fixed, self.request.bounds)
         return self._refitted[evidence]
 
@@ -353,7 +353,7 @@ def _doubt(before: Evidence, after: Evidence, names: Sequence[str], bounds: Boun
         bounds: limits of parameters inside their general limits.
     """
     holdout = hold_out(before, after, bounds)
-    if holdout.after is not None and holdout.after > MOST_LEFT:
+    if holdout.after is not None and holdout.after > LARGEST_CLOSED_GAP:
         return f"a held-out gap of {number(holdout.after, 3)} times the noise"
     result = result_of(after, bounds, after.model.effects, lacking=False)
     for name in names:

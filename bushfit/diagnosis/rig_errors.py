@@ -13,7 +13,7 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import COMPOUND, KNOWN, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
 from bushfit.effects.contract import Array
-from bushfit.fitting.preparation import MeasuredSweep, group_repeats, split_by_kind, with_gains
+from bushfit.fitting.preparation import MeasuredSweep, group_repeats, split_by_kind, with_gain_weighting
 from bushfit.fitting.rig_class import ASSUMED, of_class
 
 #: Kinds of errors of the rig; the values are indices of `Node.errors`.
@@ -121,7 +121,7 @@ def scattering_alone(evidence: Evidence) -> Evidence:
         replace(data_set, noise=replace(data_set.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), residuals="complex")
         if isinstance(data_set, MeasuredSweep)
         else data_set
-        for data_set in with_gains(evidence.data_sets, weigh=False)
+        for data_set in with_gain_weighting(evidence.data_sets, weigh=False)
     )
     return Evidence(evidence.solution.moved_to(evidence.model, data_sets), data_sets)
 

@@ -16,10 +16,10 @@ import numpy as np
 
 from bushfit.diagnosis.claims import Screen, claims
 from bushfit.diagnosis.evidence import Evidence, fit
-from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPlace, Meeting
+from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart, OutlierCluster
 from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, State, Tests
 from bushfit.diagnosis.laplace import laplace
-from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, FAR, NAMED, ODDS, REFITS, ROUNDS
+from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.propose import has_what_it_uses
 from bushfit.diagnosis.refit import refit_with_free_columns, refitted, within_reach
 from bushfit.diagnosis.verdict import judged
@@ -71,7 +71,7 @@ class Search:
             if depth == 0:
                 fresh += self._corrected_records()
             followed = [h for h in self._known.values() if h.unnamed in ("", COMPOUND) and not h.levels]
-            limit = max(hypothesis.log_posterior for hypothesis in followed) - FAR
+            limit = max(hypothesis.log_posterior for hypothesis in followed) - LOG_ODDS_CUTOFF
             nearest = sorted(fresh, key=lambda state: -state.log_posterior)[: BEAM[min(depth, 1)]]
             beam = [state for state in nearest if state.log_posterior > limit]
             if not beam:
@@ -128,7 +128,7 @@ class Search:
             if before is None or rank > (before.refitted, before.log_posterior):
                 self._known[candidate.key] = candidate
 
-    def _with_meeting(self, hypothesis: Hypothesis, place: Meeting) -> Hypothesis:
+    def _with_meeting(self, hypothesis: Hypothesis, place: OutlierCluster) -> Hypothesis:
         """Add to a hypothesis a disturbance at a frequency where several outliers were left out."""
         log_posterior = hypothesis.log_posterior + self._meeting_odds + place.log_odds
         if hypothesis.change > self.request.tolerance:
@@ -205,7 +205,7 @@ class Search:
 
     def _with_places(self, state: State, depth: int) -> Iterator[State]:
         """Extend a state by each of its likeliest faulty places, with a common shift or an error of every point."""
-        places = [(e, evidence) for e, evidence in state.weighed if isinstance(e, FaultyPlace)]
+        places = [(e, evidence) for e, evidence in state.weighed if isinstance(e, FaultyPart)]
         places.sort(key=lambda pair: -(self._log_prior(pair[0]) + pair[1].total))
         for place, shifted in places[:_PLACES]:
             scattered_place = place.point_by_point()

@@ -12,9 +12,9 @@ import numpy as np
 from scipy.special import logsumexp
 
 from bushfit.diagnosis.document import Verdict
-from bushfit.diagnosis.explanations import COMPOUND, FaultyPlace, Meeting, is_pattern
+from bushfit.diagnosis.explanations import COMPOUND, FaultyPart, OutlierCluster, is_pattern
 from bushfit.diagnosis.hypotheses import Hypothesis
-from bushfit.diagnosis.priors import DOES_NOT_FIT, MOST_REPORTED, MOSTLY, NAMED, NOTHING
+from bushfit.diagnosis.priors import DOES_NOT_FIT, LEAST_NAMED_SHARE, MOST_REPORTED, NAMED, NOTHING
 from bushfit.effects import get_effect
 from bushfit.effects.contract import Level
 
@@ -37,7 +37,7 @@ class Composition:
     unnamed: bool = False
 
     @property
-    def places(self) -> tuple[FaultyPlace, ...]:
+    def places(self) -> tuple[FaultyPart, ...]:
         """Faulty parts of the tests; empty if they form a pattern that may be physics without a name."""
         return () if is_pattern(self.best.places) else self.best.places
 
@@ -55,7 +55,7 @@ class Composition:
 
         A faulty loop is a separate test, and points that were left out have no weight, so they distort no effect.
         """
-        faults = [place for place in self.places if not isinstance(place, Meeting)]
+        faults = [place for place in self.places if not isinstance(place, OutlierCluster)]
         return bool(self.places) and (not self.names or any(place.family != "loop" for place in faults))
 
 
@@ -128,7 +128,7 @@ def _single(first: Composition, nothing: float, leads: Sequence[str]) -> Finding
     leads = tuple(dict.fromkeys((*names, *leads)))
     if first.may_mislead or not (names or best.claim or first.unnamed):
         return Finding("unexplained", nothing, (first,), leads)
-    curve = best.unnamed not in ("", COMPOUND) and best.last_change >= (1.0 - MOSTLY) * best.change
+    curve = best.unnamed not in ("", COMPOUND) and best.last_change >= (1.0 - LEAST_NAMED_SHARE) * best.change
     if not best.claim and (not names or curve or best.chance < DOES_NOT_FIT):
         return Finding("described", nothing, (first,), leads)
     partly = first.unnamed or best.levels or first.places
@@ -142,7 +142,7 @@ def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
         for name in hypothesis.effects:
             share[name] += weight
     total = sum(weight for _, weight in pairs)
-    return tuple(name for name in pairs[0][0].effects if share[name] >= MOSTLY * total)
+    return tuple(name for name in pairs[0][0].effects if share[name] >= LEAST_NAMED_SHARE * total)
 
 
 class _Parts(NamedTuple):

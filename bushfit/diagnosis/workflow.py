@@ -17,7 +17,7 @@ from bushfit.diagnosis.verdict import judged
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.mistakes import get_candidate, get_mistake
 from bushfit.fitting.design import fit_from
-from bushfit.fitting.preparation import split_by_kind, with_gains
+from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.robust import estimate, outlier_warnings, outliers_at
@@ -134,6 +134,6 @@ def _initial_fit(data: PreparedCampaign, model: Model | None, settings: Diagnosi
     if data.robust:
         robust = estimate(FitProblem.with_fixed(model, data_sets, fixed, data.bounds), robust=True)
         outliers, data_sets = robust.outliers, robust.data_sets
-    data_sets = [data_set.with_weight() for data_set in with_gains(data_sets, weigh=True)]
+    data_sets = [data_set.with_weight() for data_set in with_gain_weighting(data_sets, weigh=True)]
     descent = fit_from(model, data_sets, fixed, data.bounds).finished(EVALUATIONS)
     return InitialFit(Evidence(descent.solution, tuple(data_sets)), start, fixed, outliers)

@@ -182,7 +182,7 @@ def _strokes(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tu
     return path
 
 
-def _at_turns(strides: Array, periodic: bool, eps_half: Array) -> tuple[Array, Array]:
+def _stress_at_turning_points(strides: Array, periodic: bool, eps_half: Array) -> tuple[Array, Array]:
     """Relative stress u and du/d(ln eps_half) at the start of each stroke of a motion, (..., k) each.
 
     Args:
@@ -225,7 +225,7 @@ def _at_samples(eps_half: Array, history: History) -> tuple[Array, Array, Array,
     distance d of the travel from that start to each sample, (..., n)."""
     turning, eps_half = history.turning, np.atleast_1d(np.asarray(eps_half, dtype=float))
     sense, distance = np.sign(turning.travel), np.abs(turning.travel) / eps_half
-    return *_at_turns(turning.strides, history.periodic, eps_half), sense, distance
+    return *_stress_at_turning_points(turning.strides, history.periodic, eps_half), sense, distance
 
 
 def stress(p: Values, history: History) -> Array:

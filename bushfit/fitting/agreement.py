@@ -205,7 +205,9 @@ def usable(solution: FitResult, unfitted: Sequence[MeasuredTest] = ()) -> tuple[
     return _by_place(parts)
 
 
-def met_within(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest]) -> tuple[Usable, ...]:
+def expected_error_without_refits(
+    model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest]
+) -> tuple[Usable, ...]:
     """Expected error of a model without refits: errors at fitted points are used where too few points were not fitted.
 
     Args:

@@ -289,7 +289,7 @@ def refuse_strain(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) ->
             )
 
 
-def apart_in_temperature(model: Model, data_sets: Sequence[MeasuredTest]) -> list[str]:
+def temperature_warning(model: Model, data_sets: Sequence[MeasuredTest]) -> list[str]:
     """Warning about tests whose temperatures are too different for one model.
 
     Returns:

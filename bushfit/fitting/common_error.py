@@ -65,7 +65,7 @@ class ErrorProducts(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Joined(Sequence["MeasuredTest"]):
+class CorrelatedTests(Sequence["MeasuredTest"]):
     """Tests that share an error in addition to the noise of each: their residuals are whitened together.
 
     Args:

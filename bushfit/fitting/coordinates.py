@@ -12,7 +12,7 @@ import numpy as np
 
 from bushfit.effects import Parameter
 from bushfit.effects.contract import Array
-from bushfit.fitting.common_error import Joined
+from bushfit.fitting.common_error import CorrelatedTests
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.model.model import Model
 
@@ -91,5 +91,5 @@ def jacobian(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[st
 
 
 def together(data_sets: Sequence[MeasuredTest], rows: Array) -> Array:
-    """Whiten residuals or derivatives of all tests, (..., n), by the error that the tests share (`Joined`), if any."""
-    return data_sets.error.whiten(rows) if isinstance(data_sets, Joined) else rows
+    """Whiten residuals or derivatives of all tests, (..., n), by the error that `CorrelatedTests` share, if any."""
+    return data_sets.error.whiten(rows) if isinstance(data_sets, CorrelatedTests) else rows

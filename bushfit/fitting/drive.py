@@ -20,12 +20,12 @@ from bushfit.fitting.loop_harmonics import (
     MOST_ROWS,
     LoopHarmonics,
     OutlierRows,
-    less_slow,
     loop_harmonics,
     phase_bins,
+    remove_slow_changes,
 )
 from bushfit.fitting.repeats import FLOOR
-from bushfit.fitting.row_noise import RowNoise, of_a_lone_cycle, row_noise
+from bushfit.fitting.row_noise import RowNoise, noise_harmonics_of_single_cycle, row_noise
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.harmonics import as_complex, basis, least_squares, series
 from bushfit.units import display_unit, number
@@ -262,14 +262,14 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
     if drive.from_rest:
         harmonics = as_complex(least_squares(basis(phase, harmonics.size - 1), force, weight))
     if cycles == 1:
-        harmonics = np.where(of_a_lone_cycle(np.arange(harmonics.size)), 0.0, harmonics)
+        harmonics = np.where(noise_harmonics_of_single_cycle(np.arange(harmonics.size)), 0.0, harmonics)
     misfit = force - series(harmonics, phase)
     if np.std(misfit) < FLOOR * drive.half_range:
         return drive
     if not weight.all():
         misfit = np.interp(phase, phase[weight > 0.0], misfit[weight > 0.0])
     scale = np.sqrt(weight) if binned else 1.0
-    model, size = row_noise(misfit * scale, less_slow(phase, misfit)[0] * scale, cycles)
+    model, size = row_noise(misfit * scale, remove_slow_changes(phase, misfit)[0] * scale, cycles)
     if binned and model.order:
         # a row more or less in a bin of rows that depend on one another tells nothing: one weight for each turn
         weighted = drive.weight > 0.0
@@ -277,7 +277,7 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
         mean = np.bincount(turn[weighted], drive.weight[weighted], minlength=count.size) / np.maximum(count, 1)
         drive = replace(drive, weight=np.where(weighted, mean[turn], 0.0))
         scale = np.sqrt(drive.weight[rows])
-        model, size = row_noise(misfit * scale, less_slow(phase, misfit)[0] * scale, cycles)
+        model, size = row_noise(misfit * scale, remove_slow_changes(phase, misfit)[0] * scale, cycles)
     if binned:
         breaks = () if drive.from_rest else tuple((np.flatnonzero(np.diff(turn)) + 1).tolist())
         return replace(drive, row_noise=replace(model, size=max(size / found.force_noise, 1.0), breaks=breaks))

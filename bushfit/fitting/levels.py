@@ -107,5 +107,9 @@ def level_errors(
 def level_errors_of(sweep: MeasuredSweep) -> Array:
     """Change of a sweep's whitened residuals by a unit gain and phase error of each level in turn, (2 levels, n)."""
     return np.array(
-        [column for held_value in np.unique(sweep.held) for column in sweep.moved_together(sweep.held == held_value)]
+        [
+            column
+            for held_value in np.unique(sweep.held)
+            for column in sweep.shared_error_columns(sweep.held == held_value)
+        ]
     )

@@ -14,7 +14,7 @@ from bushfit.errors import FitError
 from bushfit.fitting.loop_harmonics import residual_limit
 from bushfit.fitting.outliers import gross_rows
 from bushfit.reading.measurement import Loop
-from bushfit.reduction.cycles import HOLE, change_after
+from bushfit.reduction.cycles import HOLE, shifted_difference
 from bushfit.reduction.harmonics import basis, least_squares, resolved_order, spread_rows
 from bushfit.reduction.programme import ENOUGH_ROWS, SAME_MOTION, THREE_CYCLES, left_out
 
@@ -121,7 +121,7 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
         sentence = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
         return part, sentence if note is None else f"{sentence}, and of these {note}"
     clock = time[time + period <= time[-1]]
-    difference = change_after(time, motion, period, slice(0, clock.size))
+    difference = shifted_difference(time, motion, period, slice(0, clock.size))
     steady = difference < SAME_MOTION * np.ptp(motion)
     breaks = np.flatnonzero(np.diff(steady, prepend=True, append=True)).reshape(-1, 2)
     breaks = breaks[clock[breaks[:, 1] - 1] - clock[breaks[:, 0]] > _BRIEF * period]
@@ -264,7 +264,7 @@ def _repeats(clock: Array, x: Array, period: float) -> bool:
     begin = int(np.searchsorted(clock, period))
     if x.size - begin < 2:
         return True
-    difference = change_after(clock, x, -period, slice(begin, None))
+    difference = shifted_difference(clock, x, -period, slice(begin, None))
     scatter = np.median(np.abs(np.diff(x, 2))) if x.size > 4 else 0.0
     return float(np.sqrt(np.mean(np.square(difference)))) < max(_REPEATS * np.ptp(x) / 2.0, _REPEATS_SCATTER * scatter)
 

@@ -102,7 +102,7 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
     freedom = np.maximum(np.count_nonzero(inliers, axis=0) - 2 * order - 1, 1)
     motion_noise = float(np.sqrt(np.sum(np.square(remainder[of_motion, 0])) / freedom[0]))
     motion = _cleared(as_complex(solution[:, 0]), motion_noise, phase, values[:, 0], of_motion)
-    settled, unknowns = less_slow(phase[of_force], remainder[of_force, 1])
+    settled, unknowns = remove_slow_changes(phase[of_force], remainder[of_force, 1])
     force_noise = float(np.sqrt(np.sum(np.square(settled)) / max(freedom[1] - unknowns, 1)))
     return LoopHarmonics(motion, as_complex(solution[:, 1]), force_noise, outliers)
 
@@ -121,7 +121,7 @@ def _cleared(coefficients: Array, noise: float, phase: Array, displacement: Arra
     return np.where(keep, coefficients, 0.0)[: int(np.flatnonzero(keep)[-1]) + 1]
 
 
-def less_slow(phase: Array, residual: Array) -> tuple[Array, int]:
+def remove_slow_changes(phase: Array, residual: Array) -> tuple[Array, int]:
     """Remove slow changes (mean and three harmonics of each cycle: settling, drift) from residuals of the force.
 
     Args:

@@ -22,7 +22,7 @@ SHIFT = "temperature.shift"
 
 
 @dataclass(frozen=True, eq=False)
-class Shifted:
+class ShiftedSweep:
     """A sweep shifted to the reference temperature of 23 degC.
 
     Args:
@@ -43,7 +43,7 @@ class Shifted:
     reduced_stiffness: Array
 
 
-def master_curve(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[Shifted, ...]:
+def master_curve(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[ShiftedSweep, ...]:
     """Shift sweeps at several temperatures to 23 degC, by a fitted model with an effect of temperature.
 
     Args:
@@ -63,7 +63,7 @@ def master_curve(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[Shift
             shift, error = (float(value.item()) for value in law(result, np.array([temperature])))
             further, unsure = _further_shift(model, sweep)
             laws = (shift, error), (shift + further, unsure)
-            curves.append(Shifted(sweep, temperature, *laws, sweep.frequency * pace, reduced))
+            curves.append(ShiftedSweep(sweep, temperature, *laws, sweep.frequency * pace, reduced))
     return tuple(sorted(curves, key=lambda curve: curve.temperature))
 
 

@@ -379,7 +379,7 @@ class MeasuredSweep(MeasuredBase):
             return f"the {self.direction} sweep of amplitudes at {self.frequency[point]:.4g} Hz"
         return f"run {self.repeat[point]} of {self.name}, {self.direction}"
 
-    def moved_together(self, chosen: Array) -> list[Array]:
+    def shared_error_columns(self, chosen: Array) -> list[Array]:
         """Changes of the whitened residuals, (2 n,) each, by a common unit error of gain, and of phase, at a mask."""
         return [self.whiten(unit * chosen.astype(complex)) for unit in (1.0, 1.0j)]
 

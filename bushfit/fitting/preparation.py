@@ -73,7 +73,7 @@ def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[Me
     ]
 
 
-def with_gains(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> list[MeasuredTest]:
+def with_gain_weighting(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> list[MeasuredTest]:
     """Tests whose loops have the gain error included in the noise that weights the residuals (`weigh`), or not."""
     return [replace(test, gain_weighs=weigh) if isinstance(test, MeasuredLoop) else test for test in data_sets]
 

@@ -12,13 +12,13 @@ from bushfit.errors import FitError
 from bushfit.fitting.agreement import misfits, usable
 from bushfit.fitting.assess import (
     FitStage,
-    apart_in_temperature,
     covariance,
     implausible,
     lack_of_fit,
     measured_range,
     misfit,
     quality,
+    temperature_warning,
     unfitted,
 )
 from bushfit.fitting.coordinates import Bounds, Coordinates
@@ -263,7 +263,7 @@ def _result(
     warnings = (
         *notes,
         *implausible(data.campaign.bushing, tests),
-        *apart_in_temperature(model, tests),
+        *temperature_warning(model, tests),
         *data.assumed,
         *outlier_warnings(outliers, robust=data.robust),
         *(sentence for step in steps for sentence in cautions(model, step, data.bounds, cov, NEXT)),

@@ -155,7 +155,7 @@ def row_noise(residual: Array, settled: Array, cycles: int) -> tuple[RowNoise, f
         Correlated noise of unit variance, and the standard deviation of one row [N or N m].
     """
     number = np.arange(residual.size // 2 + 1)
-    between = number % cycles > 0 if cycles > 1 else of_a_lone_cycle(number)
+    between = number % cycles > 0 if cycles > 1 else noise_harmonics_of_single_cycle(number)
     fast = between & (number > _SLOW * cycles)
     waves = np.exp(-2j * np.pi / residual.size * np.outer(np.arange(_ORDERS[-1] + 1), number))
     used, power = fast, _periodogram(settled)
@@ -178,7 +178,7 @@ def row_noise(residual: Array, settled: Array, cycles: int) -> tuple[RowNoise, f
     return RowNoise(polynomial / np.sqrt(innovation), starts, error, share), float(np.sqrt(correlations[0]))
 
 
-def of_a_lone_cycle(number: Array) -> Array:
+def noise_harmonics_of_single_cycle(number: Array) -> Array:
     """Mask of the harmonics, given by number, (n,), of a lone cycle that are taken for noise, (n,)."""
     return (number % 2 == 0) & (number >= _FIRST_EVEN)
 

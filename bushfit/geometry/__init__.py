@@ -80,7 +80,7 @@ STRAINING = Motion(
 )
 
 
-class _Tested:
+class _TestObject:
     """Base class of the two kinds of test objects: a direction of the bushing, or a specimen of its compound."""
 
     @property
@@ -99,7 +99,7 @@ class _Tested:
         return self.motion.display
 
 
-class Direction(_Tested, StrEnum):
+class Direction(_TestObject, StrEnum):
     """Direction in which a bushing is tested."""
 
     AXIAL = "axial"
@@ -191,7 +191,7 @@ class Bushing:
 
 
 @dataclass(frozen=True)
-class Specimen(_Tested):
+class Specimen(_TestObject):
     """Specimen of the rubber compound that is tested instead of a bushing: a coupon, or a mount in simple shear.
 
     Args:

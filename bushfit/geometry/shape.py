@@ -44,7 +44,7 @@ class Correction(NamedTuple):
     strain: float
     softening: float
 
-    def lowering(self, mu: float) -> float:
+    def stiffness_decrease(self, mu: float) -> float:
         """Relative decrease of the radial stiffness by a bulk modulus of 2 GPa, for a shear modulus `mu` [Pa].
 
         Notes:

@@ -16,7 +16,7 @@ from bushfit.fitting.measured_loop import MeasuredLoop
 from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.fitting.preparation import prepare_loops, prepare_sweeps
 from bushfit.geometry import Direction
-from bushfit.inspection.labels import temperatures_of
+from bushfit.inspection.labels import count_temperatures
 from bushfit.inspection.opening import inspect_file, open_table, recognize_table
 from bushfit.inspection.record import Inspection
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
@@ -210,7 +210,7 @@ def distribute_options(sources: Sequence[TestSource], test_options: Mapping[str,
         counts = dict[int, int]()
         for index, source in enumerate(sources):
             with suppress(BushfitError):  # which the inspection of the file reports
-                counts[index] = temperatures_of(recognize_table(source.file, by_source[index])[0])
+                counts[index] = count_temperatures(recognize_table(source.file, by_source[index])[0])
         for index, count in counts.items():
             if count == 0 and 2 in counts.values():
                 by_source[index]["temperature"] = None

@@ -22,7 +22,7 @@ _HELD_ROLES = {"at_amplitude": "amplitude", "at_frequency": "frequency"}
 _AGREEMENT = 0.03
 
 
-def temperatures_of(table: Table) -> int:
+def count_temperatures(table: Table) -> int:
     """Number of temperatures in a table: 0 without a temperature column, 1 for one temperature, 2 for several."""
     if (column := table.roles.get("temperature")) is None:
         return 0

@@ -16,7 +16,7 @@ from bushfit.reading.names import Labels
 from bushfit.reduction.cycles import lone_outliers
 from bushfit.reduction.harmonics import cycle_harmonics, resolved_order, series
 from bushfit.reduction.steps import reduce
-from bushfit.reduction.turning_points import least_prominence
+from bushfit.reduction.turning_points import noise_threshold
 from bushfit.units import display_unit, format_aligned, number
 
 #: Minimum duration of a gap in units of the median time step; chosen: jitter of the clock is shorter.
@@ -119,7 +119,7 @@ def gaps(motion: RecordedChannel, history: Loop) -> list[str]:
     wide = steps > max(_GAP_STEPS * np.median(steps), _GAP_WIDEST_STEPS * widest)
     if not history.timed:
         outliers = lone_outliers(history.time, motion.values)
-        wide &= (steps > least_prominence(motion.values)) & ~(outliers[1:] | outliers[:-1])
+        wide &= (steps > noise_threshold(motion.values)) & ~(outliers[1:] | outliers[:-1])
     if not wide.any():
         return []
     first, count = int(np.argmax(wide)), int(wide.sum())
@@ -326,7 +326,7 @@ def changing_cycles(drive: Drive) -> list[str]:
             f"{first} {force_unit} in the first cycle to {last} in the last ({percent} %)"
         )
     # a time that was made from the motion turns its noise into drift
-    smallest_drift = 2.0 * _SMALLEST_CHANGE * drive.amplitude if loop.timed else least_prominence(loop.displacement)
+    smallest_drift = 2.0 * _SMALLEST_CHANGE * drive.amplitude if loop.timed else noise_threshold(loop.displacement)
     limits = max(_REAL_CHANGE * 1.5 * error, smallest), smallest_drift
     for name, unit, mean, limit in zip(
         (force, motion), (units.force, units.displacement), means.T, limits, strict=True

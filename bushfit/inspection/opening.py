@@ -14,9 +14,9 @@ from bushfit.campaign.campaign import reader_keywords
 from bushfit.campaign.schema import SpecimenSettings
 from bushfit.errors import BushfitError, MeasurementError, NoTestError, error_location, quote_path
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
-from bushfit.inspection.labels import keys_from_labels, labels_of_file, temperatures_of
+from bushfit.inspection.labels import count_temperatures, keys_from_labels, labels_of_file
 from bushfit.inspection.loops import describe_history, describe_loop, describe_programme
-from bushfit.inspection.record import ColumnSeen, Findings, Inspection, Kind
+from bushfit.inspection.record import ColumnDescription, Findings, Inspection, Kind
 from bushfit.inspection.sweeps import describe_sweep
 from bushfit.reading.headers import LOOP_COLUMNS, PAIRS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary, of_motion
 from bushfit.reading.labelled import Rows
@@ -28,7 +28,7 @@ from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.resonance import is_resonance
 from bushfit.reading.source import Channels, Sheet
 from bushfit.reading.stated import LoopFile, SweepFile
-from bushfit.reading.stiffness import hint_of_derived, refuse_ambiguous_damping
+from bushfit.reading.stiffness import hint_for_convertible_columns, refuse_ambiguous_damping
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.table import Table
 from bushfit.reduction.programme import programme
@@ -98,7 +98,7 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
         kind=NoTestError,
         found=", ".join(best.headers) + f" (understood: {understood})" if understood else None,
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
-        hint=hint_of_derived(best) or f"correct the header, or name the column: {column}",
+        hint=hint_for_convertible_columns(best) or f"correct the header, or name the column: {column}",
     )
 
 
@@ -115,7 +115,7 @@ def missing_role(table: Table, *, is_sweep: bool) -> str | None:
     return next((role for role in nearest if role not in roles), None)
 
 
-def test_place(file: Path, table: Table, test_options: Mapping[str, Any]) -> Place | None:
+def tested_body(file: Path, table: Table, test_options: Mapping[str, Any]) -> Place | None:
     """Determine the direction of the bushing, or the specimen, that was tested.
 
     A modulus belongs to a specimen, a stiffness to the bushing unless the options give the sizes of a block in shear.
@@ -232,7 +232,7 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
         MeasurementError, UnitError, CampaignError, FitError: a file or an option that cannot be used.
     """
     table, is_sweep = recognize_table(file, test_options)
-    place = test_place(file, table, test_options)
+    place = tested_body(file, table, test_options)
     read_as = place or Direction.AXIAL  # which of two translations it is makes no difference to reading
     entry = campaign_entry(table, place, test_options, is_sweep=is_sweep)
     by_name = labels_of_file(file, table.source.sheet or "", test_options)
@@ -254,9 +254,9 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
         settings = reader_arguments(file, read_as, entry, LoopFile)["test"]
         kind, (facts, odd) = classify_recording(measured, by_name, settings)
         odd = turned + odd
-    columns = seen_columns(table, is_sweep=is_sweep)
+    columns = describe_columns(table, is_sweep=is_sweep)
     facts |= label_facts
-    return Inspection(file, kind, place, written_with(table), columns, facts, tuple(odd), entry, measured, counted)
+    return Inspection(file, kind, place, describe_format(table), columns, facts, tuple(odd), entry, measured, counted)
 
 
 def read_history(file: Path, test_options: Mapping[str, Any]) -> tuple[Loop, Direction | None]:
@@ -301,7 +301,7 @@ def campaign_entry(
     roles, schema = (SWEEP_COLUMNS, SweepFile) if is_sweep else (LOOP_COLUMNS, LoopFile)
     needless = {"direction", "specimen", "columns", "units"} | {f"at_{role}" for role in table.roles}
     needless |= {"rate", "frequency", "waveform"} if "time" in table.roles else set()
-    needless |= {"temperature"} if test_options.get("temperature") and temperatures_of(table) == 1 else set()
+    needless |= {"temperature"} if test_options.get("temperature") and count_temperatures(table) == 1 else set()
     keys = {field.name for field in fields(schema)} - needless
     entry: dict[str, Any] = {"specimen": place.name} if isinstance(place, Specimen) else {}
     entry |= {key: value for key, value in test_options.items() if key in keys and value not in (None, {})}
@@ -391,7 +391,7 @@ def classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tuple
     return "loop", (facts, odd)
 
 
-def seen_columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
+def describe_columns(table: Table, *, is_sweep: bool) -> tuple[ColumnDescription, ...]:
     """Describe the columns of a test file: header, role, unit and range.
 
     Returns:
@@ -402,16 +402,16 @@ def seen_columns(table: Table, *, is_sweep: bool) -> tuple[ColumnSeen, ...]:
         role: column for role, column in table.roles.items() if role in ranged and table.holds_numbers(column.index)
     }
     values = table.read(wanted, fewest_rows=1)  # the scales of `roles` are 1: not in SI
-    columns = [ColumnSeen(header, None, None) for header in table.headers]
+    columns = [ColumnDescription(header, None, None) for header in table.headers]
     for key, (index, _) in table.row_labels.items():
-        columns[index] = ColumnSeen(table.headers[index], key.replace("_", " "), None)
+        columns[index] = ColumnDescription(table.headers[index], key.replace("_", " "), None)
     for role, column in table.roles.items():
         ends = (float(values[role].min()), float(values[role].max())) if role in values else (None, None)
-        columns[column.index] = ColumnSeen(column.header, role.replace("_", " "), column.unit, *ends)
+        columns[column.index] = ColumnDescription(column.header, role.replace("_", " "), column.unit, *ends)
     return tuple(columns)
 
 
-def written_with(table: Table) -> dict[str, str]:
+def describe_format(table: Table) -> dict[str, str]:
     """Describe the format of a file.
 
     Returns:

@@ -34,7 +34,7 @@ def format_frequencies(frequencies: Sequence[float] | Array) -> str:
 
 
 @dataclass(frozen=True)
-class ColumnSeen:
+class ColumnDescription:
     """A column of a file.
 
     Args:
@@ -59,7 +59,7 @@ class InspectedFile(TypedDict):
     kind: Annotated[Kind, Doc("a hysteresis loop, a sweep, or the raw history of a stepped sine.")]
     direction: Annotated[str | None, Doc("of the test, or specimen; null where neither file nor options say it.")]
     written: Annotated[dict[str, str], Doc("format of the file by label: encoding, delimiter, decimal mark and so on.")]
-    columns: Annotated[tuple[ColumnSeen, ...], Doc("all of them, in order.")]
+    columns: Annotated[tuple[ColumnDescription, ...], Doc("all of them, in order.")]
     facts: Annotated[dict[str, str], Doc("in words, by label.")]
     assumed: Annotated[
         str | None, Doc("assumptions, each with the option or key that changes it; null if there are none.")
@@ -93,7 +93,7 @@ class Inspection:
     kind: Kind
     direction: Place | None
     written: Mapping[str, str]
-    columns: tuple[ColumnSeen, ...]
+    columns: tuple[ColumnDescription, ...]
     facts: Mapping[str, str]
     odd: tuple[str, ...]
     entry: Mapping[str, Any] = field(default_factory=dict)
@@ -117,7 +117,7 @@ class Inspection:
         return number
 
     @property
-    def is_counting_open(self) -> bool:
+    def amplitude_convention_unknown(self) -> bool:
         """True for a sweep that does not state whether its amplitudes are zero-to-peak or peak-to-peak."""
         return self.kind == "sweep" and not self.counted and "amplitude" not in self.entry
 
@@ -133,7 +133,7 @@ class Inspection:
                 f'its strain is read as {meaning}; otherwise state strain = "{alternative}" or "tensor" in '
                 "[[specimens]]"
             )
-        if self.is_counting_open:
+        if self.amplitude_convention_unknown:
             missing = "nothing says" if "at_amplitude" in self.entry else "the header does not state"
             assumptions.append(
                 f"{missing} how amplitudes are counted: zero-to-peak is assumed; if they are peak-to-peak, add "
@@ -153,7 +153,7 @@ class Inspection:
             "kind": self.kind,
             "direction": str(self.direction) if self.direction else None,
             "written": dict(self.written),
-            "columns": to_json_data(self.columns, tuple[ColumnSeen, ...]),
+            "columns": to_json_data(self.columns, tuple[ColumnDescription, ...]),
             "facts": dict(self.facts),
             "assumed": self.assumed,
             "odd": list(self.odd),

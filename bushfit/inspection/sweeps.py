@@ -16,7 +16,7 @@ from bushfit.inspection.plausible import implausible_sizes
 from bushfit.inspection.record import Findings, format_frequencies
 from bushfit.reading.measurement import Sweep, loss_factor
 from bushfit.reading.names import Labels
-from bushfit.reading.runs import rows_alike
+from bushfit.reading.runs import group_rows
 from bushfit.reduction.arrays import MEDIAN_TO_SIGMA
 from bushfit.reduction.result import MISSED_LEVEL
 from bushfit.units import number
@@ -93,7 +93,7 @@ def copied_rows(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
     digits = max(len(f"{value:.8e}".partition("e")[0].replace(".", "").rstrip("0")) for value in magnitude)
     finest = 10.0 ** (np.floor(np.log10(magnitude)) + 1 - digits)
     copies, expected, first = 0, 0.0, sweep.frequency.size
-    for rows in rows_alike(sweep.frequency, sweep.amplitude):
+    for rows in group_rows(sweep.frequency, sweep.amplitude):
         points = np.stack((magnitude[rows], phase[rows]))
         _, start, count = np.unique(points, axis=1, return_index=True, return_counts=True)
         copies += int((count - 1).sum())
@@ -119,7 +119,7 @@ def odd_levels(sweep: Sweep) -> Iterator[str]:
     passes, of_frequency = np.unique(sweep.repeat).size, sweep.frequency.size / np.unique(sweep.frequency).size
     steps = [
         (float(np.diff(np.log(levels)).min()), float(sweep.frequency[rows[0]]))
-        for rows in rows_alike(sweep.frequency)
+        for rows in group_rows(sweep.frequency)
         if (levels := np.unique(sweep.amplitude[rows])).size > 1
     ]
     smallest, frequency = min(steps, default=(np.inf, 0.0))
@@ -142,7 +142,7 @@ def missing_frequencies(sweep: Sweep) -> Iterator[str]:
     Returns:
         One sentence for each incomplete block.
     """
-    frequencies, blocks = np.unique(sweep.frequency), rows_alike(sweep.amplitude, sweep.repeat.astype(float))
+    frequencies, blocks = np.unique(sweep.frequency), group_rows(sweep.amplitude, sweep.repeat.astype(float))
     measured = np.array([np.isin(frequencies, sweep.frequency[rows]) for rows in blocks])
     usual = measured.mean(axis=0) > 0.5
     for rows, has in zip(blocks, measured, strict=True):
@@ -157,7 +157,7 @@ def missing_frequencies(sweep: Sweep) -> Iterator[str]:
 def distance_from_repeats(sweep: Sweep) -> Array:
     """Complex distance of ln K of each point from the median of its repeats, NaN for fewer than three repeats, (n,)."""
     log_stiffness, distance = np.log(sweep.stiffness), np.full(sweep.frequency.size, np.nan + 0j)
-    for rows in rows_alike(sweep.frequency, sweep.amplitude):
+    for rows in group_rows(sweep.frequency, sweep.amplitude):
         if rows.size > 2:
             distance[rows] = log_stiffness[rows] - complex_median(log_stiffness[rows])
     return distance
@@ -175,7 +175,7 @@ def distance_from_curve(sweep: Sweep) -> Array:
         two distances is returned.
     """
     distance = np.zeros(sweep.frequency.size, dtype=complex)
-    runs = rows_alike(sweep.repeat.astype(float), sweep.held) if sweep.stepped else []
+    runs = group_rows(sweep.repeat.astype(float), sweep.held) if sweep.stepped else []
     for rows in runs:
         steps, rank = np.unique(sweep.step[rows], return_inverse=True)
         if steps.size < _FEWEST_POINTS:
@@ -206,7 +206,7 @@ def outlying_points(sweep: Sweep, noise: SweepNoise, from_repeats: Array) -> Ite
         A sentence on each of the first four outliers, and one on the number of further outliers.
     """
     distance = np.nan_to_num(from_repeats)
-    for rows in rows_alike(sweep.repeat.astype(float), sweep.amplitude):  # what a block has in common is no outlier
+    for rows in group_rows(sweep.repeat.astype(float), sweep.amplitude):  # what a block has in common is no outlier
         distance[rows] -= complex_median(distance[rows])
     random, curve = (
         np.array([noise.random[sweep.name, float(level)] for level in sweep.held]),
@@ -240,7 +240,7 @@ def outlying_blocks(sweep: Sweep, from_repeats: Array) -> Iterator[str]:
     Returns:
         One sentence for each outlying block, and one on the drift.
     """
-    blocks = rows_alike(sweep.repeat.astype(float), sweep.amplitude)
+    blocks = group_rows(sweep.repeat.astype(float), sweep.amplitude)
     blocks = [rows for rows in blocks if not np.isnan(from_repeats[rows]).any()]
     if len(blocks) < _FEWEST_BLOCKS:
         return

@@ -16,7 +16,7 @@ from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
 from bushfit.errors import ModelError
 from bushfit.geometry import Specimen
 from bushfit.model.model import Model
-from bushfit.model.structure import seen_by
+from bushfit.model.structure import values_for_effect
 from bushfit.units import number
 
 #: Default of the largest error of the arms, relative to the modulus: that of good tests.
@@ -193,7 +193,7 @@ def part_modulus(model: Model, size: str, omega: Array, under: Circumstances = U
     """
     still, values, reduced = np.zeros_like(omega), values_under(model, under), omega * model.shift_factor(under)
     branches = (branch for branch in model.viscoelastic if qualified_size(branch) == size)
-    return np.asarray(sum(branch.modulus(seen_by(branch, values), reduced, still) for branch in branches))
+    return np.asarray(sum(branch.modulus(values_for_effect(branch, values), reduced, still) for branch in branches))
 
 
 def values_under(model: Model, under: Circumstances) -> Values:

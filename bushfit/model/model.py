@@ -18,7 +18,7 @@ from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import STRAINING, Bushing, Direction, Place
 from bushfit.model.stack import adjusted_values, branch_stiffness, layered_stiffness, rubber_stiffness, stack_force
-from bushfit.model.structure import Structure, seen_by
+from bushfit.model.structure import Structure, values_for_effect
 from bushfit.units import display_unit
 
 #: Kind of test: stepped-sine sweep or hysteresis loop. The two may use different force channels of the rig.
@@ -352,7 +352,7 @@ class Model:
         """Time-temperature shift factor a_T at the temperature of a test: ratio of reduced to actual frequency."""
         values = self.values if values is None else values
         shifts = ((modifier, modifier.shift_factor) for modifier in self.structure.modifiers)
-        return prod(shift(seen_by(modifier, values), under) for modifier, shift in shifts if shift)
+        return prod(shift(values_for_effect(modifier, values), under) for modifier, shift in shifts if shift)
 
 
 def _check(name: str, value: float, parameter: Parameter) -> None:

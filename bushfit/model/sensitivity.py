@@ -16,7 +16,7 @@ from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Value, Value
 from bushfit.effects.history import History
 from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model
-from bushfit.model.structure import seen_by
+from bushfit.model.structure import values_for_effect
 
 #: Step of the differences, relative to the value (log parameters) or to the typical distance (linear parameters);
 #: chosen: the differences are good to about a millionth.
@@ -60,7 +60,7 @@ def stiffness_and_slopes(
     test = 2.0 * np.pi * frequency, amplitude * model.unit_strain(direction)
     modulus, slopes = np.zeros(frequency.size), np.zeros((len(names), frequency.size), dtype=complex)
     for branch in model.structure.branches:
-        modulus = modulus + branch.modulus(seen_by(branch, model.values), *test)
+        modulus = modulus + branch.modulus(values_for_effect(branch, model.values), *test)
         _add_slopes(slopes, model, names, branch, branch.modulus, branch.modulus_sensitivities, test)
     factor = model.stiffness_per_modulus(direction)
     return factor * modulus, factor * slopes
@@ -113,12 +113,12 @@ def _add_slopes(
     qualified = {parameter.name: qualified_name(branch, parameter) for parameter in branch.parameters}
     varied = [name for name in (*qualified.values(), *branch.uses) if name in row]
     if varied and sensitivities:
-        analytic = sensitivities(seen_by(branch, model.values), *test)
+        analytic = sensitivities(values_for_effect(branch, model.values), *test)
         for short, name in qualified.items():
             if name in row:
                 slopes[row[name]] += analytic[short]
     elif varied:
-        by_value = differences(model, varied, lambda values: respond(seen_by(branch, values), *test))[1]
+        by_value = differences(model, varied, lambda values: respond(values_for_effect(branch, values), *test))[1]
         slopes[[row[name] for name in varied]] += by_value
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from bushfit.effects import Layer, Setting
 from bushfit.effects.contract import Array, Condition, ForceBelow, StiffnessBelow, Values
 from bushfit.effects.history import History
-from bushfit.model.structure import as_one_layer, in_groups, seen_by
+from bushfit.model.structure import as_one_layer, in_groups, values_for_effect
 
 if TYPE_CHECKING:
     from bushfit.model.model import Model
@@ -119,14 +119,16 @@ def stack_force(model: Model, setting: Setting, values: Values, layers: Sequence
                 strain = strain.faster(model.shift_factor(setting.under, values))
         together, stress = displacement.periodic and structure.viscoelastic, np.zeros(1)
         for branch in structure.others if together else structure.branches:
-            stress = stress + branch.stress(seen_by(branch, base), strain)
+            stress = stress + branch.stress(values_for_effect(branch, base), strain)
         if together:  # the linear branches add up harmonic by harmonic; motions of one time step share their moduli
             count = strain.value.shape[-1]
             step, moduli = last_moduli.get(count, (None, np.zeros(1)))
             if step is not strain.step or base is not values:
                 moduli = np.zeros(1)
                 for branch in structure.viscoelastic:
-                    moduli = moduli + branch.modulus(seen_by(branch, base), strain.harmonics, strain.amplitude)
+                    moduli = moduli + branch.modulus(
+                        values_for_effect(branch, base), strain.harmonics, strain.amplitude
+                    )
                 if base is values:
                     last_moduli[count] = strain.step, moduli
             stress = stress + 2.0 * np.fft.irfft(moduli * strain.spectrum, n=count)
@@ -157,7 +159,7 @@ def branch_stiffness(
     """
     omega, modulus = omega * model.shift_factor(setting.under, values), np.zeros(1)
     for branch in model.structure.branches:
-        modulus = modulus + branch.modulus(seen_by(branch, base), omega, strain)
+        modulus = modulus + branch.modulus(values_for_effect(branch, base), omega, strain)
     return model.stiffness_per_modulus(setting.direction) * modulus
 
 
@@ -184,5 +186,5 @@ def adjusted_values(
     base = values
     for modifier in model.structure.modifiers:
         if modifier.acts_at(setting.direction):
-            base = {**base, **modifier.adjust(seen_by(modifier, base), condition)}
+            base = {**base, **modifier.adjust(values_for_effect(modifier, base), condition)}
     return base

@@ -83,14 +83,14 @@ def in_groups(layers: Sequence[Layer]) -> list[list[Layer]]:
 
 def as_one_layer(group: Sequence[Layer], values: Values) -> tuple[Layer, Values]:
     """Combine a group of layers with the same equation into the first layer, with the sum of their amounts."""
-    first, layer_values = group[0], [seen_by(layer, values) for layer in group]
+    first, layer_values = group[0], [values_for_effect(layer, values) for layer in group]
     return first, {
         **layer_values[0],
         **({first.adds: sum(values_of_layer[first.adds] for values_of_layer in layer_values)} if first.adds else {}),
     }
 
 
-def seen_by(effect: Effect, values: Values) -> Values:
+def values_for_effect(effect: Effect, values: Values) -> Values:
     """Parameter values as an effect reads them: all values by full name, and those of the effect also by short name."""
     if effect.name in BASE:
         return values

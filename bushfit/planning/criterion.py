@@ -181,7 +181,7 @@ class DriftEffect:
     level_share: Array
     shift_root: Array
 
-    def turn_sums(self, runs: Sequence[int] | Array) -> tuple[Array, Array, Array]:
+    def position_sums(self, runs: Sequence[int] | Array) -> tuple[Array, Array, Array]:
         """Position of each run in the session, -1/2 to 1/2, (runs,), its sum and its sum of squares by test, (tests,).
 
         Args:
@@ -194,13 +194,13 @@ class DriftEffect:
 
     def noncentrality(self, runs: Sequence[int] | Array) -> float:
         """Noncentrality (expected chi-square) of a unit drift; `runs` are test indices in the order of the session."""
-        _, first, second = self.turn_sums(runs)
+        _, first, second = self.position_sums(runs)
         shift = first @ self.shift_root
         return float(self.gain_information @ second - self.level_share @ first**2 - shift @ shift)
 
     def shift(self, runs: Sequence[int] | Array) -> Array:
         """Shift of the parameters by a unit drift, in standard errors, (k,); `runs` are test indices in order."""
-        return self.turn_sums(runs)[1] @ self.shift_root
+        return self.position_sums(runs)[1] @ self.shift_root
 
     def exchange_gains(self, runs: Array) -> Array:
         """Compute how much the drift becomes more visible if two runs swap their positions in the session.
@@ -212,7 +212,7 @@ class DriftEffect:
             Growth of the noncentrality minus _SHIFT_WEIGHT times the growth of the squared parameter shift, for each
             pair of runs, (runs, runs).
         """
-        turn, first, _ = self.turn_sums(runs)
+        turn, first, _ = self.position_sums(runs)
         step, squared = turn - turn[:, None], turn**2 - turn[:, None] ** 2  # of the run in the row
         gain, shared, root = self.gain_information[runs], self.level_share[runs], self.shift_root[runs]
         sums = first[runs]

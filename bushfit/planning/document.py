@@ -29,7 +29,7 @@ class PlannedRun(TypedDict):
     minutes: Annotated[float, Field(description="Duration with the change of direction before it [min].")]
 
 
-class Reached(TypedDict):
+class ErrorComparison(TypedDict):
     """Standard error before further tests, with the planned tests, and with the standard programme."""
 
     before: Annotated[float, Field(description="Without further tests.")]
@@ -37,7 +37,7 @@ class Reached(TypedDict):
     standard: Annotated[float, Field(description="With the standard programme of as many hours instead.")]
 
 
-class TargetEntry(Reached):
+class TargetEntry(ErrorComparison):
     """Half width of the 95 % interval of a target, relative to its value, at the worst operating point."""
 
     asked: Annotated[float, Field(description="Largest half width that was asked for.")]
@@ -45,7 +45,7 @@ class TargetEntry(Reached):
     why: Annotated[str | None, Field(description="Reason why the target is not reached; null if it is.")]
 
 
-class Shown(TypedDict):
+class DetectableEntry(TypedDict):
     """Smallest amount of an effect that a test at the 5 % level detects in 90 % of the cases."""
 
     parameter: Annotated[str, Field(description="Parameter of the effect that the amount is of.")]
@@ -69,7 +69,7 @@ class Rivalry(TypedDict):
     enough: Annotated[float, Field(description="Chi-square above which nine of ten campaigns separate the models.")]
 
 
-class Checked(TypedDict):
+class SimulationCheck(TypedDict):
     """Predicted standard errors compared with fits to simulations of the plan."""
 
     campaigns: Annotated[int, Field(description="Number of simulated campaigns.")]
@@ -96,15 +96,15 @@ class PlanFile(TypedDict):
     hours_left: Annotated[float, Field(description="Hours of the rig that no test takes [h].")]
     enough: Annotated[str | None, Field(description="Reason why hours are left; null if they are used.")]
     targets: Annotated[dict[str, TargetEntry], Field(description="Targets by name; empty if none was given.")]
-    parameters: Annotated[dict[str, Reached], Field(description="Relative standard error of each parameter.")]
+    parameters: Annotated[dict[str, ErrorComparison], Field(description="Relative standard error of each parameter.")]
     stiffness: Annotated[
-        dict[str, Reached],
+        dict[str, ErrorComparison],
         Field(description="Root mean square relative standard error of the stiffness, by direction or specimen."),
     ]
     loss_factor: Annotated[
-        dict[str, Reached], Field(description="Root mean square standard error of the loss factor, likewise.")
+        dict[str, ErrorComparison], Field(description="Root mean square standard error of the loss factor, likewise.")
     ]
-    visible: Annotated[dict[str, Shown], Field(description="Smallest detectable amount of each effect.")]
+    visible: Annotated[dict[str, DetectableEntry], Field(description="Smallest detectable amount of each effect.")]
     drift: Annotated[
         dict[str, float],
         Field(
@@ -113,7 +113,7 @@ class PlanFile(TypedDict):
         ),
     ]
     rivals: Annotated[Rivalry | None, Field(description="Models to separate; null if there are none.")]
-    check: Annotated[Checked | None, Field(description="Simulations of the plan; null if none were asked for.")]
+    check: Annotated[SimulationCheck | None, Field(description="Simulations of the plan; null if none were asked for.")]
     warnings: Annotated[list[str], Field(description="Limits of the plan.")]
 
 
@@ -141,13 +141,13 @@ def plan_document(plan: Plan, check: Check | None = None) -> PlanFile:
     halves = zip(*(programme.halves for programme in programmes), strict=True)
     for target, reason, half in zip(request.targets, plan.missed, halves, strict=True):
         targets[str(target)] = {"asked": target.half, **_reached(half), "met": reason is None, "why": reason}
-    predicted: dict[str, dict[str, Reached]] = {"stiffness": {}, "loss": {}}
+    predicted: dict[str, dict[str, ErrorComparison]] = {"stiffness": {}, "loss": {}}
     ends = np.cumsum([points.frequency.size for points in request.points])[:-1]
     for quantity, by_place in predicted.items():
         by_programme = (np.split(getattr(programme, quantity), ends) for programme in programmes)
         for points, *errors in zip(request.points, *by_programme, strict=True):
             by_place[str(points.place)] = _reached(np.sqrt(np.mean(np.square(error))) for error in errors)
-    visible: dict[str, Shown] = {}
+    visible: dict[str, DetectableEntry] = {}
     for amount, standard_amount in zip(planned.detectable, standard.detectable, strict=True):
         visible[amount.effect] = {
             "parameter": amount.parameter,
@@ -193,12 +193,12 @@ def plan_document(plan: Plan, check: Check | None = None) -> PlanFile:
     }
 
 
-def _reached(errors: Iterable[float]) -> Reached:
+def _reached(errors: Iterable[float]) -> ErrorComparison:
     before, planned, standard = map(float, errors)
     return {"before": before, "planned": planned, "standard": standard}
 
 
-def _checked(check: Check) -> Checked:
+def _checked(check: Check) -> SimulationCheck:
     """Convert the result of the simulations to the entry "check" of plan.json."""
     low, high = check.interval
     return {

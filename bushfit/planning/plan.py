@@ -13,7 +13,7 @@ from bushfit.planning.contract import Knowledge, Plan, PlanRequest, Programme
 from bushfit.planning.criterion import add_runs, order_runs
 from bushfit.planning.problem import RIVALS_APART, PlanningProblem
 from bushfit.planning.search import PlanSearch
-from bushfit.planning.targets import UNLIMITED_RUNS, Goal, percent
+from bushfit.planning.targets import UNLIMITED_RUNS, TargetSensitivity, percent
 from bushfit.units import number
 
 #: Shares of the hours that are tried before all of them: for rivals, and within a tenth for targets.
@@ -79,7 +79,7 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
     )
 
 
-def explain_miss(search: PlanSearch, goal: Goal) -> str | None:
+def explain_miss(search: PlanSearch, goal: TargetSensitivity) -> str | None:
     """Write a sentence on the reason why the chosen tests miss a target, and on the hours that would meet the target.
 
     Args:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.campaign.schema import SimulatedLoop
-from bushfit.diagnosis.priors import TELLS
+from bushfit.diagnosis.priors import DECISIVE_CHI_SQUARE
 from bushfit.effects import Effect
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import residual
@@ -17,7 +17,7 @@ from bushfit.planning.candidates import candidates, run_minutes, standard_tests
 from bushfit.planning.contract import Knowledge, PlanRequest, Test
 from bushfit.planning.criterion import Budget
 from bushfit.planning.information import CandidateGrid, ModelInformation, rival_chi_squares
-from bushfit.planning.targets import UNLIMITED_RUNS, Goal, WantedPoints
+from bushfit.planning.targets import UNLIMITED_RUNS, TargetSensitivity, WantedPoints
 
 #: The 90 % quantile of the normal distribution.
 _NINE_OF_TEN = 1.2815515655446004
@@ -25,8 +25,8 @@ _NINE_OF_TEN = 1.2815515655446004
 #: 97.5 % and the 90 % quantiles of the normal distribution.
 DETECTABLE = Z95 + _NINE_OF_TEN
 #: Expected chi-square between rivals above which `diagnose` separates them in 90 % of the cases: the observed value of
-#: an expected d scatters by 2 sqrt(d), and `diagnose` does not separate rivals within TELLS.
-RIVALS_APART = (_NINE_OF_TEN + float(np.sqrt(_NINE_OF_TEN**2 + TELLS))) ** 2
+#: an expected d scatters by 2 sqrt(d), and `diagnose` does not separate rivals within DECISIVE_CHI_SQUARE.
+RIVALS_APART = (_NINE_OF_TEN + float(np.sqrt(_NINE_OF_TEN**2 + DECISIVE_CHI_SQUARE))) ** 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class PlanningProblem:
     effects: list[Effect]
     models: list[ModelInformation]
     wanted: list[WantedPoints]
-    goals: list[Goal]
+    goals: list[TargetSensitivity]
     budget: Budget
 
     @classmethod
@@ -80,7 +80,7 @@ class PlanningProblem:
         wanted = {points.place: WantedPoints.from_knowledge(knowledge, points) for points in request.points}
         names = (*knowledge.names, *knowledge.bounded)
         goals = [
-            Goal.from_target(target, names, wanted[target.place] if target.place else None)
+            TargetSensitivity.from_target(target, names, wanted[target.place] if target.place else None)
             for target in request.targets
         ]
         budget = _budget(request, tests)

@@ -18,7 +18,7 @@ from bushfit.planning.contract import DetectableAmount, Programme, Test
 from bushfit.planning.criterion import Budget, Criterion, DriftEffect, best_runs, order_runs
 from bushfit.planning.information import eliminate_line_errors
 from bushfit.planning.problem import DETECTABLE, RIVALS_APART, PlanningProblem
-from bushfit.planning.targets import Goal
+from bushfit.planning.targets import TargetSensitivity
 from bushfit.prediction.caveats import unfitted
 
 #: Weight of the logarithm of each lack of power beside the logarithm of the variance, and the weight that is used if
@@ -134,7 +134,7 @@ class PlanSearch:
             return False
         return not soundly or (not self.less_visible_effects(counts) and self.determines_scatter(counts))
 
-    def untested(self, goal: Goal, counts: Array) -> str | None:
+    def untested(self, goal: TargetSensitivity, counts: Array) -> str | None:
         """Write a warning if a target's direction is untested, so that its interval omits the error of the formula.
 
         Args:

@@ -70,7 +70,7 @@ class WantedPoints:
 
 
 @dataclass(frozen=True, eq=False)
-class Goal:
+class TargetSensitivity:
     """Target with the data that give its interval for any covariance of the parameters.
 
     The target has n operating points (one for a parameter); the k parameters include the parameters at a bound.
@@ -90,7 +90,7 @@ class Goal:
     points: Points | None = None
 
     @classmethod
-    def from_target(cls, target: Target, names: Sequence[str], wanted: WantedPoints | None) -> Goal:
+    def from_target(cls, target: Target, names: Sequence[str], wanted: WantedPoints | None) -> TargetSensitivity:
         """Compute the derivatives and fixed errors of a target.
 
         Args:
@@ -99,7 +99,7 @@ class Goal:
             wanted: sensitivities at the operating points of the direction; None for a parameter.
 
         Returns:
-            Goal at all operating points of the direction.
+            TargetSensitivity at all operating points of the direction.
         """
         if wanted is None:
             row = np.array([[float(name == target.quantity) for name in names]])

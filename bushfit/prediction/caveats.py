@@ -49,7 +49,7 @@ _RANKS = (
 _AGREEMENT = 1.4
 
 
-def use_of(warning: str) -> str:
+def consequence_of(warning: str) -> str:
     """Sentence of `uses.toml` on the consequence of a warning for the use of the numbers."""
     return next(use for pattern, use in _USES.items() if re.search(pattern, warning))
 
@@ -57,7 +57,7 @@ def use_of(warning: str) -> str:
 def by_importance(warnings: Iterable[str]) -> list[str]:
     """Sort warnings by their importance for the use of the numbers, the most important first."""
     ranked = [
-        (next(rank for rank, pattern in enumerate(_RANKS) if re.search(pattern, use_of(warning))), warning)
+        (next(rank for rank, pattern in enumerate(_RANKS) if re.search(pattern, consequence_of(warning))), warning)
         for warning in warnings
     ]
     return [warning for _, warning in sorted(ranked, key=lambda pair: pair[0])]
@@ -172,9 +172,11 @@ def unfitted(result: Result, direction: Place) -> Iterator[str]:
 
 def _compressible(result: Result, bushing: Bushing) -> Iterator[str]:
     """Yield a warning if a bulk modulus of 2 GPa would lower the radial stiffness by more than 1 %."""
-    lowering = bushing.correction.lowering(result.model.values.get("mu", 0.0)) if bushing.correction else 0.0
-    if lowering > _NOTED_LOWERING:
-        percent = number(100.0 * lowering, 2)
+    stiffness_decrease = (
+        bushing.correction.stiffness_decrease(result.model.values.get("mu", 0.0)) if bushing.correction else 0.0
+    )
+    if stiffness_decrease > _NOTED_LOWERING:
+        percent = number(100.0 * stiffness_decrease, 2)
         yield (
             f"{Direction.RADIAL}: the model assumes incompressible rubber; a bulk modulus of 2 GPa would lower "
             f"the radial stiffness of this shape by {percent} %"
@@ -192,7 +194,7 @@ def _radial_error(bushing: Bushing) -> str:
     return f'{error}; shape = "calibrated" in the campaign corrects it'
 
 
-def of_points(
+def point_warnings(
     result: Result,
     place: Place,
     points: Array,

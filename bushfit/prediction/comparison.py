@@ -271,7 +271,7 @@ def compare_parameters(
             p = 2.0 * float(stdtr(freedom[i], -abs(difference[i]) / error[i]))
             row = replace(row, difference=value, interval=(low, high), p=p)
         contrasts.append(row)
-    return tuple(contrasts), chance_of(difference[tested], matrix[np.ix_(tested, tested)], freedom[tested])
+    return tuple(contrasts), joint_p_value(difference[tested], matrix[np.ix_(tested, tested)], freedom[tested])
 
 
 def exponent_of(name: str, parameter: Parameter) -> str | None:
@@ -310,7 +310,7 @@ def quantities_of(result: Result, rows: Sequence[tuple[str, str | None]], omega:
     return quantities, slopes
 
 
-def chance_of(difference: Array, matrix: Array, freedom: Array) -> tuple[float, int] | None:
+def joint_p_value(difference: Array, matrix: Array, freedom: Array) -> tuple[float, int] | None:
     """Compute the probability that chance alone causes several differences together.
 
     Args:

@@ -24,7 +24,7 @@ from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_and_slopes
-from bushfit.prediction.caveats import MARGIN, extrapolations, of_points, unfitted
+from bushfit.prediction.caveats import MARGIN, extrapolations, point_warnings, unfitted
 from bushfit.reading.runs import nominal
 from bushfit.reduction.resonance import response
 from bushfit.units import number
@@ -153,7 +153,7 @@ def predict(
         candidates = [getattr(prediction, name) for prediction in predictions]
         low, high = (np.array([getattr(band, end) for band in candidates]) for end in ("low", "high"))
         bands[name] = replace(candidates[0], low=low.min(axis=0), high=high.max(axis=0))
-    warnings = of_points(
+    warnings = point_warnings(
         result,
         direction,
         np.array((frequency, amplitude, bushings.stiffness.value)),

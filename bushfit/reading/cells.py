@@ -252,8 +252,10 @@ class Cells:
         if layout.delimiter == "," and isinstance(source, Text) and not source.may_have_comma(layout):
             notations = tuple(way for way in notations if "," not in (way.decimal, way.thousands)) or notations
         evidence = weigh(self.number_texts(), notations)
-        may_group = isinstance(source, Sheet) or source.may_group(layout, evidence.ways[0].decimal)
-        if evidence.contrary is None and may_group:
+        may_have_thousands_separators = isinstance(source, Sheet) or source.may_have_thousands_separators(
+            layout, evidence.ways[0].decimal
+        )
+        if evidence.contrary is None and may_have_thousands_separators:
             evidence = weigh(self.number_texts(), notations, all_cells=True)
         columns = {column.index: column for column in self.roles.values()}
         if evidence.contrary:

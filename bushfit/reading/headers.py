@@ -250,14 +250,14 @@ class Vocabulary:
             bare = plain(name)
             implied: AmplitudeConvention | None = "peak-to-peak" if bare in _PEAK_TO_PEAK_NAMES else convention
             amplitudes = [bare + "amplitude"] * bool(implied) + ["amplitude"] * (bare in _PEAK_TO_PEAK_NAMES)
-            for word in (bare, plain(_ASIDES.sub("", _folded(name))), *amplitudes, *self._twice(name)):
+            for word in (bare, plain(_ASIDES.sub("", _folded(name))), *amplitudes, *self._names_with_symbol(name)):
                 for role in self._roles.get(word, ()):
                     is_unit = units.is_unit if role != "temperature" else units.kelvin_scale
                     if (certain or is_unit(unit or "")) and fits(word, role, unit):
                         return Heading(role, unit, implied, logarithm)
         return None
 
-    def _twice(self, name: str) -> Iterator[str]:
+    def _names_with_symbol(self, name: str) -> Iterator[str]:
         """Words for the quantity in a header that also has its symbol, such as "Storage modulus G'" or "Weg s"."""
         for blank in re.finditer(r"[\s,(]+", name):
             word, symbol = plain(name[: blank.start()]), plain(name[blank.end() :])

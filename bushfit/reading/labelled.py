@@ -10,7 +10,7 @@ from bushfit.reading.cells import Cells
 from bushfit.reading.headers import ROW_COLUMNS, Vocabulary
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import named_direction
-from bushfit.reading.runs import rows_alike
+from bushfit.reading.runs import group_rows
 from bushfit.reading.source import Text
 
 #: Smallest mean number of rows per distinct text in a column that assigns rows to tests; chosen: a row counter has one.
@@ -88,11 +88,11 @@ def _large_texts(cells: Cells) -> Mapping[int, ColumnTexts]:
     if source.columns(cells.layout, first, cells.needed, cells.numerals) is None:
         return {}
     free = set(range(len(first))) - {column.index for column in cells.roles.values()}
-    frame = source.texts(cells.layout, sorted(index for index in free if _may_separate(cells, index)))
+    frame = source.texts(cells.layout, sorted(index for index in free if _may_distinguish_tests(cells, index)))
     return {index: ColumnTexts(*texts) for index, texts in (frame or {}).items()}
 
 
-def _may_separate(cells: Cells, index: int) -> bool:
+def _may_distinguish_tests(cells: Cells, index: int) -> bool:
     """Return True if a column has no role and few distinct texts, so that its texts may distinguish tests."""
     if not cells.headers[index] or index in {column.index for column in cells.roles.values()}:
         return False
@@ -110,7 +110,7 @@ def find_labels(cells: Cells) -> Mapping[str, tuple[int, Sequence[str]]]:
         heading = _LABELS.heading(header) if header else None
         if heading is None or heading.role in labels or (header == "block" and "displacement" not in cells.roles):
             continue
-        if _may_separate(cells, index):
+        if _may_distinguish_tests(cells, index):
             texts = column_texts(cells, index)
             if heading.role == "direction":
                 directions = [named_direction([text], short=True) for text in texts.values]
@@ -183,14 +183,19 @@ def note_not_understood(
     understood = {index for key, (index, texts) in labels.items() if key != "direction" or len({*texts}) == 1}
     for index, header in enumerate(cells.headers):
         is_number = cells.holds_numbers(index)
-        if index in understood or header == "block" or (is_number and not settled) or not _may_separate(cells, index):
+        if (
+            index in understood
+            or header == "block"
+            or (is_number and not settled)
+            or not _may_distinguish_tests(cells, index)
+        ):
             continue
         texts = column_texts(cells, index)
         number, counts = np.unique(
             texts.codes if rows is None else texts.codes[rows], return_inverse=True, return_counts=True
         )[1:]
         depends_on = [settled] if is_number else [(quantity,) for quantity in settled]
-        explained = any(all(np.ptp(number[alike]) == 0 for alike in rows_alike(*keys)) for keys in depends_on)
+        explained = any(all(np.ptp(number[alike]) == 0 for alike in group_rows(*keys)) for keys in depends_on)
         if counts.size > 1 and not explained and not (is_number and counts.min() < _FEWEST_ROWS):
             values = sorted(
                 texts.values[code] for code in np.unique(texts.codes if rows is None else texts.codes[rows])

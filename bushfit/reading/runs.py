@@ -123,7 +123,7 @@ def _by_frequency(frequency: Floats, amplitude: Floats) -> Floats:
     """
     rank = np.empty(amplitude.size, dtype=np.intp)
     shapes = set()
-    for rows in rows_alike(frequency):
+    for rows in group_rows(frequency):
         levels, rank[rows], counts = np.unique(nominal(amplitude[rows]), return_inverse=True, return_counts=True)
         shapes.add((levels.size, counts.min(), counts.max()))
         if len(shapes) > 1 or counts.min() != counts.max() or counts.max() < 2 or levels.size < _FEWEST_POINTS:
@@ -154,7 +154,7 @@ def _medians_if_separate(amplitude: Floats, rank: NDArray[np.intp]) -> Floats:
     return _group_medians(amplitude, rank) if (levels[:-1, -1] < levels[1:, 0]).all() else amplitude
 
 
-def rows_alike(*keys: Floats) -> list[NDArray[np.intp]]:
+def group_rows(*keys: Floats) -> list[NDArray[np.intp]]:
     """Return the row indices of each group of rows that agree in all keys, (n,) each, such as frequency and level."""
     group = _group_numbers(*keys)
     return np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group))[:-1])

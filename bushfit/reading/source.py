@@ -68,7 +68,7 @@ class Text:
         """Return True if cells below the header can contain a comma."""
         return self.has('"' if layout.delimiter == "," else ",", layout)
 
-    def may_group(self, layout: Layout, decimal: str) -> bool:
+    def may_have_thousands_separators(self, layout: Layout, decimal: str) -> bool:
         """Return True if numbers below the header can have thousands separators, given their decimal mark."""
         signs = _SEPARATORS if decimal == "." else (*_SEPARATORS, ".")
         if any(self.has(sign, layout) for sign in signs) or (decimal == "." and self.may_have_comma(layout)):

@@ -48,12 +48,12 @@ def stiffness_pair(table: Table) -> tuple[str, str]:
     raise table.header_error(
         "no pair of columns gives a complex stiffness",
         expected=f"{usual}, or a force amplitude and its phase",
-        hint=hint_of_derived(table)
+        hint=hint_for_convertible_columns(table)
         or 'correct the header, or name the columns in the campaign: columns = { stiffness = "..." }',
     )
 
 
-def hint_of_derived(table: Table) -> str | None:
+def hint_for_convertible_columns(table: Table) -> str | None:
     """Return the next step if a stiffness or loss can be computed from, say, a compliance in the table; else None."""
     headings = (_DERIVED.heading(header) for header in table.headers if header)
     return next((_WAYS_ON[heading.role] for heading in headings if heading), None)

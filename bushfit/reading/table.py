@@ -266,10 +266,10 @@ class Table(Cells):
                 table is in doubt.
         """
         table, left_out = self.needing(wanted), None
-        values = table._by_library(wanted)
+        values = table._read_with_pandas(wanted)
         if values is None:
             cleaned, left_out = table._without_faults()
-            values = cleaned._by_library(wanted) if left_out else None
+            values = cleaned._read_with_pandas(wanted) if left_out else None
             if values is None:
                 cleaned, left_out, values = table, None, table._row_by_row(wanted)
             notes = (*self.notes, *cleaned.note_left_out(left_out))
@@ -333,7 +333,7 @@ class Table(Cells):
             found = f'"{cells[column.index]}"'
             raise self.error(problem, line=line, column=column, found=found, expected=expected, hint=hint)
 
-    def _by_library(self, wanted: Mapping[str, Column]) -> dict[str, Floats] | None:
+    def _read_with_pandas(self, wanted: Mapping[str, Column]) -> dict[str, Floats] | None:
         """Values in SI by role, (n,) each, as read by pandas; None if the table has to be read row by row.
 
         pandas is used without thousands separators, with the decimal mark of the first cells.

@@ -75,7 +75,7 @@ def to_csv(table: pd.DataFrame, *, decimal_comma: bool = False) -> bytes:
     if decimal_comma:
         point, delimiter, encoding = ",", ";", "utf-8-sig"
     writer = csv.writer(text, delimiter=delimiter, lineterminator="\n")
-    writer.writerow([defused(str(header)) for header in table.columns])
+    writer.writerow([escape_formula(str(header)) for header in table.columns])
     for start in range(0, len(table), _ROWS_AT_ONCE):
         part = table.iloc[start : start + _ROWS_AT_ONCE]
         writer.writerows(zip(*(_texts(column, point) for _, column in part.items()), strict=True))
@@ -92,7 +92,7 @@ def _texts(column: pd.Series[Any], point: str) -> list[str]:
         if isinstance(value, float):
             return "" if value != value else f"{value:.7g}".replace(".", point)
         if isinstance(value, str):
-            return defused(value)
+            return escape_formula(value)
         return "" if value is None else str(value)
 
     if column.dtype == "str":
@@ -103,7 +103,7 @@ def _texts(column: pd.Series[Any], point: str) -> list[str]:
 
 
 @lru_cache(maxsize=4096)
-def defused(text: str) -> str:
+def escape_formula(text: str) -> str:
     """Return a text on one line, with an apostrophe before it if a spreadsheet would run it as a formula."""
     line = in_a_line(text)
     return f"'{line}" if _FORMULA.match(line) else line
@@ -115,8 +115,8 @@ def in_a_line(text: str) -> str:
     return "\t".join(map(printable, " ".join(_LINE_ENDS.split(text)).split("\t")))
 
 
-def undefused(text: str) -> str:
-    """Restore a text from the result of `defused`, except for its line ends and control characters."""
+def unescape_formula(text: str) -> str:
+    """Restore a text from the result of `escape_formula`, except for its line ends and control characters."""
     return text[1:] if text.startswith("'") and _FORMULA.match(text[1:]) else text
 
 

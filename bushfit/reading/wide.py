@@ -78,7 +78,7 @@ class _Meaning:
 
 #: Column of a wide table: meaning of its headers, meaning of the first column of its block, and for each row the line
 #: number, the cell of the first column, and the cell of this column.
-_Series = tuple[_Meaning, _Meaning, list[tuple[int, str | float, str | float]]]
+_WideColumn = tuple[_Meaning, _Meaning, list[tuple[int, str | float, str | float]]]
 
 
 def unpivot(
@@ -145,7 +145,7 @@ def _find_blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple
             yield [cells[first:last] for cells in headers], data
 
 
-def _read_block(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: Vocabulary) -> list[_Series]:
+def _read_block(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: Vocabulary) -> list[_WideColumn]:
     """Columns of a block with their meanings; an empty list if it is not a block of a wide table."""
     columns = [index for index in range(1, len(data[0][1])) if any(cells[index] != "" for _, cells in data)]
     meanings = dict.fromkeys(columns, _Meaning())
@@ -228,7 +228,7 @@ def _role_of_unit(unit: str | None) -> str | None:
 
 
 def _long_table(
-    series: Sequence[_Series], source: RowSource, file: Path, vocabulary: Vocabulary
+    series: Sequence[_WideColumn], source: RowSource, file: Path, vocabulary: Vocabulary
 ) -> tuple[RowSource, Layout]:
     """Long table with the values from all blocks of a wide table, and its layout.
 
@@ -236,7 +236,7 @@ def _long_table(
         MeasurementError: a block does not state its quantity, blocks differ in their frequencies or amplitudes, or a
             quantity has two units.
     """
-    by_role: dict[str | None, list[_Series]] = {meaning.role: [] for meaning, *_ in series}
+    by_role: dict[str | None, list[_WideColumn]] = {meaning.role: [] for meaning, *_ in series}
     for one in sorted(series, key=lambda one: _number(one[0].level)):
         by_role[one[0].role].append(one)
     down = {(first.stepped, first.level_unit, first.convention) for _, first, _ in series}

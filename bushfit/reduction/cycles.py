@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bushfit.reading.measurement import Complex, Floats
 from bushfit.reduction.arrays import CHUNK, scatter
 from bushfit.reduction.harmonics import basis
-from bushfit.reduction.turning_points import Integers, least_prominence, middle_crossings, motion_turns, stroke_middles
+from bushfit.reduction.turning_points import Integers, middle_crossings, motion_turns, noise_threshold, stroke_middles
 
 #: Longest gap without rows in a cycle, relative to its period; chosen: a fundamental needs rows all around the cycle.
 HOLE = 0.34
@@ -134,7 +134,7 @@ def resumes_in_phase(gap: float, *, step: float = 1.0) -> bool:
     return gap < _LONGEST_INTERRUPTION and abs(gap - step * round(gap / step)) < _SAME_PHASE
 
 
-def change_after(time: Floats, motion: Floats, shift: float, rows: slice) -> Floats:
+def shifted_difference(time: Floats, motion: Floats, shift: float, rows: slice) -> Floats:
     """Compute the change of a motion over a given time, to test whether the motion is periodic with this time.
 
     Args:
@@ -165,7 +165,7 @@ def lone_outliers(time: Floats, values: Floats) -> NDArray[np.bool_]:
         distance, however few rows it has, nor does the kink of dry friction.
     """
     outliers = np.zeros(values.size, dtype=bool)
-    smallest = least_prominence(values)
+    smallest = noise_threshold(values)
     for start in range(0, values.size - 4, CHUNK):
         rows = slice(start, start + CHUNK + 4)
         chunk_values, clock = values[rows], time[rows]
@@ -271,7 +271,7 @@ def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
     return k if other_frequency or other_amplitude else 0
 
 
-def mean_from_steady(motion: Complex, stiffness: Complex, fewest: int) -> slice:
+def select_steady_cycles(motion: Complex, stiffness: Complex, fewest: int) -> slice:
     """Select the steady cycles of a step: cut both ends so that the standard error of the mean is smallest.
 
     Args:

@@ -132,7 +132,7 @@ class HarmonicFit:
         chance: expected squared magnitude of each harmonic for white noise of unit variance, (order,).
         freedom: degrees of freedom: rows minus unknowns.
         squares: sums over the rows of squares and products of the residuals of displacement and force, (2, 2).
-        left_over: complex fundamental of the residuals in each cycle, (2, cycles).
+        cycle_residuals: complex fundamental of the residuals in each cycle, (2, cycles).
     """
 
     frequency: float
@@ -140,7 +140,7 @@ class HarmonicFit:
     chance: Floats
     freedom: int
     squares: Floats
-    left_over: Complex
+    cycle_residuals: Complex
 
     @classmethod
     def to_cycles(cls, time: Floats, displacement: Floats, force: Floats, edges: Floats) -> "HarmonicFit":
@@ -160,7 +160,7 @@ class HarmonicFit:
         number = np.arange(count) - (count - 1) / 2.0
         for _ in range(4):  # each squares what the frequency is off by, so that fewer do
             fit = cls._fit_at(frequency, time[thin], values[:, thin], count, _FREQUENCY_HARMONICS)
-            phase = np.unwrap(np.angle(fit.coefficients[0, 1] + fit.left_over[0]))
+            phase = np.unwrap(np.angle(fit.coefficients[0, 1] + fit.cycle_residuals[0]))
             drift = float(number @ phase / (number @ number)) / (2.0 * np.pi)
             frequency *= 1.0 + drift
             if abs(drift) * count < _SETTLED_DRIFT:
@@ -204,9 +204,9 @@ class HarmonicFit:
         (xx, xf), (_, ff) = self.squares
         white = (ff - 2.0 * k.real * xf + abs(k) ** 2 * xx) / self.freedom * self.chance[0] / 2.0
         variance = np.full(2, white)
-        cycles = self.left_over.shape[1]
+        cycles = self.cycle_residuals.shape[1]
         if cycles > 2:
-            scatter = (self.left_over[1] - k * self.left_over[0]) / (f / abs(f))
+            scatter = (self.cycle_residuals[1] - k * self.cycle_residuals[0]) / (f / abs(f))
             cycle_variance = np.array([scatter.real.var(ddof=1), scatter.imag.var(ddof=1)]) / cycles
             high = fdtri(2 * (cycles - 1), self.freedom, 1.0 - _WHITE_P)
             if cycle_variance.mean() > high * white:

@@ -14,9 +14,9 @@ from bushfit.errors import MeasurementError
 from bushfit.reading.measurement import Floats, Loop, RecordPart
 from bushfit.reading.stated import LoopFile
 from bushfit.reduction.cycles import (
-    change_after,
     lone_outliers,
     resumes_in_phase,
+    shifted_difference,
     stretches,
 )
 from bushfit.reduction.harmonics import cycle_harmonics
@@ -157,7 +157,7 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
         return []
     before = [float(time[0]), *(span.end for span in spans[:-1])]
     after = [*(span.begin for span in spans[1:]), float(time[-1])]
-    return [_to_its_ends(span, time, motion, *limits) for span, *limits in zip(spans, before, after, strict=True)]
+    return [_extend_span(span, time, motion, *limits) for span, *limits in zip(spans, before, after, strict=True)]
 
 
 def _alike_runs(values: Floats, reach: Floats) -> Iterator[slice]:
@@ -179,7 +179,7 @@ def _alike_runs(values: Floats, reach: Floats) -> Iterator[slice]:
             yield slice(run.start + part.start, run.start + part.stop)
 
 
-def _to_its_ends(span: SteadySpan, time: Floats, motion: Floats, before: float, after: float) -> SteadySpan:
+def _extend_span(span: SteadySpan, time: Floats, motion: Floats, before: float, after: float) -> SteadySpan:
     """Extend a part by half a cycle on either side if the motion is periodic there.
 
     The part is not extended beyond `before`, the end of the previous part, and `after`, the beginning of the next one.
@@ -189,7 +189,7 @@ def _to_its_ends(span: SteadySpan, time: Floats, motion: Floats, before: float, 
         extended = limit - shift / 2.0
         extended = max(extended, neighbour) if shift > 0.0 else min(extended, neighbour)
         rows = slice(*np.searchsorted(time, (extended, limit) if shift > 0.0 else (limit, extended)))
-        change = change_after(time, motion, shift, rows)
+        change = shifted_difference(time, motion, shift, rows)
         is_periodic = not change.size or float(np.quantile(change, 0.9)) < SAME_MOTION * span.range
         limits.append(extended if is_periodic else limit)
     begin, end = limits

@@ -16,7 +16,14 @@ from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
 from bushfit.progress import track
 from bushfit.reading.measurement import Complex, Floats, Loop
-from bushfit.reduction.cycles import Cycles, keeps_changing, lone_outliers, mean_from_steady, pieces, resumes_in_phase
+from bushfit.reduction.cycles import (
+    Cycles,
+    keeps_changing,
+    lone_outliers,
+    pieces,
+    resumes_in_phase,
+    select_steady_cycles,
+)
 from bushfit.reduction.harmonics import HarmonicFit
 from bushfit.reduction.result import Reduction, SkippedStretch, Step
 
@@ -163,7 +170,7 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
 
     Motion and force are the complex fundamentals of each of these cycles [m or rad, N or N m], (k,).
     """
-    steady = mean_from_steady(motion, force / motion, fewest)
+    steady = select_steady_cycles(motion, force / motion, fewest)
     used = slice(inside.start + steady.start, inside.start + steady.stop)
     edges = cycles.edges[used.start : used.stop + 1]
     count = used.stop - used.start

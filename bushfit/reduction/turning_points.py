@@ -85,7 +85,7 @@ def motion_turns(time: Floats, motion: Floats) -> tuple[Integers, float]:
           is within 2 % of its range of a peak for 18 % of the time.
         - If the half cycle is much longer than its neighbours, the larger motion pauses, and small strokes are a test.
     """
-    prominence = least_prominence(motion)
+    prominence = noise_threshold(motion)
     moving = np.concatenate(([0], 1 + np.flatnonzero(np.diff(motion) != 0.0)))
     fine = prominent_turns(motion, reversals(motion, moving), prominence)
     small = max(prominence, _RIPPLE * float(np.ptp(motion)))
@@ -143,7 +143,7 @@ def middle_crossings(time: Floats, motion: Floats, turns: Integers, middle: Floa
     return time[row - 1] + part * (time[row] - time[row - 1])
 
 
-def least_prominence(values: Floats) -> float:
+def noise_threshold(values: Floats) -> float:
     """Estimate the smallest difference between neighbouring turning points that is not noise.
 
     Args:

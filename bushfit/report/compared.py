@@ -16,7 +16,7 @@ from bushfit.errors import ModelError
 from bushfit.model.file import require_schema
 from bushfit.prediction.comparison import Comparison, Contrast, ParameterContrast, relative
 from bushfit.report.compare_document import SCHEMA, ComparisonFile
-from bushfit.report.tables import columns_of, required, words
+from bushfit.report.tables import required, response_headers, words
 from bushfit.units import display_unit, number, split_header
 from bushfit.validation import validate_tables
 
@@ -26,7 +26,7 @@ _DIGITS, _MOST_DECIMALS = 4, 6
 _OPEN = 1e7
 #: Smallest probability that is written as a number; smaller ones are written as "< 0.001".
 _LEAST_PROBABILITY = 1e-3
-#: Column headers of the rows of `SideBySide.family_cells`.
+#: Column headers of the rows of `ComparisonDocument.family_cells`.
 FAMILY_HEADS = ("family", "parameters", "NRMSE", "χ²", "probability", "held out", "first, held out", "parts")
 
 
@@ -42,7 +42,7 @@ def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
         ("..., low" and "..., high"), and "yes" or "no" for a significant difference ("..., sure").
     """
     (_, length), _, (_, factor) = contrast.place.display
-    amplitude, name, _ = columns_of(contrast.place)
+    amplitude, name, _ = response_headers(contrast.place)
     columns: dict[str, Any] = {
         "frequency [Hz]": contrast.reference.frequency,
         amplitude: contrast.reference.amplitude * length,
@@ -65,13 +65,13 @@ def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
 
 
 @dataclass(frozen=True, eq=False)
-class SideBySide:
+class ComparisonDocument:
     """Comparison of two or more results, or of model families, read from a validated `compare.json`."""
 
     document: ComparisonFile
 
     @classmethod
-    def from_document(cls, document: Mapping[str, Any], file: Path | None = None) -> SideBySide:
+    def from_document(cls, document: Mapping[str, Any], file: Path | None = None) -> ComparisonDocument:
         """Validate the content of a `compare.json`.
 
         Args:
@@ -210,7 +210,7 @@ class SideBySide:
 
 
 class ContrastHeaders(NamedTuple):
-    """Column headers, with units, of a table of differences from `SideBySide.differences_at`.
+    """Column headers, with units, of a table of differences from `ComparisonDocument.differences_at`.
 
     Args:
         amplitude: header of the amplitude.

@@ -8,7 +8,7 @@ from bushfit.model.result import Result
 from bushfit.units import display_unit, format_aligned
 
 #: Ratio of a value to its lower bound up to which the value is treated as being at the bound.
-_AT_LEAST = 1.01
+_BOUND_RATIO = 1.01
 #: Significant digits of a value whose standard error is not known.
 _PLAIN_DIGITS = 4
 #: Smallest and largest number of significant digits of a value, whatever its standard error is.
@@ -60,7 +60,7 @@ def parameter_rows(result: Result) -> Iterator[ParameterRow]:
     for name, parameter in result.model.parameters.items():
         value, stderr = result.model.values[name], result.covariance.stderr(name)
         interval = result.profile.get(name) or result.interval(name)
-        if parameter.log and value <= _AT_LEAST * parameter.bounds[0]:  # no standard error at a bound
+        if parameter.log and value <= _BOUND_RATIO * parameter.bounds[0]:  # no standard error at a bound
             stderr = interval = None
         elif interval == parameter.bounds:
             interval = None

@@ -38,7 +38,7 @@ _KINDS: tuple[Kind, ...] = ("json", "raw", "table", "page", "figure")
 #: Record of the files that bushfit wrote into a folder: lines of SHA-256 and file name, in the format of sha256sum.
 _RECORD = ".bushfit.sha256"
 #: Control characters, other than line ends, that are escaped in a JSON document.
-_STEERING = re.compile(rf"(?!\n){CONTROL.pattern}")
+_CONTROL_CHARACTERS = re.compile(rf"(?!\n){CONTROL.pattern}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +172,7 @@ def encode_all(files: Iterable[ResultFile], formats: Formats) -> dict[str, bytes
 def to_json(document: Mapping[str, Any]) -> bytes:
     """Encode a document as JSON in UTF-8, with control characters escaped so that it is safe to print in a terminal."""
     text = json.dumps(document, indent=1, allow_nan=False, ensure_ascii=False)
-    return (_STEERING.sub(lambda sign: f"\\u{ord(sign[0]):04x}", text) + "\n").encode()
+    return (_CONTROL_CHARACTERS.sub(lambda sign: f"\\u{ord(sign[0]):04x}", text) + "\n").encode()
 
 
 def write_results(

@@ -10,7 +10,7 @@ import pandas as pd
 from bushfit.diagnosis.record import Diagnosis, level_of
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError, printable
-from bushfit.fitting.master_curve import Shifted
+from bushfit.fitting.master_curve import ShiftedSweep
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Display, Place
 from bushfit.model.arms import Arms, arm_rows
@@ -41,14 +41,14 @@ def words(place: Place) -> tuple[str, str, str]:
     return f"{strain} amplitude", stress, modulus
 
 
-def columns_of(place: Place) -> tuple[str, str, str]:
+def response_headers(place: Place) -> tuple[str, str, str]:
     """Column headers, with units, of amplitude, stiffness magnitude and force for a direction or specimen."""
     (length, _), (force, _), (stiffness, _) = place.display
     motion_name, resisting, resisted = words(place)
     return f"{motion_name} [{length}]", f"{resisted} [{stiffness}]", f"{resisting} [{force}]"
 
 
-def moved_of(place: Place) -> str:
+def displacement_header(place: Place) -> str:
     """Column header, with unit, of displacement, rotation or strain for a direction or specimen."""
     motion_name = "strain" if place.motion is STRAINING else "displacement"
     return f"{motion_name} [{place.display.displacement.name}]"
@@ -56,7 +56,7 @@ def moved_of(place: Place) -> str:
 
 def amplitude_column(place: Place, amplitude: Array) -> dict[str, Array]:
     """Table column of amplitudes, as {header: values in display units}; `amplitude` is in SI (m, rad or 1), (n,)."""
-    return {columns_of(place)[0]: amplitude * place.display.displacement.factor}
+    return {response_headers(place)[0]: amplitude * place.display.displacement.factor}
 
 
 def response_columns(place: Place, stiffness: Array, before: str = "") -> dict[str, Array]:
@@ -68,7 +68,7 @@ def response_columns(place: Place, stiffness: Array, before: str = "") -> dict[s
         before: prefix of both headers, such as "model ".
     """
     magnitude = np.abs(stiffness) * place.display.stiffness.factor
-    return {f"{before}{columns_of(place)[1]}": magnitude, f"{before}loss factor [-]": loss_factor(stiffness)}
+    return {f"{before}{response_headers(place)[1]}": magnitude, f"{before}loss factor [-]": loss_factor(stiffness)}
 
 
 def prediction_table(prediction: Prediction, display: Display | None = None) -> pd.DataFrame:
@@ -129,7 +129,7 @@ def wide_table(prediction: Prediction, display: Display | None = None) -> pd.Dat
     return wide.reset_index()
 
 
-def shaken_table(resonance: PredictedResonance) -> pd.DataFrame:
+def predicted_resonance_table(resonance: PredictedResonance) -> pd.DataFrame:
     """Table of the predicted resonance of a mass on a mount whose base is shaken.
 
     Args:
@@ -149,7 +149,7 @@ def shaken_table(resonance: PredictedResonance) -> pd.DataFrame:
         }
     )
     if resonance.if_rigs:
-        if_rigs = shaken_table(resonance.if_rigs).iloc[:, 1:].add_suffix(f", {IF_RIGS}")
+        if_rigs = predicted_resonance_table(resonance.if_rigs).iloc[:, 1:].add_suffix(f", {IF_RIGS}")
         table = pd.concat([table, if_rigs], axis=1)
     return table
 
@@ -191,7 +191,7 @@ def loops_table(model: Model, data_sets: Sequence[MeasuredLoop]) -> pd.DataFrame
     for data_set in data_sets:
         place, drive = data_set.direction, data_set.drive
         (_, length), (_, factor), _ = place.display
-        force = columns_of(place)[2]
+        force = response_headers(place)[2]
         binned = drive.phase.size < data_set.test.force.size
         outliers = np.empty(0) if binned else drive.outliers["force"].rows
         tables.append(
@@ -201,7 +201,7 @@ def loops_table(model: Model, data_sets: Sequence[MeasuredLoop]) -> pd.DataFrame
                     "direction": str(place),
                     "time [s]": drive.phase / drive.frequency,
                     "frequency [Hz]": drive.frequency,
-                    moved_of(place): drive.displacement(drive.phase) * length,
+                    displacement_header(place): drive.displacement(drive.phase) * length,
                     force: drive.force * factor,
                     f"model {force}": data_set.force(model) * factor,
                     "residual [noise]": -data_set.displayed_residual(model),
@@ -294,7 +294,7 @@ def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def master_curve_table(shifted_sweeps: Sequence[Shifted]) -> pd.DataFrame:
+def master_curve_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:
     """Table of sweeps at several temperatures, as measured and shifted to 23 degC (time-temperature superposition).
 
     Returns:
@@ -310,7 +310,7 @@ def master_curve_table(shifted_sweeps: Sequence[Shifted]) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def shift_factors_table(shifted_sweeps: Sequence[Shifted]) -> pd.DataFrame:
+def shift_factors_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:
     """Table of the temperature shift factors log10 a_T of sweeps, with 95 % intervals.
 
     Returns:

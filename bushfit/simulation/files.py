@@ -85,7 +85,7 @@ def raw_loop_table(loop: Loop) -> pd.DataFrame:
         Columns of time [s], displacement and force, or time, strain and stress; one row per instant.
     """
     moves, resists, _ = loop.direction.motion.words
-    (length, length_factor), (force, force_factor), _ = _as_stated(loop.direction)
+    (length, length_factor), (force, force_factor), _ = _file_units(loop.direction)
     return pd.DataFrame(
         {
             "time [s]": loop.time,
@@ -108,7 +108,7 @@ def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
     """
     motion = sweep.direction.motion
     amplitude, relates = "strain amplitude" if motion is STRAINING else "amplitude", motion.words[2]
-    (length, length_factor), _, (stiffness, factor) = _as_stated(sweep.direction)
+    (length, length_factor), _, (stiffness, factor) = _file_units(sweep.direction)
     level, reached = sweep.amplitude, sweep.reached
     if sweep.stepped == "amplitude" and reached is not None:
         level, reached = reached, None
@@ -143,7 +143,7 @@ def raw_resonance_table(test: ResonanceTest) -> pd.DataFrame:
     )
 
 
-def _as_stated(place: Place) -> Display:
+def _file_units(place: Place) -> Display:
     """Units of displacement, force and stiffness in the files of a direction or specimen; tensor strain is gamma/2."""
     (unit, factor), force, stiffness = place.display
     ratio = strain_factor_of_files(place)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign, load_campaign
-from bushfit.campaign.session import Visit, session
+from bushfit.campaign.session import SessionTest, session
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Bushing, Direction, Specimen, unit_strain
 
@@ -123,8 +123,8 @@ COUPON = Specimen("DMA", "modulus")
 
 
 def test_turns_strains_and_rests_of_a_session() -> None:
-    loop = Visit(Direction.AXIAL, np.array([1e-3]), 300.0)
-    sweep = Visit(Direction.AXIAL, np.array([1e-4, 5e-4, 2e-4]))
+    loop = SessionTest(Direction.AXIAL, np.array([1e-3]), 300.0)
+    sweep = SessionTest(Direction.AXIAL, np.array([1e-4, 5e-4, 2e-4]))
     first, second = session(RUBBER, [loop, sweep])
     assert first.temperature == 300.0
     assert second.temperature is None
@@ -133,11 +133,14 @@ def test_turns_strains_and_rests_of_a_session() -> None:
     np.testing.assert_allclose(first.strained, [0.0])
     np.testing.assert_allclose(second.strained, 3 * [1e-3 * unit_strain(RUBBER, Direction.AXIAL)])
     up_and_down = np.array([1.0, 2.0, 4.0, 4.1, 2.0, 2.1, 1.0, 2.0]) * 1e-4
-    (found,) = session(RUBBER, [Visit(Direction.AXIAL, up_and_down)])
+    (found,) = session(RUBBER, [SessionTest(Direction.AXIAL, up_and_down)])
     strain = up_and_down * unit_strain(RUBBER, Direction.AXIAL)
     np.testing.assert_allclose(found.left, [0.0, 0.0, 0.0, 0.0, strain[3], strain[3], strain[5], strain[3]])
     np.testing.assert_allclose(7.0 * found.rested[4:], [1.0, 2.0, 1.0, 4.0])
-    coupon, mount = Visit(COUPON, np.array([0.5, 0.1])), Visit(Direction.RADIAL, np.array([1e-4, 1e-4, 1e-4]))
+    coupon, mount = (
+        SessionTest(COUPON, np.array([0.5, 0.1])),
+        SessionTest(Direction.RADIAL, np.array([1e-4, 1e-4, 1e-4])),
+    )
     of_coupon, of_mount = session(RUBBER, [coupon, mount])
     np.testing.assert_allclose(of_coupon.turn, [0.0, 1.0])
     np.testing.assert_allclose(of_mount.turn, [0.0, 0.5, 1.0])

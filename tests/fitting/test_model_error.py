@@ -239,7 +239,10 @@ def test_the_covariance_is_the_sandwich_of_noise_and_process(rig: Rig) -> None:
     sources = [
         sweep.residual_change(found.process.shapes * sweep.stiffness(model), model),
         *(sweep.whiten(unit * np.diag(size).astype(complex)) for unit, size in zip((1.0, 1.0j), random, strict=True)),
-        *(np.array(sweep.moved_together(run == i)) * np.array(sweep.noise.shared)[:, None] for i in np.unique(run)),
+        *(
+            np.array(sweep.shared_error_columns(run == i)) * np.array(sweep.noise.shared)[:, None]
+            for i in np.unique(run)
+        ),
     ]
     slopes = found.coordinates.slopes(model.values)
     moved = np.linalg.pinv(jacobian(model, [sweep], FIVE).T) @ np.concatenate(sources).T * slopes[:, None]

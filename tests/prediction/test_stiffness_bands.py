@@ -21,7 +21,7 @@ from bushfit.prediction.caveats import caveats
 from bushfit.prediction.grid import PAPER_AMPLITUDES, PAPER_FREQUENCIES, default_grid
 from bushfit.prediction.stiffness import predict, predict_resonance
 from bushfit.reading.measurement import Sweep
-from bushfit.report.tables import prediction_table, shaken_table
+from bushfit.report.tables import predicted_resonance_table, prediction_table
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import undisturbed
 
@@ -106,7 +106,7 @@ def test_what_may_be_the_rigs_is_predicted_both_ways_and_the_bands_span_both(eit
     assert shaken.if_rigs is not None
     assert shaken.if_rigs.peak[0] > 1.02 * shaken.peak[0]
     assert f"at {shaken.if_rigs.peak[0]:.4g} Hz" in shaken.warnings[-1]
-    rigs_too = shaken_table(shaken)["transmissibility [-], if it is the rig's"]
+    rigs_too = predicted_resonance_table(shaken)["transmissibility [-], if it is the rig's"]
     np.testing.assert_allclose(rigs_too, np.abs(shaken.if_rigs.transmissibility))
 
 

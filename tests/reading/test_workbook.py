@@ -25,7 +25,7 @@ from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
-from bushfit.reading.tablefile import Form, defused, ending, to_bytes, to_csv
+from bushfit.reading.tablefile import Form, ending, escape_formula, to_bytes, to_csv
 from bushfit.simulation.files import raw_loop_table, raw_sweep_table
 
 Sheets = dict[str, list[list[object]]]
@@ -186,9 +186,9 @@ def test_cells_of_a_text_have_seven_digits_and_run_nothing() -> None:
     assert to_csv(table) == b'x [mm],n,\'=run\n0.3333333,-3,\' =1+1\n,4,"a ""b"", c"\n'
     commas = to_bytes("t", TABLE, "decimal-comma")
     assert commas.startswith(b"\xef\xbb\xbfx [mm], low;n;'=text\n0,3333333;1;'=1+1\n;2;\"a; b, c\"\n-1e-12;3;Pr")
-    assert [defused(text) for text in RUN] == [f"'{text}" for text in RUN]
-    assert [defused(text) for text in STAY] == STAY
-    assert (defused("a\r\nb"), defused("a\r\n=1")) == ("a b", "a =1")
+    assert [escape_formula(text) for text in RUN] == [f"'{text}" for text in RUN]
+    assert [escape_formula(text) for text in STAY] == STAY
+    assert (escape_formula("a\r\nb"), escape_formula("a\r\n=1")) == ("a b", "a =1")
 
 
 RUN = ["=1+1", "+cmd", "-2+3", "@SUM(A1)", "\t=1", "  =1", '=HYPERLINK("http://x")', "\uff1d1", '"=1', "%0A=1", "|x"]

@@ -15,7 +15,7 @@ from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop
-from bushfit.reduction.cycles import mean_from_steady
+from bushfit.reduction.cycles import select_steady_cycles
 from bushfit.reduction.harmonics import spread_rows
 from bushfit.reduction.result import Reduction
 from bushfit.reduction.steps import reduce
@@ -267,5 +267,5 @@ def test_cycles_that_are_not_steady_are_cut_at_either_end() -> None:
     stiffness, start, end = np.full(20, 1e5 + 0j), motion.copy(), motion.copy()
     start[:3] *= [0.5, 0.8, 0.95]
     end[-2:] *= [0.9, 0.7]
-    assert mean_from_steady(start, stiffness, 3).start == 3
-    assert mean_from_steady(end, stiffness, 3).stop == 18
+    assert select_steady_cycles(start, stiffness, 3).start == 3
+    assert select_steady_cycles(end, stiffness, 3).stop == 18

@@ -118,4 +118,4 @@ def test_a_bulk_modulus_of_2_gpa() -> None:
         assert correction is not None
         for mu, error in ((1e6, 0.005), (1e7, 0.02)):
             soft = solve_tube(inner, length, bulk=2e9 / mu, fineness=0.7).stiffness
-            assert correction.lowering(mu) == pytest.approx(1.0 - soft / hard, abs=error)
+            assert correction.stiffness_decrease(mu) == pytest.approx(1.0 - soft / hard, abs=error)

@@ -14,7 +14,7 @@ from lab_campaign import Answer
 
 from bushfit.campaign.campaign import load_campaign
 from bushfit.fitting.coordinates import residual
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, with_gains
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, with_gain_weighting
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.solve import solve
@@ -101,7 +101,7 @@ def against_truth(folder: Path, silent: Path, model: Path) -> float:
         tests, true = (
             PreparedCampaign.from_campaign(load_campaign(each / "bushing.toml")) for each in (folder, silent)
         )
-    data_sets = with_gains((*tests.loops, *tests.sweeps), weigh=True)
+    data_sets = with_gain_weighting((*tests.loops, *tests.sweeps), weigh=True)
     told = solve(FitProblem(told, data_sets, tuple(told.values))).model
     off = residual(told, data_sets)
     as_true = [_with(one, other) for one, other in zip(data_sets, (*true.loops, *true.sweeps), strict=True)]

@@ -9,9 +9,9 @@ import numpy as np
 
 from bushfit.geometry import Bushing
 from bushfit.model.file import read_document
-from bushfit.prediction.caveats import by_importance, use_of
+from bushfit.prediction.caveats import by_importance, consequence_of
 from bushfit.report import plots
-from bushfit.report.compared import FAMILY_HEADS, ContrastHeaders, SideBySide, chance, parameter_cells, signed
+from bushfit.report.compared import FAMILY_HEADS, ComparisonDocument, ContrastHeaders, chance, parameter_cells, signed
 from bushfit.report.page.report import MOST, conditions, tube_description
 from bushfit.report.page.svg import picture
 from bushfit.report.page.values import grid_corners
@@ -35,7 +35,7 @@ def read_comparison(folder: Path) -> list[ResultFile]:
     """
     file = folder / "compare.json"
     document = read_document(file)
-    SideBySide.from_document(document, file)
+    ComparisonDocument.from_document(document, file)
     return [json_file("compare", document)]
 
 
@@ -48,7 +48,7 @@ def comparison_context(files: Sequence[ResultFile]) -> dict[str, Any]:
     Returns:
         Values by the names of the template variables.
     """
-    comparison = SideBySide.from_document(contents(files, "json")["compare"])
+    comparison = ComparisonDocument.from_document(contents(files, "json")["compare"])
     document, names, places = comparison.document, comparison.names, comparison.places
     compared, (reference, *other_names) = document["compared"], names.values()
     tables = [next(iter(comparison.differences_at(place).values())) for place in places]
@@ -97,12 +97,12 @@ def comparison_context(files: Sequence[ResultFile]) -> dict[str, Any]:
         "chance": chance,
         "pictures": pictures,
         "tabled": [*value_rows(comparison)][: 2 * _ROWS],
-        "warnings": [(line, use_of(line)) for line in by_importance(document["warnings"])],
+        "warnings": [(line, consequence_of(line)) for line in by_importance(document["warnings"])],
         "files": [(f"{', '.join(letters)}: {file}", sha256) for (file, sha256), letters in labels.items()],
     }
 
 
-def difference_sizes(comparison: SideBySide, place: str) -> Iterator[dict[str, Any]]:
+def difference_sizes(comparison: ComparisonDocument, place: str) -> Iterator[dict[str, Any]]:
     """Summarise the differences of each result from the first one in a direction or specimen, as texts.
 
     Args:
@@ -129,7 +129,7 @@ def difference_sizes(comparison: SideBySide, place: str) -> Iterator[dict[str, A
         yield row
 
 
-def value_rows(comparison: SideBySide) -> Iterator[tuple[Any, ...]]:
+def value_rows(comparison: ComparisonDocument) -> Iterator[tuple[Any, ...]]:
     """Rows of the table of values: the first result and each other one at a few operating points.
 
     Args:

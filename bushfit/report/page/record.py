@@ -21,9 +21,9 @@ from bushfit.model.file import from_document, read_document, require_schema
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.files import read_utf8
-from bushfit.reading.tablefile import undefused
+from bushfit.reading.tablefile import unescape_formula
 from bushfit.report.results import ResultFile, contents, json_file, place_names, table_file
-from bushfit.report.tables import columns_of, required, spread
+from bushfit.report.tables import required, response_headers, spread
 from bushfit.validation import validate_tables
 
 #: Documents with a model in order of preference; document of the fit without the effects that a diagnosis added.
@@ -137,7 +137,7 @@ def _predictions(
             table = sweeps[sweeps["direction"] == str(place)]
         if table is None or table.empty:
             continue
-        headers = ["frequency [Hz]", columns_of(place)[0]]
+        headers = ["frequency [Hz]", response_headers(place)[0]]
         axes = [np.unique(column) for column in required(table, *headers)[headers].to_numpy(dtype=float).T]
         if name not in tables:
             axes = [levels[spread(levels.size, _MOST_LEVELS)] for levels in axes]
@@ -213,7 +213,9 @@ def read_table(folder: Path, name: str) -> pd.DataFrame | None:
         table = table.astype(dict.fromkeys(numbers, float))
         if np.isinf(table[numbers].to_numpy()).any():
             raise ValueError("inf")
-        return table.assign(**{header: [undefused(str(cell)) for cell in table[header].fillna("")] for header in texts})
+        return table.assign(
+            **{header: [unescape_formula(str(cell)) for cell in table[header].fillna("")] for header in texts}
+        )
     except (ValueError, KeyError, BadZipFile) as error:
         raise ModelError(
             "this table is not as bushfit writes it",

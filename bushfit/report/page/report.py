@@ -15,7 +15,7 @@ from bushfit.diagnosis.record import odds_in_words
 from bushfit.effects.temperature import REFERENCE
 from bushfit.geometry import STRAINING, TRANSLATION, Bushing, Specimen
 from bushfit.model.result import Result
-from bushfit.prediction.caveats import by_importance, use_of, warnings_of
+from bushfit.prediction.caveats import by_importance, consequence_of, warnings_of
 from bushfit.reading.measurement import SAME_TEMPERATURE
 from bushfit.report import plots
 from bushfit.report.page.record import ReportRecord
@@ -50,7 +50,7 @@ _CONDITIONS = {
     "specimen_number": "Specimen no.",
 }
 #: Format of the conditions in the table of tests, by campaign key.
-_BESIDE_TEST = {
+_CONDITION_FORMATS = {
     "specimen_number": "part {}",
     "temperature_degC": "{} °C",
     "preload": "{} preload",
@@ -112,7 +112,7 @@ def report_context(record: ReportRecord) -> dict[str, Any]:
         "more_tests": max(0, len(tests) - MOST),
         "tabled": [*value_rows(predictions)],
         "gaps": {f"{name} data": gap_texts(diagnosis, part) for name, part in _GAPS.items()} if diagnosis else {},
-        "warnings": [(line, use_of(line)) for line in by_importance(warnings)],
+        "warnings": [(line, consequence_of(line)) for line in by_importance(warnings)],
         "campaign": campaign,
         "files": list(dict.fromkeys((file, sha256) for file, sha256 in (*named, *inputs) if file and sha256)),
         "versions": record.versions,
@@ -229,7 +229,7 @@ def test_rows(record: ReportRecord) -> list[dict[str, str | int]]:
     rows = list[dict[str, str | int]]()
     for test in record.tests[:MOST]:
         unit, factor = DISPLAYS[test.unit]
-        test_conditions = {key: value for key in _BESIDE_TEST if (value := test.conditions.get(key)) is not None}
+        test_conditions = {key: value for key in _CONDITION_FORMATS if (value := test.conditions.get(key)) is not None}
         texts = {key: value if isinstance(value, str) else number(value, 3) for key, value in test_conditions.items()}
         row: dict[str, str | int] = {
             "test": test.test,
@@ -238,7 +238,7 @@ def test_rows(record: ReportRecord) -> list[dict[str, str | int]]:
             "frequency": format_range("Hz", *test.frequency_Hz),
             "amplitude": format_range(unit, *(factor * end for end in test.amplitude)),
             "rows": test.rows,
-            "conditions": ", ".join(_BESIDE_TEST[key].format(text) for key, text in texts.items()),
+            "conditions": ", ".join(_CONDITION_FORMATS[key].format(text) for key, text in texts.items()),
             **dict.fromkeys(("use", "nrmse", "chi"), ""),
         }
         if misfit := misfits.get(test.test):

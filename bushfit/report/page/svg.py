@@ -65,7 +65,7 @@ def picture(chart: Chart, name: str, title: str) -> Picture:
     ElementTree.register_namespace("", _SVG.strip("{}"))
     root = ElementTree.parse(io.BytesIO(image)).getroot()
     _rewrite(root, name)
-    _hoist(root)
+    _share_attributes(root)
     _unwrap(root)
     root.attrib.clear()
     root.attrib |= {
@@ -133,7 +133,7 @@ def _rounded(decimals: int, digits: re.Match[str]) -> str:
     return f"{float(digits[0]):.{decimals}f}".rstrip("0").rstrip(".")
 
 
-def _hoist(root: ElementTree.Element) -> None:
+def _share_attributes(root: ElementTree.Element) -> None:
     """Move attributes that all children of a group share to the group, and drop those that a marker repeats."""
     shapes = {f"#{element.get('id')}": element for element in root.iter() if element.get("id")}
     for marker in root.iter(f"{_SVG}use"):

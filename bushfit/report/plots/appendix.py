@@ -15,7 +15,7 @@ from bushfit.report.parameters import parameter_rows
 from bushfit.report.plots import style
 from bushfit.report.plots.measured import sweep_groups
 from bushfit.report.plots.prediction import refined
-from bushfit.report.tables import columns_of, spread
+from bushfit.report.tables import response_headers, spread
 from bushfit.units import format_range
 
 #: Largest number of amplitudes that are drawn.
@@ -40,7 +40,7 @@ def complex_figure(result: Result, prediction: Prediction, table: pd.DataFrame |
         Figure with three panels; a line with its 95 % band per amplitude, at most six.
     """
     place, fine = prediction.direction, refined(result, prediction)
-    amplitude_header, stiffness_header, _ = columns_of(place)
+    amplitude_header, stiffness_header, _ = response_headers(place)
     (unit, length), _, (stiffness_unit, factor) = place.display
     levels = np.unique(prediction.amplitude)
     levels = levels[spread(levels.size, _MOST_LEVELS)]

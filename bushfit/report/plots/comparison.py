@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.lines import Line2D
 
-from bushfit.report.compared import ContrastHeaders, SideBySide
+from bushfit.report.compared import ComparisonDocument, ContrastHeaders
 from bushfit.report.plots import style
 from bushfit.report.tables import numbers
 from bushfit.units import display_unit, format_range, split_header
@@ -17,7 +17,7 @@ _LEAST_PERCENT, _LEAST_LOSS = 1.0, 0.005
 
 
 @style.in_own_style
-def comparison_figure(comparison: SideBySide) -> style.Chart:
+def comparison_figure(comparison: ComparisonDocument) -> style.Chart:
     """Figure of stiffness and loss factor of all compared results, and of their differences from the first result.
 
     Curves are over frequency at the smallest and largest amplitude, or over amplitude if there is only one frequency.

@@ -17,13 +17,13 @@ from bushfit.report.plots.measured import (
     SECTOR,
     Curve,
     SweepGroup,
-    loops_of,
+    loops_by_direction,
     means,
     phase_after_turn,
     sector_means,
     sweep_groups,
 )
-from bushfit.report.tables import columns_of, moved_of
+from bushfit.report.tables import displacement_header, response_headers
 from bushfit.units import display_unit, format_range
 
 #: Height of a panel of residuals [cm].
@@ -82,12 +82,12 @@ def draw_curves(pair: Sequence[Axes], group: SweepGroup, result: Result) -> None
         group: sweeps of one direction or specimen, with a curve per level of the fixed quantity.
         result: fitted model, with the effects of the rig.
     """
-    stiffness, x_header = columns_of(group.place)[1], group.x_header
+    stiffness, x_header = response_headers(group.place)[1], group.x_header
     factor, labels = stiffness_scale(group.place, max(curve.rows[stiffness].max() for curve in group.curves))
     looks = style.styles(len(group.curves), group.palette)
     for axes, label, header, scale in zip(pair, labels, (stiffness, "loss factor [-]"), (factor, 1.0), strict=True):
         for curve, look in zip(group.curves, looks, strict=True):
-            draw_points(axes, drawn_points(curve.rows), x_header, header, scale, look, len(group.curves))
+            draw_points(axes, points_to_draw(curve.rows), x_header, header, scale, look, len(group.curves))
             x, values = _model_line(group, curve, header, result)
             axes.plot(x, scale * values, color=look.color, ls=look.dashes, lw=1.3)
         style.label_axes(axes, x_header, label, np.concatenate([curve.rows[x_header] for curve in group.curves]))
@@ -110,12 +110,12 @@ def stiffness_scale(place: Place, largest: float) -> tuple[float, tuple[str, str
     """
     name, factor = place.display.stiffness
     unit, to_figure = display_unit(name, factor, largest / factor)
-    quantity = columns_of(place)[1].partition(" [")[0]
+    quantity = response_headers(place)[1].partition(" [")[0]
     symbol = " |K|" if quantity == "stiffness" else ""
     return to_figure / factor, (f"{place} {quantity}{symbol} [{unit}]", f"{place} loss factor [-]")
 
 
-def drawn_points(rows: pd.DataFrame) -> pd.DataFrame:
+def points_to_draw(rows: pd.DataFrame) -> pd.DataFrame:
     """Rows of a table of sweeps to draw: without outliers and without points whose stated error is above 5 %."""
     keep = rows["outlier"] == "no"
     if "stated error [-]" in rows:
@@ -185,7 +185,7 @@ def _draw_residuals(strips: Sequence[Axes], group: SweepGroup) -> None:
     for strip, part in zip(strips, ("stiffness", "loss"), strict=True):
         header = f"{part} residual [noise]"
         for curve, look in zip(group.curves, looks, strict=True):
-            points = drawn_points(curve.rows)
+            points = points_to_draw(curve.rows)
             points = points[:: _thinning(len(points), len(looks))]
             strip.plot(points[group.x_header], points[header], look.marker, color=look.color, alpha=0.8, **style.DOT)
         style.label_axes(strip, group.x_header, f"{part} residual\n/ noise", x)
@@ -209,7 +209,7 @@ def loops_figure(result: Result, table: pd.DataFrame, title: str) -> style.Chart
     Returns:
         Figure with two panels per direction or specimen.
     """
-    places = list(loops_of(table, result))
+    places = list(loops_by_direction(table, result))
     figure = style.Chart(title, 1.25 * style.ROW * len(places))  # nearly square panels for hysteresis loops
     grid = figure.subplots(len(places), 2, squeeze=False, width_ratios=[1.15, 1.0])
     for (place, loops), (force_panel, phase_panel) in zip(places, grid, strict=True):
@@ -238,7 +238,7 @@ def loops_figure(result: Result, table: pd.DataFrame, title: str) -> style.Chart
 
 def _draw_forces(axes: Axes, place: Place, loops: dict[str, pd.DataFrame], looks: Sequence[style.Style]) -> None:
     """Draw force over displacement of the loops of a direction, with lines of the model and crosses at outliers."""
-    motion, force = moved_of(place), columns_of(place)[2]
+    motion, force = displacement_header(place), response_headers(place)[2]
     name, factor = place.display.force
     unit, to_figure = display_unit(name, factor, max(loop[force].abs().max() for loop in loops.values()) / factor)
     scale = to_figure / factor
@@ -269,7 +269,7 @@ def loop_labels(place: Place, loops: dict[str, pd.DataFrame]) -> list[str]:
     """
     labels = []
     for loop in loops.values():
-        motion = loop[moved_of(place)]
+        motion = loop[displacement_header(place)]
         amplitude = format_range(place.display.displacement.name, float(motion.max() - motion.min()) / 2.0)
         labels.append(f"{amplitude}, {format_range('Hz', float(loop['frequency [Hz]'].iloc[0]))}")
     if len(set(labels)) == len(labels):

@@ -18,7 +18,15 @@ from bushfit.geometry import Place
 from bushfit.model.result import Result
 from bushfit.report.plots import style
 from bushfit.report.plots.fits import loop_labels
-from bushfit.report.plots.measured import SECTOR, Curve, SweepGroup, loops_of, means, sector_means, sweep_groups
+from bushfit.report.plots.measured import (
+    SECTOR,
+    Curve,
+    SweepGroup,
+    loops_by_direction,
+    means,
+    sector_means,
+    sweep_groups,
+)
 
 #: Heights [cm]: row of a map; smallest and largest map; colour bar; panel of loops.
 _LEVEL, _LEAST_MAP, _LARGEST_MAP, _SCALE, _LOOPS = 0.6, 1.9, 4.2, 0.5, 4.4
@@ -54,7 +62,7 @@ def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any]
     sweeps = table[table["kind"] == "sweep"]
     groups = sweep_groups(sweeps, result) if len(sweeps) else []
     maps = [(group, map_rows(group)) for group in groups]
-    loops = list(loops_of(table[table["kind"] == "loop"], result))
+    loops = list(loops_by_direction(table[table["kind"] == "loop"], result))
     heights = [2.0 * min(max(_LEVEL * len(rows), _LEAST_MAP), _LARGEST_MAP) for _, rows in maps]
     heights += [_SCALE] * bool(maps) + [_LOOPS] * len(loops)
     figure = style.Chart(

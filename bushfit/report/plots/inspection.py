@@ -94,7 +94,7 @@ def _draw_history(figure: Figure, cell: SubplotSpec, history: Loop, loop: Axes |
         if history.time.size <= 2 * _TIME_BINS:
             axes.plot(history.time, values, lw=0.8, color=_COLOR)
         else:
-            axes.fill_between(*time_ranges(history.time, values), step="post", color=_COLOR, lw=0.6)
+            axes.fill_between(*envelope_over_time(history.time, values), step="post", color=_COLOR, lw=0.6)
         axes.set_label(str(history.direction))
         style.label_axes(axes, "time [s]" if history.timed else "time rebuilt [s]", label)
     figure.align_ylabels(over_time)
@@ -108,7 +108,7 @@ def _draw_history(figure: Figure, cell: SubplotSpec, history: Loop, loop: Axes |
     return loop
 
 
-def time_ranges(time: Array, values: Array) -> tuple[Array, Array, Array]:
+def envelope_over_time(time: Array, values: Array) -> tuple[Array, Array, Array]:
     """Start time, smallest and largest value of each of 1500 equal time bins that contain rows, (k,) each."""
     first = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], _TIME_BINS + 1)[:-1]))
     return time[first], np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
@@ -177,7 +177,7 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
 def _draw_strip(axes: Axes, history: Loop, reduction: Reduction, looks: dict[float, style.Style]) -> None:
     """Draw displacement over time, with the cycles in use in the colour of their amplitude."""
     unit, factor = reduction.direction.display.displacement
-    time, low, high = time_ranges(history.time, factor * history.displacement)
+    time, low, high = envelope_over_time(history.time, factor * history.displacement)
     axes.fill_between(time, low, high, color="#c8c8c8", lw=0.4, step="post")
     for level, look in looks.items():
         steps = [step for step in reduction.steps if step.name == history.name and step.level == level]

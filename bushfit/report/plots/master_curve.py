@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bushfit.fitting.master_curve import SHIFT, Shifted, law
+from bushfit.fitting.master_curve import SHIFT, ShiftedSweep, law
 from bushfit.model.arms import Arms, part_modulus
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
@@ -23,7 +23,7 @@ _BEYOND = 4.0
 
 
 @style.in_own_style
-def master_curve_figure(model: Model, shifted_sweeps: Sequence[Shifted], title: str) -> style.Chart:
+def master_curve_figure(model: Model, shifted_sweeps: Sequence[ShiftedSweep], title: str) -> style.Chart:
     """Figure of the master curve: stiffness and loss factor over reduced frequency at 23 degC, measured and modelled.
 
     Args:
@@ -69,7 +69,7 @@ def master_curve_figure(model: Model, shifted_sweeps: Sequence[Shifted], title: 
 
 
 @style.in_own_style
-def shift_factors_figure(result: Result, shifted_sweeps: Sequence[Shifted], title: str) -> style.Chart:
+def shift_factors_figure(result: Result, shifted_sweeps: Sequence[ShiftedSweep], title: str) -> style.Chart:
     """Figure of the temperature shift factors: the fitted law, each sweep by itself, and their differences.
 
     Args:
@@ -100,7 +100,7 @@ def shift_factors_figure(result: Result, shifted_sweeps: Sequence[Shifted], titl
     )
 
 
-def _degree(shifted: Shifted) -> float:
+def _degree(shifted: ShiftedSweep) -> float:
     """Mean temperature of a sweep, rounded to 1 degC."""
     return float(np.round(shifted.temperature - CELSIUS))
 

@@ -12,7 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.geometry import Place
 from bushfit.model.result import Result
 from bushfit.reading.measurement import SAME_TEMPERATURE
-from bushfit.report.tables import columns_of, moved_of, spread
+from bushfit.report.tables import displacement_header, response_headers, spread
 from bushfit.units import format_range, number
 
 #: Quantity along the x axis of a sweep.
@@ -70,7 +70,7 @@ class SweepGroup(NamedTuple):
 
 def header_of(place: Place, axis: Axis) -> str:
     """Header of the table column of the quantity `axis`, frequency or amplitude, for a direction or specimen."""
-    return "frequency [Hz]" if axis == "frequency" else columns_of(place)[0]
+    return "frequency [Hz]" if axis == "frequency" else response_headers(place)[0]
 
 
 def sweep_groups(table: pd.DataFrame, result: Result) -> list[SweepGroup]:
@@ -123,7 +123,7 @@ def means(rows: pd.DataFrame, x_header: str, *headers: str) -> tuple[Array, ...]
     return averages.index.to_numpy(dtype=float), *averages.to_numpy(dtype=float).T
 
 
-def loops_of(table: pd.DataFrame, result: Result) -> Iterator[tuple[Place, dict[str, pd.DataFrame]]]:
+def loops_by_direction(table: pd.DataFrame, result: Result) -> Iterator[tuple[Place, dict[str, pd.DataFrame]]]:
     """Split a table into the loops of each direction or specimen, for the panels of a figure.
 
     Args:
@@ -159,6 +159,6 @@ def sector_means(loop: pd.DataFrame, place: Place, header: str) -> tuple[Array, 
 def phase_after_turn(loop: pd.DataFrame, place: Place) -> Array:
     """Phase of each row of a loop [deg], (n,), from 0 at the maximum of the motion (the upper turn) up to 360."""
     turns = (loop["time [s]"] * loop["frequency [Hz]"]).to_numpy()
-    motion = loop[moved_of(place)].to_numpy()
+    motion = loop[displacement_header(place)].to_numpy()
     first_harmonic = np.mean((motion - motion.mean()) * np.exp(-2j * np.pi * turns))
     return np.asarray(360.0 * ((turns + np.angle(first_harmonic) / (2.0 * np.pi)) % 1.0))

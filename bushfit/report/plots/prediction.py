@@ -13,9 +13,9 @@ from bushfit.prediction.caveats import rig_effects
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.runs import nominal
 from bushfit.report.plots import style
-from bushfit.report.plots.fits import draw_curves, draw_points, drawn_points, points_note, stiffness_scale
+from bushfit.report.plots.fits import draw_curves, draw_points, points_note, points_to_draw, stiffness_scale
 from bushfit.report.plots.measured import Axis, header_of, sweep_groups
-from bushfit.report.tables import IF_RIGS, columns_of, spread
+from bushfit.report.tables import IF_RIGS, response_headers, spread
 from bushfit.units import display_unit, format_range
 
 #: Number of points of a line of the model.
@@ -142,13 +142,13 @@ def draw_prediction(
     factor, labels = stiffness_scale(place, to_table * float(prediction.stiffness.value.max()))
     x, looks = scales[axis] * getattr(prediction, axis), style.styles(chosen.size, fixed)
     kinds = (
-        ("stiffness", columns_of(place)[1], factor, factor * to_table),
+        ("stiffness", response_headers(place)[1], factor, factor * to_table),
         ("loss_factor", "loss factor [-]", 1.0, 1.0),
     )
     for axes, label, (name, header, from_table, from_si) in zip(pair, labels, kinds, strict=True):
         band = getattr(prediction, name)
         for look, index in zip(looks, chosen, strict=True):
-            mask, rows = getattr(prediction, fixed) == levels[index], drawn_points(points[index])
+            mask, rows = getattr(prediction, fixed) == levels[index], points_to_draw(points[index])
             value, low, high = (from_si * end[mask] for end in (band.value, band.low, band.high))
             marker = "_" if value.size == 1 else ""  # a single point is a stroke
             axes.plot(x[mask], value, color=look.color, ls=look.dashes, lw=_LINE, marker=marker, ms=14.0)

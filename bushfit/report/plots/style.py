@@ -50,7 +50,7 @@ _DPI = 150
 #: Compression level of a PNG: a higher level takes longer and saves little.
 _COMPRESSION = 3
 #: Metadata keys, by format, that are omitted: they would contain date and version.
-_UNSAID = {"png": ["Software"], "svg": ["Creator", "Date"], "pdf": ["Creator", "Producer", "CreationDate"]}
+_OMITTED_METADATA = {"png": ["Software"], "svg": ["Creator", "Date"], "pdf": ["Creator", "Producer", "CreationDate"]}
 #: Largest number of lines in a legend: more do not fit beside a panel.
 MOST_NAMED = 8
 #: Colour map of each kind of level, and the part of the map in use: each colour has one meaning.
@@ -322,7 +322,7 @@ def file_name(name: str, letters: int = 20) -> str:
     return shortened(name, letters).replace("$", r"\$")
 
 
-def first_sentences(sentences: Sequence[str]) -> str:
+def warnings_note(sentences: Sequence[str]) -> str:
     """Join the first warnings, up to about 600 letters, into the note below a figure; the others are counted."""
     ends = np.cumsum([len(sentence) for sentence in sentences])
     count = max(int(np.searchsorted(ends, _MOST_LETTERS)), 1)
@@ -348,5 +348,5 @@ def to_image(figure: Figure, form: str = "png", *, outlines: bool = True) -> byt
     with _own_settings(**{"svg.fonttype": "path" if outlines else "none"}):
         canvas = get_registered_canvas_class(form)(figure)
         options = {"pil_kwargs": {"compress_level": _COMPRESSION}} if form == "png" else {}
-        getattr(canvas, f"print_{form}")(buffer, metadata=dict.fromkeys(_UNSAID[form]), **options)
+        getattr(canvas, f"print_{form}")(buffer, metadata=dict.fromkeys(_OMITTED_METADATA[form]), **options)
     return buffer.getvalue()
