@@ -118,7 +118,14 @@ def dask_workers(address: str) -> Workers:
         raise BatchError(problem, place="--scheduler", found=found, expected=expected, hint=hint) from None
 
     def count() -> int:
-        """Return the number of worker threads of the cluster."""
+        """Count the worker threads of the cluster.
+
+        Returns:
+            Number of threads.
+
+        Raises:
+            BatchError: the connection to the scheduler is lost.
+        """
         try:
             if client.status == "running":
                 return sum(client.nthreads().values())

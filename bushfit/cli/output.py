@@ -252,7 +252,10 @@ def with_output(folder: str, *written: Written) -> Parameter:
 
 
 def _column_widths(columns: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int, width: int) -> list[int]:
-    """Column widths [characters] with headers and texts wrapped between words; empty if the table exceeds `width`."""
+    """Column widths [characters] at which a table fits `width`; empty if it does not fit.
+
+    Headers and the cells of the first `text_columns` columns are wrapped between words; numbers are never wrapped.
+    """
     widths, narrowest = [], []
     for index, (header, *cells) in enumerate(zip(columns, *rows, strict=True)):
         unbroken = [part for cell in cells for part in cell.split()] if index < text_columns else cells

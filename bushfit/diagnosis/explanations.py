@@ -80,7 +80,10 @@ class FaultyPart(Explanation):
 
     @property
     def columns(self) -> Array:
-        """Change of the whitened residuals by a unit deviation of each kind (gain, phase, slopes), (c, n)."""
+        """Derivatives of the n whitened residuals by the c errors of the faulty part, (c, n), one row for each error.
+
+        The errors are a relative gain, a phase [rad] and their slopes along the part.
+        """
         assert self.group is not None
         return self.group.whole
 

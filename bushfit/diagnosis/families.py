@@ -45,7 +45,8 @@ class FittedFamily:
         name: effects that the family adds or puts in place of branches, joined by +; for the first family, "paper" and
             its other effects.
         evidence: the fitted model and the tests.
-        held: root mean squares of the held-out parts: `before` for the first family, `after` for this family.
+        held: root mean square of the residuals of the held-out tests, in units of the noise: `before` for the first
+            family, `after` for this family.
         gain: reduction of the held-out mean square relative to the first family, in squared units of noise, with the
             ends of its 95 % interval; None for the first family, or if nothing is held out.
         p: probability of a gain or loss this large if both families are equally good; None if `gain` is None.

@@ -51,7 +51,7 @@ class Composition:
 
     @property
     def may_mislead(self) -> bool:
-        """True if faulty places may distort the effects: faults of a level, a repeat or a frequency.
+        """True if a fault at one amplitude level, repeat or frequency may bias the effects that are reported beside it.
 
         A faulty loop is a separate test, and points that were left out have no weight, so they distort no effect.
         """
@@ -162,7 +162,11 @@ class _Parts(NamedTuple):
 
     @classmethod
     def of_hypothesis(cls, hypothesis: Hypothesis) -> _Parts:
-        """List the parts of a hypothesis; effects of the rubber are left out if the compound deviates."""
+        """Effects, faulty places and mistake that a hypothesis names.
+
+        Effects of the rubber are not named if the hypothesis includes a smooth deviation of the compound, because the
+        deviation could imitate them.
+        """
         effects = frozenset(
             name for name in hypothesis.effects if not (hypothesis.bent and get_effect(name).level == Level.MATERIAL)
         )

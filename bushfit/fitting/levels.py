@@ -105,7 +105,11 @@ def level_errors(
 
 
 def level_errors_of(sweep: MeasuredSweep) -> Array:
-    """Change of a sweep's whitened residuals by a unit gain and phase error of each level in turn, (2 levels, n)."""
+    """Derivatives of a sweep's whitened residuals by the gain and phase error of each of its levels.
+
+    Returns:
+        Derivatives, (2 levels, n): gain [1] and phase [rad] of the first level, then of the next.
+    """
     return np.array(
         [
             column

@@ -229,10 +229,7 @@ class MeasuredLoop(MeasuredBase):
         return np.where(self.weights > 0.0, self.misfit(model), distance)
 
     def outlying(self, model: Model) -> Array:
-        """Indices of the outliers, (k,): points far from both the model and their neighbours.
-
-        For a loop: indices of the rows whose force is far from the harmonics of the force, independent of the model.
-        """
+        """Indices of the rows whose force is far from the loop's own harmonics, (k,); the model is not used."""
         return self.drive.outliers["force"].rows
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:

@@ -164,7 +164,11 @@ def likeliest_size(model: Model, data_sets: Sequence[MeasuredTest], names: Seque
     variance = np.concatenate([part.variance for part in parts])
 
     def cost(log_size: float) -> float:
-        """Compute -2 ln(restricted likelihood), up to a constant, for the natural log of a model error's size."""
+        """Minus twice the log of the restricted likelihood of a model error, given the natural log of its size.
+
+        Returns:
+            The value, up to a constant.
+        """
         square = float(np.exp(2.0 * log_size))
         grown = 1.0 + square * variance
         both = products - components * (square / grown) @ components.T

@@ -47,7 +47,7 @@ class SharedError:
 
     @cached_property
     def weight(self) -> Array:
-        """Sum of the squares of `unit` over each group, (g,)."""
+        """Squared norm of the residuals that a unit shared error causes in each group, (g,): sum of `unit` squared."""
         return np.maximum(np.add.reduceat(self.unit**2, self.starts), np.finfo(float).tiny)
 
     @cached_property

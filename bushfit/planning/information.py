@@ -51,7 +51,10 @@ class Information(NamedTuple):
         return self.products[..., : self.products.shape[-2]]
 
     def noncentralities(self) -> Array:
-        """Expected increase of chi-square by each effect or rival model after a refit, (choices, e)."""
+        """Expected chi-square of the fitted model if an effect it lacks, or a rival model, is true, (choices, e).
+
+        There is one row for each choice of tests; the parameters are refitted, and noise alone is subtracted.
+        """
         cross = self.products[..., self.products.shape[-2] :]
         fitted = np.linalg.solve(self.parameters, cross)
         return np.maximum(self.squares - np.sum(cross * fitted, axis=-2), 0.0)

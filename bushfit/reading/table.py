@@ -226,10 +226,14 @@ class Table(Cells):
         return " or ".join(f'columns = {{ {role} = "{header}" }}' for header in fitting[:3] or ["..."])
 
     def refuse_other_motion(self, role: str, headers: Sequence[str] | None = None) -> None:
-        """Refuse a table of strain and modulus for a test of displacement and force, or the reverse.
+        """Refuse strain or modulus columns in a test of displacement and force, or the reverse.
+
+        Args:
+            role: role of the column that the test lacks, such as "amplitude".
+            headers: headers known to belong to the other kind of test; by default those of the table are checked.
 
         Raises:
-            MeasurementError: a header names the role in the other kind of test, or `headers` that do so are given.
+            MeasurementError: a header has this role in the other kind of test.
         """
         other_motion = TRANSLATION if self.motion is STRAINING else STRAINING
         kinds = ["displacement and force or stiffness", "strain and modulus"]
