@@ -421,7 +421,7 @@ def describe_format(table: Table) -> dict[str, str]:
     if isinstance(source, Channels):
         written = {"format": source.format} | ({"group": source.sheet} if source.sheet else {})
     elif isinstance(source, Sheet):
-        written = {"sheet": source.sheet, "header": f"row {layout.header_line}"}
+        written = ({"sheet": source.sheet} if source.sheet else {}) | {"header": f"row {layout.header_line}"}
     else:
         written = {
             "encoding": source.encoding or "UTF-8",
