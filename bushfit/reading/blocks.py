@@ -7,7 +7,7 @@ from itertools import islice
 
 from bushfit import units
 from bushfit.reading.headers import AmplitudeConvention, Vocabulary, plain
-from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_units_row, split
+from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row, is_units_row, split
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names, named_direction
 from bushfit.reading.source import Channels, Combined, RowSource, Text, cells_of
 
@@ -101,6 +101,9 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
                 repeated = True
                 continue
             if is_units_row(cells):
+                continue
+            if parts and is_summary_row(cells):  # left out later, with a note
+                parts.append((line.number, cells, len(groups) - 1))
                 continue
             if is_note or not is_row(cells):
                 between.append(line)

@@ -11,7 +11,7 @@ from typing import Any
 from bushfit.errors import MeasurementError
 from bushfit.reading.headers import WORDS, Column, plain
 from bushfit.reading.instruments import word_for_part
-from bushfit.reading.layout import FileFormat, Layout, is_comment, is_row, is_units_row
+from bushfit.reading.layout import FileFormat, Layout, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, is_like_number, weigh
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 from bushfit.reading.times import clock
@@ -26,7 +26,6 @@ _MOST_LISTED = 4
 _MOST_WORDS = 3
 #: Placeholders for a missing value.
 _MISSING = frozenset(WORDS["rows_of"]["missing"])
-_SUMMARIES = frozenset(map(plain, WORDS["rows_of"]["summary"]))
 
 #: Line number and cells of a row of a table.
 Row = tuple[int, Sequence[str | float]]
@@ -104,8 +103,7 @@ class Cells:
         "word": another word instead of a number; "doubtful": looks like data, but cannot be read.
         """
         texts = [str(cell) for cell in cells]
-        first = next((text for text in texts if text), "")
-        if plain(first) in _SUMMARIES and not is_like_number(first):
+        if is_summary_row(texts):
             return "other"
         if any(texts[len(self.headers) :]):
             return "doubtful" if is_row(texts) else "other"

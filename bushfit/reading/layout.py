@@ -15,9 +15,11 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from bushfit import units
-from bushfit.reading.headers import Vocabulary, split_convention
+from bushfit.reading.headers import WORDS, Vocabulary, plain, split_convention
 from bushfit.reading.numerals import is_like_number
 
+#: First words of rows that summarise others.
+_SUMMARIES = frozenset(map(plain, WORDS["rows_of"]["summary"]))
 #: Characters that separate columns, by their names in a campaign, in the order in which they are tried.
 DELIMITERS = {"semicolon": ";", "tab": "\t", "pipe": "|", "comma": ",", "caret": "^", "blanks": " "}
 #: Non-empty lines at the start of a file that are searched for the header; chosen: far more than preambles have.
@@ -296,3 +298,9 @@ def is_units_row(cells: Sequence[str]) -> bool:
     filled = [split_convention(cell)[0] for cell in cells if cell]
     has_numbers = any(is_like_number(cell) and cell != "1" for cell in filled)
     return not has_numbers and 0 < len(filled) <= 2 * sum(units.is_unit(cell) for cell in filled)
+
+
+def is_summary_row(cells: Sequence[str]) -> bool:
+    """Return True if the first text of a row is a word such as "Mean" or "Std", so that it summarises other rows."""
+    first = next(filter(None, cells), "")
+    return plain(first) in _SUMMARIES and not is_like_number(first)

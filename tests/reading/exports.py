@@ -192,7 +192,7 @@ EXPORTS: dict[str, Export] = {
     ),
     "blocks, means, and an end": Export(
         blocks("Amplitude:\t{}\tmm".format, "f [Hz]|K* [N/mm]|tan delta", end=["Mean\t1450\t0.12", "Std\t10\t0.01", "---", "End of test"]),
-        words=["rows left out", "Mean"],
+        words=["7 rows left out", "Mean"],
     ),
     "means": Export(sweep(USUAL + "tan delta", F, A, K, ETA) + "Mean\t0.3\t1400\t0.13\nStd Dev\t0.1\t20\t0.01\n", words=["2 rows left out"]),
     "missing values": Export(
