@@ -101,6 +101,7 @@ def index_page(files: Sequence[ResultFile], folder: Path, base: str = "") -> str
             }
         )
     units = {header: split_header(header) for header in batch.quantities}
+    compared = [table.parts for table in batch.quantities.values() if table.detectable]
     context: dict[str, Any] = {
         "batch": batch,
         "bad": bool(batch.missed or batch.failed),
@@ -109,7 +110,7 @@ def index_page(files: Sequence[ResultFile], folder: Path, base: str = "") -> str
         "errors": listed.get("error", [])[:_MOST_NAMED],
         "differing": listed.get("differs", [])[:_MOST_NAMED],
         "most_named": _MOST_NAMED,
-        "parts_compared": max((table.parts for table in batch.quantities.values() if table.detectable), default=0),
+        "parts_compared": max(compared or [table.parts for table in batch.quantities.values()], default=0),
         "quantities": [
             (table, units[header][0], "" if units[header][1] in (None, "-") else f" {units[header][1]}")
             for header, table in batch.quantities.items()
