@@ -239,7 +239,7 @@ def inspect_source(
         BushfitError: an option is missing; the hint names it.
     """
     from bushfit.geometry import Specimen
-    from bushfit.inspection.opening import BLOCK_KEYS
+    from bushfit.inspection.recognition import BLOCK_KEYS
 
     source = replace(source, test_options={key: value for key, value in test_options.items() if value != ""})
     with options_named():

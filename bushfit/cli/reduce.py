@@ -108,7 +108,7 @@ def command(
 
 def _resonance_table(file: Path, test_options: Mapping[str, Any], shaker: Mapping[str, str | None]) -> Table | None:
     """Table of a resonance test; None for other files, unless an option such as the mass states a resonance test."""
-    from bushfit.inspection.opening import open_table
+    from bushfit.inspection.recognition import open_table
     from bushfit.reading.headers import RESONANCE_COLUMNS
     from bushfit.reading.resonance import is_resonance
 
@@ -132,7 +132,7 @@ def _reduce_resonance(
 ) -> tuple[Resonance, str, str]:
     """Reduce a resonance test to a sweep; return it with its campaign key ("direction" or "specimen") and value."""
     from bushfit.geometry import Direction
-    from bushfit.inspection.opening import test_direction
+    from bushfit.inspection.recognition import test_direction
     from bushfit.reading.resonance import read_resonance
     from bushfit.reduction.resonance import reduce_resonance
 

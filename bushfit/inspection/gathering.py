@@ -17,7 +17,8 @@ from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.fitting.preparation import prepare_loops, prepare_sweeps
 from bushfit.geometry import Direction
 from bushfit.inspection.labels import count_temperatures
-from bushfit.inspection.opening import inspect_file, open_table, recognize_table
+from bushfit.inspection.opening import inspect_file
+from bushfit.inspection.recognition import open_table, recognize_table
 from bushfit.inspection.record import Inspection
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.instruments import word_for_part

@@ -1,0 +1,199 @@
+"""Recognition of a test file: loop or sweep by its columns, and the direction or specimen that was tested."""
+
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import fields
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from bushfit.campaign.schema import SpecimenSettings
+from bushfit.errors import BushfitError, NoTestError, quote_path
+from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
+from bushfit.reading.headers import LOOP_COLUMNS, PAIRS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary, of_motion
+from bushfit.reading.labelled import Rows
+from bushfit.reading.layout import FileFormat
+from bushfit.reading.names import direction_of_file
+from bushfit.reading.parts import OpenedFile, open_file
+from bushfit.reading.resonance import is_resonance
+from bushfit.reading.stiffness import hint_for_convertible_columns, refuse_ambiguous_damping
+from bushfit.reading.table import Table
+from bushfit.validation import validate_tables
+
+#: Keys of [[specimens]] for the sizes of a block in shear.
+BLOCK_KEYS = ("area", "thickness", "elements")
+#: Headers of a bar in tension: E', |E*|, "storage modulus E'", "tensile strain".
+_TENSILE = re.compile(r"(?<![^\W_])E(?![^\W_])|young|tensile|tension|traction|zug", re.IGNORECASE)
+
+
+def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table, bool]:
+    """Open a test file as a loop or a sweep, by its columns.
+
+    Args:
+        file: test file.
+        test_options: keys of [[loops]] and [[sweeps]], as TOML gives them; keys that do not apply are ignored.
+
+    Returns:
+        The table, and True if it is a sweep.
+
+    Raises:
+        NoTestError: a file that cannot be opened as a table, or whose columns are not those of a test.
+        MeasurementError, UnitError: unclear columns or units, which may be those of a test.
+    """
+    opened: list[tuple[Table, bool]] = []
+    failed: list[tuple[Mapping[str, Sequence[str]], BushfitError]] = []
+    try:
+        content = open_content(file, test_options)
+    except BushfitError as error:
+        raise NoTestError(**vars(error)) from None
+    for names, motion in product((SWEEP_COLUMNS, LOOP_COLUMNS), (TRANSLATION, STRAINING)):
+        is_sweep = names is SWEEP_COLUMNS
+        try:
+            table = open_table(content, names, test_options, motion)
+        except BushfitError as error:
+            failed.append((of_motion(names, motion), error))
+            continue
+        opened.append((table, is_sweep))
+        if missing_role(table, is_sweep=is_sweep) is None:
+            return table, is_sweep
+        if is_sweep:
+            refuse_ambiguous_damping(table)
+    resonance: Table | None = None
+    with suppress(BushfitError):  # whose columns are not those of a resonance test
+        resonance = open_table(content, RESONANCE_COLUMNS, test_options)
+    if resonance and is_resonance(resonance):
+        hint = f'bushfit reduce {quote_path(file)} --mass "..." converts it to a sweep'
+        problem, expected = "this is a resonance test, not a sweep", "loops and sweeps"
+        raise resonance.error(problem, kind=NoTestError, expected=expected, hint=hint)
+    if not opened:
+        errors = [error for _, error in failed]
+        raise NoTestError(**vars(next((one for one in errors if one.problem != "there is no header"), errors[0])))
+    best, is_sweep = max(opened, key=lambda one: len(one[0].roles))
+    for usual, failure in failed:
+        if len(best.roles) <= max(1, len(Vocabulary(usual, {}).roles(best.headers))):
+            raise failure
+    understood = ", ".join(role.replace("_", " ") for role in best.roles)
+    lacking = missing_role(best, is_sweep=is_sweep) or "force"
+    units = {"displacement": "m", "force": "N", "stiffness": "N/m", "storage_stiffness": "N/m", "phase": "rad"}
+    column = best.columns_key(lacking, units.get(lacking, "1"))
+    raise best.header_error(
+        "the columns are not those of a test",
+        kind=NoTestError,
+        found=", ".join(best.headers) + f" (understood: {understood})" if understood else None,
+        expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
+        hint=hint_for_convertible_columns(best) or f"correct the header, or name the column: {column}",
+    )
+
+
+def missing_role(table: Table, *, is_sweep: bool) -> str | None:
+    """Role of the first column that a test needs and the table lacks, such as "force"; None if the table is complete.
+
+    Frequency and amplitude of a sweep are not required, because they may be constant and stated outside the table.
+    """
+    roles = set(table.roles)
+    if not is_sweep:
+        return next((role for role in ("displacement", "force") if role not in roles), None)
+    pairs = [pair for pair in PAIRS if pair[0] != "force_amplitude" or {"frequency", "amplitude"} <= roles]
+    nearest = max(pairs, key=lambda pair: len(roles & set(pair)))
+    return next((role for role in nearest if role not in roles), None)
+
+
+def tested_body(file: Path, table: Table, test_options: Mapping[str, Any]) -> Place | None:
+    """Determine the direction of the bushing, or the specimen, that was tested.
+
+    A modulus belongs to a specimen, a stiffness to the bushing unless the options give the sizes of a block in shear.
+
+    Args:
+        file: test file.
+        table: table of the file.
+        test_options: options of the test.
+
+    Returns:
+        Direction or specimen; None if neither options nor file state it.
+
+    Raises:
+        MeasurementError: units of torsion although an option states another direction.
+        CampaignError, UnitError, ModelError: invalid sizes of a specimen.
+    """
+    keys: dict[str, Any] = {"kind": "shear"} | {key: test_options[key] for key in BLOCK_KEYS if key in test_options}
+    if table.motion is STRAINING:
+        headers = table.layout.written or [column.header for column in table.roles.values()]
+        keys = {"kind": "modulus"} | ({"strain": "tension"} if any(map(_TENSILE.search, headers)) else {})
+    elif len(keys) == 1:
+        return test_direction(file, table, test_options)
+    name = test_options.get("specimen", "bar" if "strain" in keys else "coupon")
+    return Specimen(**vars(validate_tables({"name": name, **keys}, None, SpecimenSettings)))
+
+
+def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) -> Direction | None:
+    """Determine the direction of a test of the bushing from an option, or else from the file.
+
+    Args:
+        file: test file.
+        table: table of the file.
+        test_options: options of the test.
+
+    Returns:
+        The direction; None if neither option nor file states it.
+
+    Raises:
+        MeasurementError: the file states another direction than the option, or several directions.
+    """
+    turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
+    headers = table.layout.written or table.headers
+    in_column = dict.fromkeys(table.row_labels.get("direction", (0, ()))[1])
+    named = direction_of_file(file, headers, turns=turns, sheet=table.source.sheet)
+    found = Direction(*in_column) if len(in_column) == 1 else named
+    if "direction" not in test_options:
+        if len(in_column) > 1:
+            problem, hint = "this file contains tests in several directions", "state one: --direction axial"
+            raise table.header_error(problem, found=", ".join(in_column), expected="one direction", hint=hint)
+        return found
+    if found and found != test_options["direction"] and len(in_column) < 2:
+        raise table.header_error(
+            f"{'the units say' if turns else 'the file says'} {found}, and --direction {test_options['direction']}",
+            found=", ".join([*filter(None, [file.name, table.source.sheet]), *headers]),
+            expected="one direction",
+            hint="leave --direction out; or state the direction in the file name, which takes precedence over "
+            "the header",
+        )
+    return Direction(test_options["direction"])
+
+
+def open_content(file: Path, test_options: Mapping[str, Any]) -> OpenedFile:
+    """Open a test file with the format options (keys of `FileFormat`) that the user states.
+
+    Raises:
+        MeasurementError: the file cannot be read.
+    """
+    return open_file(file, FileFormat(**{field.name: test_options.get(field.name) for field in fields(FileFormat)}))
+
+
+def open_table(
+    file: Path | OpenedFile,
+    names: Mapping[str, Sequence[str]],
+    test_options: Mapping[str, Any],
+    motion: Motion = TRANSLATION,
+) -> Table:
+    """Open a test file as a table of one kind of test.
+
+    Args:
+        file: test file, or its opened content.
+        names: known headers of the columns of this kind of test, by role.
+        test_options: options of the test; options for columns of other tests are ignored.
+        motion: kind of motion that the columns describe.
+
+    Returns:
+        Table with the roles of its columns.
+
+    Raises:
+        MeasurementError, UnitError: columns that are missing or unclear.
+    """
+    relevant = {
+        key: {role: text for role, text in test_options.get(key, {}).items() if role in names}
+        for key in ("columns", "units")
+    }
+    rows = Rows(test_options.get("direction"), test_options.get("specimen_number"), test_options.get("rows", {}))
+    opened = file if isinstance(file, OpenedFile) else open_content(file, test_options)
+    return Table.open(opened, names, relevant["columns"], relevant["units"], None, motion, rows if any(rows) else None)
