@@ -3,14 +3,14 @@
 import numpy as np
 
 from bushfit.effects import BASE, LIBRARY, qualified_name
-from bushfit.effects.contract import Circumstances
+from bushfit.effects.contract import RubberConditions
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
 
 #: What the library adds to the paper's model.
 ADDED = tuple(name for name in LIBRARY if name not in BASE)
 #: A warm test, late in the session and after a large strain.
-UNDER = Circumstances(temperature=303.0, turn=0.7, strained=0.08, left=0.08, rested=0.03)
+UNDER = RubberConditions(temperature=303.0, session_time=0.7, largest_strain=0.08, previous_strain=0.08, rest_time=0.03)
 
 
 def random_model(rng: np.random.Generator) -> Model:

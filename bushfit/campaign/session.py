@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulatedTest
-from bushfit.effects.contract import Array, Circumstances
+from bushfit.effects.contract import Array, RubberConditions
 from bushfit.geometry import Bushing, Place, Specimen, unit_strain
 from bushfit.reading.measurement import Loop, Sweep
 
@@ -31,15 +31,15 @@ class SessionTest(NamedTuple):
     order: float | None = None
 
 
-def measured_session(bushing: Bushing | None, tests: Sequence[Loop | Sweep]) -> list[Circumstances]:
-    """Circumstances of measured tests: temperature, time in the session and earlier strains of each point.
+def measured_session(bushing: Bushing | None, tests: Sequence[Loop | Sweep]) -> list[RubberConditions]:
+    """Conditions of measured tests: temperature, time in the session and earlier strains of each point.
 
     Args:
         bushing: the bushing; None if only specimens were tested.
         tests: loops and sweeps, in order; the condition `order` of a test takes precedence.
 
     Returns:
-        Circumstances of each test: one entry per row of a sweep, one entry for a loop.
+        Conditions of each test: one entry per row of a sweep, one entry for a loop.
     """
 
     def visit(test: Loop | Sweep) -> SessionTest:
@@ -50,8 +50,10 @@ def measured_session(bushing: Bushing | None, tests: Sequence[Loop | Sweep]) -> 
     return session(bushing, [visit(test) for test in tests])
 
 
-def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], repeats: int) -> list[Circumstances]:
-    """Circumstances of planned tests. The strains of a resonance test depend on its result and are taken as zero.
+def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], repeats: int) -> list[RubberConditions]:
+    """Conditions of planned tests: temperature, time in the session and earlier strains of each point.
+
+    The strains of a resonance test depend on its result and are taken as zero.
 
     Args:
         bushing: the bushing; None if only specimens are tested.
@@ -59,7 +61,7 @@ def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], rep
         repeats: repeats of each sweep and resonance test that states none.
 
     Returns:
-        Circumstances of each test: one entry per row of a sweep or resonance test, one per part of a loop.
+        Conditions of each test: one entry per row of a sweep or resonance test, one per part of a loop.
     """
 
     def amplitudes(test: SimulatedTest) -> Array:
@@ -73,30 +75,30 @@ def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], rep
     return session(bushing, [SessionTest(test.direction, amplitudes(test), test.temperature) for test in tests])
 
 
-def session(bushing: Bushing | None, visits: Sequence[SessionTest]) -> list[Circumstances]:
-    """Circumstances of the tests of a session. Each body has a session of its own.
+def session(bushing: Bushing | None, visits: Sequence[SessionTest]) -> list[RubberConditions]:
+    """Conditions of the tests of a session: temperature, time and earlier strains. Each body has a session of its own.
 
     Args:
         bushing: the bushing; None if only specimens were tested.
         visits: tests in the order of the campaign.
 
     Returns:
-        Circumstances of each test, in the order of `visits`: temperature [K], position in the session (turn, from 0 to
+        Conditions of each test, in the order of `visits`: temperature [K], position in the session (from 0 to
         1), and the strain amplitudes before each point, (n,) each.
     """
     numbers = [place if visit.order is None else visit.order for place, visit in enumerate(visits, start=1)]
     bodies = [visit.place if isinstance(visit.place, Specimen) else None for visit in visits]
-    circumstances: dict[int, Circumstances] = {}
+    conditions: dict[int, RubberConditions] = {}
     for body in dict.fromkeys(bodies):
         visited = sorted((i for i, tested in enumerate(bodies) if tested == body), key=numbers.__getitem__)
         strains = [visits[i].amplitude * unit_strain(bushing, visits[i].place) for i in visited]
         ends = np.cumsum([strain.size for strain in strains])
         turn = np.arange(ends[-1]) / max(float(ends[-1]) - 1.0, 1.0)
-        strained = np.maximum.accumulate(np.concatenate([[0.0], *strains]))[:-1]
-        histories = (turn, strained, *_last_larger(np.concatenate(strains), turn))
+        largest_strain = np.maximum.accumulate(np.concatenate([[0.0], *strains]))[:-1]
+        histories = (turn, largest_strain, *_last_larger(np.concatenate(strains), turn))
         for i, *columns in zip(visited, *(np.split(column, ends[:-1]) for column in histories), strict=True):
-            circumstances[i] = Circumstances(visits[i].temperature, *columns)
-    return [circumstances[i] for i in range(len(visits))]
+            conditions[i] = RubberConditions(visits[i].temperature, *columns)
+    return [conditions[i] for i in range(len(visits))]
 
 
 def _last_larger(strain: Array, turn: Array) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.options import command_called, direction_option, effect_option, file_option, flag, option, under
+from bushfit.cli.options import command_called, direction_option, effect_option, file_option, flag, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.errors import error_location
 from bushfit.units import format_aligned, number, split_header
@@ -24,7 +24,7 @@ _MOST_SHOWN = 10
 
 @command_called("batch", '"data/practice/*/bushing.toml" --at "axial 25 Hz 0.1 mm"')
 @click.argument("manifest", metavar="MANIFEST", nargs=-1, required=True)
-@under(
+@option_group(
     "Work on each bushing",
     option(
         "--command commands",
@@ -42,18 +42,18 @@ _MOST_SHOWN = 10
         multiple=True,
     ),
 )
-@under(
+@option_group(
     "Limits",
     file_option("--limits", "Judge each bushing by the limits in this TOML file."),
     file_option("--junit", "Write a JUnit report for CI."),
 )
-@under(
+@option_group(
     "Execution",
     flag("--resume", "Evaluate missing, failed or changed rows only."),
     option("--jobs", "N", "Number of worker processes [one per core].", type=click.IntRange(1)),
     option("--scheduler", "ADDRESS", "Use this Dask cluster, such as tcp://10.0.0.5:8786."),
 )
-@under(
+@option_group(
     "Output",
     flag("--tables"),
     flag("--plots", "Also write these for each bushing."),

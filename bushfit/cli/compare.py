@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.options import FILE, command_called, direction_option, effect_lists, option, under
+from bushfit.cli.options import FILE, command_called, direction_option, effect_lists, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import grid_options, grid_values
 from bushfit.errors import error_location, quote_path
@@ -26,7 +26,7 @@ _CHANCE = 0.05
     "compare", "configs/cmp_15961.toml configs/arm_bushing.toml", "configs/arm_bushing.toml --families sliders,kraus"
 )
 @click.argument("sources", metavar="A [B]...", nargs=-1, required=True, type=FILE)
-@under(
+@option_group(
     "Range of the comparison",
     direction_option(
         "axial, radial, torsion or a specimen, also for the fit of a campaign; may be given again [where all "

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
-from bushfit.cli.options import command_called, explanations, file_option, option, under
+from bushfit.cli.options import command_called, explanations, file_option, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.printing import print_parameters
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
@@ -26,7 +26,7 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 
 
 @command_called("diagnose", "configs/mystery_mount.toml")
-@under(
+@option_group(
     "What may be missing",
     option("--max-effects", "N", "Largest number of effects to add [3].", type=click.IntRange(0, 5), default=3),
     option(

@@ -5,7 +5,7 @@ from typing import Any, Literal
 
 import click
 
-from bushfit.cli.options import FILE, command_called, option, under
+from bushfit.cli.options import FILE, command_called, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import grid_values, kelvin, positive, prediction_options
 
@@ -16,7 +16,7 @@ from bushfit.cli.shared_options import grid_values, kelvin, positive, prediction
     'data/arm_bushing/truth.json --format abaqus --units "m kg s N" -o results/si',
 )
 @click.argument("model", metavar="MODEL", type=FILE)
-@under(
+@option_group(
     "Target program",
     option(
         "--format formats",

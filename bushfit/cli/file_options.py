@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from bushfit.cli.options import DIRECTIONS, FILE, Function, Parameter, add_parameters, option, option_of, under
+from bushfit.cli.options import DIRECTIONS, FILE, Function, Parameter, add_parameters, option, option_group, option_of
 from bushfit.errors import BushfitError, MeasurementError
 
 #: Options for metadata that a loop or sweep file may not contain: campaign key, metavar and help text.
@@ -87,7 +87,7 @@ def metadata_options(*, sweeps: bool = True) -> Parameter:
         return add_parameters(
             wrapped,
             click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_tests_alone),
-            under(
+            option_group(
                 "Information that is missing in the files",
                 _metadata_option("direction", "DIRECTION", "axial, radial or torsion [names, columns]."),
                 option("--unit units", "ROLE=UNIT", 'Unit of a column: "force=kN".', multiple=True),
@@ -100,7 +100,7 @@ def metadata_options(*, sweeps: bool = True) -> Parameter:
                 _metadata_option("force_sign", "-1", "If the force has the opposite sign."),
                 *(_metadata_option(key, metavar, words) for key, (metavar, words) in keys.items()),
             ),
-            under(
+            option_group(
                 "File format, if it is not detected",
                 *(_metadata_option(key, metavar) for key, metavar in _AS_WRITTEN.items()),
             ),

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bushfit.cli.options import command_called, direction_option, effect_option, file_option, flag, under
+from bushfit.cli.options import command_called, direction_option, effect_option, file_option, flag, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.printing import print_step
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 
 @command_called("fit-static", "configs/cmp_15961.toml")
-@under("Fit", file_option("--dynamic", "Keep the parameters m and alpha fixed at their values in this dynamic.json."))
+@option_group(
+    "Fit", file_option("--dynamic", "Keep the parameters m and alpha fixed at their values in this dynamic.json.")
+)
 @campaign_options()
 @with_output("results/<campaign name>", "tables", "pictures")
 def static(
@@ -41,7 +43,7 @@ def static(
 
 
 @command_called("fit-dynamic", "configs/cmp_15961.toml")
-@under(
+@option_group(
     "Fit",
     file_option(
         "--static", "Fix mu, sigma_fmax and eps_half at the values in this static.json [the loops are fitted first]."
@@ -68,7 +70,7 @@ def dynamic(
 
 
 @command_called("fit", "configs/arm_bushing.toml --direction axial --direction radial --profile")
-@under(
+@option_group(
     "Tests and model",
     direction_option(
         "Fit the tests in this direction (axial, radial, torsion) or of this specimen; may be given again "

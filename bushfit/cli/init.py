@@ -15,7 +15,7 @@ import click
 
 from bushfit.cli.file_options import STATED, TYPES, direction_error, metadata_options, options_named
 from bushfit.cli.inspect import print_left_out
-from bushfit.cli.options import command_called, flag, option, option_of, under
+from bushfit.cli.options import command_called, flag, option, option_group, option_of
 from bushfit.cli.output import Output, with_output
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, error_location, quote_path
 from bushfit.progress import track
@@ -58,7 +58,7 @@ _Read = TypeVar("_Read")
     "data/arm_bushing/loop_axial_1.csv data/arm_bushing/sweep_axial.csv "
     '--inner-diameter "28 mm" --outer-diameter "40 mm" --length "45 mm"',
 )
-@under(
+@option_group(
     "The rubber of the bushing",
     option("--inner-radius", "LENGTH"),
     option("--inner-diameter", "LENGTH", 'Inside; give one of the two, such as "20 mm".'),
@@ -68,7 +68,7 @@ _Read = TypeVar("_Read")
     option("--name", "NAME", "Name [that of the folder of the first file]."),
 )
 @metadata_options()
-@under("Output", flag("--no-input", "Ask nothing: what is missing is an error."))
+@option_group("Output", flag("--no-input", "Ask nothing: what is missing is an error."))
 @with_output("results/<bushing name>")
 def command(
     files: tuple[Path, ...],

@@ -181,7 +181,7 @@ def add_parameters(function: Function, *parameters: Parameter) -> Function:
     return function
 
 
-def under(heading: str, *parameters: Parameter) -> Parameter:
+def option_group(heading: str, *parameters: Parameter) -> Parameter:
     """Group options under a heading of the help, in the given order."""
 
     def decorate(function: Function) -> Function:

@@ -31,7 +31,7 @@ from bushfit.cli.options import (
     flag,
     format_options,
     option,
-    under,
+    option_group,
 )
 from bushfit.errors import printable
 from bushfit.progress import report_progress_to
@@ -236,7 +236,7 @@ def with_output(folder: str, *written: Written) -> Parameter:
 
         return add_parameters(
             wrapped,
-            under(
+            option_group(
                 "Output",
                 option("-o --output", "DIR", f"Folder of the results [{folder}].", type=Folder(path_type=Path)),
                 flag("--force", "Replace earlier results in this folder."),

@@ -12,7 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.options import FILE, Size, command_called, direction_option, effect_lists, file_option, option, under
+from bushfit.cli.options import (
+    FILE,
+    Size,
+    command_called,
+    direction_option,
+    effect_lists,
+    file_option,
+    option,
+    option_group,
+)
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import grid_options, grid_values, positive
 from bushfit.errors import error_location
@@ -33,7 +42,7 @@ _MOST_VALUES = 6
 
 @command_called("plan", "configs/arm_bushing.toml --hours 4", 'configs/new_bushing.toml --target "stiffness=1 %"')
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=FILE)
-@under(
+@option_group(
     "Aim of the plan",
     option(
         "--hours",
@@ -67,8 +76,8 @@ _MOST_VALUES = 6
     ),
     file_option("--campaign", "With MODEL.json: use [rig] and [predict] of this campaign."),
 )
-@under("Range of later predictions", grid_options("the campaign's"))
-@under(
+@option_group("Range of later predictions", grid_options("the campaign's"))
+@option_group(
     "Check by simulation",
     option("--check count", "N", "Simulate and fit the planned tests N times.", type=click.IntRange(2, 100_000)),
     option("--seed", "N", "Seed of the random numbers [0].", type=click.IntRange(0), default=0),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.options import FILE, command_called, file_option, flag, option, under
+from bushfit.cli.options import FILE, command_called, file_option, flag, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.printing import print_tests
 from bushfit.cli.shared_options import grid_values, kelvin, positive, prediction_options
@@ -22,7 +22,7 @@ _MOST_AMPLITUDES = 8
 @command_called("predict", 'data/arm_bushing/truth.json --frequencies "10:100:10 Hz" --amplitudes "0.1, 0.5 mm"')
 @click.argument("model", metavar="MODEL", type=FILE)
 @prediction_options("Use the grid of this campaign and show its sweeps.")
-@under(
+@option_group(
     "Further predictions",
     file_option("--bushing", "Another bushing of the same compound, from [bushing] of this TOML file."),
     option("--mass", "MASS"),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bushfit.cli.file_options import direction_error, metadata_options, options_named
-from bushfit.cli.options import command_called, option, under
+from bushfit.cli.options import command_called, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import parse_grid, positive
 from bushfit.errors import BushfitError, MeasurementError
@@ -37,14 +37,14 @@ _LINES_AN_OCTAVE = 3
     'data/measured/epdm_70/shaker_1g_573g.csv --mass "0.5878 kg" --specimen mount',
 )
 @metadata_options(sweeps=False)
-@under(
+@option_group(
     "Raw histories",
     option("--levels", "GRID", 'Nominal amplitudes, "0.1, 0.2 mm" [detected].'),
     option(
         "--cycles", "N", "Leave out steps with fewer than N steady cycles [3].", type=click.IntRange(3, 1000), default=3
     ),
 )
-@under(
+@option_group(
     "Resonance test",
     option("--mass", "MASS", 'Mass on the mount, such as "0.5 kg".'),
     option("--mass-added", "MASS", 'Mass that moves with it, such as "15 g".'),

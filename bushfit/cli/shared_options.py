@@ -18,8 +18,8 @@ from bushfit.cli.options import (
     direction_option,
     file_option,
     option,
+    option_group,
     option_of,
-    under,
 )
 from bushfit.errors import UnitError, error_location
 from bushfit.units import parse_quantity, regular_steps
@@ -43,7 +43,7 @@ def campaign_options(soft_l1: str = "less weight on distant points, none on outl
         return add_parameters(
             function,
             click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=FILE),
-            under(
+            option_group(
                 "Fit",
                 option(
                     "--loss",
@@ -103,7 +103,7 @@ def grid_options(default: str) -> Parameter:
 
 def prediction_options(campaign: str) -> Parameter:
     """Create the options for directions, grid and temperature of a prediction, and --campaign with a help text."""
-    return under(
+    return option_group(
         "Range and conditions",
         direction_option(
             "axial, radial, torsion or a specimen; may be given again [axial and radial, and all specimens]."

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.options import FILE, command_called, option, option_of, under
+from bushfit.cli.options import FILE, command_called, option, option_group, option_of
 from bushfit.cli.output import Output, with_output
 from bushfit.errors import ModelError, UnitError, error_location
 from bushfit.units import is_number, parse_quantity
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @command_called("simulate", "configs/simulate_arm_bushing.toml --seed 7")
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=FILE)
-@under(
+@option_group(
     "Tests and effects",
     option(
         "--effect effects",
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     option("--repeats", "N", "Number of repeats of each sweep [1].", type=click.IntRange(1, 1000)),
     option("--seed", "N", "Seed of the random numbers [0].", type=click.IntRange(0)),
 )
-@under(
+@option_group(
     "Noise and errors of the rig [from the campaign, else none]",
     option("--noise", "SHARE", 'Scatter of a sweep point relative to |K|, such as "0.5 %".'),
     option("--force-noise", "SHARE", 'Noise of a loop relative to half its force range: "0.3 %".'),

@@ -15,7 +15,7 @@ from bushfit.campaign.schema import PredictSettings
 from bushfit.campaign.session import measured_session
 from bushfit.commands.loading import HasResult, as_result
 from bushfit.effects import Level
-from bushfit.effects.contract import Array, Circumstances
+from bushfit.effects.contract import Array, RubberConditions
 from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError
 from bushfit.fitting.agreement import expected_error_without_refits, misfits
@@ -154,8 +154,8 @@ def predict(
     if bushing:
         result, note = carried(result, bushing)
         notes, directions = (*notes, note), directions or [str(direction) for direction in _DIRECTIONS]
-    knows_temperature = result.model.knows_temperature
-    if temperature is not None and not knows_temperature:
+    depends_on_temperature = result.model.depends_on_temperature
+    if temperature is not None and not depends_on_temperature:
         raise ModelError(
             "the model has no effect of temperature",
             found=f"{temperature - CELSIUS:.4g} degC asked for",
@@ -171,8 +171,8 @@ def predict(
     drawn_sweeps = [
         sweep
         for sweep in measured
-        if not knows_temperature
-        or (tested := sweep.circumstances.temperature) is None
+        if not depends_on_temperature
+        or (tested := sweep.conditions.temperature) is None
         or abs(np.mean(tested) - (temperature or REFERENCE)) <= SAME_TEMPERATURE
     ]
     predictions = [
@@ -194,7 +194,7 @@ def predict(
     if arms:
         frequency = np.concatenate([prediction.frequency for prediction in predictions])
         band = float(frequency.min()), float(frequency.max())
-        maxwell = model_arms(result.model.without(Level.INSTRUMENT), band, arms, Circumstances(temperature))
+        maxwell = model_arms(result.model.without(Level.INSTRUMENT), band, arms, RubberConditions(temperature))
         if not maxwell:
             raise ModelError(
                 "the model has nothing that Maxwell arms could represent",
@@ -221,12 +221,12 @@ def grid_of(directions: Sequence[str] | None, *axes: Numbers | None) -> PredictS
 
 
 def _predictable_sweeps(result: Result, campaign: Campaign) -> list[MeasuredSweep]:
-    """Sweeps of a campaign that the model can predict, each with its circumstances (temperature, earlier strains)."""
+    """Sweeps of a campaign that the model can predict, with the temperature and earlier strains of their points."""
     tests: tuple[Loop | Sweep, ...] = (*campaign.loops, *campaign.sweeps)
-    circumstances = measured_session(result.model.bushing, tests)[len(campaign.loops) :]
+    conditions = measured_session(result.model.bushing, tests)[len(campaign.loops) :]
     return [
-        replace(sweep, under=under)
-        for sweep, under in zip(prepare_sweeps(campaign.sweeps), circumstances, strict=True)
+        replace(sweep, test_conditions=conditions)
+        for sweep, conditions in zip(prepare_sweeps(campaign.sweeps), conditions, strict=True)
         if result.model.bushing or isinstance(sweep.direction, Specimen)
     ]
 

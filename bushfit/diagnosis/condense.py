@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.effects.contract import Array, Circumstances
+from bushfit.effects.contract import Array, RubberConditions
 from bushfit.fitting.noise import LineKey, SweepNoise, sweep_noise
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, repeats_of, with_gain_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -28,13 +28,13 @@ class _Means(NamedTuple):
 
     Args:
         sweep: means over narrow bands, or the selected points.
-        under: circumstances of these points, such as temperature; they include the effect of rows that are left out.
+        conditions: temperature and earlier strains at these points, which include those of rows that are left out.
         shares: variance of a mean relative to the variance of a row, averaged over each line that was reduced to means.
         words: sentence on how the sweep was reduced.
     """
 
     sweep: Sweep
-    under: Circumstances
+    conditions: RubberConditions
     shares: Mapping[LineKey, float]
     words: str
 
@@ -71,7 +71,9 @@ def condensed(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, ...]
         noise, means = noises[id(data_set.noise)], means_by_sweep.get(data_set)
         if means:
             weight = np.full(means.sweep.frequency.size, data_set.sweep.weight)
-            sweeps.append(replace(data_set, sweep=means.sweep, noise=noise, weight=weight, under=means.under))
+            sweeps.append(
+                replace(data_set, sweep=means.sweep, noise=noise, weight=weight, test_conditions=means.conditions)
+            )
         else:
             sweeps.append(replace(data_set, noise=noise))
     messages += tuple(f"{means.sweep.name}: {means.words}" for means in means_by_sweep.values())
@@ -149,9 +151,8 @@ def _condensed_sweep(data_set: MeasuredSweep) -> _Means | None:
         counted = f"{rows.size} points are averaged to {means.frequency.size} narrow bands for the diagnosis"
         words = "; ".join(filter(None, (words, counted)))
     shares = {(sweep.name, line): float(np.mean(1.0 / groups.counts[means.held == line])) for line in long}
-    under = data_set.under
-    conditions = (under.temperature, under.turn, under.strained, under.left, under.rested)
-    return _Means(means, Circumstances(*map(groups.mean, conditions)), shares, words)
+    conditions = RubberConditions(*map(groups.mean, vars(data_set.test_conditions).values()))
+    return _Means(means, conditions, shares, words)
 
 
 @dataclass(frozen=True, eq=False)

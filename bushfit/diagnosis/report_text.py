@@ -337,7 +337,7 @@ class DiagnosisWriter:
     def _notes(self) -> list[str]:
         """Sentences on the effects and kinds of fault that these tests cannot show."""
         unseen = [proposal.name for proposal in self.search.root.proposals if not proposal.visible]
-        unseen = [name for name in unseen if not get_effect(name).under]  # not those that need a stated condition
+        unseen = [name for name in unseen if not get_effect(name).depends_on]  # not those that need a stated condition
         notes = [f"not identifiable from these tests: {', '.join(unseen)}"] if unseen else []
         directions = {str(test.direction) for test in self.request.base.data_sets}
         return [*notes, *([_ONE_DIRECTION] if self.first and self.first.unnamed and len(directions) == 1 else [])]

@@ -112,31 +112,31 @@ class Parameter:
 
 
 @dataclass(frozen=True, eq=False)
-class Circumstances:
-    """Temperature and history of a test; effects that depend on an unknown quantity (None) do nothing.
+class RubberConditions:
+    """Temperature and strain history of the rubber in a test; effects that depend on an unknown (None) do nothing.
 
     Args:
-        temperature: of the rubber [K], a number or one per operating point, (n,).
-        turn: time of the measurement as a share of the session, from 0 for the first point to 1 for the last, (n,).
-        strained: largest strain amplitude that the rubber had undergone before the measurement [1], (n,).
-        left: most recent earlier strain amplitude larger than that of the point [1], (n,); 0 if there was none.
-        rested: time since that larger amplitude, as a share of the session, (n,).
+        temperature: temperature of the rubber [K], a number or one per operating point, (n,).
+        session_time: time of the measurement, from 0 at the first to 1 at the last point of the session, (n,).
+        largest_strain: largest strain amplitude that the rubber had undergone before the measurement [1], (n,).
+        previous_strain: last earlier strain amplitude larger than that of the point [1], (n,); 0 without any.
+        rest_time: time since that larger amplitude, as a share of the session, (n,).
     """
 
     temperature: Array | float | None = None
-    turn: Array | float | None = None
-    strained: Array | float | None = None
-    left: Array | float | None = None
-    rested: Array | float | None = None
+    session_time: Array | float | None = None
+    largest_strain: Array | float | None = None
+    previous_strain: Array | float | None = None
+    rest_time: Array | float | None = None
 
-    def select(self, points: Any) -> Circumstances:
-        """Select the circumstances of some operating points by a numpy index; single numbers apply to all points."""
-        quantities = (self.temperature, self.turn, self.strained, self.left, self.rested)
-        return Circumstances(*(value[points] if isinstance(value, np.ndarray) else value for value in quantities))
+    def select(self, points: Any) -> RubberConditions:
+        """Return the conditions of some operating points, by their numpy index; single numbers apply to all points."""
+        quantities = vars(self).values()
+        return RubberConditions(*(value[points] if isinstance(value, np.ndarray) else value for value in quantities))
 
 
-#: Unknown circumstances, as in a prediction.
-UNKNOWN = Circumstances()
+#: Unknown conditions, as in a prediction.
+UNKNOWN = RubberConditions()
 
 
 @dataclass(frozen=True)
@@ -147,14 +147,14 @@ class Setting:
         bushing: geometry of the bushing; None if only specimens are tested.
         direction: direction of the motion, or the specimen under test.
         kind: "sweep" or "loop"; some effects belong to the rig of one kind only.
-        under: temperature and history of the rubber during the test.
+        conditions: temperature and history of the rubber during the test.
         unnamed: data of the smooth correction `unnamed`; None if the model does not include this effect.
     """
 
     bushing: Bushing | None
     direction: Place
     kind: Literal["sweep", "loop"]
-    under: Circumstances = UNKNOWN
+    conditions: RubberConditions = UNKNOWN
     unnamed: Unnamed | None = None
 
 
@@ -197,7 +197,7 @@ class Effect:
         twins: effects with the same equation in all tests, mostly of the rig. The effect of the bushing, which lists
             the twins, is proposed; the tests determine its size but cannot distinguish it from its twins.
         replaces: name of the paper's branch that the effect replaces; None if the effect is added.
-        under: names of the `Circumstances` that the effect depends on.
+        depends_on: names of the `RubberConditions` that the effect depends on.
         assumption: sentence on the value of these quantities in a prediction; empty for effects of the rig.
         in_place_of: function from the values of the replaced branch to start values for a fit, the most probable
             first; None if the effect replaces no branch.
@@ -220,7 +220,9 @@ class Effect:
     corrects: str | None = None
     twins: tuple[str, ...] = ()
     replaces: str | None = None
-    under: tuple[Literal["temperature", "turn", "strained", "left", "rested"], ...] = ()
+    depends_on: tuple[
+        Literal["temperature", "session_time", "largest_strain", "previous_strain", "rest_time"], ...
+    ] = ()
     assumption: str = ""
     harmonic_only: bool = False
     in_place_of: Callable[[Values], list[dict[str, float]]] | None = None
@@ -273,12 +275,12 @@ class Modifier(Effect):
 
     Args:
         adjust: (values, condition) -> the changed values only, by parameter name.
-        shift_factor: (values, circumstances) -> time-temperature shift factor a_T; None without a shift.
+        shift_factor: (values, test conditions) -> time-temperature shift factor a_T; None without a shift.
     """
 
     level: Level = Level.MATERIAL
     adjust: Callable[[Values, Condition], dict[str, Value]]
-    shift_factor: Callable[[Values, Circumstances], Value] | None = None
+    shift_factor: Callable[[Values, RubberConditions], Value] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,17 +16,17 @@ def _gain(p: Values, setting: Setting) -> Value:
 
     t is a share of the session, from 0 at the first point to 1 at the last.
 
-    >>> from bushfit.effects.contract import Circumstances
-    >>> halfway = Setting(None, "axial", "sweep", Circumstances(turn=0.5))
+    >>> from bushfit.effects.contract import RubberConditions
+    >>> halfway = Setting(None, "axial", "sweep", RubberConditions(session_time=0.5))
     >>> float(_gain({"gain": 0.02, "onset": 1e6}, halfway).round(6))
     1.01
     >>> float(_gain({"gain": 0.02, "onset": 0.01}, halfway).round(6))
     1.017039
     """
-    turn = setting.under.turn
-    if turn is None:
+    session_time = setting.conditions.session_time
+    if session_time is None:
         return 1.0
-    return 1.0 + p["gain"] * np.log1p(np.asarray(turn) / p["onset"]) / np.log1p(1.0 / p["onset"])
+    return 1.0 + p["gain"] * np.log1p(np.asarray(session_time) / p["onset"]) / np.log1p(1.0 / p["onset"])
 
 
 stiffness = force = partial(scaled_response, _gain)

@@ -20,15 +20,15 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
         Solution of lambda' = (lambda_inf(e0) - lambda)/tau for the intact share lambda of the network at the constant
         amplitude e0, after equilibrium at e_l.
 
-    >>> from bushfit.effects.contract import Circumstances
+    >>> from bushfit.effects.contract import RubberConditions
     >>> model = paper.with_effect("filler_recovery", {"filler_recovery.share": 0.2})
-    >>> model.values_at("axial", 25.0, 0.0, Circumstances(left=0.1, rested=0.0))["sigma_fmax"]
+    >>> model.values_at("axial", 25.0, 0.0, RubberConditions(previous_strain=0.1, rest_time=0.0))["sigma_fmax"]
     11680.0
     """
-    previous, rested = condition.setting.under.left, condition.setting.under.rested
-    if previous is None or rested is None:
+    previous, rest_time = condition.setting.conditions.previous_strain, condition.setting.conditions.rest_time
+    if previous is None or rest_time is None:
         return {}
     larger = np.maximum(condition.strain, previous)
     ratio = np.divide(condition.strain, larger, out=np.ones(np.shape(larger)), where=larger > 0.0)
-    broken = p["share"] * (1.0 - np.square(ratio)) * np.exp(-np.asarray(rested) / p["tau"])
+    broken = p["share"] * (1.0 - np.square(ratio)) * np.exp(-np.asarray(rest_time) / p["tau"])
     return scaled_values(p, ("sigma_fmax",), 1.0 - broken)

@@ -16,12 +16,12 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
     Returns:
         The changed values by name; empty if the history of the test is unknown.
 
-    >>> from bushfit.effects.contract import Circumstances
+    >>> from bushfit.effects.contract import RubberConditions
     >>> model = paper.with_effect("mullins_levels", {"mullins_levels.share": 0.2})
-    >>> round(model.values_at("axial", 25.0, 0.0, Circumstances(strained=0.1))["mu"])
+    >>> round(model.values_at("axial", 25.0, 0.0, RubberConditions(largest_strain=0.1))["mu"])
     906291
     """
-    before = condition.setting.under.strained
+    before = condition.setting.conditions.largest_strain
     if before is None:
         return {}
     largest = np.maximum(condition.strain, before)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Circumstances, Condition, Value, Values, scaled_values
+from bushfit.effects.contract import Array, Condition, RubberConditions, Value, Values, scaled_values
 from bushfit.units import CELSIUS
 
 #: Temperature at which all values are unchanged [K]: that of laboratories, ISO 23529, so that a model stands by itself.
@@ -22,7 +22,7 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
         mu times T/T0, and all other moduli and stresses times exp(-softening dT), with dT = T - T0 and T0 = 23 degC;
         empty if the temperature is unknown.
     """
-    temperature = condition.setting.under.temperature
+    temperature = condition.setting.conditions.temperature
     if temperature is None:
         return {}
     warmer, ratio = np.asarray(temperature) - REFERENCE, np.asarray(temperature) / REFERENCE
@@ -31,15 +31,15 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
     return {**spring, **scaled_values(p, softened, np.exp(-p["softening"] * warmer))}
 
 
-def shift_factor(p: Values, under: Circumstances) -> Value:
+def shift_factor(p: Values, conditions: RubberConditions) -> Value:
     """Time-temperature shift factor a_T; 1 if the temperature is unknown.
 
     Rubber at the temperature T and angular frequency w responds as at 23 degC and w a_T.
 
-    >>> shift_factor({"shift": 0.03}, Circumstances(temperature=np.array([286.15, 296.15, 306.15]))).round(3)
+    >>> shift_factor({"shift": 0.03}, RubberConditions(temperature=np.array([286.15, 296.15, 306.15]))).round(3)
     array([1.366, 1.   , 0.749])
     """
-    return 1.0 if under.temperature is None else np.exp(log_shift(p["shift"], np.asarray(under.temperature)))
+    return 1.0 if conditions.temperature is None else np.exp(log_shift(p["shift"], np.asarray(conditions.temperature)))
 
 
 def log_shift(shift: Value, temperature: Array) -> Array:

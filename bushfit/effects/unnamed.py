@@ -146,7 +146,7 @@ class Unnamed:
         if patch is None:
             zero = np.zeros(np.broadcast_shapes(np.shape(omega), strain.shape))
             return zero.astype(complex), np.full((2, *zero.shape), self.far_deviation), zero
-        temperature = REFERENCE if setting.under.temperature is None else setting.under.temperature
+        temperature = REFERENCE if setting.conditions.temperature is None else setting.conditions.temperature
         kelvin = np.asarray(temperature) if patch.temperature_K else None
         points = coordinates(omega / (2.0 * np.pi), strain, kelvin)
         inside = np.clip(points, patch.nodes.min(axis=0), patch.nodes.max(axis=0))

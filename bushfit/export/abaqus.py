@@ -86,7 +86,7 @@ def _materials(order: Order, units: UnitSystem) -> Iterator[str]:
     long_term = model.values[_LONG_TERM]
     for rank, table in enumerate(stiffness_tables(first), start=1):
         strain = 2.0 * table.amplitude * model.unit_strain(table.direction)
-        ratio = model.stiffness(_COMPOUND, table.frequency, strain, under=order.under) / long_term
+        ratio = model.stiffness(_COMPOUND, table.frequency, strain, conditions=order.conditions) / long_term
         about = f"shear strain amplitude {number(100.0 * strain, 6)} %, that of {describe_amplitudes((table,))}"
         yield from comment_lines("**", [f"COMPOUND_{rank}: {about}"])
         yield f"*MATERIAL, NAME=COMPOUND_{rank}"

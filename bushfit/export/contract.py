@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
-from bushfit.effects.contract import Circumstances
+from bushfit.effects.contract import RubberConditions
 from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import UnitError
 from bushfit.geometry import ROTATION, STRAINING, Display, Motion, Place, Unit
@@ -139,7 +139,7 @@ class Order:
             days = sorted({str(test.conditions["date"]) for test in campaign.tests if "date" in test.conditions})
             yield "campaign", f"{campaign.name}, {campaign.file}, sha256 {campaign.sha256}"
             yield "tests", f"{len(campaign.tests)}, {'made ' + ', '.join(days) if days else 'no date stated'}"
-        if model.knows_temperature:
+        if model.depends_on_temperature:
             celsius = number((self.temperature or REFERENCE) - CELSIUS, 3)
             yield "temperature", f"{celsius} degC, as if it were the same at all times and throughout"
         if measured:
@@ -156,9 +156,9 @@ class Order:
         yield from (("warning", line) for line in warnings)
 
     @property
-    def under(self) -> Circumstances:
-        """Circumstances of the exported response: the temperature of the rubber."""
-        return Circumstances(self.temperature)
+    def conditions(self) -> RubberConditions:
+        """Temperature of the rubber for which the response is exported."""
+        return RubberConditions(self.temperature)
 
     @property
     def places(self) -> tuple[Place, ...]:

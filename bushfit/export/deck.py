@@ -231,7 +231,7 @@ def table_losses(order: Order, form: Form) -> Iterator[str]:
             for table in tables:  # linear interpolation halfway between two frequencies
                 halfway = 0.5 * (table.frequency[1:] + table.frequency[:-1])
                 lines = (0.5 * (part[1:] + part[:-1]) for part in form.parts(table.frequency, table.stiffness))
-                exact = model.stiffness(place, halfway, table.amplitude, under=order.under)
+                exact = model.stiffness(place, halfway, table.amplitude, conditions=order.conditions)
                 worst = max(worst, float(np.max(np.abs(form.joined(halfway, *lines) / exact - 1.0))))
             yield f"{place}: between the frequencies |K| has errors up to {number(100.0 * worst, 2)} %"
         else:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bushfit.effects import Branch, Effect, Level, Modifier, place_suffix, qualified_name
-from bushfit.effects.contract import Circumstances
+from bushfit.effects.contract import RubberConditions
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError
 from bushfit.export.contract import Order
@@ -84,7 +84,7 @@ def time_model(order: Order) -> TimeModel:
     Raises:
         ModelError: an effect has no law in the time domain or none in the C sources, or no arms reach the accuracy.
     """
-    model, under = order.result.model.without(Level.INSTRUMENT), order.under
+    model, conditions = order.result.model.without(Level.INSTRUMENT), order.conditions
     omitted = [effect.name for effect in model.records if effect.name == UNNAMED or effect.settles]
     model = model.without(*omitted)
     for effect in model.records:
@@ -101,12 +101,12 @@ def time_model(order: Order) -> TimeModel:
     fitted = [order.result.measured.frequency] if order.result.measured else []
     frequencies = np.concatenate([*(prediction.frequency for prediction in order.predictions), *fitted])
     band = float(frequencies.min()) / 100.0, float(frequencies.max()) * 10.0
-    arms = model_arms(model, band, order.accuracy, under)
+    arms = model_arms(model, band, order.accuracy, conditions)
     values, names = _values(order, model, arms)
     losses = [f"the long memory of the rubber: {part.sentence}, fading below" for part in arms]
     for prediction in order.predictions:
-        losses += [*_steady_losses(model, omitted, prediction, under), *band_losses(prediction)]
-    sizes = values_under(model, under)
+        losses += [*_steady_losses(model, omitted, prediction, conditions), *band_losses(prediction)]
+    sizes = values_under(model, conditions)
     return TimeModel(
         order.places,
         values,
@@ -142,7 +142,7 @@ def _values(order: Order, model: Model, arms: tuple[Arms, ...]) -> tuple[tuple[F
     """
     places = order.places
     local_values = [
-        model.values_at(prediction.direction, *middle_point(prediction), order.under)
+        model.values_at(prediction.direction, *middle_point(prediction), order.conditions)
         for prediction in order.predictions
     ]
     fitted_sizes, sizes = {part.size for part in arms}, {qualified_size(branch) for branch in model.viscoelastic}
@@ -186,7 +186,7 @@ def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Ar
     return fields
 
 
-def _steady_losses(model: Model, omitted: list[str], prediction: Prediction, under: Circumstances) -> list[str]:
+def _steady_losses(model: Model, omitted: list[str], prediction: Prediction, conditions: RubberConditions) -> list[str]:
     """Write a sentence on the error of the steady stiffness due to constant modifiers and omitted effects; or none."""
     fixed = [effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.shift_factor]
     if not (fixed or omitted):
@@ -194,7 +194,7 @@ def _steady_losses(model: Model, omitted: list[str], prediction: Prediction, und
     place, (frequency, amplitude) = prediction.direction, middle_point(prediction)
     plain, values = model.without(*fixed), model.values_at(place, frequency, amplitude)
     written = plain.with_values({name: values[name] for name in plain.values})
-    stiffness = written.stiffness(place, prediction.frequency, prediction.amplitude, under=under)
+    stiffness = written.stiffness(place, prediction.frequency, prediction.amplitude, conditions=conditions)
     complete = prediction.storage_stiffness.value + 1j * prediction.loss_stiffness.value
     error = float(np.max(np.abs(stiffness / complete - 1.0)))
     if error < 1e-6 and not omitted:  # rounding

@@ -69,10 +69,10 @@ class FittedTests:
         """Frequency [Hz], equivalent strain and, if the model uses it, temperature [K] of the points, (p,) each."""
         model = self.solution.model
         axes = [*operating_conditions(model.bushing, self.data_sets)]
-        if model.knows_temperature:
+        if model.depends_on_temperature:
             kelvin = [
                 np.broadcast_to(
-                    REFERENCE if test.circumstances.temperature is None else test.circumstances.temperature,
+                    REFERENCE if test.conditions.temperature is None else test.conditions.temperature,
                     test.frequency.shape,
                 )
                 for test in self.data_sets

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Circumstances
+from bushfit.effects.contract import Array, RubberConditions
 from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -56,7 +56,7 @@ def master_curve(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[Shift
     model, curves = result.model, []
     for sweep in sweeps:
         if can_shift(sweep.sweep):
-            pace = np.broadcast_to(model.shift_factor(sweep.circumstances), sweep.frequency.shape)
+            pace = np.broadcast_to(model.shift_factor(sweep.conditions), sweep.frequency.shape)
             at_reference = model.stiffness(sweep.direction, sweep.frequency * pace, sweep.amplitude)
             reduced = sweep.measured * at_reference / sweep.stiffness(model)
             temperature = float(np.mean(sweep.temperature))
@@ -82,7 +82,7 @@ def law(result: Result, temperature: Array) -> tuple[Array, Array]:
     step = _APART * (error or np.nan)
 
     def shift(shift_value: float) -> Array:
-        return np.log(result.model.with_values({SHIFT: shift_value}).shift_factor(Circumstances(temperature)))
+        return np.log(result.model.with_values({SHIFT: shift_value}).shift_factor(RubberConditions(temperature)))
 
     slope = (shift(value + step) - shift(value - step)) / (2.0 * step) if error else np.full(temperature.shape, np.nan)
     return shift(value), np.abs(slope) * (error or np.nan)
@@ -94,10 +94,13 @@ def _further_shift(model: Model, sweep: MeasuredSweep) -> tuple[float, float]:
     Notes: Gauss-Newton with equal weights, because the residuals are mostly not noise; nan if the stiffness does not
     change with frequency.
     """
-    shift, place, under = 0.0, sweep.direction, sweep.circumstances
+    shift, place, conditions = 0.0, sweep.direction, sweep.conditions
 
     def over_measured(shift: float) -> Array:
-        return model.stiffness(place, sweep.frequency * np.exp(shift), sweep.amplitude, under=under) / sweep.measured
+        return (
+            model.stiffness(place, sweep.frequency * np.exp(shift), sweep.amplitude, conditions=conditions)
+            / sweep.measured
+        )
 
     for _ in range(_STEPS):
         slope = (over_measured(shift + _APART) - over_measured(shift - _APART)) / (2.0 * _APART)

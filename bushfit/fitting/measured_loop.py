@@ -7,7 +7,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
+from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Values
 from bushfit.fitting.common_error import CommonError, ErrorProducts
 from bushfit.fitting.drive import Drive
 from bushfit.fitting.loop_harmonics import SMOOTH_HARMONICS, smooth_waves
@@ -32,7 +32,7 @@ class MeasuredLoop(MeasuredBase):
 
     Args:
         drive: loop prepared as an input of the model.
-        under: temperature and other circumstances of the loop.
+        test_conditions: temperature of the rubber in the loop, and its strains before.
         fundamental_only: True to use only the first harmonic of the residuals, so that the loop is one operating point
             with two residuals: for an added stiffness that is known at the loop's frequency only.
         gain_error: standard deviation of the relative gain error of the whole record, by the class of its rig.
@@ -45,7 +45,7 @@ class MeasuredLoop(MeasuredBase):
     """
 
     drive: Drive
-    under: Circumstances = UNKNOWN
+    test_conditions: RubberConditions = UNKNOWN
     fundamental_only: bool = False
     gain_error: float = 0.0
     gain_weighs: bool = False
@@ -80,9 +80,9 @@ class MeasuredLoop(MeasuredBase):
         return np.array([self.drive.amplitude])
 
     @property
-    def circumstances(self) -> Circumstances:
-        """Circumstances of the operating points, such as temperature and earlier tests."""
-        return self.under
+    def conditions(self) -> RubberConditions:
+        """Temperature of the rubber at the operating points, and its strains before."""
+        return self.test_conditions
 
     @cached_property
     def measured(self) -> Array:
@@ -158,7 +158,7 @@ class MeasuredLoop(MeasuredBase):
         if last and last[0] is model and values is None:
             return last[2]
         history = self.drive.history(model.settles)
-        force = model.force(self.direction, history, kind="loop", values=values, under=self.under)
+        force = model.force(self.direction, history, kind="loop", values=values, conditions=self.test_conditions)
         force = self.drive.at_rows(force) + (self.drive.datum or 0.0)
         return force if values is not None else self._keep("force", model, (), force)
 
@@ -180,7 +180,7 @@ class MeasuredLoop(MeasuredBase):
     def _slopes(self, model: Model, names: Sequence[str]) -> Array:
         """Derivatives of the force at the rows by parameter value, (len(names), n); caches the force too."""
         history = self.drive.history(model.settles)
-        force, slopes = force_and_slopes(model, self.direction, history, names, self.under)
+        force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
         self._keep("force", model, (), self.drive.at_rows(force) + (self.drive.datum or 0.0))
         return self.drive.at_rows(slopes)
 
@@ -196,7 +196,7 @@ class MeasuredLoop(MeasuredBase):
         slopes = self.jacobian(model, names)
         if as_share:
             test = self.direction, self.frequency, self.amplitude
-            stiffness, of_stiffness = stiffness_and_slopes(model, *test, names, "loop", self.under)
+            stiffness, of_stiffness = stiffness_and_slopes(model, *test, names, "loop", self.test_conditions)
             slopes = slopes + self.residual_change(added / stiffness * of_stiffness, model)
         return slopes
 

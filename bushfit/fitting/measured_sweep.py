@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from bushfit.campaign.schema import Residuals
-from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
+from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Values
 from bushfit.fitting.common_error import ErrorProducts
 from bushfit.fitting.line_misfit import LineMisfit
 from bushfit.fitting.measured_test import MeasuredBase, shown_amplitude
@@ -44,7 +44,7 @@ class MeasuredSweep(MeasuredBase):
         residuals: definition of the residuals: "complex", or magnitude and loss factor.
         weight: weight of each point, 0 to 1, (n,) in `order`; None for full weight.
         part: indices of the rows of the sweep that are used, (n,) in `order`; None for all rows.
-        under: temperature and other circumstances of each row of the sweep, (rows,) each.
+        test_conditions: temperature of the rubber at each row of the sweep, and its strains before, (rows,) each.
         contradiction: sentence on a disagreement with an earlier test of the same points; None without one.
         model_error: standard deviation of the relative error of the model at an operating point, added to the noise in
             phase and in quadrature; repeats share the error.
@@ -55,7 +55,7 @@ class MeasuredSweep(MeasuredBase):
     residuals: Residuals = "complex"
     weight: Array | None = None
     part: Array | None = None
-    under: Circumstances = UNKNOWN
+    test_conditions: RubberConditions = UNKNOWN
     contradiction: str | None = None
     model_error: float = 0.0
     kind = "sweep"
@@ -159,8 +159,8 @@ class MeasuredSweep(MeasuredBase):
         return self.sweep.amplitude[self.order]
 
     @cached_property
-    def circumstances(self) -> Circumstances:
-        return self.under.select(self.order)
+    def conditions(self) -> RubberConditions:
+        return self.test_conditions.select(self.order)
 
     @cached_property
     def held(self) -> Array:
@@ -194,14 +194,14 @@ class MeasuredSweep(MeasuredBase):
         distinct, place = np.unique(points, return_inverse=True)
         return distinct.real, distinct.imag, place
 
-    def _operating_points(self, model: Model) -> tuple[Array, Array, Circumstances, Array | slice]:
-        """Frequency, reached amplitude and circumstances at which to evaluate a model, and the index of each point's.
+    def _operating_points(self, model: Model) -> tuple[Array, Array, RubberConditions, Array | slice]:
+        """Frequency, reached amplitude and test conditions at which to evaluate a model, and the index of each point's.
 
-        These are the distinct operating points, or all points if the model depends on circumstances (temperature).
+        These are the distinct operating points, or all points if the model depends on temperature or earlier strains.
         """
-        if model.knows_circumstances:
+        if model.depends_on_conditions:
             reached = self.sweep.amplitude_reached[self.order]
-            return self.frequency, reached, self.circumstances, slice(None)
+            return self.frequency, reached, self.conditions, slice(None)
         frequency, amplitude, place = self._distinct
         return frequency, amplitude, UNKNOWN, place
 
@@ -215,8 +215,10 @@ class MeasuredSweep(MeasuredBase):
         last = self._last.get("stiffness")
         if last and last[0] is model and values is None:
             return last[2]
-        frequency, amplitude, under, place = self._operating_points(model)
-        stiffness = model.stiffness(self.direction, frequency, amplitude, values=values, under=under)[..., place]
+        frequency, amplitude, conditions, place = self._operating_points(model)
+        stiffness = model.stiffness(self.direction, frequency, amplitude, values=values, conditions=conditions)[
+            ..., place
+        ]
         return stiffness if values is not None else self._keep("stiffness", model, (), stiffness)
 
     def residual(self, model: Model, values: Values | None = None) -> Array:
@@ -246,8 +248,10 @@ class MeasuredSweep(MeasuredBase):
 
     def _slopes(self, model: Model, names: Sequence[str]) -> Array:
         """Derivatives of the stiffness at the points by parameter value, (len(names), n); caches the stiffness too."""
-        frequency, amplitude, under, place = self._operating_points(model)
-        stiffness, slopes = stiffness_and_slopes(model, self.direction, frequency, amplitude, names, under=under)
+        frequency, amplitude, conditions, place = self._operating_points(model)
+        stiffness, slopes = stiffness_and_slopes(
+            model, self.direction, frequency, amplitude, names, conditions=conditions
+        )
         self._keep("stiffness", model, (), stiffness[place])
         return slopes[:, place]
 

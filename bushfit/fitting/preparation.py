@@ -184,7 +184,7 @@ def log_slopes(model: Model, data_set: MeasuredTest, names: Sequence[str]) -> Ar
         names: names of the parameters.
     """
     test = data_set.direction, data_set.frequency, data_set.amplitude
-    stiffness, slopes = stiffness_and_slopes(model, *test, names, data_set.kind, data_set.circumstances)
+    stiffness, slopes = stiffness_and_slopes(model, *test, names, data_set.kind, data_set.conditions)
     return slopes / stiffness
 
 

@@ -76,10 +76,12 @@ class PreparedCampaign:
         return data.in_session()
 
     def in_session(self) -> "PreparedCampaign":
-        """Add to each test the circumstances in which it was measured, such as the temperature and earlier tests."""
-        under = iter(measured_session(self.campaign.bushing, [data_set.test for data_set in self.data_sets]))
-        loops = tuple(replace(loop, under=next(under).select(0)) for loop in self.loops)
-        return replace(self, loops=loops, sweeps=tuple(replace(sweep, under=next(under)) for sweep in self.sweeps))
+        """Return the campaign with the temperature of the rubber and its earlier strains at each point of each test."""
+        conditions = iter(measured_session(self.campaign.bushing, [data_set.test for data_set in self.data_sets]))
+        loops = tuple(replace(loop, test_conditions=next(conditions).select(0)) for loop in self.loops)
+        return replace(
+            self, loops=loops, sweeps=tuple(replace(sweep, test_conditions=next(conditions)) for sweep in self.sweeps)
+        )
 
     @property
     def data_sets(self) -> list[MeasuredTest]:

@@ -12,7 +12,7 @@ from operator import itemgetter
 import numpy as np
 
 from bushfit.effects import Branch, Modifier, qualified_name
-from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Values
+from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Values
 from bushfit.errors import ModelError
 from bushfit.geometry import Specimen
 from bushfit.model.model import Model
@@ -53,7 +53,7 @@ class Arms:
         time: relaxation times tau_k [s], (k,).
         band: lowest and highest frequency [Hz] of the approximation.
         error: largest relative error of the complex modulus in the band.
-        under: temperature of the rubber; unknown for the reference temperature of the model.
+        conditions: temperature of the rubber; unknown for the reference temperature of the model.
 
     Notes: because all moduli and times are positive, the arms dissipate energy in any motion.
     """
@@ -64,7 +64,7 @@ class Arms:
     time: Array
     band: tuple[float, float]
     error: float
-    under: Circumstances = UNKNOWN
+    conditions: RubberConditions = UNKNOWN
 
     def complex_modulus(self, omega: Array) -> Array:
         """Complex shear modulus mu^ of the arms [Pa], (n,), at angular frequencies [rad/s], (n,)."""
@@ -131,7 +131,7 @@ def fitted_arms(
 
 
 def model_arms(
-    model: Model, band: tuple[float, float], accuracy: float = ACCURACY, under: Circumstances = UNKNOWN
+    model: Model, band: tuple[float, float], accuracy: float = ACCURACY, conditions: RubberConditions = UNKNOWN
 ) -> tuple[Arms, ...]:
     """Fit Maxwell arms to each linear viscoelastic part of a model, at the model's values, the springpot first.
 
@@ -142,7 +142,7 @@ def model_arms(
         model: model with its parameter values.
         band: lowest and highest frequency [Hz].
         accuracy: largest relative error of each modulus.
-        under: test conditions, such as the temperature.
+        conditions: temperature and strain history of the rubber in the test.
 
     Returns:
         Arms of each part.
@@ -152,12 +152,16 @@ def model_arms(
         parts.setdefault(qualified_size(branch), []).append(branch.name)
     found = (
         fitted_arms(
-            partial(part_modulus, model, size, under=under), band, accuracy, stands_for=" and ".join(names), size=size
+            partial(part_modulus, model, size, conditions=conditions),
+            band,
+            accuracy,
+            stands_for=" and ".join(names),
+            size=size,
         )
         for size, names in parts.items()
         if model.values[size]
     )
-    return tuple(replace(part, under=under) for part in found)
+    return tuple(replace(part, conditions=conditions) for part in found)
 
 
 def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float]]:
@@ -166,7 +170,7 @@ def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float
     >>> [row[0] for row in arm_rows(paper, model_arms(paper, (5.0, 155.0)))]
     ['elastic', 'springpot', 'springpot', 'springpot', 'springpot']
     """
-    values = values_under(model, arms[0].under) if arms else model.values
+    values = values_under(model, arms[0].conditions) if arms else model.values
     at_rest = [("elastic", values["mu"], np.nan)] if "mu" in values else []
     springs = ((part.stands_for, *pair) for part in arms for pair in zip(part.modulus, part.time, strict=True))
     return at_rest + [(name, float(modulus), float(time)) for name, modulus, time in springs]
@@ -179,31 +183,35 @@ def qualified_size(branch: Branch) -> str:
     return qualified_names.get(branch.size, branch.size)
 
 
-def part_modulus(model: Model, size: str, omega: Array, under: Circumstances = UNKNOWN) -> Array:
+def part_modulus(model: Model, size: str, omega: Array, conditions: RubberConditions = UNKNOWN) -> Array:
     """Complex modulus of the viscoelastic branches whose moduli are proportional to the same parameter.
 
     Args:
         model: model with its parameter values.
         size: name of this parameter in files and reports.
         omega: angular frequencies [rad/s], (n,).
-        under: test conditions, such as the temperature.
+        conditions: temperature and strain history of the rubber in the test.
 
     Returns:
         Complex modulus [Pa], (n,).
     """
-    still, values, reduced = np.zeros_like(omega), values_under(model, under), omega * model.shift_factor(under)
+    still, values, reduced = (
+        np.zeros_like(omega),
+        values_under(model, conditions),
+        omega * model.shift_factor(conditions),
+    )
     branches = (branch for branch in model.viscoelastic if qualified_size(branch) == size)
     return np.asarray(sum(branch.modulus(values_for_effect(branch, values), reduced, still) for branch in branches))
 
 
-def values_under(model: Model, under: Circumstances) -> Values:
+def values_under(model: Model, conditions: RubberConditions) -> Values:
     """Parameter values [SI] of a model at the temperature of a test; unchanged if the temperature is unknown."""
-    if under.temperature is None:
+    if conditions.temperature is None:
         return model.values
     other_modifiers = [
         effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.shift_factor
     ]
-    return model.without(*other_modifiers).values_at(Specimen("compound", "modulus"), 1.0, 0.0, under)
+    return model.without(*other_modifiers).values_at(Specimen("compound", "modulus"), 1.0, 0.0, conditions)
 
 
 def _basis(omega: Array, time: Array) -> Array:

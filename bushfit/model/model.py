@@ -11,7 +11,7 @@ import numpy as np
 
 from bushfit import geometry
 from bushfit.effects import BASE, Branch, Effect, Layer, Level, Parameter, Setting, get_effect, qualified_name, twins_of
-from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Value, Values
+from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Value, Values
 from bushfit.effects.history import History
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.effects.unnamed import Unnamed
@@ -90,9 +90,9 @@ class Model:
         return len(self.structure.branches) == len(self.records)
 
     @property
-    def knows_circumstances(self) -> bool:
+    def depends_on_conditions(self) -> bool:
         """True if the response depends on the temperature or the history of the rubber."""
-        return any(effect.under for effect in self.records)
+        return any(effect.depends_on for effect in self.records)
 
     @property
     def settles(self) -> bool:
@@ -100,9 +100,9 @@ class Model:
         return any(effect.settles for effect in self.records)
 
     @property
-    def knows_temperature(self) -> bool:
+    def depends_on_temperature(self) -> bool:
         """True if the response depends on the temperature of the rubber."""
-        return any("temperature" in effect.under for effect in self.records)
+        return any("temperature" in effect.depends_on for effect in self.records)
 
     @property
     def name(self) -> str:
@@ -232,7 +232,7 @@ class Model:
         *,
         kind: Kind = "sweep",
         values: Values | None = None,
-        under: Circumstances = UNKNOWN,
+        conditions: RubberConditions = UNKNOWN,
     ) -> Array:
         """Complex dynamic stiffness of the steady first harmonic [N/m or N m/rad].
 
@@ -243,7 +243,7 @@ class Model:
             kind: kind of test, "loop" or "sweep"; only effects of the instrument differ between them.
             values: parameter values [SI] in place of those of the model; arrays whose last axis has
                 length 1 add leading axes to the result.
-            under: temperature and history of the rubber in the test.
+            conditions: temperature and strain history of the rubber in the test.
 
         Returns:
             Complex stiffness, in the common shape of frequency and amplitude.
@@ -260,7 +260,7 @@ class Model:
         amplitude = np.asarray(amplitude, dtype=float)
         if omega.shape != amplitude.shape:
             omega, amplitude = np.broadcast_arrays(omega, amplitude)
-        points, setting = np.atleast_1d(omega), self.setting(direction, kind, under)
+        points, setting = np.atleast_1d(omega), self.setting(direction, kind, conditions)
         values = self.values if values is None else values
         amplitude = np.atleast_1d(amplitude)
         if layers := self.layers(setting):
@@ -281,7 +281,7 @@ class Model:
         *,
         kind: Kind = "sweep",
         values: Values | None = None,
-        under: Circumstances = UNKNOWN,
+        conditions: RubberConditions = UNKNOWN,
     ) -> Array:
         """Force over time for a displacement history, from rest or in a steady cycle.
 
@@ -290,7 +290,7 @@ class Model:
             displacement: history of displacement [m] or rotation [rad], (..., n).
             kind: kind of test, "loop" or "sweep"; only effects of the instrument differ between them.
             values: parameter values [SI] in place of those of the model.
-            under: test conditions, such as the temperature.
+            conditions: temperature and strain history of the rubber in the test.
 
         Returns:
             Force [N] or moment [N m], (..., n).
@@ -299,23 +299,23 @@ class Model:
         >>> round(float(paper.force("axial", motion).max()), 1)
         458.1
         """
-        setting = self.setting(direction, kind, under)
+        setting = self.setting(direction, kind, conditions)
         respond = stack_force(self, setting, self.values if values is None else values, self.layers(setting))
         return respond(displacement)
 
-    def setting(self, place: Place | str, kind: Kind = "sweep", under: Circumstances = UNKNOWN) -> Setting:
+    def setting(self, place: Place | str, kind: Kind = "sweep", conditions: RubberConditions = UNKNOWN) -> Setting:
         """Collect the properties of a test that its response depends on.
 
         Args:
             place: direction or specimen, or the name of a direction.
             kind: kind of test, "loop" or "sweep".
-            under: test conditions, such as the temperature.
+            conditions: temperature and strain history of the rubber in the test.
 
         Returns:
             Geometry, direction, kind and test conditions.
         """
         direction = Direction(place) if isinstance(place, str) else place
-        return Setting(self.bushing, direction, kind, under, self.unnamed)
+        return Setting(self.bushing, direction, kind, conditions, self.unnamed)
 
     def layers(self, setting: Setting) -> tuple[Layer, ...]:
         """Layers of the model that act in a test, from the rubber outward; a test of a modulus has no rig layers."""
@@ -325,7 +325,7 @@ class Model:
         return tuple(layer for layer in layers if layer.acts_at(place) and (layer.turns or not place.is_rotation))
 
     def values_at(
-        self, place: Place, frequency: float, amplitude: float, under: Circumstances = UNKNOWN
+        self, place: Place, frequency: float, amplitude: float, conditions: RubberConditions = UNKNOWN
     ) -> dict[str, float]:
         """Parameter values after all modifiers, at one operating condition.
 
@@ -333,7 +333,7 @@ class Model:
             place: direction or specimen.
             frequency: frequency [Hz].
             amplitude: zero-to-peak displacement [m] or rotation [rad].
-            under: test conditions, such as the temperature.
+            conditions: temperature and strain history of the rubber in the test.
 
         Returns:
             Parameter values [SI] by qualified name.
@@ -344,15 +344,20 @@ class Model:
         """
         omega, reached = 2.0 * np.pi * np.atleast_1d(frequency), np.atleast_1d(amplitude)
         found = adjusted_values(
-            self, self.setting(place, under=under), self.values, omega, reached, reached * self.unit_strain(place)
+            self,
+            self.setting(place, conditions=conditions),
+            self.values,
+            omega,
+            reached,
+            reached * self.unit_strain(place),
         )
         return {name: float(np.asarray(value).item()) for name, value in found.items()}
 
-    def shift_factor(self, under: Circumstances, values: Values | None = None) -> Value:
+    def shift_factor(self, conditions: RubberConditions, values: Values | None = None) -> Value:
         """Time-temperature shift factor a_T at the temperature of a test: ratio of reduced to actual frequency."""
         values = self.values if values is None else values
         shifts = ((modifier, modifier.shift_factor) for modifier in self.structure.modifiers)
-        return prod(shift(values_for_effect(modifier, values), under) for modifier, shift in shifts if shift)
+        return prod(shift(values_for_effect(modifier, values), conditions) for modifier, shift in shifts if shift)
 
 
 def _check(name: str, value: float, parameter: Parameter) -> None:

@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from bushfit.effects.contract import UNKNOWN, Array, Circumstances
+from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
 from bushfit.effects.history import History
 from bushfit.errors import ModelError
 from bushfit.geometry import Place
@@ -53,7 +53,7 @@ def record(
     steps_per_cycle: int = STEPS_PER_CYCLE,
     waveform: str = "sine",
     kind: Kind = "sweep",
-    under: Circumstances = UNKNOWN,
+    conditions: RubberConditions = UNKNOWN,
 ) -> Record:
     """Simulate a cyclic test from rest: impose `run_in + cycles` cycles and record the last `cycles`.
 
@@ -70,7 +70,7 @@ def record(
         steps_per_cycle: time steps per cycle; the error of the Gruenwald-Letnikov sum is inversely proportional.
         waveform: "sine" or "triangle".
         kind: "loop" or "sweep"; only effects of the instrument depend on it.
-        under: temperature and history of the rubber, one number each.
+        conditions: temperature and history of the rubber, one number each.
 
     Returns:
         Time from 0, displacement and force of the last `cycles`.
@@ -80,7 +80,9 @@ def record(
     motion = amplitude * wave(waveform, phase)
     if swell[0]:
         motion *= 1.0 + (swell[1] - 1.0) * np.sin(np.pi * np.minimum(phase / swell[0], 1.0)) ** 2
-    whole = imposed(model, direction, motion, 1.0 / (frequency * steps_per_cycle), frequency, kind=kind, under=under)
+    whole = imposed(
+        model, direction, motion, 1.0 / (frequency * steps_per_cycle), frequency, kind=kind, conditions=conditions
+    )
     recorded = slice(before * steps_per_cycle, None)
     return Record(
         whole.time[recorded] - whole.time[recorded][0],
@@ -97,7 +99,7 @@ def imposed(
     frequency: float,
     *,
     kind: Kind = "loop",
-    under: Circumstances = UNKNOWN,
+    conditions: RubberConditions = UNKNOWN,
 ) -> Record:
     """Simulate a test with an arbitrary motion from rest.
 
@@ -108,7 +110,7 @@ def imposed(
         step: time between samples [s].
         frequency: frequency of the cycles [Hz], for effects that depend on it.
         kind: "loop" or "sweep"; only effects of the instrument depend on it.
-        under: temperature and history of the rubber, one number each.
+        conditions: temperature and history of the rubber, one number each.
 
     Returns:
         Time, displacement and force at all n samples.
@@ -126,7 +128,7 @@ def imposed(
             hint="ask predict for the stiffness of the steady state",
         )
     history = History(motion, step, periodic=False, frequency=frequency)
-    force = model.force(direction, history, kind=kind, under=under)
+    force = model.force(direction, history, kind=kind, conditions=conditions)
     return Record(np.arange(motion.size) * step, motion, force)
 
 
@@ -145,7 +147,7 @@ def dynamic_stiffness(
     *,
     run_in: int = 10,
     steps_per_cycle: int = STEPS_PER_CYCLE,
-    under: Circumstances = UNKNOWN,
+    conditions: RubberConditions = UNKNOWN,
 ) -> Array:
     """Simulate a stepped-sine test, one cycle per operating point after a run-in, evaluated at the first harmonic.
 
@@ -156,7 +158,7 @@ def dynamic_stiffness(
         amplitude: zero-to-peak amplitude [m or rad], (n,).
         run_in: number of cycles before the measured cycle.
         steps_per_cycle: time steps per cycle.
-        under: temperature and history of the rubber, numbers or (n,).
+        conditions: temperature and history of the rubber, numbers or (n,).
 
     Returns:
         Complex dynamic stiffness [N/m or N m/rad], (n,).
@@ -167,4 +169,4 @@ def dynamic_stiffness(
     """
     measured = partial(record, model, direction, cycles=1, run_in=run_in, steps_per_cycle=steps_per_cycle)
     points = enumerate(zip(np.atleast_1d(frequency), np.atleast_1d(amplitude), strict=True))
-    return np.array([lock_in(measured(f, x, under=under.select(number)), f) for number, (f, x) in points])
+    return np.array([lock_in(measured(f, x, conditions=conditions.select(number)), f) for number, (f, x) in points])

@@ -12,7 +12,7 @@ from typing import cast
 import numpy as np
 
 from bushfit.effects import Branch, place_suffix, qualified_name
-from bushfit.effects.contract import UNKNOWN, Array, Circumstances, Value, Values
+from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Value, Values
 from bushfit.effects.history import History
 from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model
@@ -30,7 +30,7 @@ def stiffness_and_slopes(
     amplitude: Array,
     names: Sequence[str],
     kind: Kind = "sweep",
-    under: Circumstances = UNKNOWN,
+    conditions: RubberConditions = UNKNOWN,
 ) -> tuple[Array, Array]:
     """Complex dynamic stiffness of a model and its derivatives by parameters, for the Jacobian of a fit.
 
@@ -41,7 +41,7 @@ def stiffness_and_slopes(
         amplitude: zero-to-peak amplitude [m or rad], (n,).
         names: names of k parameters.
         kind: kind of test, "loop" or "sweep".
-        under: temperature and history of the rubber at the points.
+        conditions: temperature and history of the rubber at the points.
 
     Returns:
         Complex stiffness [N/m or N m/rad], (n,), and its derivatives per SI unit of each parameter, (k, n).
@@ -55,7 +55,9 @@ def stiffness_and_slopes(
             direction,
             model,
             names,
-            lambda values: model.stiffness(direction, frequency, amplitude, kind=kind, values=values, under=under),
+            lambda values: model.stiffness(
+                direction, frequency, amplitude, kind=kind, values=values, conditions=conditions
+            ),
         )
     test = 2.0 * np.pi * frequency, amplitude * model.unit_strain(direction)
     modulus, slopes = np.zeros(frequency.size), np.zeros((len(names), frequency.size), dtype=complex)
@@ -67,7 +69,7 @@ def stiffness_and_slopes(
 
 
 def force_and_slopes(
-    model: Model, direction: Place, displacement: History, names: Sequence[str], under: Circumstances = UNKNOWN
+    model: Model, direction: Place, displacement: History, names: Sequence[str], conditions: RubberConditions = UNKNOWN
 ) -> tuple[Array, Array]:
     """Force of a loop over time and its derivatives by parameters, for the Jacobian of a fit.
 
@@ -76,7 +78,7 @@ def force_and_slopes(
         direction: direction or specimen.
         displacement: displacement history [m or rad] of n samples.
         names: names of k parameters.
-        under: temperature and history of the rubber in the test.
+        conditions: temperature and history of the rubber in the test.
 
     Returns:
         Force [N or N m], (n,), and its derivatives per SI unit of each parameter, (k, n).
@@ -86,13 +88,13 @@ def force_and_slopes(
             direction,
             model,
             names,
-            lambda values: model.force(direction, displacement, kind="loop", values=values, under=under),
+            lambda values: model.force(direction, displacement, kind="loop", values=values, conditions=conditions),
         )
     per_displacement = model.unit_strain(direction)
     slopes, test = np.zeros((len(names), displacement.value.shape[-1])), (displacement.scaled(per_displacement),)
     for branch in model.structure.branches:
         _add_slopes(slopes, model, names, branch, branch.stress, branch.stress_sensitivities, test)
-    force = model.force(direction, displacement, kind="loop", under=under)
+    force = model.force(direction, displacement, kind="loop", conditions=conditions)
     return force, model.stiffness_per_modulus(direction) / (2.0 * per_displacement) * slopes
 
 

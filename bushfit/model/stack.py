@@ -25,7 +25,7 @@ def layered_stiffness(
 
     Args:
         model: the model.
-        setting: direction and circumstances of the test.
+        setting: direction, kind and conditions of the test.
         values: parameter values [SI] by qualified name.
         layers: layers to include, from the rubber outward.
         omega: angular frequencies [rad/s], (n,).
@@ -57,7 +57,7 @@ def layered_stiffness(
                 motion: displacement [m] or rotation [rad] over a cycle, (..., k, n).
                 points: numpy index of these k operating points in the test.
             """
-            cycles = replace(setting, under=setting.under.select(points).select((..., None)))
+            cycles = replace(setting, conditions=setting.conditions.select(points).select((..., None)))
             force = stack_force(model, cycles, per_sample, [layer for group in groups[:count] for layer in group])
             return force(History.steady(motion, cast(float, omega[..., None] / (2.0 * np.pi))))
 
@@ -76,7 +76,7 @@ def rubber_stiffness(model: Model, setting: Setting, values: Values, omega: Arra
 
     Args:
         model: the model.
-        setting: direction and circumstances of the test.
+        setting: direction, kind and conditions of the test.
         values: parameter values [SI] by qualified name.
         omega: angular frequencies [rad/s], (n,).
         amplitude: zero-to-peak displacements [m] or rotations [rad], (n,).
@@ -91,7 +91,7 @@ def stack_force(model: Model, setting: Setting, values: Values, layers: Sequence
 
     Args:
         model: the model.
-        setting: direction and circumstances of the test.
+        setting: direction, kind and conditions of the test.
         values: parameter values [SI] by qualified name.
         layers: layers to include, from the rubber outward.
 
@@ -116,7 +116,7 @@ def stack_force(model: Model, setting: Setting, values: Values, layers: Sequence
             omega = np.atleast_1d(displacement.omega)
             base = adjusted_values(model, setting, values, omega, displacement.amplitude, strain.amplitude)
             if any(modifier.shift_factor for modifier in structure.modifiers):
-                strain = strain.faster(model.shift_factor(setting.under, values))
+                strain = strain.faster(model.shift_factor(setting.conditions, values))
         together, stress = displacement.periodic and structure.viscoelastic, np.zeros(1)
         for branch in structure.others if together else structure.branches:
             stress = stress + branch.stress(values_for_effect(branch, base), strain)
@@ -148,7 +148,7 @@ def branch_stiffness(
 
     Args:
         model: the model.
-        setting: direction and circumstances of the test.
+        setting: direction, kind and conditions of the test.
         values: parameter values [SI] by qualified name, for the shift factor.
         omega: angular frequencies [rad/s], (n,).
         strain: strain amplitudes, (n,).
@@ -157,7 +157,7 @@ def branch_stiffness(
     Returns:
         Stiffness [N/m or N m/rad], (..., n).
     """
-    omega, modulus = omega * model.shift_factor(setting.under, values), np.zeros(1)
+    omega, modulus = omega * model.shift_factor(setting.conditions, values), np.zeros(1)
     for branch in model.structure.branches:
         modulus = modulus + branch.modulus(values_for_effect(branch, base), omega, strain)
     return model.stiffness_per_modulus(setting.direction) * modulus
@@ -170,7 +170,7 @@ def adjusted_values(
 
     Args:
         model: the model.
-        setting: direction and circumstances of the test.
+        setting: direction, kind and conditions of the test.
         values: parameter values [SI] by qualified name.
         omega: angular frequencies [rad/s], (n,).
         amplitude: zero-to-peak displacements [m] or rotations [rad], (n,).

@@ -18,7 +18,7 @@ import numpy as np
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.propose import missing_effects, sensitivity
 from bushfit.effects import Effect
-from bushfit.effects.contract import UNKNOWN, Array, Circumstances
+from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
 from bushfit.fitting.coordinates import Coordinates, jacobian
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.preparation import MeasuredTest, new_loop, new_sweep, split_by_kind
@@ -196,8 +196,8 @@ class CandidateGrid:
             for sweep, numbers in zip(place_sweeps, np.split(index.ravel(), ends), strict=True):
                 rows[sweep] = start + np.stack((numbers, len(points) + numbers))
             start += 2 * len(points)
-        under = Circumstances(strained=knowledge.strain) if knowledge.strain else UNKNOWN
-        strained = tuple(replace(data_set, under=under) for data_set in data_sets)
+        conditions = RubberConditions(largest_strain=knowledge.strain) if knowledge.strain else UNKNOWN
+        strained = tuple(replace(data_set, test_conditions=conditions) for data_set in data_sets)
         return cls(knowledge, tests, strained, tuple(rows[test] for test in tests))
 
     def information(self, knowledge: Knowledge, further: Array) -> ModelInformation:
@@ -245,7 +245,7 @@ class CandidateGrid:
         model, places = self.knowledge.model, dict.fromkeys(str(test.direction) for test in self.tests)
         effects, columns = list[Effect](), [np.empty((0, sum(data_set.size for data_set in self.data_sets)))]
         for effect in missing_effects(model, places):
-            if not (effect.replaces or effect.under):
+            if not (effect.replaces or effect.depends_on):
                 columns.append(sensitivity(model, self.data_sets, effect)[1])
                 effects += [effect] * len(columns[-1])
         return effects, np.concatenate(columns)

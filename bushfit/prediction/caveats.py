@@ -221,7 +221,7 @@ def point_warnings(
     yield from extrapolations(result, place, frequency, amplitude, temperature)
     conditions = set() if temperature is None else {"temperature"}
     effects = result.model.without(Level.INSTRUMENT).records
-    yield from (effect.assumption for effect in effects if effect.assumption and not conditions & {*effect.under})
+    yield from (effect.assumption for effect in effects if effect.assumption and not conditions & {*effect.depends_on})
     rig = rig_effects(result)
     if rig and measured is not None and not np.isnan(measured).all():
         percent = percent_off(stiffness / np.abs(measured))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from bushfit.effects import Level
-from bushfit.effects.contract import Array, Circumstances
+from bushfit.effects.contract import Array, RubberConditions
 from bushfit.errors import ModelError
 from bushfit.fitting.preparation import MeasuredSweep
 from bushfit.geometry import TRANSLATION, Place
@@ -206,13 +206,13 @@ def predict_with_model(
         Prediction without warnings. An unnamed correction or a model error adds an error of the real and one of the
         imaginary part; within the measured range these replace the errors of the parameters.
     """
-    under = Circumstances(temperature)
+    conditions = RubberConditions(temperature)
     names = [name for name in result.covariance.names if name in model.values]
     covariance = result.covariance.restricted(names)
-    stiffness, slopes = stiffness_and_slopes(model, direction, frequency, amplitude, names, under=under)
+    stiffness, slopes = stiffness_and_slopes(model, direction, frequency, amplitude, names, conditions=conditions)
     count, scale = len(names), np.ones(frequency.size)
     if correction := model.unnamed or result.model_error:
-        setting = model.setting(direction, under=under)
+        setting = model.setting(direction, conditions=conditions)
         share, error, weight = correction.evaluate(setting, 2.0 * np.pi * frequency, amplitude)
         scale = np.sqrt(1.0 - np.square(weight))
         relative_error = error / (1.0 + share) if model.unnamed else np.hypot(error, [share.real, share.imag])
@@ -321,16 +321,16 @@ def predict_resonance(
     if place.motion is not TRANSLATION:
         raise ModelError("this cannot carry a mass", found=str(place), expected="a direction or mount with a stiffness")
     bushings, *rig_models = car_models(result.model, result.unresolved)
-    under = Circumstances(temperature)
+    conditions = RubberConditions(temperature)
     if frequencies is None:
-        small = bushings.stiffness(place, 1.0, _SMALL_STRAIN / bushings.unit_strain(place), under=under)
+        small = bushings.stiffness(place, 1.0, _SMALL_STRAIN / bushings.unit_strain(place), conditions=conditions)
         resonance = float(np.sqrt(np.abs(small) / mass)) / (2.0 * np.pi)
         frequencies = resonance * np.geomspace(_DECADE[0], _DECADE[1], _RESONANCE_POINTS)
     frequency = np.asarray(frequencies, dtype=float)
     base = base_acceleration / (2.0 * np.pi * frequency) ** 2
 
     def shaken(model: Model) -> PredictedResonance:
-        stiffness_at = partial(model.stiffness, place, frequency, under=under)
+        stiffness_at = partial(model.stiffness, place, frequency, conditions=conditions)
         amplitude, ratio = response(stiffness_at, mass, frequency, base)
         stiffness = stiffness_at(amplitude)
         return PredictedResonance(place, mass, base_acceleration, frequency, amplitude, ratio, stiffness)

@@ -12,7 +12,7 @@ import numpy as np
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulatedTest, SimulateSettings
 from bushfit.campaign.session import planned_session
-from bushfit.effects.contract import Array, Circumstances
+from bushfit.effects.contract import Array, RubberConditions
 from bushfit.geometry import Specimen
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -87,7 +87,7 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
         the model depends on the order of the tests, the loops come first.
     """
     planned = [test for kind in (clean.loops, clean.sweeps, clean.resonances) for test, _ in kind]
-    under = planned_session(clean.truth.bushing, planned, plan.repeats)[len(clean.loops) :]
+    conditions = planned_session(clean.truth.bushing, planned, plan.repeats)[len(clean.loops) :]
     random, gains, loops = np.random.default_rng(plan.seed), dict[SimulatedLoop, float](), []
     for number, (loop, record) in enumerate(clean.loops, start=1):
         if loop not in gains:  # the gain error of each level, which its repeats share
@@ -97,7 +97,7 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
         noise = plan.force_noise * np.ptp(record.force) / 2.0 * _filtered_noise(rows, plan, random)
         name, force = f"loop_{loop.direction}_{number}", gains[loop] * record.force + noise
         loops.append(Loop(name, loop.direction, record.time, displacement, force, temperature=loop.temperature))
-    named = zip(_names("sweep", [test for test, _ in clean.sweeps]), clean.sweeps, under, strict=False)
+    named = zip(_names("sweep", [test for test, _ in clean.sweeps]), clean.sweeps, conditions, strict=False)
     sweeps = [_sweep(clean.truth, test, k, name, plan, random, conditions) for name, (test, k), conditions in named]
     shaken = [resonance for resonance in clean.resonances for _ in range(plan.repeats)]
     resonances = []
@@ -122,7 +122,7 @@ def _sweep(
     name: str,
     plan: SimulateSettings,
     random: Generator,
-    under: Circumstances,
+    conditions: RubberConditions,
 ) -> Sweep:
     """Add noise to all repeats of a sweep, whose exact complex stiffness is `clean`, (levels, steps).
 
@@ -141,9 +141,9 @@ def _sweep(
         of_frequency = of_frequency if test.stepped == "frequency" else of_frequency[:, None, None]
         ratios = np.exp(test.reached * np.sqrt(0.5) * (of_frequency + random.standard_normal(shape)))
         reached = level * ratios.ravel()
-    if test.reached or truth.knows_circumstances:
-        planned = frequency, level, stiffness.ravel(), Circumstances(test.temperature)
-        nearby = near(truth, test.direction, *planned, under)
+    if test.reached or truth.depends_on_conditions:
+        planned = frequency, level, stiffness.ravel(), RubberConditions(test.temperature)
+        nearby = near(truth, test.direction, *planned, conditions)
         stiffness = nearby(level if reached is None else reached).reshape(shape)
     if plan.level_gain_error or plan.level_phase_error:
         gain, phase = random.standard_normal((2, shape[0], 1, 1))

@@ -14,7 +14,7 @@ import numpy as np
 from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulateSettings
 from bushfit.campaign.session import planned_session
 from bushfit.effects import Level, Modifier, friction
-from bushfit.effects.contract import UNKNOWN, Array, Circumstances
+from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
 from bushfit.errors import CampaignError
 from bushfit.geometry import Direction, Place
 from bushfit.model import rig
@@ -86,22 +86,22 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
                 expected="a campaign with [[simulate.sweeps]] of a specimen; the paper's tests are those of a bushing",
             )
         loops, sweeps = PAPER_LOOPS, PAPER_SWEEPS
-    under = planned_session(truth.bushing, [*loops, *sweeps, *resonances], plan.repeats)
+    conditions = planned_session(truth.bushing, [*loops, *sweeps, *resonances], plan.repeats)
     return Undisturbed(
         truth,
         tuple(
-            (test, _clean_loop(truth, test, circumstances.select(0)))
-            for test, circumstances in track("loops simulated", list(zip(loops, under, strict=False)))
+            (test, _clean_loop(truth, test, conditions.select(0)))
+            for test, conditions in track("loops simulated", list(zip(loops, conditions, strict=False)))
         ),
         tuple((test, _clean_sweep(truth, test, steps_per_cycle)) for test in track("sweeps simulated", sweeps)),
         tuple((test, _clean_resonance(truth, test, steps_per_cycle)) for test in resonances),
     )
 
 
-def _clean_loop(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.Record:
+def _clean_loop(truth: Model, test: SimulatedLoop, conditions: RubberConditions) -> rig.Record:
     """Simulate the record of a steady loop, or of a programme from rest, without noise, 1000 rows per cycle."""
     if len(test.parts) > 1:
-        record = _clean_programme(truth, test, under)
+        record = _clean_programme(truth, test, conditions)
     else:
         ((frequency, amplitude),) = test.parts
         run_in, swell = _run_in(truth, test.direction, amplitude)
@@ -116,7 +116,7 @@ def _clean_loop(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.
             steps_per_cycle=_ROWS_PER_CYCLE * _STEPS_PER_ROW,
             waveform=test.waveform,
             kind="loop",
-            under=under,
+            conditions=conditions,
         )
     rows = slice(None, None, _STEPS_PER_ROW)
     return rig.Record(record.time[rows], record.displacement[rows], record.force[rows])
@@ -140,8 +140,8 @@ def _run_in(truth: Model, place: Place, amplitude: float) -> tuple[int, tuple[in
     return int(np.clip(np.ceil(cycles), _LEAST_RUN_IN, _MOST_RUN_IN)), (0, 1.0)
 
 
-def _clean_programme(truth: Model, test: SimulatedLoop, under: Circumstances) -> rig.Record:
-    """Simulate the record of a loop programme from rest without noise, in the circumstances of its start."""
+def _clean_programme(truth: Model, test: SimulatedLoop, conditions: RubberConditions) -> rig.Record:
+    """Simulate the record of a loop programme from rest without noise, under the conditions at its start."""
     fastest = max(frequency for frequency, _ in test.parts)
     step = 1.0 / (fastest * _ROWS_PER_CYCLE * _STEPS_PER_ROW)
     duration = sum(test.cycles / frequency + test.pause for frequency, _ in test.parts)
@@ -159,14 +159,16 @@ def _clean_programme(truth: Model, test: SimulatedLoop, under: Circumstances) ->
         phase = np.arange(round(test.cycles / (frequency * step))) * (frequency * step)
         motions += [amplitude * rig.wave(test.waveform, phase), rest]
     motion = np.concatenate([*motions[:-1], [0.0]])
-    return rig.imposed(truth, test.direction, motion, step, test.parts[0][0], under=under)
+    return rig.imposed(truth, test.direction, motion, step, test.parts[0][0], conditions=conditions)
 
 
 def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Array:
     """Simulate the complex stiffness of a sweep without noise [N/m or N m/rad], (levels, steps)."""
     points = (values.ravel() for values in test.points)
-    under = Circumstances(test.temperature)
-    stiffness = rig.dynamic_stiffness(truth, test.direction, *points, steps_per_cycle=steps_per_cycle, under=under)
+    conditions = RubberConditions(test.temperature)
+    stiffness = rig.dynamic_stiffness(
+        truth, test.direction, *points, steps_per_cycle=steps_per_cycle, conditions=conditions
+    )
     return stiffness.reshape(len(test.levels), -1)
 
 
@@ -194,10 +196,10 @@ def near(
     frequency: Array,
     amplitude: Array,
     stiffness: Array,
-    under: Circumstances = UNKNOWN,
-    target: Circumstances = UNKNOWN,
+    conditions: RubberConditions = UNKNOWN,
+    target: RubberConditions = UNKNOWN,
 ) -> Callable[[Array], Array]:
-    """Extrapolate a stiffness computed by the virtual rig to nearby amplitudes and other circumstances.
+    """Extrapolate a stiffness computed by the virtual rig to nearby amplitudes and other test conditions.
 
     Args:
         truth: true model.
@@ -205,8 +207,8 @@ def near(
         frequency: frequency of each point [Hz], (n,).
         amplitude: zero-to-peak amplitude at which the stiffness is known [m, rad or 1], (n,).
         stiffness: known complex stiffness [N/m or N m/rad], (n,).
-        under: circumstances (temperature and history) of the known stiffness.
-        target: circumstances of the result.
+        conditions: temperature and strain history of the rubber for the known stiffness.
+        target: temperature and strain history for the result.
 
     Returns:
         Function of the amplitude, (n,), that returns the complex stiffness, (n,).
@@ -215,5 +217,5 @@ def near(
         The ratio of the rig's stiffness to the closed form, within 0.1 % of 1, is constant. The error is below 1e-5 at
         an amplitude 2 % away, and below 4e-5 at 10 %.
     """
-    ratio = stiffness / truth.stiffness(place, frequency, amplitude, under=under)
-    return lambda reached: ratio * truth.stiffness(place, frequency, reached, under=target)
+    ratio = stiffness / truth.stiffness(place, frequency, amplitude, conditions=conditions)
+    return lambda reached: ratio * truth.stiffness(place, frequency, reached, conditions=target)

@@ -128,24 +128,24 @@ def test_turns_strains_and_rests_of_a_session() -> None:
     first, second = session(RUBBER, [loop, sweep])
     assert first.temperature == 300.0
     assert second.temperature is None
-    np.testing.assert_allclose(first.turn, [0.0])
-    np.testing.assert_allclose(second.turn, [1 / 3, 2 / 3, 1.0])
-    np.testing.assert_allclose(first.strained, [0.0])
-    np.testing.assert_allclose(second.strained, 3 * [1e-3 * unit_strain(RUBBER, Direction.AXIAL)])
+    np.testing.assert_allclose(first.session_time, [0.0])
+    np.testing.assert_allclose(second.session_time, [1 / 3, 2 / 3, 1.0])
+    np.testing.assert_allclose(first.largest_strain, [0.0])
+    np.testing.assert_allclose(second.largest_strain, 3 * [1e-3 * unit_strain(RUBBER, Direction.AXIAL)])
     up_and_down = np.array([1.0, 2.0, 4.0, 4.1, 2.0, 2.1, 1.0, 2.0]) * 1e-4
     (found,) = session(RUBBER, [SessionTest(Direction.AXIAL, up_and_down)])
     strain = up_and_down * unit_strain(RUBBER, Direction.AXIAL)
-    np.testing.assert_allclose(found.left, [0.0, 0.0, 0.0, 0.0, strain[3], strain[3], strain[5], strain[3]])
-    np.testing.assert_allclose(7.0 * found.rested[4:], [1.0, 2.0, 1.0, 4.0])
+    np.testing.assert_allclose(found.previous_strain, [0.0, 0.0, 0.0, 0.0, strain[3], strain[3], strain[5], strain[3]])
+    np.testing.assert_allclose(7.0 * found.rest_time[4:], [1.0, 2.0, 1.0, 4.0])
     coupon, mount = (
         SessionTest(COUPON, np.array([0.5, 0.1])),
         SessionTest(Direction.RADIAL, np.array([1e-4, 1e-4, 1e-4])),
     )
     of_coupon, of_mount = session(RUBBER, [coupon, mount])
-    np.testing.assert_allclose(of_coupon.turn, [0.0, 1.0])
-    np.testing.assert_allclose(of_mount.turn, [0.0, 0.5, 1.0])
-    np.testing.assert_allclose(of_coupon.strained, [0.0, 0.5 * unit_strain(None, COUPON)])
-    assert of_mount.strained[2] < 0.1
+    np.testing.assert_allclose(of_coupon.session_time, [0.0, 1.0])
+    np.testing.assert_allclose(of_mount.session_time, [0.0, 0.5, 1.0])
+    np.testing.assert_allclose(of_coupon.largest_strain, [0.0, 0.5 * unit_strain(None, COUPON)])
+    assert of_mount.largest_strain[2] < 0.1
 
 
 def write(folder: Path, order: tuple[str, str]) -> Path:
@@ -165,9 +165,9 @@ def write(folder: Path, order: tuple[str, str]) -> Path:
 @pytest.mark.parametrize(("order", "first"), [(("", ""), "cold"), (("order = 2", "order = 1"), "warm")])
 def test_a_campaign_gives_temperatures_and_order(tmp_path: Path, order: tuple[str, str], first: str) -> None:
     data = PreparedCampaign.from_campaign(load_campaign(write(tmp_path, order)))
-    under = {sweep.name: sweep.circumstances for sweep in data.sweeps}
-    assert under["cold"].temperature == pytest.approx(293.15)
-    np.testing.assert_allclose(under["warm"].temperature, [303.15, 304.15, 305.15])
-    assert under[first].turn[0] == 0.0
-    part = data.sweeps[1].select(data.sweeps[1].amplitude == 1e-4).circumstances
-    np.testing.assert_array_equal(part.turn, under["warm"].turn)
+    conditions = {sweep.name: sweep.conditions for sweep in data.sweeps}
+    assert conditions["cold"].temperature == pytest.approx(293.15)
+    np.testing.assert_allclose(conditions["warm"].temperature, [303.15, 304.15, 305.15])
+    assert conditions[first].session_time[0] == 0.0
+    part = data.sweeps[1].select(data.sweeps[1].amplitude == 1e-4).conditions
+    np.testing.assert_array_equal(part.session_time, conditions["warm"].session_time)

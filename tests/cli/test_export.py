@@ -21,7 +21,7 @@ from shell import BUSHING, CAMPAIGN, Run, document, names, refused, typing
 from tries import some
 
 from bushfit.cli import cli
-from bushfit.effects.contract import Circumstances
+from bushfit.effects.contract import RubberConditions
 from bushfit.model.file import load_result
 from bushfit.units import CELSIUS
 
@@ -324,8 +324,8 @@ def test_a_deck_is_of_the_temperature_asked_for(bushfit: Run, root: Path, tmp_pa
     (tmp_path / "m.json").write_text(json.dumps(model))
     grid = ("--direction", "axial", "--frequencies", "10, 50 Hz", "--amplitudes", "0.2 mm", "--temperature", "60 degC")
     bushfit("export", tmp_path / "m.json", "--format", "nastran", "--format", "csv", *grid, "-o", tmp_path / "x")
-    table, warm = pd.read_csv(tmp_path / "x/axial.csv"), Circumstances(60.0 + CELSIUS)
-    exact = load_result(tmp_path / "m.json").model.stiffness("axial", table["frequency [Hz]"], 2e-4, under=warm)
+    table, warm = pd.read_csv(tmp_path / "x/axial.csv"), RubberConditions(60.0 + CELSIUS)
+    exact = load_result(tmp_path / "m.json").model.stiffness("axial", table["frequency [Hz]"], 2e-4, conditions=warm)
     assert table["storage stiffness [N/mm]"].to_numpy() == pytest.approx(exact.real / 1e3, rel=1e-6)
     deck = (tmp_path / "x/bushing.bdf").read_text()
     assert "$ temperature: 60 degC" in deck

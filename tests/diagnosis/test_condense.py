@@ -105,7 +105,9 @@ def test_of_very_many_levels_some_are_diagnosed_and_none_forgotten() -> None:
     before, after = data.sweeps[0], banded.sweeps[0]
     for point in range(0, 160, 7):
         same = (before.sweep.amplitude == sweep.amplitude[point]) & (before.sweep.frequency == sweep.frequency[point])
-        assert astuple(after.under.select(point)) == astuple(before.under.select(int(np.flatnonzero(same)[0])))
+        assert astuple(after.test_conditions.select(point)) == astuple(
+            before.test_conditions.select(int(np.flatnonzero(same)[0]))
+        )
 
 
 UP = np.geomspace(5.0, 60.0, 450)

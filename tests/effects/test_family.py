@@ -24,7 +24,7 @@ from bushfit.effects import (
     qualified_name,
     twins_of,
 )
-from bushfit.effects.contract import Circumstances
+from bushfit.effects.contract import RubberConditions
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
@@ -71,9 +71,9 @@ def steady_sine(amplitude: float, frequency: float, samples: int = SAMPLES) -> H
 
 def harmonic_gap(model: Model, direction: Direction, frequency: float, amplitude: float) -> float:
     """First harmonic of the steady time face against the frequency face, relative."""
-    force = model.force(direction, steady_sine(amplitude, frequency), under=UNDER)
+    force = model.force(direction, steady_sine(amplitude, frequency), conditions=UNDER)
     timed = 2.0 * np.fft.rfft(force)[..., 1] / (SAMPLES * amplitude)
-    return float(np.ravel(np.abs(timed / model.stiffness(direction, frequency, amplitude, under=UNDER) - 1.0))[0])
+    return float(np.ravel(np.abs(timed / model.stiffness(direction, frequency, amplitude, conditions=UNDER) - 1.0))[0])
 
 
 def harmonic_error(model: Model) -> float:
@@ -109,10 +109,10 @@ def test_neutral_value_gives_the_plain_model_back(effect: Effect, rng: np.random
     ]
     for direction, kind in itertools.product(Direction, ("sweep", "loop")):
         expected = plain.stiffness(direction, frequency, amplitude, kind=kind)
-        assert np.array_equal(neutral.stiffness(direction, frequency, amplitude, kind=kind, under=UNDER), expected)
+        assert np.array_equal(neutral.stiffness(direction, frequency, amplitude, kind=kind, conditions=UNDER), expected)
         for history in histories:
             expected = plain.force(direction, history, kind=kind)
-            assert np.array_equal(neutral.force(direction, history, kind=kind, under=UNDER), expected)
+            assert np.array_equal(neutral.force(direction, history, kind=kind, conditions=UNDER), expected)
 
 
 def test_first_harmonic_of_the_time_face_is_the_frequency_face(effect: Effect, rng: np.random.Generator) -> None:
@@ -130,8 +130,10 @@ def test_the_rig_from_rest_finds_the_frequency_face(name: str, rng: np.random.Ge
     model = sized(plain, name, direction, amplitude, rng)
     errors = []
     for each in (plain, model):
-        measured = record(each, direction, frequency, amplitude, cycles=1, run_in=12, steps_per_cycle=2048, under=UNDER)
-        closed = np.ravel(each.stiffness(direction, frequency, amplitude, under=UNDER))[0]
+        measured = record(
+            each, direction, frequency, amplitude, cycles=1, run_in=12, steps_per_cycle=2048, conditions=UNDER
+        )
+        closed = np.ravel(each.stiffness(direction, frequency, amplitude, conditions=UNDER))[0]
         errors.append(lock_in(measured, frequency) / closed - 1.0)
     print(f"{name}: from rest {abs(errors[1]):.1e}, without it {abs(errors[0]):.1e}")
     assert abs(errors[1] - errors[0]) <= LIBRARY[name].harmonic_error + 3e-4
@@ -199,14 +201,14 @@ def test_sensitivities_match_finite_differences(effect: Effect, rng: np.random.G
     frequency = np.array([5.0, 60.0, 155.0])
     amplitudes = amplitude * np.array([0.91, 1.07, 2.1])
     loop, swept_at = steady_sine(amplitude, 0.1, 512), (direction, frequency, amplitudes)
-    _, swept = stiffness_and_slopes(model, direction, frequency, amplitudes, names, kind="loop", under=UNDER)
+    _, swept = stiffness_and_slopes(model, direction, frequency, amplitudes, names, kind="loop", conditions=UNDER)
     _, looped = force_and_slopes(model, direction, loop, names, UNDER)
     worst = 0.0
     for i, key in enumerate(names):
         size = scale(model.parameters[key], model.values[key])
-        stiffness = five_point(model, key, lambda m: m.stiffness(*swept_at, kind="loop", under=UNDER))
+        stiffness = five_point(model, key, lambda m: m.stiffness(*swept_at, kind="loop", conditions=UNDER))
         force, wider = (
-            five_point(model, key, lambda m: m.force(direction, loop, kind="loop", under=UNDER), step)
+            five_point(model, key, lambda m: m.force(direction, loop, kind="loop", conditions=UNDER), step)
             for step in (2e-3, 3e-3)
         )
         largest = np.max(np.abs(model.force(direction, loop)))
@@ -255,7 +257,7 @@ def test_any_two_compose(effect: Effect, rng: np.random.Generator) -> None:
         both = sized(model, other, direction, amplitude, rng)
         turned = plain.with_effect(other).with_effect(effect.name).with_values(both.values)
         at = (direction, frequency, amplitude)
-        assert np.array_equal(both.stiffness(*at, under=UNDER), turned.stiffness(*at, under=UNDER))
+        assert np.array_equal(both.stiffness(*at, conditions=UNDER), turned.stiffness(*at, conditions=UNDER))
         assert both.records == turned.records
         gap = harmonic_gap(both, *at)
         assert gap <= 2.0 * harmonic_error(both) + 1e-6, (other, gap)
@@ -288,13 +290,13 @@ def test_a_stack_of_values_equals_one_after_the_other(
     ]
     frequency, amplitudes = np.array([0.1, 40.0, 155.0, 155.0]), amplitude * np.array([1.0, 0.5, 1.5, 0.0])
     turns = np.linspace(0.0, 1.0, 4)
-    each_point = Circumstances(295.0 + turns, turns, 0.1 * turns, 0.1 * turns, 0.1 - 0.1 * turns)
-    both = model.stiffness(direction, frequency, amplitudes, kind="loop", values=stacked(models), under=each_point)
+    each_point = RubberConditions(295.0 + turns, turns, 0.1 * turns, 0.1 * turns, 0.1 - 0.1 * turns)
+    both = model.stiffness(direction, frequency, amplitudes, kind="loop", values=stacked(models), conditions=each_point)
     assert both.shape == (3, 4)
     for row, each in zip(both, models, strict=True):
         for i, one in enumerate(row):
-            under = each_point.select(i)
-            alone = each.stiffness(direction, frequency[i], amplitudes[i], kind="loop", under=under)
+            conditions = each_point.select(i)
+            alone = each.stiffness(direction, frequency[i], amplitudes[i], kind="loop", conditions=conditions)
             np.testing.assert_allclose(one, alone, rtol=1e-12)
     phase = np.arange(600) / 200
     motion = amplitude * np.sin(2.0 * np.pi * phase)
@@ -302,8 +304,8 @@ def test_a_stack_of_values_equals_one_after_the_other(
         History.steady(motion, 5.0, cycles=3),
         History(motion, 1e-3, periodic=False, frequency=5.0),
     ):
-        answer = model.force(direction, history, kind="loop", values=stacked(models), under=UNDER)
+        answer = model.force(direction, history, kind="loop", values=stacked(models), conditions=UNDER)
         both = np.broadcast_to(answer, (3, 600))
         for row, each in zip(both, models, strict=True):
-            expected = each.force(direction, history, kind="loop", under=UNDER)
+            expected = each.force(direction, history, kind="loop", conditions=UNDER)
             np.testing.assert_allclose(row, expected, rtol=1e-10, atol=1e-10 * np.ptp(expected))

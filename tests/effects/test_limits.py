@@ -10,7 +10,7 @@ import pytest
 import scipy.stats
 
 from bushfit.effects import BASE, LIBRARY, Effect, History, distributed_sliders, qualified_name, sliders
-from bushfit.effects.contract import Circumstances
+from bushfit.effects.contract import RubberConditions
 from bushfit.effects.dead_zone import first_harmonic
 from bushfit.effects.temperature import log_shift
 from bushfit.geometry import Bushing, Direction
@@ -112,7 +112,9 @@ def test_what_corrects_a_formula_scales_that_direction_and_no_other(effect: Effe
 def test_warm_rubber_is_softer_and_faster(shift: float) -> None:
     """At 33 degC with 0.3 % a kelvin: moduli times exp(-0.03), the spring's times 306.15/296.15, the springpot's also
     times a_T^alpha; and so is the second one, with its own order."""
-    warm_test = Circumstances(33.0 + CELSIUS, turn=0.5, strained=0.1, left=0.1, rested=0.02)
+    warm_test = RubberConditions(
+        33.0 + CELSIUS, session_time=0.5, largest_strain=0.1, previous_strain=0.1, rest_time=0.02
+    )
     c2 = min(np.sqrt(2072.1 / shift), 296.15)
     a_t = np.exp(-shift * 10.0 * c2 / (c2 + 10.0))
     plain = added("second_springpot", m=3e3, alpha=0.7)
@@ -120,8 +122,10 @@ def test_warm_rubber_is_softer_and_faster(shift: float) -> None:
     by_hand = {"mu": 306.15 / 296.15, **{name: np.exp(-0.03) * factor for name, factor in faster.items()}}
     expected = plain.with_values({name: factor * plain.values[name] for name, factor in by_hand.items()})
     warm = added("temperature", plain, softening=3e-3, shift=shift)
-    np.testing.assert_allclose(warm.stiffness(*AXIAL, under=warm_test), expected.stiffness(*AXIAL), rtol=1e-5)
-    np.testing.assert_allclose(warm.force("axial", LOOP, under=warm_test), expected.force("axial", LOOP), rtol=1e-5)
+    np.testing.assert_allclose(warm.stiffness(*AXIAL, conditions=warm_test), expected.stiffness(*AXIAL), rtol=1e-5)
+    np.testing.assert_allclose(
+        warm.force("axial", LOOP, conditions=warm_test), expected.force("axial", LOOP), rtol=1e-5
+    )
     same(warm, plain, 0.0)
 
 
@@ -142,8 +146,8 @@ def test_the_shift_factor_is_that_of_williams_landel_and_ferry() -> None:
 
 def test_mullins_softens_below_the_largest_strain_so_far_and_not_there() -> None:
     softened = added("mullins_levels", share=0.2)
-    strained = np.full(3, AMPLITUDE[1] * PLAIN.unit_strain(Direction.AXIAL))
-    ratio = softened.stiffness(*AXIAL, under=Circumstances(strained=strained)) / PLAIN.stiffness(*AXIAL)
+    strain = np.full(3, AMPLITUDE[1] * PLAIN.unit_strain(Direction.AXIAL))
+    ratio = softened.stiffness(*AXIAL, conditions=RubberConditions(largest_strain=strain)) / PLAIN.stiffness(*AXIAL)
     np.testing.assert_allclose(ratio, [1.0 - 0.2 * math.erf(0.75), 1.0, 1.0], rtol=1e-12)
     same(softened, PLAIN, 0.0)
 
@@ -151,10 +155,12 @@ def test_mullins_softens_below_the_largest_strain_so_far_and_not_there() -> None
 def test_friction_recovers_after_a_larger_strain() -> None:
     """Left at twice the strain, three quarters of the share are lost at first, 1/e of that a time constant later."""
     broken = added("filler_recovery", share=0.4, tau=0.1)
-    left = 2.0 * AMPLITUDE * PLAIN.unit_strain(Direction.AXIAL)
+    previous_strain = 2.0 * AMPLITUDE * PLAIN.unit_strain(Direction.AXIAL)
     for rested, lost in ((0.0, 0.3), (0.1, 0.3 / math.e), (100.0, 0.0)):
         weak = PLAIN.with_values({"sigma_fmax": (1.0 - lost) * PLAIN.values["sigma_fmax"]})
-        stiffness = broken.stiffness(*AXIAL, under=Circumstances(left=left, rested=rested))
+        stiffness = broken.stiffness(
+            *AXIAL, conditions=RubberConditions(previous_strain=previous_strain, rest_time=rested)
+        )
         np.testing.assert_allclose(stiffness, weak.stiffness(*AXIAL), rtol=1e-12)
     same(broken, PLAIN, 0.0)
 

@@ -11,7 +11,7 @@ from fmpy.validation import validate_fmu
 from fmus import LEVELS, Running, off, order_of, wandering, written
 
 from bushfit.effects import LIBRARY, Branch, Layer, Level, get_parameter, qualified_name
-from bushfit.effects.contract import Array, Circumstances
+from bushfit.effects.contract import Array, RubberConditions
 from bushfit.export.in_time import FIELDS
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
@@ -124,7 +124,7 @@ def test_an_fmu_is_of_the_temperature_asked_for(paper_model: Model, tmp_path: Pa
     motion[:, 0] = amplitude * np.sin(2.0 * np.pi * phase)
     force = running.run(motion, 1.0 / (64 * frequency))[-64:, 0]
     found = 2.0 * np.mean(force * np.exp(-2j * np.pi * phase[-64:])) / (-1j * amplitude)
-    warm = model.stiffness("axial", frequency, amplitude, under=Circumstances(at))
+    warm = model.stiffness("axial", frequency, amplitude, conditions=RubberConditions(at))
     print(abs(found / warm - 1.0), abs(found / model.stiffness("axial", frequency, amplitude) - 1.0))
     assert abs(found / warm - 1.0) < LARGEST < 0.2 * abs(found / model.stiffness("axial", frequency, amplitude) - 1.0)
 

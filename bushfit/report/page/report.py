@@ -167,7 +167,7 @@ def draw_figures(record: ReportRecord) -> tuple[list[Picture], list[Picture], bo
 
 def sweeps_beside(sweeps: pd.DataFrame | None, result: Result) -> pd.DataFrame | None:
     """Sweeps to draw with a prediction: all, or only those at 23 °C if the model depends on temperature."""
-    if sweeps is None or "temperature [degC]" not in sweeps or not result.model.knows_temperature:
+    if sweeps is None or "temperature [degC]" not in sweeps or not result.model.depends_on_temperature:
         return sweeps
     degrees = sweeps.groupby("sweep" if "sweep" in sweeps else "test")["temperature [degC]"].transform("mean")
     return sweeps[~((degrees - (REFERENCE - CELSIUS)).abs() > SAME_TEMPERATURE)]

@@ -165,7 +165,7 @@ def points_note(table: pd.DataFrame) -> str:
 
 def _model_line(group: SweepGroup, curve: Curve, header: str, result: Result) -> tuple[Array, Array]:
     """Points (x, y) of the model line of a curve: on a fine grid, or at the measured points if conditions vary."""
-    if not group.shares_levels or result.model.knows_circumstances:
+    if not group.shares_levels or result.model.depends_on_conditions:
         x, values = means(curve.rows, group.x_header, f"model {header}")
         return x, values
     x = curve.rows[group.x_header].to_numpy()

@@ -123,7 +123,7 @@ def arms_figure(model: Model, arms: Sequence[Arms], title: str) -> style.Chart:
     omega = 2.0 * np.pi * np.geomspace(low / _BEYOND, high * _BEYOND, 400)
     frequency = omega / (2.0 * np.pi)
     inside = (frequency >= low) & (frequency <= high)
-    wholes = [part_modulus(model, part.size, omega, part.under) for part in arms]
+    wholes = [part_modulus(model, part.size, omega, part.conditions) for part in arms]
     unit, factor = display_unit("Pa", 1.0, max(float(np.abs(whole).max()) for whole in wholes))
     looks = style.styles(len(arms), "loop")
     for part, whole, look in zip(arms, wholes, looks, strict=True):

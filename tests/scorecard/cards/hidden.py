@@ -101,7 +101,7 @@ def hidden_campaign(
     for _ in range(30):  # the worst effect needs a dozen bushings until one shows it at a size in range
         plain = random_bushing(random)
         plan = plan_of(plain, random, seed, directions)
-        if any("temperature" in get_effect(name).under for name in hidden):
+        if any("temperature" in get_effect(name).depends_on for name in hidden):
             plan = _at_temperatures(plan, random)
         with suppress(_OutOfReachError):
             model, least = _with_hidden(plain, hidden, plan, random, visible)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.random import Generator
 
 from bushfit.campaign.schema import SimulateSettings
-from bushfit.effects.contract import UNKNOWN, Array, Circumstances, ForceBelow, Setting
+from bushfit.effects.contract import UNKNOWN, Array, ForceBelow, RubberConditions, Setting
 from bushfit.effects.history import History
 from bushfit.geometry import Direction, Place
 from bushfit.model.model import Kind, Model
@@ -42,12 +42,12 @@ class Rigged(Model):
         *,
         kind: Kind = "sweep",
         values: Any = None,
-        under: Circumstances = UNKNOWN,
+        conditions: RubberConditions = UNKNOWN,
     ) -> Array:
         """The force that the rig records, as of `Model`."""
         place = Direction(direction) if isinstance(direction, str) else direction
-        below = partial(super().force, place, kind=kind, values=values, under=under)
-        return self.around(below, displacement, Setting(self.bushing, place, kind, under))
+        below = partial(super().force, place, kind=kind, values=values, conditions=conditions)
+        return self.around(below, displacement, Setting(self.bushing, place, kind, conditions))
 
 
 @dataclass(frozen=True)
