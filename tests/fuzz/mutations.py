@@ -31,8 +31,16 @@ model = "model.json"
 commands = ["predict"]
 """
 FOLDER = ROOT / "data/reports/mystery_mount"
+
+
+def thinned(name: str, step: int) -> str:
+    """Return every n-th row of a table of the example bushing, with its header."""
+    header, *rows = (ROOT / "data/cmp_15961" / name).read_text(encoding="utf-8").splitlines()
+    return "\n".join([header, *rows[::step]]) + "\n"
+
+
 INPUTS = {
-    **FILES, "list.toml": MANIFEST, "list.csv": "name,campaign,commands\na,campaign.toml,fit\n",
+    **FILES, "loop.csv": thinned("loop_axial_1.csv", 15), "sweep.csv": thinned("sweep_axial.csv", 2), "list.toml": MANIFEST, "list.csv": "name,campaign,commands\na,campaign.toml,fit\n",
     "limits.toml": (ROOT / "configs/limits.toml").read_text(encoding="utf-8"),
     **{f"res/{file.name}": file.read_text(encoding="utf-8") for file in FOLDER.iterdir() if file.suffix in (".json", ".csv")},
 }  # fmt: skip
