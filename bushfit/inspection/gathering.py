@@ -1,5 +1,6 @@
 """Search for tests in files, sheets of workbooks, and folders."""
 
+import os
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -111,6 +112,8 @@ def list_folder(folder: Path) -> tuple[list[TestSource], list[str]]:
             left_out.append(f"{path_text}: a broken link")
         elif printable(path.name) != path.name:
             left_out.append(f"{path_text}: its name contains characters that are not text; rename it")
+        elif path.is_dir() and not os.access(path, os.R_OK | os.X_OK):
+            left_out.append(f"{path_text}: no permission to read this folder")
         elif path.is_dir() and not path.is_symlink():
             inner_files, inner_left_out = list_folder(path)
             files += inner_files

@@ -47,6 +47,15 @@ def test_the_campaign_loads_and_fits_and_its_geometry_is_echoed(
     assert fitted == pytest.approx(table_1, rel=0.02)
 
 
+def test_a_locked_folder_is_left_out(typed: Run, tests: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    (tests[0].parent / "locked").mkdir()
+    monkeypatch.setattr("os.access", lambda path, _: Path(path).name != "locked")  # rights do not bind root
+    done = typed("init", tests[0].parent, *GEOMETRY, "-o", "lab/campaign")
+    assert "left out: lab/my tests/locked: no permission to read this folder" in done.stderr.replace(
+        str(tests[0].parents[2]) + "/", ""
+    )
+
+
 def test_where_it_is_written_and_that_the_next_line_can_be_pasted(
     typed: Run, tests: list[Path], tmp_path: Path
 ) -> None:

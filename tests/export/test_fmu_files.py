@@ -186,3 +186,11 @@ def test_without_a_compiler_it_is_said_how_to_get_one(paper_model: Model, monkey
     with pytest.raises(OutputError, match="no compiler") as refused:
         export(order_of(paper_model))
     assert refused.value.hint == 'pip install "bushfit[fmu]"'
+
+
+def test_a_service_without_a_home_folder_compiles_too(
+    exported: Exported, paper_model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("HOME", "XDG_CACHE_HOME", "LOCALAPPDATA", "APPDATA"):
+        monkeypatch.delenv(name, raising=False)
+    assert export(order_of(paper_model)).files == exported.files

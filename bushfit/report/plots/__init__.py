@@ -11,6 +11,8 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
+from bushfit.errors import BushfitError
+
 if TYPE_CHECKING:
     from bushfit.report.plots import (  # noqa: F401
         appendix,
@@ -32,4 +34,13 @@ def __getattr__(name: str) -> Any:
     """Return the module `name` of this folder, imported when it is first used."""
     if name.startswith("_") or find_spec(f"{__name__}.{name}") is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return import_module(f"{__name__}.{name}")
+    try:
+        return import_module(f"{__name__}.{name}")
+    except UnicodeDecodeError as error:  # of matplotlib, which reads the file before anybody can stop it
+        raise BushfitError(
+            "matplotlib cannot read its settings, and no picture is drawn",
+            file="matplotlibrc",
+            found=f"byte {error.object[error.start]:#04x}, which is not UTF-8",
+            expected="a text file in UTF-8",
+            hint="remove the file from this folder or from matplotlib's folder of settings, or save it as UTF-8",
+        ) from error

@@ -64,6 +64,12 @@ def test_settings_of_the_user_do_not_matter(root: Path, tmp_path: Path) -> None:
         assert done.stderr == b""
     images = [(folder / "loops.png").read_bytes() for folder in folders]
     assert images[0] == images[1]
+    (tmp_path / "matplotlibrc").write_bytes(b"lines.linewidth: 2\n# \xff\n")  # which stops matplotlib at its import
+    environment = {**os.environ, "MATPLOTLIBRC": str(tmp_path)}
+    done = subprocess.run([*run[:-1], str(tmp_path / "saved")], env=environment, check=False, capture_output=True)
+    assert (done.returncode, done.stderr.count(b"rror: ")) == (2, 1)
+    assert b"error: matplotlibrc" in done.stderr
+    assert (tmp_path / "saved/static.json").exists()
 
 
 def test_sweeps_have_a_row_a_direction_and_residuals(paper_model: Model, swept: Swept) -> None:
