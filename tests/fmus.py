@@ -12,7 +12,7 @@ import numpy as np
 from fmpy.fmi2 import FMU2Slave
 
 from bushfit.effects.contract import Array
-from bushfit.export.contract import Order
+from bushfit.export.contract import ExportRequest
 from bushfit.export.fmu import export
 from bushfit.geometry import Direction, Place
 from bushfit.model.model import Model
@@ -29,15 +29,17 @@ LEVELS = {
 }
 
 
-def order_of(model: Model, places: Sequence[Place] = tuple(LEVELS), accuracy: float = 0.01, **result: Any) -> Order:
-    """An order of these places over the paper's grid."""
+def request_of(
+    model: Model, places: Sequence[Place] = tuple(LEVELS), accuracy: float = 0.01, **result: Any
+) -> ExportRequest:
+    """A request of these places over the paper's grid."""
     found = Result(model, **result)
     grids = [LEVELS.get(place, (0.01, 0.05)) if isinstance(place, Direction) else (0.01, 0.05) for place in places]
     predictions = [predict(found, place, FREQUENCIES, grid) for place, grid in zip(places, grids, strict=True)]
-    return Order(found, Source(Path("model.json"), "0" * 64), tuple(predictions), accuracy)
+    return ExportRequest(found, Source(Path("model.json"), "0" * 64), tuple(predictions), accuracy)
 
 
-def written(wanted: Order, folder: Path) -> Path:
+def written(wanted: ExportRequest, folder: Path) -> Path:
     """The FMU of an order, written into a folder."""
     ((name, content),) = export(wanted).files.items()
     (folder / name).write_bytes(content)

@@ -53,7 +53,7 @@ def sized(model: Model, name: str, direction: Direction, amplitude: float, rng: 
     for parameter in LIBRARY[name].parameters:
         key = qualified_name(LIBRARY[name], parameter)
         share = rng.uniform(0.5, 1.5)
-        values[key] = by_hand[key] * share if key in by_hand else parameter.sized(share)
+        values[key] = by_hand[key] * share if key in by_hand else parameter.value_at_share(share)
     return model.with_effect(name, values)
 
 

@@ -66,8 +66,8 @@ def without_copied_repeats(sweep: Sweep) -> Sweep:
     """
     runs: set[bytes] = set()
     is_copy, repeats = np.zeros(sweep.frequency.size, dtype=bool), dict[int, None]()
-    for repeat, level in sorted(set(zip(sweep.repeat.tolist(), sweep.held.tolist(), strict=True))):
-        rows = (sweep.repeat == repeat) & (sweep.held == level)
+    for repeat, level in sorted(set(zip(sweep.repeat.tolist(), sweep.held_value.tolist(), strict=True))):
+        rows = (sweep.repeat == repeat) & (sweep.held_value == level)
         numbers = _digits(sweep, rows)
         if numbers in runs:
             is_copy |= rows

@@ -356,7 +356,7 @@ def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
 
 def _family_document(label: str, family: FittedFamily, result: Result) -> FamilyEntry:
     """Entry of a family in compare.json: its fit and held-out error."""
-    evidence, held_out = family.evidence, family.held
+    evidence, held_out = family.evidence, family.holdout
     return {
         "label": label,
         "name": family.name,

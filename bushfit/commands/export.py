@@ -14,7 +14,7 @@ from typing_extensions import TypedDict
 from bushfit.campaign.campaign import Campaign
 from bushfit.commands.loading import model_source
 from bushfit.commands.predict import PredictionOutput, arms_files, predict
-from bushfit.export.contract import Dialect, Exported, Order, UnitSystem
+from bushfit.export.contract import Dialect, Exported, ExportRequest, UnitSystem
 from bushfit.model.arms import ACCURACY
 from bushfit.model.file import load_result
 from bushfit.progress import track
@@ -106,11 +106,11 @@ def export(
         predicted = predict(result, campaign, **{**grid, "frequencies": np.unique(np.concatenate(frequencies))})
     settings = (accuracy, units, dialect, decimal_comma, grid.get("temperature"))
     today = datetime.now(UTC).date().isoformat()
-    order = Order(result, model_source(model), tuple(predicted.predictions), *settings, today)
+    request = ExportRequest(result, model_source(model), tuple(predicted.predictions), *settings, today)
     exported: dict[str, Exported] = {}
     for name in track("formats written", formats):
         module, _, function = FORMATS[name].partition(":")
-        exported[name] = getattr(importlib.import_module(f"bushfit.{module}"), function)(order)
+        exported[name] = getattr(importlib.import_module(f"bushfit.{module}"), function)(request)
     contents = {name: content for written in exported.values() for name, content in written.files.items()}
     arms = tuple(part for written in exported.values() for part in written.arms)
     places = [prediction.direction for prediction in predicted.predictions]

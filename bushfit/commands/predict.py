@@ -22,7 +22,7 @@ from bushfit.fitting.agreement import expected_error_without_refits, misfits
 from bushfit.fitting.preparation import MeasuredSweep, prepare_sweeps
 from bushfit.geometry import Bushing, Direction, Place, Specimen, get_place
 from bushfit.model.arms import Arms, model_arms
-from bushfit.model.result import Misfit, Result, Usable, carried
+from bushfit.model.result import Misfit, Result, Usable, transfer_compound
 from bushfit.prediction.caveats import warnings_of
 from bushfit.prediction.grid import default_grid, grid_settings, requested_grid
 from bushfit.prediction.stiffness import PredictedResonance, Prediction, predict_resonance
@@ -152,7 +152,7 @@ def predict(
     """
     result, sweeps = as_result(model), campaign.sweeps if campaign else ()
     if bushing:
-        result, note = carried(result, bushing)
+        result, note = transfer_compound(result, bushing)
         notes, directions = (*notes, note), directions or [str(direction) for direction in _DIRECTIONS]
     depends_on_temperature = result.model.depends_on_temperature
     if temperature is not None and not depends_on_temperature:

@@ -90,7 +90,7 @@ def _test_document(data_set: MeasuredTest) -> dict[str, Any]:
         "amplitudes": measured_levels([sweep], "amplitude").tolist() if sweep else [],
         "unit": data_set.direction.motion.displacement_unit,
         "repeats": int(sweep.repeat.max()) if sweep else 1,
-        "rows": data_set.size // data_set.parts,
+        "rows": data_set.size // data_set.residuals_per_point,
         "file": source and str(source.file),
         "sha256": source and source.sha256,
         "conditions": dict(source.conditions) if source else {},

@@ -77,11 +77,11 @@ class Claim:
     def corrections(self, data: PreparedCampaign) -> tuple[str, ...]:
         """Lines to write into the campaign file to correct the mistake, one for each affected test."""
         data_sets = [*data.loops, *data.sweeps]
-        return tuple(self.mistake.corrected(data_sets[place].test) for place in self.tests) or (
-            self.mistake.corrected(None),
+        return tuple(self.mistake.correction_line(data_sets[place].test) for place in self.tests) or (
+            self.mistake.correction_line(None),
         )
 
-    def mended(self, data: PreparedCampaign) -> PreparedCampaign:
+    def corrected(self, data: PreparedCampaign) -> PreparedCampaign:
         """Correct the mistake in a campaign.
 
         Args:
@@ -92,11 +92,11 @@ class Claim:
         """
         campaign = data.campaign
         if not self.tests:
-            bushing = campaign.bushing and self.mistake.mended_bushing(campaign.bushing)
+            bushing = campaign.bushing and self.mistake.corrected_bushing(campaign.bushing)
             return replace(data, campaign=replace(campaign, bushing=bushing)).in_session()
         loops, sweeps, count = list(data.loops), [sweep.test for sweep in data.sweeps], len(data.loops)
         for place in self.tests:
-            test = self.mistake.mended([*data.loops, *data.sweeps][place].test)
+            test = self.mistake.corrected_test([*data.loops, *data.sweeps][place].test)
             if isinstance(test, Loop):
                 loops[place] = prepare_loops([test], data.campaign.rig, without_outliers=data.robust)[0]
             elif isinstance(test, Sweep):
@@ -124,7 +124,7 @@ def adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[PreparedCam
     for name in names:
         claim = _parse_claim(data, name)
         messages.append(f"corrected by --adopt {name}: read as if {claim.words(data)}; {claim.corrections(data)[0]}")
-        data = claim.mended(data)
+        data = claim.corrected(data)
     return data, messages
 
 
@@ -225,7 +225,7 @@ class Screen:
         """
         bushing = self.data.campaign.bushing
         if claim and not claim.tests and bushing:
-            bushing = claim.mistake.mended_bushing(bushing)
+            bushing = claim.mistake.corrected_bushing(bushing)
         data_sets: list[MeasuredTest] = [*self.data.loops, *self.data.sweeps]
         mistakes = [claim.mistake if claim and place in claim.tests else None for place in range(len(data_sets))]
         try:
@@ -298,13 +298,13 @@ def _points(data_set: MeasuredTest, mistake: Mistake | None) -> tuple[Place, Arr
     """
     if isinstance(data_set, MeasuredSweep):
         sweep, noise = data_set.sweep, np.hypot(data_set.relative_noise, max(data_set.noise.shared))
-        mended = (mistake and mistake.mended(sweep)) or sweep
+        mended = (mistake and mistake.corrected_test(sweep)) or sweep
     else:
         sweep, noise = (
             Sweep(data_set.name, data_set.direction, data_set.frequency, data_set.amplitude, data_set.measured),
             0.0,
         )
-        mended = mistake.mended_cycle(sweep) if mistake else sweep
+        mended = mistake.corrected_harmonic(sweep) if mistake else sweep
     points = np.stack((mended.frequency, mended.amplitude_reached))
     distinct, place, count = np.unique(points, axis=1, return_inverse=True, return_counts=True)
     place = place.ravel()

@@ -127,14 +127,14 @@ def _noise(before: SweepNoise, condensations: Sequence[_Means], rig: RigSettings
 def _condensed_sweep(data_set: MeasuredSweep) -> _Means | None:
     """Reduce a sweep with long runs or very many lines; None if the whole sweep is diagnosed."""
     sweep, rows, words = data_set.sweep, data_set.order[data_set.weights > 0.0], ""
-    lines = np.unique(sweep.held[rows])
+    lines = np.unique(sweep.held_value[rows])
     if lines.size > _MOST_LINES:
         some = lines[np.linspace(0, lines.size - 1, _MOST_LINES).round().astype(int)]
-        rows = rows[np.isin(sweep.held[rows], some)]
+        rows = rows[np.isin(sweep.held_value[rows], some)]
         words = (
             f"{some.size} of its {lines.size} runs at one level, or frequency, are used in the diagnosis, evenly spread"
         )
-    levels, repeat = sweep.held[rows], sweep.repeat[rows]
+    levels, repeat = sweep.held_value[rows], sweep.repeat[rows]
     step = sweep.step[rows] if sweep.stepped else rows  # where neither is held, in the turn they were measured
     band, long = np.arange(rows.size), list[float]()  # each of its own
     for line in np.unique(levels).tolist():
@@ -150,7 +150,7 @@ def _condensed_sweep(data_set: MeasuredSweep) -> _Means | None:
     if means.frequency.size < rows.size:
         counted = f"{rows.size} points are averaged to {means.frequency.size} narrow bands for the diagnosis"
         words = "; ".join(filter(None, (words, counted)))
-    shares = {(sweep.name, line): float(np.mean(1.0 / groups.counts[means.held == line])) for line in long}
+    shares = {(sweep.name, line): float(np.mean(1.0 / groups.counts[means.held_value == line])) for line in long}
     conditions = RubberConditions(*map(groups.mean, vars(data_set.test_conditions).values()))
     return _Means(means, conditions, shares, words)
 

@@ -102,7 +102,7 @@ def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
     chosen: dict[str, dict[MeasuredTest, Array]] = {}
     for sweep in split_by_kind(tests)[1]:
         rank = np.unique(sweep.step, return_inverse=True)[1]
-        levels, level = np.unique(sweep.held, return_inverse=True)
+        levels, level = np.unique(sweep.held_value, return_inverse=True)
         last_repeat = (sweep.repeat == sweep.repeat.max()) & (np.ptp(sweep.repeat) > 0)
         masks = {
             f"every third {sweep.sweep.stepped or 'point'}": (rank % 3 == 1) & (rank < rank.max()),
@@ -115,7 +115,9 @@ def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
     both = [LeaveOut.from_fit(fit.jacobian[fit.moving], fit.residual) for fit in (solution, fitted)]
     residuals = dict[str, Array]()
     for name, by_sweep in chosen.items():
-        part = HoldOutPart(name, [by_sweep.get(test, np.zeros(test.size // test.parts, dtype=bool)) for test in tests])
+        part = HoldOutPart(
+            name, [by_sweep.get(test, np.zeros(test.size // test.residuals_per_point, dtype=bool)) for test in tests]
+        )
         rows = part.rows(tests)
         pairs = [(fit, np.pad(rows, (0, fit.residual.size - rows.size))) for fit in both]
         if not any(fit.open(mask).any() for fit, mask in pairs):  # else the rest does not determine the model

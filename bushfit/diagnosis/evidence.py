@@ -142,7 +142,7 @@ def result_of(
         model = found.model
     solution = found
     moving = tuple(name for name in solution.coordinates.names if name not in solution.at_bound)
-    cov = covariance(solution.model, [FitStage(moving, found.weighed or found.minimised, found.process)])
+    cov = covariance(solution.model, [FitStage(moving, found.covariance_tests or found.minimised, found.smooth_error)])
     return Result(
         model,
         moving,

@@ -39,7 +39,7 @@ _CURVE_LENGTHS = {"smooth": (1.5, 1.2), "rough": (0.5, 0.5)}
 _CURVE_PATTERNS = {"nodes": 150, "count": 16, "minimum": 1e-4}
 #: Number of phases of a cycle at which harmonics are summed: about six per period of the highest harmonic.
 _PHASES = 32
-#: Index of the first row of `MeasuredLoop.contrasts` that belongs to an overtone of the loop's frequency.
+#: Index of the first row of `MeasuredLoop.smooth_changes` that belongs to an overtone of the loop's frequency.
 _OVERTONES = 3
 
 
@@ -132,7 +132,9 @@ def is_pattern(places: Sequence[FaultyPart]) -> bool:
     return sum(place.family == "frequency" for place in places) > 1 or any(place.extreme for place in places)
 
 
-def meetings(outliers: Sequence[Outlier], sweeps: Sequence[MeasuredSweep], model: Model) -> list[OutlierCluster]:
+def outlier_clusters(
+    outliers: Sequence[Outlier], sweeps: Sequence[MeasuredSweep], model: Model
+) -> list[OutlierCluster]:
     """Find frequencies at which several outliers lie, as signs of a disturbance and not of single wrong rows.
 
     Args:
@@ -277,9 +279,9 @@ def _restricted(
 
 def _harmonics(evidence: Evidence, loops: Sequence[MeasuredLoop]) -> Array:
     """Change of the whitened residuals by unit amounts of c harmonics that repeated loops share, (c, n)."""
-    columns = np.zeros((len(loops[0].contrasts()), evidence.residual.size))
+    columns = np.zeros((len(loops[0].smooth_changes()), evidence.residual.size))
     for loop in loops:
-        columns[:, evidence.place[loop]] = loop.contrasts()
+        columns[:, evidence.place[loop]] = loop.smooth_changes()
     return columns
 
 

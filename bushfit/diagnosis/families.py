@@ -45,7 +45,7 @@ class FittedFamily:
         name: effects that the family adds or puts in place of branches, joined by +; for the first family, "paper" and
             its other effects.
         evidence: the fitted model and the tests.
-        held: root mean square of the residuals of the held-out tests, in units of the noise: `before` for the first
+        holdout: root mean square of the residuals of the held-out tests, in units of the noise: `before` for the first
             family, `after` for this family.
         gain: reduction of the held-out mean square relative to the first family, in squared units of noise, with the
             ends of its 95 % interval; None for the first family, or if nothing is held out.
@@ -57,7 +57,7 @@ class FittedFamily:
 
     name: str
     evidence: Evidence
-    held: HoldOut
+    holdout: HoldOut
     gain: tuple[float, float, float] | None = None
     p: float | None = None
     log_evidence: float = 0.0
@@ -66,14 +66,14 @@ class FittedFamily:
     @property
     def words(self) -> str:
         """Sentence that compares the held-out error of the family with that of the first family."""
-        if self.gain is None or self.p is None or self.held.before is None or self.held.after is None:
+        if self.gain is None or self.p is None or self.holdout.before is None or self.holdout.after is None:
             return "no part can be held out of both"
-        figures = f"held out {number(self.held.after, 3)} x noise, the first {number(self.held.before, 3)}"
-        if abs(self.held.after / self.held.before - 1.0) < _ALIKE:
+        figures = f"held out {number(self.holdout.after, 3)} x noise, the first {number(self.holdout.before, 3)}"
+        if abs(self.holdout.after / self.holdout.before - 1.0) < _ALIKE:
             return f"{figures}: alike within {number(100.0 * _ALIKE, 2)} %"
-        better = sum(part.after < part.before for part in self.held.parts)
-        figures += f", better in {better} of {len(self.held.parts)} parts"
-        if self.p >= CHANCE or (self.gain[0] > 0.0) is (self.held.after > self.held.before):
+        better = sum(part.after < part.before for part in self.holdout.parts)
+        figures += f", better in {better} of {len(self.holdout.parts)} parts"
+        if self.p >= CHANCE or (self.gain[0] > 0.0) is (self.holdout.after > self.holdout.before):
             return f"{figures}: within chance (p {number(self.p, 2)})"
         return f"{figures}: {'better' if self.gain[0] > 0.0 else 'worse'} by more than chance"
 

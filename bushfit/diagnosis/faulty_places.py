@@ -48,10 +48,10 @@ def faulty_places(evidence: Evidence) -> list[FaultyPart]:
 def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
     """Suspects: each level of a direction with several levels, and each repeat of a level with over two repeats."""
     for sweep in sweeps:
-        levels_of_direction = [np.unique(member.held) for member in sweeps if member.direction == sweep.direction]
+        levels_of_direction = [np.unique(member.held_value) for member in sweeps if member.direction == sweep.direction]
         levels = np.concatenate(levels_of_direction)
-        for level in np.unique(sweep.held):
-            mask = sweep.held == level
+        for level in np.unique(sweep.held_value):
+            mask = sweep.held_value == level
             label = sweep.line_words(int(np.argmax(mask)))
             if levels.size > 1:  # in this file or in others
                 place = _shifted(evidence, "level", label, [sweep], [mask], sloping=True)

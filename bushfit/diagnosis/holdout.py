@@ -51,7 +51,9 @@ class HoldOutPart:
 
     def rows(self, data_sets: Sequence[MeasuredTest]) -> Array:
         """Mask of the rows of this part in the residual vector of all tests, (n,)."""
-        return np.concatenate([np.tile(mask, data.parts) for data, mask in zip(data_sets, self.points, strict=True)])
+        return np.concatenate(
+            [np.tile(mask, data.residuals_per_point) for data, mask in zip(data_sets, self.points, strict=True)]
+        )
 
     def rest(self, data_sets: Sequence[MeasuredTest]) -> list[MeasuredTest]:
         """Tests without the points of this part, with unchanged noise; tests held out entirely are left out."""
@@ -224,10 +226,10 @@ def _clusters(data_sets: Sequence[MeasuredTest]) -> Array:
     """Index of the sweep line or loop that each residual belongs to, (n,)."""
     numbers, first = list[Array](), 0
     for data_set in data_sets:
-        line = np.zeros(data_set.size // data_set.parts, dtype=int)
+        line = np.zeros(data_set.size // data_set.residuals_per_point, dtype=int)
         if isinstance(data_set, MeasuredSweep):
-            line = np.unique(data_set.held, return_inverse=True)[1]
-        numbers.append(np.tile(first + line, data_set.parts))
+            line = np.unique(data_set.held_value, return_inverse=True)[1]
+        numbers.append(np.tile(first + line, data_set.residuals_per_point))
         first += int(line.max()) + 1
     return np.concatenate(numbers)
 
@@ -247,19 +249,19 @@ def parts(data_sets: Sequence[MeasuredTest]) -> Iterator[HoldOutPart]:
 
     def part(name: str, chosen: Mapping[MeasuredTest, Array]) -> HoldOutPart:
         return HoldOutPart(
-            name, [chosen.get(data, np.zeros(data.size // data.parts, dtype=bool)) for data in data_sets]
+            name, [chosen.get(data, np.zeros(data.size // data.residuals_per_point, dtype=bool)) for data in data_sets]
         )
 
     loops, sweeps = split_by_kind(data_sets)
     for stepped, (line_name, top) in _NAMES.items():
         mine = [sweep for sweep in sweeps if sweep.sweep.stepped == stepped]
-        ranks = {sweep: np.unique(sweep.held, return_inverse=True)[1] for sweep in mine}
+        ranks = {sweep: np.unique(sweep.held_value, return_inverse=True)[1] for sweep in mine}
         for rank in range(max((int(r.max()) + 1 for r in ranks.values()), default=0)):
             yield part(f"{line_name} {rank + 1}", {sweep: r == rank for sweep, r in ranks.items()})
         if mine and top:
             limit = np.quantile(np.concatenate([sweep.step for sweep in mine]), 1.0 - _TOP)
             yield part(f"top third of the {top}", {sweep: sweep.step > limit for sweep in mine})
-    wholes = {data: np.ones(data.size // data.parts, dtype=bool) for data in data_sets}
+    wholes = {data: np.ones(data.size // data.residuals_per_point, dtype=bool) for data in data_sets}
     for direction in dict.fromkeys(data.direction for data in data_sets):
         members = {data: whole for data, whole in wholes.items() if data.direction == direction}
         if len(members) < len(wholes):

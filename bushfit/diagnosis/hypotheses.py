@@ -35,24 +35,24 @@ class DiagnosisRequest:
     Args:
         data: campaign with the prepared tests.
         base: starting model, fitted to the tests.
-        fit_mended: function that fits the starting model to a campaign with a corrected record.
+        fit_corrected: function that fits the starting model to a campaign with a corrected record.
         without: names of effects and mistakes not to consider.
         max_effects: maximum number of added effects.
         tolerance: relative change of |K| up to which an explanation is neglected.
         start: starting values read from the data, by parameter, for a fit that the gap has distorted.
-        meetings: frequencies at which several outliers were left out.
+        outlier_clusters: frequencies at which several outliers were left out.
         fixed: names of parameters that are not fitted.
         bounds: limits of the fitted parameters inside their general limits.
     """
 
     data: PreparedCampaign
     base: Evidence
-    fit_mended: Callable[[PreparedCampaign], Evidence]
+    fit_corrected: Callable[[PreparedCampaign], Evidence]
     without: Sequence[str]
     max_effects: int
     tolerance: float
     start: Mapping[str, float]
-    meetings: Sequence[OutlierCluster]
+    outlier_clusters: Sequence[OutlierCluster]
     fixed: Sequence[str]
     bounds: Bounds
 
@@ -71,7 +71,7 @@ class Hypothesis:
         change: largest relative change of |K| by any of the explanations.
         last_change: relative change of |K| by the last explanation if its evidence is linear; 0 if it was refitted.
         state: fitted state that has exactly these explanations, or to which the last was added by a linear model.
-        bent: True if the compound deviates from the model's laws in addition.
+        compound_deviates: True if the compound deviates from the model's laws in addition.
     """
 
     effects: tuple[str, ...]
@@ -82,8 +82,8 @@ class Hypothesis:
     log_posterior: float
     change: float
     last_change: float
-    state: State
-    bent: bool = False
+    state: SearchState
+    compound_deviates: bool = False
 
     @property
     def key(self) -> frozenset[Hashable]:
@@ -99,7 +99,7 @@ class Hypothesis:
     @property
     def chance(self) -> float:
         """Probability that tests would have a larger misfit than these if the hypothesis were true."""
-        return self.state.linear.chance(bent=self.bent)
+        return self.state.linear.chance(compound_deviates=self.compound_deviates)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +156,7 @@ class Tests:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class SearchState:
     """Node of the search: a fitted model with added effects and faulty places, the base of a linear model.
 
     The evidence for each further explanation is computed by linearising the residuals around this fit.
@@ -186,7 +186,7 @@ class State:
     change: float = 0.0
 
     @classmethod
-    def of_tests(cls, tests: Tests, request: DiagnosisRequest) -> State:
+    def of_tests(cls, tests: Tests, request: DiagnosisRequest) -> SearchState:
         """Create the initial state of a search: the starting model with nothing added."""
         return cls(tests, request, tests.base, tests.log_prior, change=tests.change)
 
@@ -215,14 +215,14 @@ class State:
     @cached_property
     def log_posterior(self) -> float:
         """Natural log of prior times evidence, summed over the cases with and without a deviation of the compound."""
-        total = float(np.logaddexp(self.linear.log_evidence, self.linear.log_evidence_bent))
+        total = float(np.logaddexp(self.linear.log_evidence, self.linear.log_evidence_with_compound))
         return self.log_prior + self.log_density + total
 
     @cached_property
     def likeliest_deviation(self) -> float:
         """Likeliest size of the compound's deviation, relative to |K|; 0 if no deviation is more probable."""
         linear = self.linear
-        return linear.deviation[1] if linear.log_evidence_bent > linear.log_evidence else 0.0
+        return linear.deviation[1] if linear.log_evidence_with_compound > linear.log_evidence else 0.0
 
     def free_columns(self, deviation: float) -> Array | None:
         """Residuals that faulty places and the compound may cause, left free while further effects are refitted.
@@ -246,7 +246,7 @@ class State:
         return proposals(self.bare, (*self.request.without, *self.effects), self.request.fixed)
 
     @cached_property
-    def weighed(self) -> list[tuple[Explanation, GroupEvidence]]:
+    def explanation_evidence(self) -> list[tuple[Explanation, GroupEvidence]]:
         """Every explanation that has residual columns, with its evidence in the linear model."""
         explanations = [e for e in (*self.proposals, *self.tests.explanations) if e.group is not None]
         return list(zip(explanations, self.weigh(explanations), strict=True))
@@ -297,7 +297,7 @@ class State:
                 log_posterior=log_prior + evidence.beside.log_evidence,
                 change=max(self.change, evidence.beside.size, self.linear.deviation[0]),
                 last_change=evidence.beside.size,
-                bent=True,
+                compound_deviates=True,
             )
             extended.append(bent)
         return extended
@@ -322,18 +322,18 @@ class State:
         wide = replace(
             plain,
             levels=True,
-            log_posterior=log_prior + linear.log_evidence_wide,
+            log_posterior=log_prior + linear.log_evidence_with_level_errors,
             change=max(self.change, LEVELS[-1][0] * max(of_class(tests.rig, ASSUMED))),
         )
-        if not np.isfinite(linear.log_evidence_bent):
+        if not np.isfinite(linear.log_evidence_with_compound):
             return [plain, wide]
         deviation = linear.deviation[0]
         bent = replace(
             plain,
             unnamed=COMPOUND,
-            log_posterior=log_prior + linear.log_evidence_bent,
+            log_posterior=log_prior + linear.log_evidence_with_compound,
             change=max(self.change, deviation),
             last_change=deviation,
-            bent=True,
+            compound_deviates=True,
         )
         return [plain, wide, bent]

@@ -236,12 +236,12 @@ class LinearModel:
         return self._log_evidence_over(self._plain)
 
     @property
-    def log_evidence_bent(self) -> float:
+    def log_evidence_with_compound(self) -> float:
         """Log evidence of the tests if the compound deviates from the model's laws and nothing else is missing."""
         return self._log_evidence_over(self._deviation > 0.0)
 
     @property
-    def log_evidence_wide(self) -> float:
+    def log_evidence_with_level_errors(self) -> float:
         """Log evidence of the tests if level errors exceed the class of the rig and nothing else is missing."""
         return self._log_evidence_over(~self._plain & (self._deviation == 0.0))
 
@@ -249,7 +249,7 @@ class LinearModel:
     def deviation(self) -> tuple[float, float]:
         """Posterior relative change of |K| by the compound's deviation (root mean square), and its likeliest size."""
         bent = self._deviation > 0.0
-        share = np.exp(self._at_nodes.base[bent] - self.log_evidence_bent)
+        share = np.exp(self._at_nodes.base[bent] - self.log_evidence_with_compound)
         sizes = self._deviation[bent]
         likeliest = max(np.unique(sizes), key=lambda size: share[sizes == size].sum())
         return float(np.sqrt(share @ self._at_nodes.changes[bent])), float(likeliest)
@@ -273,15 +273,15 @@ class LinearModel:
         led = (best[index] > best.max() - far) | (with_group > with_group[plain].max() - far)
         return self.nodes[near | (plain & led)]
 
-    def chance(self, *, bent: bool = False) -> float:
+    def chance(self, *, compound_deviates: bool = False) -> float:
         """Probability that tests of a complete model would have a larger misfit r^T P r than these tests.
 
         Args:
-            bent: True to average over nodes with a deviation of the compound; False for nodes without one.
+            compound_deviates: True to average over nodes with a deviation of the compound; False for nodes without one.
 
         Notes: a posterior predictive check, averaged over nodes by probability (Gelman, Meng and Stern, 1996).
         """
-        base = np.where(self._deviation > 0.0 if bent else self._plain, self._at_nodes.base, -np.inf)
+        base = np.where(self._deviation > 0.0 if compound_deviates else self._plain, self._at_nodes.base, -np.inf)
         freedom = max(self.residual.size - int(np.count_nonzero(self.precision == 0.0)), 1)
         return float(np.exp(base - logsumexp(base)) @ chdtrc(freedom, self._at_nodes.misfit))
 

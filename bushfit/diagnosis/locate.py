@@ -136,7 +136,7 @@ def _loop_regions(evidence: Evidence) -> Iterator[Where]:
     """Regions for loops: each with the harmonic in which its force deviates most from the model."""
     loops, _ = split_by_kind(evidence.data_sets)
     for data_set in loops:
-        columns, amplitude = data_set.contrasts(), data_set.drive.amplitude
+        columns, amplitude = data_set.smooth_changes(), data_set.drive.amplitude
         norms = np.maximum(np.linalg.norm(columns, axis=1), np.finfo(float).tiny)
         amounts = columns @ evidence.residual[evidence.place[data_set]] / norms
         by_order = [np.hypot(values[::2], [0.0, *values[1::2]]) for values in (amounts, amounts / norms)]

@@ -17,7 +17,7 @@ import numpy as np
 from bushfit.diagnosis.claims import Screen, claims
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart, OutlierCluster
-from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, State, Tests
+from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, SearchState, Tests
 from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.propose import has_what_it_uses
@@ -46,9 +46,9 @@ class Search:
         self._known: dict[frozenset[Hashable], Hypothesis] = {}
         self._visited: set[frozenset[Hashable]] = set()
         tests = Tests(request.base, request.data.campaign.rig, log(1.0 - sum(ODDS.values())))
-        self.root = State.of_tests(tests, request)
+        self.root = SearchState.of_tests(tests, request)
         self._log_priors = prior_odds([*self.root.proposals, *tests.explanations])
-        families = {e.family for e in (*request.meetings, *tests.explanations) if e.kind == "place"}
+        families = {e.family for e in (*request.outlier_clusters, *tests.explanations) if e.kind == "place"}
         self._meeting_odds = log(ODDS["place"] / max(len(families), 1)) - tests.log_prior
 
     def run(self) -> list[Hypothesis]:
@@ -60,7 +60,7 @@ class Search:
         beam = [self._register(self.root)]
         for depth in range(ROUNDS + 1):
             for state in track(f"round {depth + 1} of at most {ROUNDS + 1}", beam):
-                for explanation, evidence in state.weighed:
+                for explanation, evidence in state.explanation_evidence:
                     if len(state.effects) < self.request.max_effects or explanation.kind != "effect":
                         log_odds = self._log_prior(explanation) - log(depth + 1)
                         for hypothesis in state.extended(explanation, evidence, log_odds):
@@ -110,7 +110,7 @@ class Search:
             self._log_priors[key] = min(odds for (kind, _), odds in self._log_priors.items() if kind == key[0])
         return self._log_priors[key]
 
-    def _register(self, state: State) -> State:
+    def _register(self, state: SearchState) -> SearchState:
         """Mark a state as visited, note its hypotheses, and return the state."""
         self._visited.add(state.key)
         for hypothesis in state.hypotheses:
@@ -122,13 +122,16 @@ class Search:
 
         Of two fits of the same set of explanations, a refitted one replaces a linear one; else the more probable stays.
         """
-        for candidate in (hypothesis, *(self._with_meeting(hypothesis, place) for place in self.request.meetings)):
+        for candidate in (
+            hypothesis,
+            *(self._with_outlier_cluster(hypothesis, place) for place in self.request.outlier_clusters),
+        ):
             before = self._known.get(candidate.key)
             rank = candidate.refitted, candidate.log_posterior
             if before is None or rank > (before.refitted, before.log_posterior):
                 self._known[candidate.key] = candidate
 
-    def _with_meeting(self, hypothesis: Hypothesis, place: OutlierCluster) -> Hypothesis:
+    def _with_outlier_cluster(self, hypothesis: Hypothesis, place: OutlierCluster) -> Hypothesis:
         """Add to a hypothesis a disturbance at a frequency where several outliers were left out."""
         log_posterior = hypothesis.log_posterior + self._meeting_odds + place.log_odds
         if hypothesis.change > self.request.tolerance:
@@ -138,7 +141,7 @@ class Search:
         plain = self.root.hypotheses[0]  # what is smaller than the tolerance is no part of an explanation
         return replace(plain, places=(place,), log_posterior=log_posterior, change=place.size, last_change=place.size)
 
-    def _grow(self, state: State, depth: int) -> Iterator[State]:
+    def _grow(self, state: SearchState, depth: int) -> Iterator[SearchState]:
         """Extend a state by each of its most promising effects (refitted) and faulty places.
 
         States without one of the earlier effects follow each extension: the last effect may make that one unnecessary.
@@ -149,7 +152,7 @@ class Search:
             yield from self._without_earlier(grown)
         yield from self._with_places(state, depth)
 
-    def _promising(self, state: State, by_evidence: int, by_score: int) -> list[str]:
+    def _promising(self, state: SearchState, by_evidence: int, by_score: int) -> list[str]:
         """Names of the effects to refit next to a state.
 
         Args:
@@ -160,13 +163,17 @@ class Search:
         scores = {p.name: p.score for p in state.proposals if state.key | {p.name} not in self._visited}
         prior = {p.name: self._log_prior(p) for p in state.proposals}
         base = state.log_prior + state.log_density - state.log_posterior
-        gains = {e.name: base + prior[e.name] + evidence.total for e, evidence in state.weighed if e.kind == "effect"}
+        gains = {
+            e.name: base + prior[e.name] + evidence.total
+            for e, evidence in state.explanation_evidence
+            if e.kind == "effect"
+        }
         gains = {name: gain for name, gain in gains.items() if name in scores}
         first = sorted(gains, key=lambda name: -gains[name])[:by_evidence]
         second = [name for name, score in scores.items() if 0.5 * score + prior[name] > -_SLIGHT][:by_score]
         return list(dict.fromkeys([*(name for name in first if gains[name] > -_SLIGHT), *second]))
 
-    def _with_effects(self, state: State, names: Sequence[str], depth: int) -> list[State]:
+    def _with_effects(self, state: SearchState, names: Sequence[str], depth: int) -> list[SearchState]:
         """Extend a state by each of the named effects, refitted with all parameters.
 
         Each effect is refitted with the compound's likeliest deviation left free, and without a deviation if none
@@ -177,7 +184,7 @@ class Search:
             return []
         proposed = [proposal for proposal in state.proposals if proposal.name in names]
         start = request.start if not state.effects and state.evidence.reduced > _BENT else {}
-        grown: dict[str, State] = {}
+        grown: dict[str, SearchState] = {}
         for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
             columns = state.free_columns(deviation)
             remaining = [p for p in proposed if p.name not in grown or not grown[p.name].likeliest_deviation]
@@ -190,7 +197,7 @@ class Search:
                     grown[name] = candidate
         return list(grown.values())
 
-    def _with_effect(self, state: State, name: str, evidence: Evidence, depth: int) -> State:
+    def _with_effect(self, state: SearchState, name: str, evidence: Evidence, depth: int) -> SearchState:
         """Add an effect to a state, given the fit `evidence` of the model with the effect; `depth` lowers the prior."""
         log_density, precision, change = laplace(name, evidence, state.evidence)
         return replace(
@@ -203,9 +210,9 @@ class Search:
             change=max(state.change, change),
         )
 
-    def _with_places(self, state: State, depth: int) -> Iterator[State]:
+    def _with_places(self, state: SearchState, depth: int) -> Iterator[SearchState]:
         """Extend a state by each of its likeliest faulty places, with a common shift or an error of every point."""
-        places = [(e, evidence) for e, evidence in state.weighed if isinstance(e, FaultyPart)]
+        places = [(e, evidence) for e, evidence in state.explanation_evidence if isinstance(e, FaultyPart)]
         places.sort(key=lambda pair: -(self._log_prior(pair[0]) + pair[1].total))
         for place, shifted in places[:_PLACES]:
             scattered_place = place.point_by_point()
@@ -229,7 +236,7 @@ class Search:
             )
             yield self._register(grown)
 
-    def _without_earlier(self, state: State) -> Iterator[State]:
+    def _without_earlier(self, state: SearchState) -> Iterator[SearchState]:
         """Remove each effect before the last from a state and refit: the last effect may make it unnecessary."""
         if state.places:
             return
@@ -242,22 +249,22 @@ class Search:
                 if not all(has_what_it_uses(effect, model) for effect in model.records):
                     continue
                 evidence = fit(model, data_sets, request.fixed, {**within_reach(model, data_sets), **request.bounds})
-                shorter = State.of_tests(state.tests, request)
+                shorter = SearchState.of_tests(state.tests, request)
                 for order, effect_name in enumerate(effect for effect in state.effects if effect != name):
                     shorter = self._with_effect(shorter, effect_name, evidence, order)
                 yield self._register(shorter)
 
-    def _corrected_records(self) -> Iterator[State]:
+    def _corrected_records(self) -> Iterator[SearchState]:
         """States of the starting model fitted to the tests with one mistake in the record corrected, the best first."""
         data, base = self.request.data, self.request.base
         possible = claims(data, self.request.without)
         for claim in track("mistakes put right", list(Screen(data).best(possible, _CLAIMS))):
             with suppress(FitError, ModelError):  # corrected tests that nothing can be fitted to
-                evidence = self.request.fit_mended(claim.mended(data))
+                evidence = self.request.fit_corrected(claim.corrected(data))
                 if [test.size for test in evidence.data_sets] == [test.size for test in base.data_sets]:
                     log_prior = log(ODDS["record"]) - log(len(possible))
                     tests = Tests(evidence, data.campaign.rig, log_prior, claim, _record_change(base, evidence))
-                    yield self._register(State.of_tests(tests, self.request))
+                    yield self._register(SearchState.of_tests(tests, self.request))
 
 
 def _record_change(base: Evidence, mended: Evidence) -> float:

@@ -168,7 +168,9 @@ class _Parts(NamedTuple):
         deviation could imitate them.
         """
         effects = frozenset(
-            name for name in hypothesis.effects if not (hypothesis.bent and get_effect(name).level == Level.MATERIAL)
+            name
+            for name in hypothesis.effects
+            if not (hypothesis.compound_deviates and get_effect(name).level == Level.MATERIAL)
         )
         pattern = is_pattern(hypothesis.places)
         places = [f"{place.family}:{place.name}" for place in hypothesis.places] + ["levels:"] * hypothesis.levels

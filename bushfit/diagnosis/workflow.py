@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from bushfit.diagnosis.claims import adopted
 from bushfit.diagnosis.condense import condensed
 from bushfit.diagnosis.evidence import EVALUATIONS, Evidence
-from bushfit.diagnosis.explanations import meetings
+from bushfit.diagnosis.explanations import outlier_clusters
 from bushfit.diagnosis.hypotheses import DiagnosisRequest
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.report_text import DiagnosisWriter
@@ -72,7 +72,7 @@ def diagnose(
             settings.max_effects,
             settings.tolerance,
             initial.start,
-            meetings(excluded, whole.sweeps, initial.evidence.model),
+            outlier_clusters(excluded, whole.sweeps, initial.evidence.model),
             initial.fixed,
             data.bounds,
         )
@@ -128,7 +128,7 @@ def _initial_fit(data: PreparedCampaign, model: Model | None, settings: Diagnosi
         if get_mistake(name) is None and name not in (model := model.with_twin(name)).effects:
             # at a tenth of its typical size: at its neutral value a fit may not see it
             amount = (effect := get_effect(name)).amount
-            initial_values = {} if effect.replaces else {qualified_name(effect, amount): amount.sized(0.1)}
+            initial_values = {} if effect.replaces else {qualified_name(effect, amount): amount.value_at_share(0.1)}
             model = model.with_effect(name, initial_values)
     outliers: tuple[Outlier, ...] = ()
     if data.robust:

@@ -102,10 +102,10 @@ class Parameter:
     log: bool = False
     scale: Literal["period", "frequency", "displacement", "strain", "force", "order", "session"] | None = None
 
-    def sized(self, share: float) -> float:
+    def value_at_share(self, share: float) -> float:
         """Parameter value at a share (1 = typical) of the typical distance from the neutral value (0 if None).
 
-        >>> Parameter("c3", "1", (0.0, 1e5), 0.0, 20.0, "cubic stress coefficient over mu").sized(0.5)
+        >>> Parameter("c3", "1", (0.0, 1e5), 0.0, 20.0, "cubic stress coefficient over mu").value_at_share(0.5)
         10.0
         """
         return (self.neutral or 0.0) + share * self.typical
@@ -191,7 +191,7 @@ class Effect:
         source: literature reference.
         confirmed_by: simplest test that would confirm the effect.
         harmonic_error: relative error of the first-harmonic equation compared with the equation in time; 0 if exact.
-        settles: True if the response changes from cycle to cycle, so that all cycles of a loop are computed.
+        is_transient: True if the response changes from cycle to cycle, so that all cycles of a loop are computed.
         corrects: direction or specimen whose stiffness formula the effect scales by a fitted factor, so that the error
             of the formula needs no warning; None for other effects.
         twins: effects with the same equation in all tests, mostly of the rig. The effect of the bushing, which lists
@@ -216,7 +216,7 @@ class Effect:
     source: str
     confirmed_by: str = ""
     harmonic_error: float = 0.0
-    settles: bool = False
+    is_transient: bool = False
     corrects: str | None = None
     twins: tuple[str, ...] = ()
     replaces: str | None = None

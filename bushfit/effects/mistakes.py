@@ -62,7 +62,7 @@ class Mistake(Effect):
     swaps: bool = False
     scales: bool = False
 
-    def mended(self, test: _Test) -> _Test | None:
+    def corrected_test(self, test: _Test) -> _Test | None:
         """Correct a test for this mistake.
 
         Returns:
@@ -82,7 +82,7 @@ class Mistake(Effect):
             stiffness=self.force * (self.stiffness(test.stiffness) if self.stiffness else test.stiffness),
         )
 
-    def mended_cycle(self, cycle: Sweep) -> Sweep:
+    def corrected_harmonic(self, cycle: Sweep) -> Sweep:
         """Correct the first harmonic of a loop, given as a sweep of one point, for this mistake.
 
         Returns:
@@ -122,12 +122,12 @@ class Mistake(Effect):
     def _direction(self, place: Place) -> Place:
         return (other_direction(place) if self.swaps else None) or place
 
-    def mended_bushing(self, bushing: Bushing) -> Bushing:
+    def corrected_bushing(self, bushing: Bushing) -> Bushing:
         """Correct the radii of a bushing for this mistake."""
         inner, outer = (self.displacement * radius for radius in (bushing.inner_radius, bushing.outer_radius))
         return replace(bushing, inner_radius=inner, outer_radius=outer)
 
-    def corrected(self, test: Loop | Sweep | None) -> str:
+    def correction_line(self, test: Loop | Sweep | None) -> str:
         """Line of the campaign file that corrects the mistake in a test, or in the bushing if `test` is None."""
         if test is None:
             return self.line
@@ -137,7 +137,7 @@ class Mistake(Effect):
 
     def in_words(self, test: Loop | Sweep) -> str:
         """Sentence that states the mistake in a test, with the line of the campaign file that corrects it."""
-        return f"{self.sentence.format(files=file_or_name(test))} (then, in the campaign: {self.corrected(test)})"
+        return f"{self.sentence.format(files=file_or_name(test))} (then, in the campaign: {self.correction_line(test)})"
 
 
 def file_or_name(test: Loop | Sweep) -> str:

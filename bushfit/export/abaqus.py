@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 
 from bushfit.effects import Level as EffectLevel
-from bushfit.export.contract import MM_T_S_N, Exported, Order, UnitSystem
+from bushfit.export.contract import MM_T_S_N, Exported, ExportRequest, UnitSystem
 from bushfit.export.deck import (
     AmplitudeLevel,
     Form,
@@ -44,24 +44,26 @@ _COMPOUND = Specimen("compound", "modulus")
 _FORM = Form(lambda f, k: (k.real, k.imag / (2.0 * np.pi * f)), lambda f, a, b: a + 2j * np.pi * f * b)
 
 
-def export(order: Order) -> Exported:
+def export(request: ExportRequest) -> Exported:
     """Write an Abaqus connector behavior for each amplitude, and a material at the strains of the first direction.
 
     Args:
-        order: model, predictions and settings.
+        request: model, predictions and settings.
 
     Returns:
         File bushing.inp, and sentences on properties that the format cannot represent.
     """
-    units = order.units or MM_T_S_N
-    losses = tuple(table_losses(order, _FORM))
-    if has_material := _LONG_TERM in order.result.model.values:
+    units = request.units or MM_T_S_N
+    losses = tuple(table_losses(request, _FORM))
+    if has_material := _LONG_TERM in request.result.model.values:
         losses += ("compound: strain is uniform in a material, so the amplitude of each element is that of the table",)
     else:
         losses += ("compound: no elastic branch, so no long-term modulus, and no material",)
     usage = "behaviors are for CONN3D2 of type BUSHING; they act in *STEADY STATE DYNAMICS, DIRECT"
-    lines = deck_lines(order, "**", units, losses, usage, "BUSHING_", partial(_behavior, units))
-    return Exported({"bushing.inp": encode_deck([*lines, *(_materials(order, units) if has_material else ())])}, losses)
+    lines = deck_lines(request, "**", units, losses, usage, "BUSHING_", partial(_behavior, units))
+    return Exported(
+        {"bushing.inp": encode_deck([*lines, *(_materials(request, units) if has_material else ())])}, losses
+    )
 
 
 def _behavior(units: UnitSystem, rank: int, level: AmplitudeLevel) -> Iterator[str]:
@@ -80,13 +82,13 @@ def _behavior(units: UnitSystem, rank: int, level: AmplitudeLevel) -> Iterator[s
                 yield ", ".join(texts[start : start + _A_LINE])
 
 
-def _materials(order: Order, units: UnitSystem) -> Iterator[str]:
+def _materials(request: ExportRequest, units: UnitSystem) -> Iterator[str]:
     """Yield the lines of a material for the strain at each amplitude of the first direction."""
-    model, first = order.result.model.without(EffectLevel.INSTRUMENT), exported_directions(order)[0]
+    model, first = request.result.model.without(EffectLevel.INSTRUMENT), exported_directions(request)[0]
     long_term = model.values[_LONG_TERM]
     for rank, table in enumerate(stiffness_tables(first), start=1):
         strain = 2.0 * table.amplitude * model.unit_strain(table.direction)
-        ratio = model.stiffness(_COMPOUND, table.frequency, strain, conditions=order.conditions) / long_term
+        ratio = model.stiffness(_COMPOUND, table.frequency, strain, conditions=request.conditions) / long_term
         about = f"shear strain amplitude {number(100.0 * strain, 6)} %, that of {describe_amplitudes((table,))}"
         yield from comment_lines("**", [f"COMPOUND_{rank}: {about}"])
         yield f"*MATERIAL, NAME=COMPOUND_{rank}"

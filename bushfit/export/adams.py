@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.export.contract import Exported, Order
+from bushfit.export.contract import Exported, ExportRequest
 from bushfit.export.deck import (
     DOFS,
     StiffnessTable,
@@ -90,23 +90,23 @@ class _Element(NamedTuple):
         )
 
 
-def export(order: Order) -> Exported:
+def export(request: ExportRequest) -> Exported:
     """Write one file for Adams Car and one for Adams Car Ride.
 
     Args:
-        order: model, predictions and settings.
+        request: model, predictions and settings.
 
     Returns:
         Files bushing_car.bus and bushing_ride.bus, and sentences on properties that the format cannot represent.
     """
-    predictions = exported_directions(order)
+    predictions = exported_directions(request)
     elements = [_element(stiffness_tables(prediction)) for prediction in predictions]
-    shared = [line for prediction in predictions for line in band_losses(prediction)] + list(common_losses(order))
-    if order.units:
-        shared.append(f"the requested units, {order.units}: the file states its own units, which Adams converts")
+    shared = [line for prediction in predictions for line in band_losses(prediction)] + list(common_losses(request))
+    if request.units:
+        shared.append(f"the requested units, {request.units}: the file states its own units, which Adams converts")
     losses = {kind: [element.loss(kind) for element in elements] for kind in _KINDS}
     files = {
-        f"bushing_{kind}.bus": encode_deck(_property_file(order, elements, kind, [*losses[kind], *shared]))
+        f"bushing_{kind}.bus": encode_deck(_property_file(request, elements, kind, [*losses[kind], *shared]))
         for kind in _KINDS
     }
     return Exported(files, (*losses["car"], *losses["ride"], *shared))
@@ -128,11 +128,13 @@ def _element(tables: Sequence[StiffnessTable]) -> _Element:
     return _Element(tables, displacement, force, reference, frequency, exact)
 
 
-def _property_file(order: Order, elements: Sequence[_Element], kind: Kind, losses: Sequence[str]) -> Iterator[str]:
+def _property_file(
+    request: ExportRequest, elements: Sequence[_Element], kind: Kind, losses: Sequence[str]
+) -> Iterator[str]:
     """Yield the lines of a property file for Adams Car or Adams Car Ride."""
     amplitudes = describe_amplitudes([element.reference for element in elements])
     about = f"damping at {number(elements[0].frequency, 4)} Hz, {amplitudes}; curves at the lowest frequency"
-    yield from comment_lines("$", [*heading(order, ", ".join(_UNITS.values()), losses), _KINDS[kind], about])
+    yield from comment_lines("$", [*heading(request, ", ".join(_UNITS.values()), losses), _KINDS[kind], about])
     yield from _block("MDI_HEADER", {"FILE_TYPE": "'bus'", "FILE_VERSION": "4.0", "FILE_FORMAT": "'ASCII'"})
     yield from _block("UNITS", {name: f"'{unit}'" for name, unit in _UNITS.items()})
     damping, curves = [0.0] * len(_AXES), [(np.arange(-2.0, 3.0), np.zeros(5))] * len(_AXES)

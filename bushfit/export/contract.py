@@ -100,7 +100,7 @@ MM_T_S_N = UnitSystem(Unit("mm", 1e3), Unit("t", 1e-3), Unit("s", 1.0), Unit("N"
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
+class ExportRequest:
     """Input of every export format: a fitted model, its predictions, and the settings of the export.
 
     Args:

@@ -10,7 +10,7 @@ import numpy as np
 from bushfit.effects import Level as EffectLevel
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
-from bushfit.export.contract import Order, UnitSystem
+from bushfit.export.contract import ExportRequest, UnitSystem
 from bushfit.geometry import Direction
 from bushfit.prediction.caveats import percent_off
 from bushfit.prediction.stiffness import Prediction
@@ -47,7 +47,7 @@ class StiffnessTable(NamedTuple):
 AmplitudeLevel = tuple[StiffnessTable, ...]
 
 
-def exported_directions(order: Order) -> list[Prediction]:
+def exported_directions(request: ExportRequest) -> list[Prediction]:
     """Select the predictions for directions of the bushing, without specimens.
 
     Returns:
@@ -56,11 +56,11 @@ def exported_directions(order: Order) -> list[Prediction]:
     Raises:
         ModelError: there is no direction, or the frequencies of the directions differ.
     """
-    predictions = [prediction for prediction in order.predictions if isinstance(prediction.direction, Direction)]
+    predictions = [prediction for prediction in request.predictions if isinstance(prediction.direction, Direction)]
     if not predictions:
         raise ModelError(
             "there is no direction of a bushing to export",
-            found=", ".join(map(str, order.places)),
+            found=", ".join(map(str, request.places)),
             expected="axial, radial or torsion",
             hint="csv and xlsx take specimens, too",
         )
@@ -71,7 +71,7 @@ def exported_directions(order: Order) -> list[Prediction]:
 
 
 def stiffness_tables(prediction: Prediction) -> list[StiffnessTable]:
-    """Split the prediction of one direction into a table for each amplitude, in increasing order."""
+    """Split the prediction of one direction into a table for each amplitude, in increasing request."""
     direction = Direction(str(prediction.direction))
     stiffness = prediction.storage_stiffness.value + 1j * prediction.loss_stiffness.value
     rows = [(amplitude, prediction.amplitude == amplitude) for amplitude in np.unique(prediction.amplitude)]
@@ -80,13 +80,13 @@ def stiffness_tables(prediction: Prediction) -> list[StiffnessTable]:
     ]
 
 
-def amplitude_levels(order: Order) -> list[AmplitudeLevel]:
+def amplitude_levels(request: ExportRequest) -> list[AmplitudeLevel]:
     """Group the stiffness tables of all directions by the rank of their amplitude, one level for each solver property.
 
     The first level has the smallest amplitude of each direction. A direction with fewer amplitudes than others repeats
     its largest.
     """
-    by_direction = [stiffness_tables(prediction) for prediction in exported_directions(order)]
+    by_direction = [stiffness_tables(prediction) for prediction in exported_directions(request)]
     count = max(map(len, by_direction))
     return [tuple(tables[min(rank, len(tables) - 1)] for tables in by_direction) for rank in range(count)]
 
@@ -136,33 +136,33 @@ def comment_lines(mark: str, lines: Iterable[str]) -> list[str]:
     return wrapped
 
 
-def heading(order: Order, units: str, losses: Iterable[str]) -> list[str]:
+def heading(request: ExportRequest, units: str, losses: Iterable[str]) -> list[str]:
     """List the comments at the head of a deck: bushing, model and its hash, units, axes, losses and warnings.
 
     Args:
-        order: model and settings.
+        request: model and settings.
         units: description of the units.
         losses: properties that the deck cannot represent.
 
     Returns:
         Lines without comment signs.
     """
-    bushing, source = order.result.model.bushing, order.source
+    bushing, source = request.result.model.bushing, request.source
     sizes = (bushing.inner_radius, bushing.outer_radius, bushing.length) if bushing else ()
     return [
-        f"written by bushfit {__version__}{f' on {order.day}' if order.day else ''}",
-        f"bushing: {order.result.name}",
+        f"written by bushfit {__version__}{f' on {request.day}' if request.day else ''}",
+        f"bushing: {request.result.name}",
         f"inner radius, outer radius, length: {', '.join(number(1e3 * size, 6) for size in sizes)} mm",
         f"model: {source.file}",
         f"sha256: {source.sha256}",
         f"units: {units}",
         "axes: z along the bushing (axial 3, torsion 6), x and y across (radial 1, 2)",
-        *map(": ".join, order.remarks(losses)),
+        *map(": ".join, request.remarks(losses)),
     ]
 
 
 def deck_lines(
-    order: Order,
+    request: ExportRequest,
     mark: str,
     units: UnitSystem,
     losses: Iterable[str],
@@ -173,7 +173,7 @@ def deck_lines(
     """Write the lines of a deck: its heading, then a comment and the lines of each amplitude level.
 
     Args:
-        order: model and settings.
+        request: model and settings.
         mark: comment sign at the start of a comment line.
         units: unit system of the deck.
         losses: sentences on properties that the deck cannot represent.
@@ -182,8 +182,8 @@ def deck_lines(
         level_lines: function of the rank of a level, from 1, and the level that returns its lines.
     """
     about = f"{units}; frequency in {units.frequency.name}, rotation in rad"
-    lines = comment_lines(mark, [*heading(order, about, losses), usage])
-    for rank, level in enumerate(amplitude_levels(order), start=1):
+    lines = comment_lines(mark, [*heading(request, about, losses), usage])
+    for rank, level in enumerate(amplitude_levels(request), start=1):
         lines += [*comment_lines(mark, [f"{name}{rank}: {describe_amplitudes(level)}"]), *level_lines(rank, level)]
     return lines
 
@@ -204,18 +204,18 @@ def encode_deck(lines: Iterable[str]) -> bytes:
     return ("\n".join(lines) + "\n").encode("ascii")
 
 
-def table_losses(order: Order, form: Form) -> Iterator[str]:
+def table_losses(request: ExportRequest, form: Form) -> Iterator[str]:
     """Generate sentences on the losses of a deck with linear tables over frequency, one set for each amplitude.
 
     Args:
-        order: model, predictions and settings.
+        request: model, predictions and settings.
         form: conversion of the complex stiffness to the quantities that the solver interpolates.
 
     Returns:
         Iterator over sentences with the errors of |K|; sentences on a single direction come first.
     """
-    model = order.result.model.without(EffectLevel.INSTRUMENT)
-    for prediction in exported_directions(order):
+    model = request.result.model.without(EffectLevel.INSTRUMENT)
+    for prediction in exported_directions(request):
         tables, place = stiffness_tables(prediction), prediction.direction
         if len(tables) > 1:
             reference = middle(tables)
@@ -231,16 +231,16 @@ def table_losses(order: Order, form: Form) -> Iterator[str]:
             for table in tables:  # linear interpolation halfway between two frequencies
                 halfway = 0.5 * (table.frequency[1:] + table.frequency[:-1])
                 lines = (0.5 * (part[1:] + part[:-1]) for part in form.parts(table.frequency, table.stiffness))
-                exact = model.stiffness(place, halfway, table.amplitude, conditions=order.conditions)
+                exact = model.stiffness(place, halfway, table.amplitude, conditions=request.conditions)
                 worst = max(worst, float(np.max(np.abs(form.joined(halfway, *lines) / exact - 1.0))))
             yield f"{place}: between the frequencies |K| has errors up to {number(100.0 * worst, 2)} %"
         else:
             yield f"{place}: one frequency, {number(tables[0].frequency[0], 4)} Hz: K and loss are constants"
         yield from band_losses(prediction)
-    yield from common_losses(order)
+    yield from common_losses(request)
 
 
-def common_losses(order: Order) -> Iterator[str]:
+def common_losses(request: ExportRequest) -> Iterator[str]:
     """Generate sentences on the losses of every deck: time domain, coupling, and motions that the model lacks.
 
     Returns:
@@ -248,10 +248,10 @@ def common_losses(order: Order) -> Iterator[str]:
     """
     yield NO_LOOPS
     yield "each direction acts by itself: coupling between directions is not included"
-    present = {prediction.direction for prediction in exported_directions(order)}
+    present = {prediction.direction for prediction in exported_directions(request)}
     missing = [str(direction) for direction in DOFS if direction not in present]
     yield f"no stiffness in {', '.join([*missing, 'rotations about x and y'])}"
-    if specimens := [str(place) for place in order.places if place not in DOFS]:
+    if specimens := [str(place) for place in request.places if place not in DOFS]:
         yield f"specimens: {', '.join(specimens)}"
 
 

@@ -23,7 +23,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from bushfit.errors import OutputError
-from bushfit.export.contract import Exported, Order
+from bushfit.export.contract import Exported, ExportRequest
 from bushfit.export.in_time import FIELDS, TABLES, UNIT_FIELDS, TimeModel, time_model
 from bushfit.geometry import Unit
 from bushfit.reading.tablefile import folder_name
@@ -52,11 +52,11 @@ _NO_XML = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 _OFFSET = 2
 
 
-def export(order: Order) -> Exported:
+def export(request: ExportRequest) -> Exported:
     """Write a model as an FMU with one input and one output per direction or specimen.
 
     Args:
-        order: model, predictions and settings.
+        request: model, predictions and settings.
 
     Returns:
         File with the FMU, sentences on properties that the FMU cannot represent, and the Maxwell arms in it.
@@ -65,18 +65,18 @@ def export(order: Order) -> Exported:
         ModelError: an effect has no law in the time domain.
         OutputError: the compiler is missing or failed.
     """
-    model = time_model(order)
-    safe_name = re.sub(r"[^A-Za-z0-9]+", "_", folder_name(order.result.name))
+    model = time_model(request)
+    safe_name = re.sub(r"[^A-Za-z0-9]+", "_", folder_name(request.result.name))
     name = f"bushfit_{safe_name[:40].strip('_').lower()}"
     sources = {file: (files("bushfit.export") / "c" / file).read_bytes() for file in _SHARED}
     sources |= {"model.c": model_source(model).encode()}
-    without_guid = [model_description(order, model, name, ""), model_header(model, "").encode()]
+    without_guid = [model_description(request, model, name, ""), model_header(model, "").encode()]
     digest = hashlib.sha256(b"".join([*sources.values(), *without_guid])).digest()
     guid = f"{{{uuid.UUID(bytes=digest[:16])}}}"
     sources |= {"model.h": model_header(model, guid).encode()}
     path, library = compile_library(sources, name)
     content = {
-        "modelDescription.xml": model_description(order, model, name, guid),
+        "modelDescription.xml": model_description(request, model, name, guid),
         path: library,
         **{f"sources/{file}": source for file, source in sources.items()},
     }
@@ -180,11 +180,11 @@ def model_source(model: TimeModel) -> str:
     return "\n".join([*lines, "};", ""])
 
 
-def model_description(order: Order, model: TimeModel, name: str, guid: str) -> bytes:
+def model_description(request: ExportRequest, model: TimeModel, name: str, guid: str) -> bytes:
     """Write modelDescription.xml, the description of the variables of an FMU.
 
     Args:
-        order: model, predictions and settings.
+        request: model, predictions and settings.
         model: time-domain model with the values of the FMU.
         name: model identifier, which is the name of the library.
         guid: identifier that has to be equal in the description and the library.
@@ -192,10 +192,10 @@ def model_description(order: Order, model: TimeModel, name: str, guid: str) -> b
     Returns:
         Content of the XML file in UTF-8.
     """
-    about = f"Rubber bushing, displacement in and force out, of {order.source.file} (SHA-256 {order.source.sha256})"
-    about = "; ".join([about, *map(": ".join, order.remarks(model.losses))])
+    about = f"Rubber bushing, displacement in and force out, of {request.source.file} (SHA-256 {request.source.sha256})"
+    about = "; ".join([about, *map(": ".join, request.remarks(model.losses))])
     root = ET.Element("fmiModelDescription", {
-        "fmiVersion": "2.0", "modelName": _xml_text(order.result.name), "guid": guid, "description": _xml_text(about),
+        "fmiVersion": "2.0", "modelName": _xml_text(request.result.name), "guid": guid, "description": _xml_text(about),
         "generationTool": f"bushfit {__version__}", "variableNamingConvention": "flat", "numberOfEventIndicators": "0",
     })  # fmt: skip
     simulation = ET.SubElement(root, "CoSimulation", {

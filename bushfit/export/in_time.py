@@ -11,7 +11,7 @@ from bushfit.effects import Branch, Effect, Level, Modifier, place_suffix, quali
 from bushfit.effects.contract import RubberConditions
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError
-from bushfit.export.contract import Order
+from bushfit.export.contract import ExportRequest
 from bushfit.export.deck import band_losses
 from bushfit.geometry import Place
 from bushfit.model.arms import Arms, model_arms, qualified_size, values_under
@@ -75,7 +75,7 @@ class TimeModel:
     arms: tuple[Arms, ...]
 
 
-def time_model(order: Order) -> TimeModel:
+def time_model(request: ExportRequest) -> TimeModel:
     """Convert the fitted model of an export order to a time-domain model for an FMU, without effects of the rig.
 
     Returns:
@@ -84,8 +84,8 @@ def time_model(order: Order) -> TimeModel:
     Raises:
         ModelError: an effect has no law in the time domain or none in the C sources, or no arms reach the accuracy.
     """
-    model, conditions = order.result.model.without(Level.INSTRUMENT), order.conditions
-    omitted = [effect.name for effect in model.records if effect.name == UNNAMED or effect.settles]
+    model, conditions = request.result.model.without(Level.INSTRUMENT), request.conditions
+    omitted = [effect.name for effect in model.records if effect.name == UNNAMED or effect.is_transient]
     model = model.without(*omitted)
     for effect in model.records:
         has_law = isinstance(effect, Modifier) or fields_of(effect) or (isinstance(effect, Branch) and effect.size)
@@ -98,20 +98,22 @@ def time_model(order: Order) -> TimeModel:
                 hint="fit a model without it, or export the stiffness over frequency and amplitude in another format",
             )
     # loops are slow, and a triangle has overtones: two decades below and one above the frequencies of fit and grid
-    fitted = [order.result.measured.frequency] if order.result.measured else []
-    frequencies = np.concatenate([*(prediction.frequency for prediction in order.predictions), *fitted])
+    fitted = [request.result.measured.frequency] if request.result.measured else []
+    frequencies = np.concatenate([*(prediction.frequency for prediction in request.predictions), *fitted])
     band = float(frequencies.min()) / 100.0, float(frequencies.max()) * 10.0
-    arms = model_arms(model, band, order.accuracy, conditions)
-    values, names = _values(order, model, arms)
+    arms = model_arms(model, band, request.accuracy, conditions)
+    values, names = _values(request, model, arms)
     losses = [f"the long memory of the rubber: {part.sentence}, fading below" for part in arms]
-    for prediction in order.predictions:
+    for prediction in request.predictions:
         losses += [*_steady_losses(model, omitted, prediction, conditions), *band_losses(prediction)]
     sizes = values_under(model, conditions)
     return TimeModel(
-        order.places,
+        request.places,
         values,
-        tuple(_fields(model, place, place_names, arms) for place, place_names in zip(order.places, names, strict=True)),
-        tuple(model.bushing.outer_radius if model.bushing and place.is_rotation else 1.0 for place in order.places),
+        tuple(
+            _fields(model, place, place_names, arms) for place, place_names in zip(request.places, names, strict=True)
+        ),
+        tuple(model.bushing.outer_radius if model.bushing and place.is_rotation else 1.0 for place in request.places),
         tuple(part.size for part in arms),
         tuple(
             (index, float(modulus / sizes[part.size]), float(time))
@@ -135,15 +137,17 @@ def middle_point(prediction: Prediction) -> tuple[float, float]:
     return frequency, amplitude
 
 
-def _values(order: Order, model: Model, arms: tuple[Arms, ...]) -> tuple[tuple[FmuValue, ...], list[dict[str, str]]]:
+def _values(
+    request: ExportRequest, model: Model, arms: tuple[Arms, ...]
+) -> tuple[tuple[FmuValue, ...], list[dict[str, str]]]:
     """List the values of the FMU; and for each direction or specimen, the name of the FMU value of each parameter.
 
     If a parameter differs between places (directions or specimens), each place has a value `<parameter>.<place>`.
     """
-    places = order.places
+    places = request.places
     local_values = [
-        model.values_at(prediction.direction, *middle_point(prediction), order.conditions)
-        for prediction in order.predictions
+        model.values_at(prediction.direction, *middle_point(prediction), request.conditions)
+        for prediction in request.predictions
     ]
     fitted_sizes, sizes = {part.size for part in arms}, {qualified_size(branch) for branch in model.viscoelastic}
     values: dict[FmuValue, None] = {}

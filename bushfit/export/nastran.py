@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from bushfit.export.contract import MM_T_S_N, Exported, Order, UnitSystem
+from bushfit.export.contract import MM_T_S_N, Exported, ExportRequest, UnitSystem
 from bushfit.export.deck import AmplitudeLevel, Form, by_dof, deck_lines, encode_deck, format_real, table_losses
 
 #: Difference between the table numbers of two properties. The last two digits are the degree of freedom n for K, and
@@ -35,22 +35,22 @@ _DIALECTS = {
 }
 
 
-def export(order: Order) -> Exported:
+def export(request: ExportRequest) -> Exported:
     """Write the properties of the bushing as bulk data of Nastran or OptiStruct, without elements.
 
     Args:
-        order: model, predictions and settings.
+        request: model, predictions and settings.
 
     Returns:
         File with the deck, and sentences on properties that the format cannot represent.
     """
-    (names, form, file), units = _DIALECTS[order.dialect], order.units or MM_T_S_N
-    losses = tuple(table_losses(order, form))
+    (names, form, file), units = _DIALECTS[request.dialect], request.units or MM_T_S_N
+    losses = tuple(table_losses(request, form))
     usage = (
         "the tables act in frequency response; PBUSH alone, at the lowest frequency, acts elsewhere; PARAM,G is added "
         "to the loss"
     )
-    lines = deck_lines(order, "$", units, losses, usage, "property ", partial(_property, names, form, units))
+    lines = deck_lines(request, "$", units, losses, usage, "property ", partial(_property, names, form, units))
     return Exported({file: encode_deck(lines)}, losses)
 
 

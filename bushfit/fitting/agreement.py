@@ -151,7 +151,7 @@ def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[Mea
     for number, whole in enumerate([*fitted, *unfitted]):
         test = whole.with_weight()
         relative, gain = test.relative(model), np.abs(test.noise_free(model).measured / test.measured) - 1.0
-        squares = np.square(test.residual(model)).reshape(test.parts, -1).sum(axis=0)
+        squares = np.square(test.residual(model)).reshape(test.residuals_per_point, -1).sum(axis=0)
         runs = list(_runs(test))
         for run in (_Run(None, None, None, slice(None)), *(runs if len(runs) > 1 else ())):
             of_run = relative[run.points]
@@ -193,7 +193,7 @@ def usable(solution: FitResult, unfitted: Sequence[MeasuredTest] = ()) -> tuple[
         modelled = test.noise_free(model).measured
         slopes = (log_slopes(model, test, solution.names) * per_coordinate)[free]
         for run in _runs(test):
-            points = np.broadcast_to(run.points, (test.parts, test.size // test.parts))
+            points = np.broadcast_to(run.points, (test.residuals_per_point, test.size // test.residuals_per_point))
             step = whole.step(rows.start + np.flatnonzero(points))
             predicted = modelled if step is None else modelled * np.exp(step @ slopes)
             counted = run.points & (test.weights > 0.0 if isinstance(test, MeasuredSweep) else True)
@@ -255,6 +255,6 @@ def _runs(data_set: MeasuredTest) -> Iterator[_Run]:
         return
     quantity: Literal["amplitude", "frequency"] = "amplitude" if data_set.sweep.stepped == "frequency" else "frequency"
     unit = data_set.direction.motion.displacement_unit if quantity == "amplitude" else "Hz"
-    held_value = data_set.sweep.held[data_set.order]
+    held_value = data_set.sweep.held_value[data_set.order]
     for value in np.unique(held_value):
         yield _Run(quantity, float(value), unit, held_value == value)

@@ -21,7 +21,7 @@ from bushfit.fitting.preparation import (
     rows_of,
     split_by_kind,
 )
-from bushfit.fitting.problem import Process
+from bushfit.fitting.problem import SmoothError
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -52,12 +52,12 @@ class FitStage:
     Args:
         names: names of the parameters that the fit estimated.
         data_sets: tests that the fit used.
-        process: estimated error of the model, if the model misses the tests by more than their noise; else None.
+        smooth_error: estimated error of the model, if the model misses the tests by more than their noise; else None.
     """
 
     names: tuple[str, ...]
     data_sets: Sequence[MeasuredTest]
-    process: Process | None = None
+    smooth_error: SmoothError | None = None
 
 
 def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | None = None) -> Covariance:
@@ -92,7 +92,7 @@ def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | Non
         basis = np.linalg.qr(slope[equations].T)[0]
         system[equations] = basis.T @ slope.T
         excess = [1.0] * len(stage.data_sets)
-        if not stage.process:
+        if not stage.smooth_error:
             of_all = lack_of_fit(model, stage.data_sets, len(stage.names)) or 1.0
             excess = [max(of_all, lack_of_fit(model, [test], 0) or 1.0) for test in stage.data_sets]
         share = basis.T * np.sqrt(np.repeat(excess, [test.size for test in stage.data_sets]))
@@ -107,10 +107,10 @@ def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | Non
     for stage, (equations, basis) in zip(stages, bases, strict=True):
         influence = reaction[:, equations] @ basis
         blocks = list(zip(stage.data_sets, rows_of(stage.data_sets), strict=True))
-        if stage.process:  # beside it the error of the noise is the least part
-            added = stage.process.covariance(model, stage.data_sets, influence)
-            spread.append(added * np.sqrt(2.0 / stage.process.freedom))
-            matrix = matrix + added + sum(test.uncounted(influence[:, rows]) for test, rows in blocks)
+        if stage.smooth_error:  # beside it the error of the noise is the least part
+            added = stage.smooth_error.covariance(model, stage.data_sets, influence)
+            spread.append(added * np.sqrt(2.0 / stage.smooth_error.freedom))
+            matrix = matrix + added + sum(test.extra_covariance(influence[:, rows]) for test, rows in blocks)
             continue
         for test, rows in blocks:
             if isinstance(test, MeasuredLoop) and not test.gain_weighs:  # which the weights do not count
@@ -145,7 +145,7 @@ def _changes_by_noise(
     unit, sums = basis / np.linalg.norm(basis[0]), dict[Hashable, list[Array]]()
     for test, rows in zip(data_sets, rows_of(data_sets), strict=True):
         of_test = influence[:, rows]
-        for variance, move in test.unsure(of_test).items():
+        for variance, move in test.noise_sensitivity(of_test).items():
             products = [move @ of_test.T, move @ move.T, move @ unit[:, rows].T]
             so_far = sums.get(variance, [0.0] * 3)
             sums[variance] = [one + previous for one, previous in zip(products, so_far, strict=True)]

@@ -40,7 +40,7 @@ class CommonError:
         return self.columns.T @ (mixed[:, significant] / size), size
 
     @property
-    def log_size(self) -> float:
+    def log_det_covariance(self) -> float:
         """Natural log of the determinant of the residuals' covariance S."""
         return float(np.sum(np.log1p(np.square(self.principal_errors[1]))))
 

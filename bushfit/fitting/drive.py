@@ -92,7 +92,7 @@ class Drive:
     @property
     def amplitude(self) -> float:
         """Zero-to-peak displacement [m or rad]."""
-        return float(self.history(settles=False).amplitude[0])
+        return float(self.history(is_transient=False).amplitude[0])
 
     @property
     def correlated(self) -> str:
@@ -113,13 +113,13 @@ class Drive:
         _, force = as_complex(least_squares(basis(self.phase, 1) * root[:, None], self.force * root))
         return complex(force / self.coefficients[1])
 
-    def history(self, settles: bool) -> History:
+    def history(self, is_transient: bool) -> History:
         """Displacement that drives the model: one settled cycle of GRID samples, or the whole record.
 
         The whole record is used if it begins at rest, or if the response of the model changes over the first cycles
-        (`settles`). A loop that other cycles precede is settled in any case.
+        (`is_transient`). A loop that other cycles precede is settled in any case.
         """
-        return self._settling if settles and not (self.from_rest or self.follows) else self._motion
+        return self._settling if is_transient and not (self.from_rest or self.follows) else self._motion
 
     @property
     def follows(self) -> bool:
@@ -289,7 +289,7 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
 
 def _at_reversal(drive: Drive) -> Array:
     """Mask of the rows within 1.5 grid steps of a turning point, where dry friction jumps, (n,)."""
-    motion, position = drive.history(settles=False).value, drive.phase * GRID
+    motion, position = drive.history(is_transient=False).value, drive.phase * GRID
     if drive.from_rest:
         turns = np.flatnonzero(reversals(motion))
     else:

@@ -113,7 +113,7 @@ def level_errors_of(sweep: MeasuredSweep) -> Array:
     return np.array(
         [
             column
-            for held_value in np.unique(sweep.held)
-            for column in sweep.shared_error_columns(sweep.held == held_value)
+            for held_value in np.unique(sweep.held_value)
+            for column in sweep.shared_error_columns(sweep.held_value == held_value)
         ]
     )

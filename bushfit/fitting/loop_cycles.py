@@ -283,7 +283,7 @@ def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
     Returns:
         The sentence, or None.
     """
-    if loop.timed:
+    if loop.has_recorded_time:
         return None
     motion = loop.displacement
     half = np.ptp(motion) / 2.0

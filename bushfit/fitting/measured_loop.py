@@ -157,7 +157,7 @@ class MeasuredLoop(MeasuredBase):
         last = self._last.get("force")
         if last and last[0] is model and values is None:
             return last[2]
-        history = self.drive.history(model.settles)
+        history = self.drive.history(model.is_transient)
         force = model.force(self.direction, history, kind="loop", values=values, conditions=self.test_conditions)
         force = self.drive.at_rows(force) + (self.drive.datum or 0.0)
         return force if values is not None else self._keep("force", model, (), force)
@@ -179,7 +179,7 @@ class MeasuredLoop(MeasuredBase):
 
     def _slopes(self, model: Model, names: Sequence[str]) -> Array:
         """Derivatives of the force at the rows by parameter value, (len(names), n); caches the force too."""
-        history = self.drive.history(model.settles)
+        history = self.drive.history(model.is_transient)
         force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
         self._keep("force", model, (), self.drive.at_rows(force) + (self.drive.datum or 0.0))
         return self.drive.at_rows(slopes)
@@ -228,7 +228,7 @@ class MeasuredLoop(MeasuredBase):
         distance = (self.force(model) - self.drive.force) / self.drive.noise
         return np.where(self.weights > 0.0, self.misfit(model), distance)
 
-    def outlying(self, model: Model) -> Array:
+    def outlier_indices(self, model: Model) -> Array:
         """Indices of the rows whose force is far from the loop's own harmonics, (k,); the model is not used."""
         return self.drive.outliers["force"].rows
 
@@ -240,7 +240,7 @@ class MeasuredLoop(MeasuredBase):
             for row, noise_units in zip(rows.tolist(), distance.tolist(), strict=True):
                 yield Outlier(self.name, file, row + before + 1, column, noise_units)
 
-    def contrasts(self) -> Array:
+    def smooth_changes(self) -> Array:
         """Change of the whitened residuals by a force of half the force range, (11, size), in turn constant and as
         cosine and sine of each of five harmonics; with `fundamental_only` all but the first harmonic are 0."""
         rows = self._whitened(self._waves * (self._per_noise * self.drive.half_range))
@@ -250,7 +250,7 @@ class MeasuredLoop(MeasuredBase):
 
     def smooth_misfit(self, model: Model) -> float:
         """Largest smooth misfit (first five harmonics), relative to half the force range, or to |K| for a sweep."""
-        sizes = np.linalg.lstsq(self.contrasts().T, self.residual(model), rcond=None)[0]
+        sizes = np.linalg.lstsq(self.smooth_changes().T, self.residual(model), rcond=None)[0]
         return float(np.abs(sizes @ self._waves[:, self.weights > 0.0]).max())
 
     def gain_and_offset(self) -> Array:
@@ -297,11 +297,11 @@ class MeasuredLoop(MeasuredBase):
         return self._less_shared(self._in_noise(rows))
 
     @property
-    def log_size(self) -> float:
+    def log_det_covariance(self) -> float:
         """Natural log of the determinant of the covariance that shared errors give the uncorrelated rows."""
         if self.model_error:
             return float(np.sum(np.log1p(np.square(self.model_error * self._error_directions[1]))))
-        return self._gain.log_size if self._gain else 0.0
+        return self._gain.log_det_covariance if self._gain else 0.0
 
     @cached_property
     def _fundamental(self) -> Array:
@@ -364,7 +364,7 @@ class MeasuredLoop(MeasuredBase):
         directions, size = self._error_directions
         return ErrorProducts(white @ white.T, white @ directions * size, np.square(size))
 
-    def unsure(self, influence: Array) -> dict[Hashable, Array]:
+    def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
         """Sensitivity of parameter estimates to errors of each noise variance that was itself estimated.
 
         Args:
@@ -376,7 +376,7 @@ class MeasuredLoop(MeasuredBase):
         """
         reaction = self._less_shared(influence)
         whole = reaction @ self._fundamental.T if self.fundamental_only else reaction
-        parts = list(self.drive.row_noise.unsure(whole))
+        parts = list(self.drive.row_noise.noise_sensitivity(whole))
         if self.fundamental_only:
             parts = [part @ self._fundamental for part in parts]
         if not parts and self.test.noise is None:
@@ -384,7 +384,7 @@ class MeasuredLoop(MeasuredBase):
             parts = [np.sqrt(2.0 / rows) * reaction]
         return {(self.name, index): self._less_shared(part) for index, part in enumerate(parts)}
 
-    def uncounted(self, influence: Array) -> Array:
+    def extra_covariance(self, influence: Array) -> Array:
         """Covariance of estimates that the weights of the residuals do not include.
 
         For a loop with model error: the gain error, minus the model error of the first harmonic, which the Gaussian

@@ -147,7 +147,7 @@ class MeasuredSweep(MeasuredBase):
     @cached_property
     def order(self) -> Array:
         """Row index in the sweep of each point, (n,): sorted by run (held value, repeat), then by step."""
-        by_run = np.lexsort((self.sweep.step, self.sweep.repeat, self.sweep.held))
+        by_run = np.lexsort((self.sweep.step, self.sweep.repeat, self.sweep.held_value))
         return by_run if self.part is None else self.part
 
     @cached_property
@@ -163,9 +163,9 @@ class MeasuredSweep(MeasuredBase):
         return self.test_conditions.select(self.order)
 
     @cached_property
-    def held(self) -> Array:
+    def held_value(self) -> Array:
         """Value held constant in each point's run, (n,): amplitude [m or rad], frequency [Hz] or number of the run."""
-        return self.sweep.held[self.order]
+        return self.sweep.held_value[self.order]
 
     @cached_property
     def step(self) -> Array:
@@ -184,7 +184,7 @@ class MeasuredSweep(MeasuredBase):
     @cached_property
     def block_starts(self) -> Array:
         """Index of the first point of each run."""
-        label = np.stack((self.held, self.repeat.astype(float)))
+        label = np.stack((self.held_value, self.repeat.astype(float)))
         return np.concatenate(([0], 1 + np.flatnonzero(np.any(np.diff(label), axis=0))))
 
     @cached_property
@@ -293,10 +293,10 @@ class MeasuredSweep(MeasuredBase):
     @cached_property
     def covariance(self) -> Whitening:
         """Covariance of the deviations (residuals before whitening)."""
-        random = self.noise.scatter(self.name, self.held, self.step)
+        random = self.noise.scatter(self.name, self.held_value, self.step)
         if self.sweep.relative_error is not None and self.sweep.noise is None:
             random = np.maximum(np.tile(self.sweep.relative_error[self.order], (2, 1)), FLOOR)
-        line_starts = np.concatenate(([0], 1 + np.flatnonzero(np.diff(self.held))))
+        line_starts = np.concatenate(([0], 1 + np.flatnonzero(np.diff(self.held_value))))
         points = np.unique(self.frequency + 1j * self.amplitude, return_inverse=True)[1]
         return Whitening(self.block_starts, line_starts, random, self.noise, self.weights, points, self.model_error)
 
@@ -304,15 +304,15 @@ class MeasuredSweep(MeasuredBase):
         """Whiten deviations by scatter and shared errors: complex (..., n) -> (..., 2 n), gains, then phases."""
         return self.covariance.whiten(deviation)
 
-    def unsure(self, influence: Array) -> dict[Hashable, Array]:
-        return self.covariance.unsure(influence)
+    def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
+        return self.covariance.noise_sensitivity(influence)
 
-    def uncounted(self, influence: Array) -> Array:
-        return self.covariance.uncounted(influence)
+    def extra_covariance(self, influence: Array) -> Array:
+        return self.covariance.extra_covariance(influence)
 
     @property
-    def log_size(self) -> float:
-        return self.covariance.log_size if self.model_error else 0.0
+    def log_det_covariance(self) -> float:
+        return self.covariance.log_det_covariance if self.model_error else 0.0
 
     def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
         slopes = self._deviation_change(self._slopes(model, names), self.stiffness(model))
@@ -341,7 +341,7 @@ class MeasuredSweep(MeasuredBase):
         distances = self.covariance.scaled(deviation).ravel()
         return np.where(np.tile(self.weights > 0.0, 2), self.whiten(deviation), distances)
 
-    def outlying(self, model: Model) -> Array:
+    def outlier_indices(self, model: Model) -> Array:
         points, freedom = np.stack((self.frequency, self.amplitude)), self.noise.scatter_freedom or np.inf
         deviation = self.deviation(self.stiffness(model))
         return outlying_points(deviation, self.scaled_distance, self.block_starts, points, freedom)
@@ -359,8 +359,8 @@ class MeasuredSweep(MeasuredBase):
             One record for each held value.
         """
         ratio, lines = self.measured / self.stiffness(model) - 1.0, []
-        for held_value in np.unique(self.held):
-            chosen = self.held == held_value
+        for held_value in np.unique(self.held_value):
+            chosen = self.held_value == held_value
             _, first, place, counts = np.unique(
                 self.step[chosen], return_index=True, return_inverse=True, return_counts=True
             )

@@ -42,7 +42,7 @@ class MeasuredBase(ABC):
         """Model minus measured at each point, relative to |K| or to half the force range of a loop, (parts, n)."""
 
     @property
-    def parts(self) -> int:
+    def residuals_per_point(self) -> int:
         """Number of residuals of a point: 1 for a force, 2 for a complex stiffness."""
         return len(self.components)
 

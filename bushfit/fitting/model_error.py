@@ -43,7 +43,7 @@ from bushfit.fitting.discrepancy import (
 )
 from bushfit.fitting.levels import level_errors_of
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, rows_of
-from bushfit.fitting.problem import FitProblem, FitResult, Process
+from bushfit.fitting.problem import FitProblem, FitResult, SmoothError
 from bushfit.fitting.rig_class import of_class
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
@@ -100,11 +100,11 @@ def with_model_error(
     error = averaged(processes)
     if error.typical >= SIZES[-1]:
         return found, None
-    weighed = [test.with_model_error(size) for test in found.weighed or found.minimised]
+    weighed = [test.with_model_error(size) for test in found.covariance_tests or found.minimised]
     whole = Discrepancy.over_tests(_in_noise(closest, weighed), likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
-    process = Process(likeliest.best[1] * whole.complex_shapes, likeliest.likelihood.freedom(likeliest.best[1]))
-    closest = replace(closest, unsoftened=found.data_sets, outliers=found.outliers)
-    return replace(closest, weighed=weighed, process=process), error
+    process = SmoothError(likeliest.best[1] * whole.complex_shapes, likeliest.likelihood.freedom(likeliest.best[1]))
+    closest = replace(closest, noise_weighted=found.data_sets, outliers=found.outliers)
+    return replace(closest, covariance_tests=weighed, smooth_error=process), error
 
 
 def closest_fit(found: FitResult, bounds: Bounds) -> tuple[FitResult, float]:
@@ -217,7 +217,9 @@ def log_likelihood(found: FitResult, prior_precision: Mapping[str, float]) -> fl
         across = shares @ tests.project(tests.moving).T
         information = information - across.T @ np.linalg.solve(shares @ shares.T + np.eye(len(shares)), across)
     prior = np.diag([prior_precision.get(found.names[i], 0.0) for i in found.moving])
-    log_size = sum(test.log_size for test in tests.data_sets) + float(np.linalg.slogdet(information + prior)[1])
+    log_size = sum(test.log_det_covariance for test in tests.data_sets) + float(
+        np.linalg.slogdet(information + prior)[1]
+    )
     return gain - 0.5 * (float(residual @ residual) + log_size)
 
 

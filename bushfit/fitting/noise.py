@@ -112,7 +112,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
         return {
             (sweep.name, float(held_value)): line_noise(sweep, log_stiffness, held_value, without)
             for sweep, log_stiffness in at_levels
-            for held_value in np.unique(sweep.held)
+            for held_value in np.unique(sweep.held_value)
         }
 
     lines = of_lines(())

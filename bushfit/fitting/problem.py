@@ -90,7 +90,7 @@ class FitProblem:
 
 
 @dataclass(frozen=True, eq=False)
-class Process:
+class SmoothError:
     """Smooth relative error of a model (a Gaussian process), to be added to the covariance of fitted parameters.
 
     Args:
@@ -134,11 +134,11 @@ class FitResult:
         evaluations: number of model evaluations.
         at_bound: names of the parameters that ended at a bound, with the bound ("min" or "max").
         stopped: True if the fit was stopped before it converged.
-        weighed: tests with the weights for the covariance of the parameters; empty if these are the problem's.
-        unsoftened: tests with the weights of their noise alone, excluded outliers having weight 0; empty if these are
+        covariance_tests: tests, weighted as for the covariance of the parameters; empty if these are the problem's.
+        noise_weighted: tests, weighted by their noise alone, with weight 0 for excluded outliers; empty if these are
             the problem's.
         outliers: outliers by file and row.
-        process: smooth error of the model, if the model misses the tests by more than their noise; else None.
+        smooth_error: smooth error of the model, if the model misses the tests by more than their noise; else None.
     """
 
     problem: FitProblem
@@ -148,10 +148,10 @@ class FitResult:
     evaluations: int = 1
     at_bound: Mapping[str, End] = field(default_factory=dict)
     stopped: bool = False
-    weighed: Sequence[MeasuredTest] = ()
-    unsoftened: Sequence[MeasuredTest] = ()
+    covariance_tests: Sequence[MeasuredTest] = ()
+    noise_weighted: Sequence[MeasuredTest] = ()
     outliers: tuple[Outlier, ...] = ()
-    process: Process | None = None
+    smooth_error: SmoothError | None = None
 
     @property
     def names(self) -> Sequence[str]:
@@ -171,7 +171,7 @@ class FitResult:
     @property
     def data_sets(self) -> Sequence[MeasuredTest]:
         """Tests with the weights of their noise alone; excluded outliers have weight 0."""
-        return self.unsoftened or self.problem.tests
+        return self.noise_weighted or self.problem.tests
 
     @property
     def chi_square(self) -> float:

@@ -255,8 +255,8 @@ def _result(
     # beside a model error, a parameter at a bound is fixed
     stages = []
     for step in steps:
-        names = tuple(name for name in step.names if not (step.process and name in step.at_bound))
-        stages.append(FitStage(names, step.weighed or step.minimised, step.process))
+        names = tuple(name for name in step.names if not (step.smooth_error and name in step.at_bound))
+        stages.append(FitStage(names, step.covariance_tests or step.minimised, step.smooth_error))
     cov = covariance(model, stages, fixed)
     fitted = tuple(name for step in steps for name in step.names)
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
@@ -325,4 +325,4 @@ def cautions(model: Model, step: FitResult, bounds: Bounds, covariance: Covarian
             how = f"at {'most' if end == 'min' else 'least'} {number(factor * limit, 2)} {unit}".rstrip(" -")
             sentences.append(f"{name} ended at a limit of the model: the tests only show that it is {how} (95 %)")
     sentences += left_open(model, step.minimised, [name for name in names if name not in at_bound], covariance)
-    return sentences if step.process else [*sentences, *misfit(model, tests, len(names), advice)]
+    return sentences if step.smooth_error else [*sentences, *misfit(model, tests, len(names), advice)]

@@ -80,7 +80,7 @@ def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed:
     Returns:
         Noise of the line.
     """
-    chosen = (sweep.held == held_value) & ~np.isin(sweep.step, [*disturbed])
+    chosen = (sweep.held_value == held_value) & ~np.isin(sweep.step, [*disturbed])
     steps, column = np.unique(sweep.step[chosen], return_inverse=True)
     numbers, row = np.unique(sweep.repeat[chosen], return_inverse=True)
     table = np.full((numbers.size, steps.size), np.nan + 0j)

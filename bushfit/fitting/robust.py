@@ -40,9 +40,9 @@ def outliers_at(
     Args:
         model: fitted model.
         data_sets: tests.
-        outlying: indices of the outliers of each test, (k,) each; None to find them with the model.
+        outlier_indices: indices of the outliers of each test, (k,) each; None to find them with the model.
     """
-    numbers = outlying or [data_set.outlying(model) for data_set in data_sets]
+    numbers = outlying or [data_set.outlier_indices(model) for data_set in data_sets]
     pairs = zip(data_sets, numbers, strict=True)
     return tuple(entry for data_set, points in pairs for entry in data_set.outliers(points, model))
 
@@ -72,20 +72,22 @@ def estimate(
         return replace(found, outliers=outliers_at(found.model, problem.tests))
     model, tests = problem.model, problem.tests
     for _ in range(_MOST_ROUNDS):
-        outlying = [test.outlying(model) for test in tests]
+        outlying = [test.outlier_indices(model) for test in tests]
         retained = [test.without(points) for test, points in zip(tests, outlying, strict=True)]
         softened = []
         for test in retained:
             distance = test.distance(model)
-            scale = _SOFT * misfit_scale(distance[distance > 0.0] * np.sqrt(test.parts), test.parts)
+            scale = _SOFT * misfit_scale(
+                distance[distance > 0.0] * np.sqrt(test.residuals_per_point), test.residuals_per_point
+            )
             softened.append(test.weighted(1.0 / np.sqrt(1.0 + (distance / scale) ** 2)))
         found = solver(replace(problem, model=model, tests=softened))
         before, after = (found.coordinates.point(fitted.values) for fitted in (model, found.model))
         change, model = (after - before) @ found.jacobian, found.model
         if float(change @ change) < _SETTLED**2:
-            weighed = [test.weighted(np.array(_efficiency(test.parts))) for test in retained]
+            weighed = [test.weighted(np.array(_efficiency(test.residuals_per_point))) for test in retained]
             outliers = outliers_at(model, retained, outlying)
-            return replace(found, weighed=weighed, unsoftened=retained, outliers=outliers)
+            return replace(found, covariance_tests=weighed, noise_weighted=retained, outliers=outliers)
     raise FitError(
         "the robust fit does not converge",
         found=f"{_MOST_ROUNDS} rounds of reweighting",
@@ -95,7 +97,7 @@ def estimate(
 
 @lru_cache(maxsize=4)
 def _efficiency(parts: int) -> float:
-    """Efficiency (E psi')^2/E psi^2 of soft_l1 under normal noise, for points with `parts` (1 or 2) components."""
+    """Efficiency (E psi')^2/E psi^2 of soft_l1 under normal noise, for points with `parts` (1 or 2) residuals."""
     z = np.linspace(0.0, 12.0, 4001)[1:]
     density = z ** (parts - 1) * np.exp(-(z**2) / 2.0)
     density /= density.sum()

@@ -102,8 +102,8 @@ class RowNoise:
             white[..., first : first + few] = begun @ self.starts[:few, :few].T
         return white
 
-    def unsure(self, influence: Array) -> list[Array]:
-        """Sensitivity of k parameter estimates to the error of each noise parameter, see `MeasuredLoop.unsure`.
+    def noise_sensitivity(self, influence: Array) -> list[Array]:
+        """Sensitivity of k parameter estimates to the error of each parameter of the noise, see `MeasuredLoop`.
 
         Args:
             influence: weight of each whitened row in the estimates, (k, n).

@@ -94,7 +94,7 @@ class Whitening:
         rows = np.concatenate((deviation.real, deviation.imag), axis=-1) * self._block.unit
         return self._less_points(rows) if self.model_error else self._line.whiten(self._block.whiten(rows))
 
-    def uncounted(self, influence: Array) -> Array:
+    def extra_covariance(self, influence: Array) -> Array:
         """Covariance of estimates that the weights of the residuals do not include if there is a model error.
 
         Args:
@@ -123,7 +123,7 @@ class Whitening:
         return ErrorProducts(rows @ rows.T, components, self._point.weight)
 
     @property
-    def log_size(self) -> float:
+    def log_det_covariance(self) -> float:
         """Natural log of the determinant of the covariance with model error, relative to that of the scatter alone."""
         return float(np.sum(np.log1p(self._point.variance * self._point.weight)))
 
@@ -145,14 +145,14 @@ class Whitening:
             rows = rows - (weight / (1.0 + weight) * mean)[block.group]
         return rows.reshape(2, -1) / self.random
 
-    def unsure(self, influence: Array) -> dict[Hashable, Array]:
+    def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
         """Sensitivity of k parameter estimates to the error of each estimated noise variance.
 
         Args:
             influence: weight of each whitened residual in the estimates, (k, 2 n).
 
         Returns:
-            Sensitivity by identifier of the noise variance, (k, 2 n) each; see `MeasuredLoop.unsure`.
+            Sensitivity by identifier of the noise variance, (k, 2 n) each; see `MeasuredLoop.noise_sensitivity`.
 
         Notes:
             Within a block V has the derivatives I by s^2 and 1 1^T by t^2, whitened W^2 and (W 1)(W 1)^T. The estimate

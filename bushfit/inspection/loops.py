@@ -59,7 +59,7 @@ def describe_sampling(history: Loop) -> str:
     Returns:
         A clause such as "even, every 0.01 s".
     """
-    if not history.timed:
+    if not history.has_recorded_time:
         return "no time in the file"
     steps = np.diff(history.time)
     usual = float(np.median(steps))
@@ -114,17 +114,17 @@ def gaps(motion: RecordedChannel, history: Loop) -> list[str]:
     Returns:
         List with one sentence on the gaps; empty without gaps.
     """
-    steps = np.diff(history.time) if history.timed else np.abs(np.diff(motion.values))
+    steps = np.diff(history.time) if history.has_recorded_time else np.abs(np.diff(motion.values))
     widest = np.quantile(steps, 0.99)  # gaps left out
     wide = steps > max(_GAP_STEPS * np.median(steps), _GAP_WIDEST_STEPS * widest)
-    if not history.timed:
+    if not history.has_recorded_time:
         outliers = lone_outliers(history.time, motion.values)
         wide &= (steps > noise_threshold(motion.values)) & ~(outliers[1:] | outliers[:-1])
     if not wide.any():
         return []
     first, count = int(np.argmax(wide)), int(wide.sum())
     channel, size = "time", f"{steps[first]:.3g} s without a row, else mostly {np.median(steps):.3g} s"
-    if not history.timed:
+    if not history.has_recorded_time:
         ends = f"{motion.format_row(first)} to {motion.format_row(first + 1)} {motion.unit}"
         channel, size = "the motion", f"the {motion.name} jumps from {ends} at once"
     return [f"{count} gap{'s' * (count > 1)} in {channel}, the first after data row {first + 1}: {size}"]
@@ -326,7 +326,9 @@ def changing_cycles(drive: Drive) -> list[str]:
             f"{first} {force_unit} in the first cycle to {last} in the last ({percent} %)"
         )
     # a time that was made from the motion turns its noise into drift
-    smallest_drift = 2.0 * _SMALLEST_CHANGE * drive.amplitude if loop.timed else noise_threshold(loop.displacement)
+    smallest_drift = (
+        2.0 * _SMALLEST_CHANGE * drive.amplitude if loop.has_recorded_time else noise_threshold(loop.displacement)
+    )
     limits = max(_REAL_CHANGE * 1.5 * error, smallest), smallest_drift
     for name, unit, mean, limit in zip(
         (force, motion), (units.force, units.displacement), means.T, limits, strict=True
@@ -348,7 +350,11 @@ def ripple(drive: Drive) -> list[str]:
         remainder, with a Hann window. White noise makes lines up to about five times the median.
     """
     loop, steps = drive.loop, np.diff(drive.loop.time)
-    if not loop.timed or steps.size < _FEWEST_RIPPLE_ROWS or np.ptp(steps) > 2.0 * _EVEN_CLOCK * np.median(steps):
+    if (
+        not loop.has_recorded_time
+        or steps.size < _FEWEST_RIPPLE_ROWS
+        or np.ptp(steps) > 2.0 * _EVEN_CLOCK * np.median(steps)
+    ):
         return []
     phase = (loop.time - loop.time[0]) * drive.frequency
     is_triangle = waveform(drive.coefficients) == "a triangle"

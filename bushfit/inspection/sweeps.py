@@ -98,7 +98,7 @@ def copied_rows(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
         _, start, count = np.unique(points, axis=1, return_index=True, return_counts=True)
         copies += int((count - 1).sum())
         first = min([first, *rows[start[count > 1]].tolist()])
-        scatter = noise.random[sweep.name, float(sweep.held[rows[0]])][0] * magnitude[rows[0]]
+        scatter = noise.random[sweep.name, float(sweep.held_value[rows[0]])][0] * magnitude[rows[0]]
         same_digit = min(float(finest[rows[0]] / scatter), 1.0)  # two draws fall on the same last digit
         expected += rows.size * (rows.size - 1) / 2.0 * same_digit * max(same_digit, _SAME_PHASE_P)
     if copies and pdtrc(copies - 1, expected) < _CHANCE:
@@ -175,7 +175,7 @@ def distance_from_curve(sweep: Sweep) -> Array:
         two distances is returned.
     """
     distance = np.zeros(sweep.frequency.size, dtype=complex)
-    runs = group_rows(sweep.repeat.astype(float), sweep.held) if sweep.stepped else []
+    runs = group_rows(sweep.repeat.astype(float), sweep.held_value) if sweep.stepped else []
     for rows in runs:
         steps, rank = np.unique(sweep.step[rows], return_inverse=True)
         if steps.size < _FEWEST_POINTS:
@@ -209,7 +209,7 @@ def outlying_points(sweep: Sweep, noise: SweepNoise, from_repeats: Array) -> Ite
     for rows in group_rows(sweep.repeat.astype(float), sweep.amplitude):  # what a block has in common is no outlier
         distance[rows] -= complex_median(distance[rows])
     random, curve = (
-        np.array([noise.random[sweep.name, float(level)] for level in sweep.held]),
+        np.array([noise.random[sweep.name, float(level)] for level in sweep.held_value]),
         distance_from_curve(sweep),
     )
     parts = np.stack((distance.real, distance.imag), axis=1)

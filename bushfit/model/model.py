@@ -95,9 +95,9 @@ class Model:
         return any(effect.depends_on for effect in self.records)
 
     @property
-    def settles(self) -> bool:
+    def is_transient(self) -> bool:
         """True if the response changes from cycle to cycle until it is steady."""
-        return any(effect.settles for effect in self.records)
+        return any(effect.is_transient for effect in self.records)
 
     @property
     def depends_on_temperature(self) -> bool:

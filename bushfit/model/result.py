@@ -324,7 +324,7 @@ class Result:
         return max(low, min(minimum, value)), min(high, max(maximum, value))
 
 
-def carried(result: Result, bushing: Bushing) -> tuple[Result, str]:
+def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, str]:
     """Transfer the compound of a fitted model to another bushing.
 
     Effects of the material and factors of specimens are kept; effects of the first bushing and its rig are left out.

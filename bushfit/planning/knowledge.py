@@ -226,6 +226,6 @@ def _tests(data: PreparedCampaign) -> Iterator[Test]:
         stepped = sweep.sweep.stepped
         for block in np.split(np.arange(sweep.frequency.size), sweep.block_starts[1:]) if stepped else ():
             steps = tuple(sweep.step[block].tolist())
-            level = (float(sweep.held[block[0]]),)
+            level = (float(sweep.held_value[block[0]]),)
             amplitudes, frequencies = (level, steps) if stepped == "frequency" else (steps, level)
             yield SimulatedSweep(sweep.direction, amplitudes, frequencies, stepped or "frequency")

@@ -68,7 +68,7 @@ class Loop:
         displacement: displacement [m or rad], or strain of a modulus test, (n,).
         force: force [N or N m], or stress [Pa], (n,).
         noise: standard deviation of the force, relative to its half range; None if the campaign does not state it.
-        timed: True if time was recorded, False if it was rebuilt from the displacement.
+        has_recorded_time: True if time was recorded, False if it was rebuilt from the displacement.
         part: position in a record of several loops; None if the record is one loop.
         softening: excess stiffness of the first cycle relative to the last; None if noise and the memory of rubber
             explain the difference.
@@ -85,7 +85,7 @@ class Loop:
     force: Floats
     noise: float | None = None
     source: Source | None = None
-    timed: bool = True
+    has_recorded_time: bool = True
     weight: float = 1.0
     part: RecordPart | None = None
     softening: float | None = None
@@ -148,7 +148,7 @@ class Sweep:
         return self.amplitude if self.reached is None else self.reached
 
     @property
-    def held(self) -> Floats:
+    def held_value(self) -> Floats:
         """Amplitude [m or rad] or frequency [Hz] that is constant in each run, (n,); else the repeat number."""
         if self.stepped is None:
             return self.repeat.astype(float)

@@ -104,7 +104,7 @@ def programme(loop: Loop, test: LoopFile = _TIMED) -> tuple[Loop, ...]:
 
 def _clock(loop: Loop) -> Floats:
     """Time of each row [s], or row numbers if the record has no time, (n,)."""
-    return loop.time if loop.timed else np.arange(loop.displacement.size, dtype=float)
+    return loop.time if loop.has_recorded_time else np.arange(loop.displacement.size, dtype=float)
 
 
 def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
@@ -219,7 +219,8 @@ def cut_loops(loop: Loop, time: Floats, spans: Sequence[SteadySpan], test: LoopF
         rows = slice(int(ends[0]), int(ends[1]) + (span.end == time[-1]))
         gaps = begin - last_end, float(time[-1]) - span.end if number == len(spans) else 0.0
         gap_texts = [
-            "" if gap <= _AT_END * span.period else f"{gap:.3g} s" if loop.timed else f"{gap:.0f} rows" for gap in gaps
+            "" if gap <= _AT_END * span.period else f"{gap:.3g} s" if loop.has_recorded_time else f"{gap:.0f} rows"
+            for gap in gaps
         ]
         sentence = left_out(gap_texts, (span.end - begin) / span.period) if any(gap_texts) else None
         part = replace(
@@ -228,7 +229,7 @@ def cut_loops(loop: Loop, time: Floats, spans: Sequence[SteadySpan], test: LoopF
             part=RecordPart(rows.start, sentence),
             softening=measure_softening(loop, span, from_rest=number == 1),
         )
-        yield part if loop.timed else replace(part, time=test.clock(part.displacement))
+        yield part if loop.has_recorded_time else replace(part, time=test.clock(part.displacement))
         last_end = span.end
 
 

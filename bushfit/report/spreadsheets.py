@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from bushfit.export.contract import Exported, Order
+from bushfit.export.contract import Exported, ExportRequest
 from bushfit.export.deck import NO_LOOPS
 from bushfit.model.result import Result
 from bushfit.reading.tablefile import to_csv, to_xlsx
@@ -16,25 +16,25 @@ from bushfit.version import __version__
 _OF_ALL = ("parameters", "provenance")
 
 
-def csv(order: Order) -> Exported:
+def csv(request: ExportRequest) -> Exported:
     """Export the model of an order as CSV files, one for each table (predictions, parameters, provenance)."""
-    written = {name: to_csv(table, decimal_comma=order.decimal_comma) for name, table in _tables(order).items()}
+    written = {name: to_csv(table, decimal_comma=request.decimal_comma) for name, table in _tables(request).items()}
     return Exported({f"{name.replace(' ', '_')}.csv": file for name, file in written.items()}, (NO_LOOPS,))
 
 
-def xlsx(order: Order) -> Exported:
+def xlsx(request: ExportRequest) -> Exported:
     """Export the model of an order as an Excel workbook, `bushing.xlsx`, with a sheet for each table."""
-    return Exported({"bushing.xlsx": to_xlsx(_tables(order))}, (NO_LOOPS,))
+    return Exported({"bushing.xlsx": to_xlsx(_tables(request))}, (NO_LOOPS,))
 
 
-def _tables(order: Order) -> dict[str, pd.DataFrame]:
+def _tables(request: ExportRequest) -> dict[str, pd.DataFrame]:
     """Tables of an export by name: long and wide predictions of each direction or specimen, parameters, provenance."""
     tables = {
-        "parameters": parameters_table(order.result),
-        "provenance": pd.DataFrame(_provenance_rows(order), columns=["what", "value"]),
+        "parameters": parameters_table(request.result),
+        "provenance": pd.DataFrame(_provenance_rows(request), columns=["what", "value"]),
     }
-    for name, prediction in zip(place_names(order.places), order.predictions, strict=True):
-        display = order.units.display(prediction.direction.motion) if order.units else None
+    for name, prediction in zip(place_names(request.places), request.predictions, strict=True):
+        display = request.units.display(prediction.direction.motion) if request.units else None
         while {name, f"{name} wide"} & tables.keys():  # a specimen may have any name
             name += "_"
         tables[name] = prediction_table(prediction, display)
@@ -69,18 +69,18 @@ def parameters_table(result: Result) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _provenance_rows(order: Order) -> Iterator[tuple[str, str]]:
+def _provenance_rows(request: ExportRequest) -> Iterator[tuple[str, str]]:
     """Rows (name, value) on the origin of an export: dimensions, effects, model file, tests, version and warnings."""
-    result, bushing = order.result, order.result.model.bushing
+    result, bushing = request.result, request.result.model.bushing
     yield "bushing", result.name
     if bushing:
         for key in ("inner_radius", "outer_radius", "length"):
             yield f"{key} [m]", f"{getattr(bushing, key):.15g}"
     yield "effects", ", ".join(result.model.effects)
-    yield "model", str(order.source.file)
-    yield "model, sha256", order.source.sha256
+    yield "model", str(request.source.file)
+    yield "model, sha256", request.source.sha256
     for source in result.inputs:
         yield "test", str(source.file)
         yield "test, sha256", source.sha256
     yield "bushfit", __version__
-    yield from order.remarks([NO_LOOPS])
+    yield from request.remarks([NO_LOOPS])

@@ -128,7 +128,7 @@ def _run_in(truth: Model, place: Place, amplitude: float) -> tuple[int, tuple[in
     The mean friction stress from the start must decay to a thousandth. One cycle at a strain of a tenth of eps_half
     keeps 95 % of this stress, at a hundredth 99.96 %.
     """
-    if truth.settles:
+    if truth.is_transient:
         return 0, (0, 1.0)
     if "eps_half" not in truth.values:
         return _LEAST_RUN_IN, (0, 1.0)

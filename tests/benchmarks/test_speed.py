@@ -21,7 +21,7 @@ import fmpy
 import numpy as np
 import pytest
 from cards.hidden import hidden_campaign
-from fmus import Running, order_of, wandering, written
+from fmus import Running, request_of, wandering, written
 from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.optimize import leastsq
 
@@ -259,7 +259,7 @@ LONG, SHORT = 100.0, 0.2
 
 def test_faster_than_real_time(paper_model: Model, tmp_path: Path, benchmark: BenchmarkFixture) -> None:
     duration = SHORT if benchmark.disabled else LONG
-    running = Running(written(order_of(paper_model), tmp_path), tmp_path / "open")
+    running = Running(written(request_of(paper_model), tmp_path), tmp_path / "open")
     shape = wandering(int(duration / STEP) + 1, STEP, seed=1)
     motion = 2e-4 * shape[:, None] * np.array([1.0, 1.0, 50.0])
     made = running.begun(running.instance())

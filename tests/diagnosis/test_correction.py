@@ -30,7 +30,7 @@ from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import Model
-from bushfit.model.result import Alternative, Range, Result, carried
+from bushfit.model.result import Alternative, Range, Result, transfer_compound
 from bushfit.prediction.caveats import caveats
 from bushfit.prediction.stiffness import predict, predict_resonance
 from bushfit.report.results import to_json
@@ -219,7 +219,7 @@ def test_they_are_told_of_a_resonance_and_stay_with_a_compound_that_is_carried(m
     peaks = [predict_resonance(Result(each.model), *shaken).peak[0] for each in result.alternatives]
     (line,) = (line for line in predict_resonance(result, *shaken).warnings if "that agree" in line)
     assert f"{number(min(peaks), 4)} to {number(max(peaks), 4)} Hz" in line
-    other, _ = carried(
+    other, _ = transfer_compound(
         replace(result, warnings=(*result.warnings, *result.undecided)), replace(result.model.bushing, name="x")
     )
     said = caveats(other)
@@ -243,7 +243,7 @@ def test_what_was_corrected_counts_as_error_where_the_compound_is_carried(paper_
     rows = ((5.0, 155.0), (0.001, 0.1), (0.05, 0.05), (0.0, 0.0), (0.001, 0.001), (0.001, 0.001))
     data = Unnamed(0.05, (2.0, 2.0), (Patch(("axial", "radial"), *rows),))
     corrected = Result(replace(paper_model, effects=(*paper_model.effects, "unnamed"), unnamed=data))
-    other, _ = carried(corrected, replace(paper_model.bushing, name="x"))
+    other, _ = transfer_compound(corrected, replace(paper_model.bushing, name="x"))
     band = predict(other, Direction.AXIAL, [20.0], [2e-4]).stiffness
     assert (band.high - band.value) / band.value > 0.05
 

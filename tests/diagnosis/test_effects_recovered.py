@@ -50,7 +50,7 @@ def test_known_effects_are_recovered(name: str) -> None:
 def test_effects_without_a_law_in_time_are_recovered_from_their_first_harmonic(name: str, paper_model: Model) -> None:
     """The rig refuses them: the data are the closed form of the steady state with noise, for loops too."""
     effect = LIBRARY[name]
-    truth = paper_model.with_effect(name, {qualified_name(effect, effect.amount): effect.amount.sized(1.0)})
+    truth = paper_model.with_effect(name, {qualified_name(effect, effect.amount): effect.amount.value_at_share(1.0)})
     campaign = measure(in_closed_form(truth, PLAN), PLAN).campaign()
     result = fit_joint(PreparedCampaign.from_campaign(campaign), effects=(*BASE, name), directions=BOTH)
     assert 0.85 < agrees(result, truth.values) < 1.15
@@ -141,7 +141,7 @@ def test_the_family_that_made_the_tests_is_the_best_and_known_to_be(paper_model:
     assert min(found, key=lambda name: found[name].evidence.bic) == truth
     assert sum(family.probability for family in found.values()) == pytest.approx(1.0)
     assert found[truth].probability > 0.5
-    assert found[truth].held.after == pytest.approx(1.0, abs=0.05)
+    assert found[truth].holdout.after == pytest.approx(1.0, abs=0.05)
     if truth != "paper":
         assert found[truth].words.endswith("better by more than chance")
         values = found[truth].evidence.model.values

@@ -120,7 +120,7 @@ def test_effects_are_sized_by_what_they_change(bare: Evidence) -> None:
     assert (group.sense, found["inertia"].family) == (1, "inertia")
     assert found["stiffness_factor.radial"].family == "stiffness_factor"
     effect = get_effect("inertia")
-    heavy = bare.model.with_effect("inertia", {"inertia.mass": effect.amount.sized(0.01)})
+    heavy = bare.model.with_effect("inertia", {"inertia.mass": effect.amount.value_at_share(0.01)})
     largest = max(each.change(heavy, bare.model) for each in bare.data_sets)
     assert 0.01 * group.unit[0] == pytest.approx(largest, rel=0.1)
 

@@ -84,7 +84,7 @@ def test_worth_is_that_of_the_covariance_in_full(seed: int) -> None:
     of = ledger(seed)
     plain = [restricted(of, covariance(of, node)) for node in of.rig.nodes]
     assert of.log_evidence == pytest.approx(over_nodes(of, plain), abs=1e-6)
-    assert of.log_evidence_wide == pytest.approx(over_nodes(of, plain, wide=True), abs=1e-6)
+    assert of.log_evidence_with_level_errors == pytest.approx(over_nodes(of, plain, wide=True), abs=1e-6)
     for group, worth in zip(of.groups, of.group_evidence, strict=True):
         if group.sense:
             continue
@@ -138,7 +138,7 @@ def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed: int) -> Non
 
     nothing = np.zeros((of.residual.size, of.residual.size))
     assert of.log_evidence == pytest.approx(evidence(False, nothing), abs=1e-6)
-    assert of.log_evidence_bent == pytest.approx(evidence(True, nothing), abs=1e-6)
+    assert of.log_evidence_with_compound == pytest.approx(evidence(True, nothing), abs=1e-6)
     added = size**2 * (group.T @ group)
     worth = of.group_evidence[0]
     for bent, found in ((False, worth.log_evidence), (True, worth.beside.log_evidence if worth.beside else 0.0)):

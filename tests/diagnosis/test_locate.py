@@ -143,8 +143,11 @@ def test_the_prediction_s_own_error_is_that_of_a_sandwich_of_runs_and_loops(meas
     (found,) = [part for part in hold_out(evidence, evidence, {}).parts if part.part == which]
     rows = next(part for part in parts(evidence.data_sets) if part.name == which).rows(evidence.data_sets)
     slopes, left = evidence.solution.jacobian, evidence.residual
-    pairs = [(data, getattr(data, "held", np.zeros(data.size // data.parts))) for data in evidence.data_sets]
-    lines = np.concatenate([np.tile(held, data.parts) for data, held in pairs])
+    pairs = [
+        (data, getattr(data, "held_value", np.zeros(data.size // data.residuals_per_point)))
+        for data in evidence.data_sets
+    ]
+    lines = np.concatenate([np.tile(held, data.residuals_per_point) for data, held in pairs])
     tests = np.repeat(np.arange(len(pairs)), [data.size for data, _ in pairs])
     root = np.linalg.inv(np.linalg.cholesky(slopes[:, ~rows] @ slopes[:, ~rows].T))
     left = left - slopes.T @ (root.T @ root @ slopes[:, ~rows] @ left[~rows])

@@ -31,7 +31,7 @@ from rigged import (
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import Loss
-from bushfit.diagnosis.explanations import meetings
+from bushfit.diagnosis.explanations import outlier_clusters
 from bushfit.effects import BASE
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.model import Model
@@ -159,14 +159,14 @@ def at(data: PreparedCampaign, *points: tuple[int, float, int]) -> list[Outlier]
 def test_odds_by_hand(left: tuple[PreparedCampaign, Model]) -> None:
     data, model = left
     count = np.unique(np.concatenate([sweep.frequency for sweep in data.sweeps])).size
-    (three,) = meetings(at(data, (0, 65.0, 0), (0, 65.0, 1), (1, 65.0, 0)), data.sweeps, model)
+    (three,) = outlier_clusters(at(data, (0, 65.0, 0), (0, 65.0, 1), (1, 65.0, 0)), data.sweeps, model)
     assert three.log_odds == pytest.approx(2.0 * np.log(count))
     assert three.outlier_distance == pytest.approx(8.0)
-    pairs = meetings(at(data, (0, 65.0, 0), (0, 65.0, 1), (1, 45.0, 0)), data.sweeps, model)
+    pairs = outlier_clusters(at(data, (0, 65.0, 0), (0, 65.0, 1), (1, 45.0, 0)), data.sweeps, model)
     assert [pair.frequency[0] for pair in pairs] == [65.0]
     assert pairs[0].log_odds == pytest.approx(-np.log(1.0 - (1.0 - 1.0 / count) ** 2))
-    assert meetings(at(data, (0, 65.0, 0), (1, 45.0, 0)), data.sweeps, model) == []
-    assert meetings([], (), model) == []
+    assert outlier_clusters(at(data, (0, 65.0, 0), (1, 45.0, 0)), data.sweeps, model) == []
+    assert outlier_clusters([], (), model) == []
 
 
 def test_odds_that_no_float_holds_are_large_ones(left: tuple[PreparedCampaign, Model]) -> None:
@@ -182,7 +182,7 @@ def test_odds_that_no_float_holds_are_large_ones(left: tuple[PreparedCampaign, M
         relative_difference=lambda _: np.zeros((2, count)),
     )
     every = [Outlier("swept", None, row + 1, "stiffness", 8.0) for row in range(400)]
-    (found,) = meetings(every, [swept], model)  # type: ignore[list-item]
+    (found,) = outlier_clusters(every, [swept], model)  # type: ignore[list-item]
     assert 700.0 < found.log_odds < 800.0
 
 

@@ -87,7 +87,7 @@ def test_record_is_complete(effect: Effect) -> None:
     assert any(parameter.neutral is not None for parameter in effect.parameters)
     for parameter in effect.parameters:
         low, high = parameter.bounds
-        assert low < parameter.sized(1.0) < high
+        assert low < parameter.value_at_share(1.0) < high
         assert parameter.log == (parameter.neutral is None)
         assert not parameter.log or low > 0.0
         assert parameter.neutral is None or low <= parameter.neutral <= high
@@ -96,7 +96,7 @@ def test_record_is_complete(effect: Effect) -> None:
 def test_neutral_value_gives_the_plain_model_back(effect: Effect, rng: np.random.Generator) -> None:
     """Of the effect of temperature, but for the spring of a network, which goes with the absolute temperature."""
     plain = random_model(rng)
-    neutral = plain.with_effect(effect.name, {qualified_name(effect, effect.amount): effect.amount.sized(0.0)})
+    neutral = plain.with_effect(effect.name, {qualified_name(effect, effect.amount): effect.amount.value_at_share(0.0)})
     plain = beside(plain, effect.name)
     if effect.name == "temperature":
         plain = plain.with_values({"mu": plain.values["mu"] * (UNDER.temperature / 296.15)})

@@ -100,9 +100,9 @@ def test_rig_and_bushing_share_the_motion(alone: Model, history: History) -> Non
 @pytest.mark.parametrize("effect", [effect for effect in LIBRARY.values() if effect.corrects], ids=lambda one: one.name)
 def test_what_corrects_a_formula_scales_that_direction_and_no_other(effect: Effect) -> None:
     (parameter,) = effect.parameters
-    model = PLAIN.with_effect(effect.name, {qualified_name(effect, parameter): parameter.sized(1.0)})
+    model = PLAIN.with_effect(effect.name, {qualified_name(effect, parameter): parameter.value_at_share(1.0)})
     for direction in Direction:
-        factor = parameter.sized(1.0) if direction == effect.corrects else 1.0
+        factor = parameter.value_at_share(1.0) if direction == effect.corrects else 1.0
         plain = PLAIN.stiffness(direction, FREQUENCY, AMPLITUDE)
         np.testing.assert_allclose(model.stiffness(direction, FREQUENCY, AMPLITUDE), factor * plain, rtol=1e-14)
         np.testing.assert_allclose(model.force(direction, LOOP), factor * PLAIN.force(direction, LOOP), rtol=1e-14)

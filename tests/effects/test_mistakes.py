@@ -31,7 +31,7 @@ def swept(loss: float, direction: Direction = Direction.AXIAL, magnitude: float 
 @pytest.mark.parametrize("direction", list(Direction))
 def test_a_test_keeps_its_shape_name_and_weight(name: str, direction: Direction) -> None:
     for test in (swept(0.1, direction), Loop("slow", direction, LOOP.time, LOOP.displacement, LOOP.force)):
-        found = MISTAKES[name].mended(test)
+        found = MISTAKES[name].corrected_test(test)
         kind = "sweep" if isinstance(test, Sweep) else "loop"
         if found is None:
             mistake = MISTAKES[name]
@@ -43,7 +43,7 @@ def test_a_test_keeps_its_shape_name_and_weight(name: str, direction: Direction)
 
 
 def mended(name: str, test: Any) -> Any:
-    found = MISTAKES[name].mended(test)
+    found = MISTAKES[name].corrected_test(test)
     assert found is not None, name
     return found
 
@@ -69,30 +69,32 @@ def test_amplitudes_rates_units_and_directions_are_mended() -> None:
     assert mended("peak_to_peak", swept(0.1)).amplitude == pytest.approx(1e-4)
     assert mended("zero_to_peak", swept(0.1)).amplitude == pytest.approx(4e-4)
     assert np.array_equal(mended("peak_to_peak", swept(0.1)).stiffness, swept(0.1).stiffness)
-    assert MISTAKES["peak_to_peak"].mended(LOOP) is None
+    assert MISTAKES["peak_to_peak"].corrected_test(LOOP) is None
     assert mended("sixty_times_faster", LOOP).time == pytest.approx(LOOP.time / 60.0)
     assert mended("pound_force", LOOP).force == pytest.approx(4.4482216 * LOOP.force)
     assert mended("inch", LOOP).displacement == pytest.approx(25.4 * LOOP.displacement)
     assert mended("other_direction", LOOP).direction is Direction.RADIAL
-    tube = MISTAKES["diameters"].mended_bushing(Bushing("tube", 0.02, 0.036, 0.034))
+    tube = MISTAKES["diameters"].corrected_bushing(Bushing("tube", 0.02, 0.036, 0.034))
     assert tube == Bushing("tube", 0.01, 0.018, 0.034)
     cycle = Sweep("slow", Direction.AXIAL, np.array([1.0]), np.array([1e-3]), np.array([4e5 + 4e4j]))
-    of_loop = MISTAKES["inch"].mended_cycle(cycle)
+    of_loop = MISTAKES["inch"].corrected_harmonic(cycle)
     assert (of_loop.amplitude, of_loop.stiffness) == (pytest.approx(25.4e-3), pytest.approx(cycle.stiffness / 25.4))
-    assert MISTAKES["milliseconds"].mended_cycle(cycle).frequency == pytest.approx(1000.0)
+    assert MISTAKES["milliseconds"].corrected_harmonic(cycle).frequency == pytest.approx(1000.0)
 
 
 def test_a_correction_names_file_table_and_line() -> None:
     test = Sweep(
         "a", Direction.RADIAL, *np.ones((2, 3)), np.ones(3, complex), source=Source(Path("tests/radial.csv"), "0")
     )
-    assert MISTAKES["peak_to_peak"].corrected(test) == '[[sweeps]] of radial.csv: amplitude = "peak-to-peak"'
-    assert MISTAKES["other_direction"].corrected(test) == '[[sweeps]] of radial.csv: direction = "axial"'
-    assert 'units = { force = "kgf" }' in MISTAKES["kilogram_force"].corrected(LOOP)
-    assert 'units = { stiffness = "kgf/mm" }' in MISTAKES["kilogram_force"].corrected(test)
-    assert "inner_radius" in MISTAKES["diameters"].corrected(None)
+    assert MISTAKES["peak_to_peak"].correction_line(test) == '[[sweeps]] of radial.csv: amplitude = "peak-to-peak"'
+    assert MISTAKES["other_direction"].correction_line(test) == '[[sweeps]] of radial.csv: direction = "axial"'
+    assert 'units = { force = "kgf" }' in MISTAKES["kilogram_force"].correction_line(LOOP)
+    assert 'units = { stiffness = "kgf/mm" }' in MISTAKES["kilogram_force"].correction_line(test)
+    assert "inner_radius" in MISTAKES["diameters"].correction_line(None)
     assert file_or_name(test) == "radial.csv"
-    assert not any("{{" in MISTAKES[name].corrected(test) + MISTAKES[name].corrected(LOOP) for name in NAMES)
+    assert not any(
+        "{{" in MISTAKES[name].correction_line(test) + MISTAKES[name].correction_line(LOOP) for name in NAMES
+    )
 
 
 def test_a_name_with_its_test_is_known_and_another_refused() -> None:

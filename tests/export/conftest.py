@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from fmus import Running, order_of
+from fmus import Running, request_of
 from readers import HASH
 
-from bushfit.export.contract import Exported, Order
+from bushfit.export.contract import Exported, ExportRequest
 from bushfit.export.fmu import export
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
@@ -28,7 +28,7 @@ def known(root: Path) -> pd.DataFrame:
 
 
 @pytest.fixture(scope="session")
-def order(known: pd.DataFrame, paper_model: Model) -> Order:
+def export_request(known: pd.DataFrame, paper_model: Model) -> ExportRequest:
     """All directions; axially five amplitudes, radially four, in torsion three."""
     result = Result(paper_model)
     predictions = [
@@ -36,18 +36,18 @@ def order(known: pd.DataFrame, paper_model: Model) -> Order:
         for direction in Direction
         for rows in [known[known["direction"] == direction]]
     ]
-    return Order(result, Source(Path("model.json"), HASH), tuple(predictions), 0.01)
+    return ExportRequest(result, Source(Path("model.json"), HASH), tuple(predictions), 0.01)
 
 
 @pytest.fixture(scope="session")
-def named(order: Order) -> Callable[[str], Order]:
+def named(export_request: ExportRequest) -> Callable[[str], ExportRequest]:
     """The same of its axial direction, of a bushing and from a file of any name."""
 
-    def called(name: str) -> Order:
-        assert order.result.model.bushing is not None
-        model = replace(order.result.model, bushing=replace(order.result.model.bushing, name=name))
+    def called(name: str) -> ExportRequest:
+        assert export_request.result.model.bushing is not None
+        model = replace(export_request.result.model, bushing=replace(export_request.result.model.bushing, name=name))
         source = Source(Path(name.replace("\0", "") or "x"), HASH)
-        return replace(order, result=Result(model), source=source, predictions=order.predictions[:1])
+        return replace(export_request, result=Result(model), source=source, predictions=export_request.predictions[:1])
 
     return called
 
@@ -55,7 +55,7 @@ def named(order: Order) -> Callable[[str], Order]:
 @pytest.fixture(scope="session")
 def exported(paper_model: Model) -> Exported:
     """The paper's bushing in three directions."""
-    return export(order_of(paper_model))
+    return export(request_of(paper_model))
 
 
 @pytest.fixture(scope="session")

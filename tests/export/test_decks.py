@@ -14,7 +14,7 @@ from readers import HASH, Curves, abaqus_options, by_abaqus, by_optistruct, by_p
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.export import abaqus, adams, nastran
-from bushfit.export.contract import MM_T_S_N, Exported, Order, UnitSystem
+from bushfit.export.contract import MM_T_S_N, Exported, ExportRequest, UnitSystem
 from bushfit.export.deck import DOFS, amplitude_levels
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
@@ -28,12 +28,12 @@ DIGITS, ALONG = 5e-5, 2e-9
 SYSTEMS = ["N, s, t, mm", "m kg s N", "mm kg ms kN", "in lbf*s^2/in s lbf"]
 
 
-def read(name: str, order: Order, folder: Path) -> tuple[Exported, Curves]:
+def read(name: str, export_request: ExportRequest, folder: Path) -> tuple[Exported, Curves]:
     """The export of a format, and what its reader finds in it."""
     if name == "abaqus":
-        exported = abaqus.export(order)
+        exported = abaqus.export(export_request)
         return exported, by_abaqus(exported.files["bushing.inp"].decode("ascii"))
-    exported = nastran.export(replace(order, dialect=name))
+    exported = nastran.export(replace(export_request, dialect=name))
     ((file, content),) = exported.files.items()
     (folder / file).write_bytes(content)
     found = by_pynastran(folder / file) if name == "nastran" else by_optistruct(content.decode("ascii"))
@@ -43,7 +43,7 @@ def read(name: str, order: Order, folder: Path) -> tuple[Exported, Curves]:
 @pytest.mark.parametrize("units", SYSTEMS)
 @pytest.mark.parametrize("name", ["nastran", "optistruct", "abaqus"])
 def test_every_value_of_the_grid_is_read_back(
-    name: str, units: str, order: Order, known: pd.DataFrame, tmp_path: Path
+    name: str, units: str, export_request: ExportRequest, known: pd.DataFrame, tmp_path: Path
 ) -> None:
     """In whatever units, turned back into SI by factors that are typed here."""
     newton, metre, second = {
@@ -52,8 +52,8 @@ def test_every_value_of_the_grid_is_read_back(
         "mm kg ms kN": (1e-3, 1e3, 1e3),
         "in lbf*s^2/in s lbf": (1.0 / 4.4482216152605, 1.0 / 0.0254, 1.0),
     }[units]
-    _, found = read(name, replace(order, units=UnitSystem.parse(units)), tmp_path)
-    ranks = range(1, len(amplitude_levels(order)) + 1)
+    _, found = read(name, replace(export_request, units=UnitSystem.parse(units)), tmp_path)
+    ranks = range(1, len(amplitude_levels(export_request)) + 1)
     assert set(found) == {(dof, rank) for dofs in DOFS.values() for dof in dofs for rank in ranks}
     worst, apart = 0.0, 0.0
     for direction, dofs in DOFS.items():
@@ -64,7 +64,9 @@ def test_every_value_of_the_grid_is_read_back(
                 f, k = found[dof, rank]
                 np.testing.assert_allclose(f * second, frequency, rtol=ALONG)
                 worst = max(worst, np.abs(k / scale / stiffness - 1.0).max())
-                exact = order.result.model.stiffness(direction, frequency, amplitude_of(known, direction, rank))
+                exact = export_request.result.model.stiffness(
+                    direction, frequency, amplitude_of(known, direction, rank)
+                )
                 apart = max(apart, np.abs(k / scale / exact - 1.0).max())
     print(f"{name}, {units}: {len(found)} curves, off the kept computation {worst:.1e}, off the model {apart:.1e}")
     assert worst < MODEL
@@ -76,16 +78,16 @@ def amplitude_of(known: pd.DataFrame, direction: Direction, rank: int) -> float:
     return float(amplitudes[min(rank, amplitudes.size) - 1])
 
 
-def test_the_compound_of_abaqus_is_the_model_at_that_strain(order: Order, paper_model: Model) -> None:
+def test_the_compound_of_abaqus_is_the_model_at_that_strain(export_request: ExportRequest, paper_model: Model) -> None:
     """*HYPERELASTIC: C10 = G/2. *VISCOELASTIC: omega Re(g*) = G''/G, omega Im(g*) = 1 - G'/G, bulk, frequency.
 
     Source: Abaqus Analysis User's Guide, "Frequency domain viscoelasticity": storage modulus
     G (1 - omega Im g*), loss modulus G omega Re g*.
     """
-    text = abaqus.export(order).files["bushing.inp"].decode("ascii")
+    text = abaqus.export(export_request).files["bushing.inp"].decode("ascii")
     options = abaqus_options(text)
     starts = [place for place, (keyword, _, _) in enumerate(options) if keyword == "MATERIAL"]
-    amplitudes = np.unique(order.predictions[0].amplitude)
+    amplitudes = np.unique(export_request.predictions[0].amplitude)
     assert len(starts) == amplitudes.size == 5
     for start, amplitude in zip(starts, amplitudes, strict=True):
         (_, hyper, ((c10, d1),)), (_, visco, rows) = options[start + 1 : start + 3]
@@ -101,9 +103,9 @@ def test_the_compound_of_abaqus_is_the_model_at_that_strain(order: Order, paper_
         np.testing.assert_allclose(modulus, axial * np.log(1.8) / (2.0 * np.pi * 0.034), rtol=DIGITS)
 
 
-def test_adams_holds_curve_and_damping(order: Order, known: pd.DataFrame) -> None:
+def test_adams_holds_curve_and_damping(export_request: ExportRequest, known: pd.DataFrame) -> None:
     """Storage force at each amplitude, damper or loss angle in the middle of the grid; mm, newton, degrees, second."""
-    exported = adams.export(order)
+    exported = adams.export(export_request)
     factors = {"x": (1e3, 1.0), "ax": (np.degrees(1.0), 1e3)}
     for kind in ("car", "ride"):
         blocks = teimorbit(exported.files[f"bushing_{kind}.bus"].decode("ascii"))
@@ -135,10 +137,10 @@ def test_adams_holds_curve_and_damping(order: Order, known: pd.DataFrame) -> Non
 ENDS = ("FX", "FY", "FZ", "TX", "TY", "TZ")
 
 
-def test_one_frequency_and_one_amplitude(order: Order, tmp_path: Path) -> None:
+def test_one_frequency_and_one_amplitude(export_request: ExportRequest, tmp_path: Path) -> None:
     """A table needs two rows and a spline five points: PBUSH alone, and a straight line."""
-    one = replace(order, predictions=(predict(order.result, Direction.AXIAL, [20.0], [2e-4]),))
-    exact = complex(order.result.model.stiffness("axial", 20.0, 2e-4)[()])
+    one = replace(export_request, predictions=(predict(export_request.result, Direction.AXIAL, [20.0], [2e-4]),))
+    exact = complex(export_request.result.model.stiffness("axial", 20.0, 2e-4)[()])
     text = nastran.export(one).files["bushing.bdf"].decode()
     assert "PBUSHT" not in text.replace("PBUSHT*", "")
     assert "TABLED1" not in text
@@ -152,40 +154,42 @@ def test_one_frequency_and_one_amplitude(order: Order, tmp_path: Path) -> None:
     assert found[1][0] * 1e3 == pytest.approx(exact, rel=DIGITS)
 
 
-WRITERS: list[Callable[[Order], Exported]] = [nastran.export, abaqus.export, adams.export]
+WRITERS: list[Callable[[ExportRequest], Exported]] = [nastran.export, abaqus.export, adams.export]
 
 
 @pytest.mark.parametrize("export", WRITERS)
 def test_every_deck_says_what_it_is_of_and_takes_directions_of_one_grid_alone(
-    export: Callable[[Order], Exported], order: Order
+    export: Callable[[ExportRequest], Exported], export_request: ExportRequest
 ) -> None:
-    body = predict(order.result, Specimen("DMA =1+1", "modulus"), [5.0, 10.0], [0.01])
-    exported = export(replace(order, units=MM_T_S_N, predictions=(*order.predictions, body)))
+    body = predict(export_request.result, Specimen("DMA =1+1", "modulus"), [5.0, 10.0], [0.01])
+    exported = export(replace(export_request, units=MM_T_S_N, predictions=(*export_request.predictions, body)))
     assert "specimens: DMA =1+1" in exported.losses
     for content in exported.files.values():
         text = content.decode("ascii")
         for words in ("bushing: CMP 15 961", "model: model.json", f"sha256: {HASH}", "units: mm", "left out"):
             assert words in text, words
     with pytest.raises(ModelError, match="no direction of a bushing"):
-        export(replace(order, predictions=(body,)))
-    other = predict(order.result, Direction.RADIAL, [5.0, 11.0], [1e-4])
+        export(replace(export_request, predictions=(body,)))
+    other = predict(export_request.result, Direction.RADIAL, [5.0, 11.0], [1e-4])
     with pytest.raises(ModelError, match="different frequencies"):
-        export(replace(order, predictions=(order.predictions[0], other)))
+        export(replace(export_request, predictions=(export_request.predictions[0], other)))
 
 
 @pytest.mark.parametrize(("name", "at_most"), [("nastran", 0.006), ("optistruct", 0.006), ("abaqus", 0.06)])
 def test_the_error_between_frequencies_that_is_told_is_the_one_there_is(
-    name: str, at_most: float, order: Order, tmp_path: Path
+    name: str, at_most: float, export_request: ExportRequest, tmp_path: Path
 ) -> None:
     """Read back, drawn as straight lines between the rows, and compared with the model, without its rig, everywhere."""
-    rigged = Result(order.result.model.with_effect("rig_compliance", {"rig_compliance.compliance": 1e-7}))
-    exported, found = read(name, replace(order, result=rigged, predictions=order.predictions[:1]), tmp_path)
+    rigged = Result(export_request.result.model.with_effect("rig_compliance", {"rig_compliance.compliance": 1e-7}))
+    exported, found = read(
+        name, replace(export_request, result=rigged, predictions=export_request.predictions[:1]), tmp_path
+    )
     told = next(line for line in exported.losses if "between the frequencies" in line)
     claimed = float(told.split("up to ")[1].split(" %")[0]) / 100.0
     fine, worst = np.linspace(5.0, 155.0, 601), 0.0
     for (_, rank), (f, k) in found.items():
-        amplitude = np.unique(order.predictions[0].amplitude)[rank - 1]
-        off = drawn(name, f, k, fine) * 1e3 / order.result.model.stiffness("axial", fine, amplitude) - 1.0
+        amplitude = np.unique(export_request.predictions[0].amplitude)[rank - 1]
+        off = drawn(name, f, k, fine) * 1e3 / export_request.result.model.stiffness("axial", fine, amplitude) - 1.0
         worst = max(worst, float(np.abs(off).max()))
     print(f"{name}: told {claimed:.2%}, found {worst:.2%}")
     assert worst <= at_most

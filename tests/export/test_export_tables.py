@@ -14,7 +14,7 @@ import pytest
 from readers import abaqus_options, bulk_cards, teimorbit
 
 from bushfit.export import abaqus, adams, nastran
-from bushfit.export.contract import Order, UnitSystem
+from bushfit.export.contract import ExportRequest, UnitSystem
 from bushfit.geometry import Direction, Specimen
 from bushfit.prediction.stiffness import Band, predict
 from bushfit.reading.tablefile import to_xlsx
@@ -36,12 +36,14 @@ def sheets(content: bytes) -> dict[str, pd.DataFrame]:
 
 
 @pytest.mark.parametrize("kind", ["csv", "xlsx"])
-def test_long_and_wide_tables_hold_the_whole_grid(kind: str, order: Order, known: pd.DataFrame) -> None:
+def test_long_and_wide_tables_hold_the_whole_grid(
+    kind: str, export_request: ExportRequest, known: pd.DataFrame
+) -> None:
     if kind == "csv":
-        files = spreadsheets.csv(order).files
+        files = spreadsheets.csv(export_request).files
         tables = {name.removesuffix(".csv").replace("_", " "): pd.read_csv(io.BytesIO(files[name])) for name in files}
     else:
-        tables = sheets(spreadsheets.xlsx(order).files["bushing.xlsx"])
+        tables = sheets(spreadsheets.xlsx(export_request).files["bushing.xlsx"])
     places = [str(direction) for direction in Direction]
     assert list(tables) == [*(f"{p}{end}" for p in places for end in ("", " wide")), "parameters", "provenance"]
     worst = 0.0
@@ -64,34 +66,37 @@ def test_long_and_wide_tables_hold_the_whole_grid(kind: str, order: Order, known
     assert worst < MODEL
 
 
-def test_parameters_provenance_and_units_asked_for(order: Order, table_1: dict[str, float]) -> None:
-    tables = sheets(spreadsheets.xlsx(order).files["bushing.xlsx"])
+def test_parameters_provenance_and_units_asked_for(export_request: ExportRequest, table_1: dict[str, float]) -> None:
+    tables = sheets(spreadsheets.xlsx(export_request).files["bushing.xlsx"])
     parameters = tables["parameters"]
     assert dict(zip(parameters["parameter"], parameters["value"], strict=True)) == table_1
     assert set(parameters["fitted"]) == {"no"}
     provenance = dict(tables["provenance"].to_numpy().tolist())
-    assert provenance["model, sha256"] == order.source.sha256
+    assert provenance["model, sha256"] == export_request.source.sha256
     assert provenance["bushing"] == "CMP 15 961"
     assert provenance["length [m]"] == "0.034"
-    table = sheets(spreadsheets.xlsx(replace(order, units=UnitSystem.parse("m kg s N"))).files["bushing.xlsx"])
-    exact = np.abs(order.result.model.stiffness("torsion", 5.0, order.predictions[2].amplitude[0]))
+    table = sheets(spreadsheets.xlsx(replace(export_request, units=UnitSystem.parse("m kg s N"))).files["bushing.xlsx"])
+    exact = np.abs(export_request.result.model.stiffness("torsion", 5.0, export_request.predictions[2].amplitude[0]))
     assert table["torsion"]["stiffness [N*m/rad]"][0] == pytest.approx(exact, rel=1e-12)
-    assert table["torsion"]["amplitude [rad]"][0] == order.predictions[2].amplitude[0]
-    assert table["axial"]["stiffness [N/m]"][0] == pytest.approx(order.predictions[0].stiffness.value[0])
+    assert table["torsion"]["amplitude [rad]"][0] == export_request.predictions[2].amplitude[0]
+    assert table["axial"]["stiffness [N/m]"][0] == pytest.approx(export_request.predictions[0].stiffness.value[0])
 
 
-def test_specimens_have_tables_and_points_that_a_grid_lacks_are_empty(order: Order) -> None:
+def test_specimens_have_tables_and_points_that_a_grid_lacks_are_empty(export_request: ExportRequest) -> None:
     bodies = [
-        predict(order.result, Specimen(name, "modulus"), [5.0], [0.01]) for name in ("parameters", "axial", "x", "x")
+        predict(export_request.result, Specimen(name, "modulus"), [5.0], [0.01])
+        for name in ("parameters", "axial", "x", "x")
     ]
     tables = sheets(
-        spreadsheets.xlsx(replace(order, predictions=(order.predictions[0], *bodies))).files["bushing.xlsx"]
+        spreadsheets.xlsx(replace(export_request, predictions=(export_request.predictions[0], *bodies))).files[
+            "bushing.xlsx"
+        ]
     )
     assert len(tables) == 2 * 5 + 2
     assert sum("modulus [MPa]" in table for table in tables.values()) == 4
     assert "parameter" in tables["parameters"]
-    assert len(spreadsheets.csv(replace(order, predictions=tuple(bodies))).files) == 2 * 4 + 2
-    prediction = order.predictions[0]
+    assert len(spreadsheets.csv(replace(export_request, predictions=tuple(bodies))).files) == 2 * 4 + 2
+    prediction = export_request.predictions[0]
     kept = np.arange(prediction.frequency.size) != 3
 
     def band(of: Band) -> Band:
@@ -116,13 +121,13 @@ NASTY = (
 
 @pytest.mark.parametrize("name", NASTY)
 def test_decks_and_workbook_hold_the_same_under_any_name(
-    name: str, named: Callable[[str], Order], tmp_path: Path
+    name: str, named: Callable[[str], ExportRequest], tmp_path: Path
 ) -> None:
-    def content(order: Order) -> tuple[object, ...]:
+    def content(export_request: ExportRequest) -> tuple[object, ...]:
         texts = {
             file: text.decode("ascii")
             for export in (nastran.export, abaqus.export, adams.export)
-            for file, text in export(order).files.items()
+            for file, text in export(export_request).files.items()
         }
         blocks = teimorbit(texts["bushing_ride.bus"]).items()
         options = [(keyword, values) for keyword, values, _ in abaqus_options(texts["bushing.inp"])]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
-from fmus import LEVELS, Running, off, order_of, wandering, written
+from fmus import LEVELS, Running, off, request_of, wandering, written
 
 from bushfit.effects import LIBRARY, Branch, Layer, Level, get_parameter, qualified_name
 from bushfit.effects.contract import Array, RubberConditions
@@ -75,7 +75,7 @@ def every(paper_model: Model, tmp_path_factory: pytest.TempPathFactory) -> tuple
     """A model with every law at its neutral values, and its FMU."""
     folder = tmp_path_factory.mktemp("every")
     model = Model.with_defaults(paper_model.bushing, (*paper_model.effects, *SETTABLE), paper_model.values)
-    return model, Running(written(order_of(model), folder), folder / "open")
+    return model, Running(written(request_of(model), folder), folder / "open")
 
 
 @pytest.mark.parametrize("name", SETTABLE)
@@ -84,7 +84,7 @@ def test_each_effect_follows_the_rig(every: tuple[Model, Running], name: str) ->
     samples do not count."""
     neutral, running = every
     effect = LIBRARY[name]
-    values = {qualified_name(effect, parameter): parameter.sized(1.0) for parameter in effect.parameters}
+    values = {qualified_name(effect, parameter): parameter.value_at_share(1.0) for parameter in effect.parameters}
     values |= {key: 1.5e-4 for key in values if key.endswith(".gap")}
     model = neutral.with_values(values)
     motion, step, frequency = motions("random", 1)
@@ -103,12 +103,12 @@ def test_each_effect_follows_the_rig(every: tuple[Model, Running], name: str) ->
 def test_what_fades_with_memory_or_a_preload_follows_the_rig(paper_model: Model, tmp_path: Path) -> None:
     names = tuple(dict.fromkeys(name.partition(".")[0] for name in FADING))
     model = Model.with_defaults(paper_model.bushing, (*paper_model.effects, *names), {**paper_model.values, **FADING})
-    running = Running(written(order_of(model, accuracy=2e-3), tmp_path), tmp_path / "fading")
+    running = Running(written(request_of(model, accuracy=2e-3), tmp_path), tmp_path / "fading")
     assert worst(running, model, "random") < LARGEST
     doubled = {"maxwell.mu1": 2.0 * FADING["maxwell.mu1"]}
     assert worst(running, model.with_values(doubled), "random", values=doubled) < LARGEST
     model = paper_model.with_effect("elastic_preload.radial", {"elastic_preload.radial": 1.2})
-    running = Running(written(order_of(model), tmp_path), tmp_path / "preload")
+    running = Running(written(request_of(model), tmp_path), tmp_path / "preload")
     assert {"mu.axial", "mu.radial", "mu.torsion"} <= set(running.reference)
     assert worst(running, model, "random") < LARGEST
 
@@ -117,7 +117,7 @@ def test_an_fmu_is_of_the_temperature_asked_for(paper_model: Model, tmp_path: Pa
     """Springs that soften, and a springpot that shifts as well."""
     values = {"temperature.softening": 4e-3, "temperature.shift": 0.08}
     model = paper_model.with_effect("temperature", values)
-    plain, at, frequency = order_of(model), 60.0 + CELSIUS, 55.0
+    plain, at, frequency = request_of(model), 60.0 + CELSIUS, 55.0
     running = Running(written(replace(plain, temperature=at), tmp_path), tmp_path / "warm")
     amplitude, phase = LEVELS[Direction.AXIAL][1], np.arange(30 * 64 + 1) / 64
     motion = np.zeros((phase.size, 3))
@@ -148,7 +148,7 @@ def test_every_effect_is_written_or_refused_in_one_error_and_every_law_is_tested
             known in FIELDS,
             isinstance(effect, Branch) and effect.size is not None,
             effect.harmonic_only,
-            effect.settles,
+            effect.is_transient,
             effect.level is Level.INSTRUMENT,
             not isinstance(effect, Branch | Layer),
         )

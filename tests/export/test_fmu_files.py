@@ -14,7 +14,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
-from fmus import LEVELS, Running, order_of, wandering, written
+from fmus import LEVELS, Running, request_of, wandering, written
 
 from bushfit.effects import LIBRARY, Level
 from bushfit.errors import ModelError, OutputError
@@ -66,9 +66,9 @@ def test_the_library_exports_the_interface_and_needs_no_other(exported: Exported
 
 
 def test_the_same_model_gives_the_same_bytes_and_another_its_own_guid(paper_model: Model) -> None:
-    once, again = (export(order_of(paper_model)).files for _ in range(2))
+    once, again = (export(request_of(paper_model)).files for _ in range(2))
     assert once == again
-    stiffer = archive(export(order_of(paper_model.with_values({"mu": 2e6}))))
+    stiffer = archive(export(request_of(paper_model.with_values({"mu": 2e6}))))
     own = ET.fromstring(archive(Exported(once))["modelDescription.xml"]).get("guid")
     assert ET.fromstring(stiffer["modelDescription.xml"]).get("guid") != own
 
@@ -78,7 +78,7 @@ def test_names_with_quotes_and_markup_come_through(paper_model: Model, tmp_path:
     bushing = replace(paper_model.bushing, name='"A" & <b>\'\x07é</b> ]]>')
     mount = Specimen('<mount> "&1"', "shear", area=1e-3, thickness=5e-3)
     model = Model(bushing, paper_model.effects, paper_model.values)
-    wanted = order_of(model, (Direction.AXIAL, mount), specimens=(mount,))
+    wanted = request_of(model, (Direction.AXIAL, mount), specimens=(mount,))
     file = written(wanted, tmp_path)
     assert file.name == "bushfit_a_b_b.fmu"
     assert validate_fmu(str(file)) == []
@@ -88,7 +88,7 @@ def test_names_with_quotes_and_markup_come_through(paper_model: Model, tmp_path:
     force = running.run(1e-4 * np.linspace(0.0, 1.0, 11)[:, None] * np.ones(2), 1e-3)
     assert np.all(np.diff(force, axis=0) > 0.0)
     coupon = Specimen("DMA", "modulus")
-    alone = order_of(Model(None, paper_model.effects, paper_model.values), (coupon,), specimens=(coupon,))
+    alone = request_of(Model(None, paper_model.effects, paper_model.values), (coupon,), specimens=(coupon,))
     running = Running(written(alone, tmp_path), tmp_path / "coupon")
     assert (running.inputs, running.outputs) == (["strain.DMA"], ["stress.DMA"])
 
@@ -153,19 +153,19 @@ def test_wrong_calls_are_refused_and_output_before_the_first_step_is_that_of_the
 @pytest.mark.parametrize("name", ["kraus", "hysteretic_loss"])
 def test_effects_without_a_law_in_time_are_refused(paper_model: Model, name: str) -> None:
     with pytest.raises(ModelError, match="for which this effect has no law") as refused:
-        time_model(order_of(paper_model.with_effect(name)))
+        time_model(request_of(paper_model.with_effect(name)))
     assert refused.value.place == name
 
 
 def test_effects_of_the_rig_are_left_out_and_what_is_held_is_said_with_its_error(paper_model: Model) -> None:
     plain, *others = (
-        [value.name for value in time_model(order_of(model, (Direction.AXIAL,))).values]
+        [value.name for value in time_model(request_of(model, (Direction.AXIAL,))).values]
         for model in (paper_model, *(paper_model.with_effect(name) for name in OF_THE_RIG))
     )
     assert dict(zip(OF_THE_RIG, others, strict=True)) == dict.fromkeys(OF_THE_RIG, plain)
     # m (e0/0.01)^-q, held at the geometric middle of 0.1 and 0.5 mm: the whole error is that of the springpot.
     model = paper_model.with_effect("coupled_breakdown", {"coupled_breakdown.q": 0.3})
-    found = time_model(order_of(model, (Direction.AXIAL,)))
+    found = time_model(request_of(model, (Direction.AXIAL,)))
     (line,) = (line for line in found.losses if "coupled_breakdown" in line)
     strain = np.array(LEVELS[Direction.AXIAL])[:, None] * model.unit_strain(Direction.AXIAL)
     middle = np.sqrt(strain[0] * strain[-1])
@@ -177,14 +177,14 @@ def test_effects_of_the_rig_are_left_out_and_what_is_held_is_said_with_its_error
     assert f"off by up to {100.0 * error:.2g} %" in line
     held = next(value for value in found.values if value.name == "m")
     assert held.value == pytest.approx(2e5 * (middle.item() / 0.01) ** -0.3)
-    soft = time_model(order_of(paper_model.with_effect("mullins_softening", {"mullins_softening.share": 0.1})))
+    soft = time_model(request_of(paper_model.with_effect("mullins_softening", {"mullins_softening.share": 0.1})))
     assert [line for line in soft.losses if "mullins_softening: stiffness off by up to" in line]
 
 
 def test_without_a_compiler_it_is_said_how_to_get_one(paper_model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
     with pytest.raises(OutputError, match="no compiler") as refused:
-        export(order_of(paper_model))
+        export(request_of(paper_model))
     assert refused.value.hint == 'pip install "bushfit[fmu]"'
 
 
@@ -193,4 +193,4 @@ def test_a_service_without_a_home_folder_compiles_too(
 ) -> None:
     for name in ("HOME", "XDG_CACHE_HOME", "LOCALAPPDATA", "APPDATA"):
         monkeypatch.delenv(name, raising=False)
-    assert export(order_of(paper_model)).files == exported.files
+    assert export(request_of(paper_model)).files == exported.files

@@ -72,7 +72,7 @@ def test_the_motion_is_cleared_and_the_true_model_leaves_only_noise(paper_model:
     """One peak and one trough a cycle, where the motion has them, although the sensor turns at every other row."""
     loop = measured(paper_model, **CASES[case])
     data_set = MeasuredLoop(drive_of(loop))
-    cycle = data_set.drive.history(settles=False).value
+    cycle = data_set.drive.history(is_transient=False).value
     turns = np.flatnonzero(np.diff(np.sign(np.diff(np.append(cycle, cycle[0])))) != 0)
     residual = data_set.residual(paper_model)
     reduced = float(residual @ residual) / residual.size
@@ -90,7 +90,7 @@ def test_from_rest_the_virgin_curve_is_followed(paper_model: Model) -> None:
     loop = Loop("loop", Direction.AXIAL, whole.time, whole.displacement, whole.force)
     drive = drive_of(loop)
     assert drive.from_rest
-    assert not drive.history(settles=False).periodic
+    assert not drive.history(is_transient=False).periodic
     gap = np.max(np.abs(MeasuredLoop(drive).force(paper_model) - loop.force)) / drive.half_range
     print(f"from rest: model within {gap:.1e} of the record")
     assert gap < 2e-3

@@ -231,13 +231,13 @@ def test_the_covariance_is_the_sandwich_of_noise_and_process(rig: Rig) -> None:
     data = PreparedCampaign.from_campaign(campaign)
     plain = estimate(FitProblem(data.starting_model(data.effects, data.sweeps, {}), data.sweeps, FIVE, data.bounds))
     found, _ = with_model_error(plain, data.bounds)
-    (sweep,) = found.weighed
-    assert found.process is not None
+    (sweep,) = found.covariance_tests
+    assert found.smooth_error is not None
     assert isinstance(sweep, MeasuredSweep)
-    model, random = found.model, sweep.noise.scatter(sweep.name, sweep.held, sweep.step)
-    run = np.unique(np.stack((sweep.held, sweep.repeat)), axis=1, return_inverse=True)[1]
+    model, random = found.model, sweep.noise.scatter(sweep.name, sweep.held_value, sweep.step)
+    run = np.unique(np.stack((sweep.held_value, sweep.repeat)), axis=1, return_inverse=True)[1]
     sources = [
-        sweep.residual_change(found.process.shapes * sweep.stiffness(model), model),
+        sweep.residual_change(found.smooth_error.shapes * sweep.stiffness(model), model),
         *(sweep.whiten(unit * np.diag(size).astype(complex)) for unit, size in zip((1.0, 1.0j), random, strict=True)),
         *(
             np.array(sweep.shared_error_columns(run == i)) * np.array(sweep.noise.shared)[:, None]
@@ -246,5 +246,5 @@ def test_the_covariance_is_the_sandwich_of_noise_and_process(rig: Rig) -> None:
     ]
     slopes = found.coordinates.slopes(model.values)
     moved = np.linalg.pinv(jacobian(model, [sweep], FIVE).T) @ np.concatenate(sources).T * slopes[:, None]
-    known = covariance(model, [FitStage(FIVE, found.weighed or found.minimised, found.process)])
+    known = covariance(model, [FitStage(FIVE, found.covariance_tests or found.minimised, found.smooth_error)])
     np.testing.assert_allclose(known.matrix, moved @ moved.T, rtol=1e-6)

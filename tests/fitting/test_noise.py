@@ -263,7 +263,7 @@ def test_harmonics_err_as_the_noise_says(kind: str, cycles: int, rows: int, corr
         drive = data_set.drive
         assert drive.force.size < phase.size or cycles < 5
         error = data_set._whitened((true_force(drive.phase) - drive.force) * data_set._per_noise)
-        squares.append(np.mean(np.square(error @ np.linalg.qr(data_set.contrasts()[1:].T)[0])))
+        squares.append(np.mean(np.square(error @ np.linalg.qr(data_set.smooth_changes()[1:].T)[0])))
     mean, unsure = np.mean(squares), np.std(squares) / np.sqrt(len(squares))
     print(f"{kind}, {cycles} of {rows} rows: mean square of the harmonics {mean:.2f} +- {unsure:.2f}, 1 if right")
     assert 0.7 < mean < 1.5
@@ -284,7 +284,7 @@ def test_how_an_unsure_filter_moves_the_covariance() -> None:
 
     coefficient, step = noise.filter[1] / noise.filter[0], 1e-4
     expected = (variance(coefficient + step) - variance(coefficient - step)) / (2.0 * step)
-    by_coefficient = noise.unsure(influence)[1] / noise.error[1, 1]
+    by_coefficient = noise.noise_sensitivity(influence)[1] / noise.error[1, 1]
     assert float(by_coefficient[0] @ influence[0]) == pytest.approx(expected, rel=0.03)
 
 

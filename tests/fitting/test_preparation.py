@@ -70,7 +70,7 @@ def test_unsure_noise_moves_the_covariance_by_its_derivatives(sweep: MeasuredSwe
     line = np.unique(sweep.amplitude, return_inverse=True)[1]
     block = np.unique(np.stack((sweep.amplitude, sweep.repeat)), axis=1, return_inverse=True)[1].ravel()
     plain = covariance_of(sweep)
-    for (_, kind, part), found in data.unsure(influence).items():
+    for (_, kind, part), found in data.noise_sensitivity(influence).items():
         own = slice(part * n, part * n + n)
         error = np.sqrt(2.0 / freedom[kind])
         random = np.array([noise.random["sweep", float(x)][part] ** 2 for x in sweep.amplitude])

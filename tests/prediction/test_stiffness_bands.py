@@ -16,7 +16,7 @@ from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction, Shape, Specimen
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
-from bushfit.model.result import Range, Result, carried
+from bushfit.model.result import Range, Result, transfer_compound
 from bushfit.prediction.caveats import caveats
 from bushfit.prediction.grid import PAPER_AMPLITUDES, PAPER_FREQUENCIES, default_grid
 from bushfit.prediction.stiffness import predict, predict_resonance
@@ -179,7 +179,7 @@ def test_the_compound_is_carried_to_another_bushing(result: Result) -> None:
     model = result.model.with_effect("stiffness_factor.radial", {"stiffness_factor.radial": 1.1})
     model = model.with_effect("inertia").with_effect("clearance").with_effect("viscous")
     wide = Bushing("wide", 0.010, 0.018, 0.068)
-    other, said = carried(replace(result, model=model), wide)
+    other, said = transfer_compound(replace(result, model=model), wide)
     assert other.model.effects == ("elastic", "springpot", "friction", "viscous")
     assert "clearance, stiffness_factor.radial, inertia" in said
     here, there = (predict(each, Direction.AXIAL, [10.0, 50.0], [1e-4]) for each in (result, other))
@@ -208,7 +208,7 @@ def test_a_coupon_predicts_a_bushing_and_says_what_it_does_not_know(result: Resu
     assert 1.0 < table["modulus [MPa]"].iloc[0] < 3.0
     with pytest.raises(ModelError, match=r"axial: there is no bushing[\s\S]*--bushing other.toml"):
         predict(alone, Direction.AXIAL, [10.0], [1e-4])
-    bushing, _ = carried(alone, result.model.bushing)  # type: ignore[arg-type]
+    bushing, _ = transfer_compound(alone, result.model.bushing)  # type: ignore[arg-type]
     found = predict(bushing, Direction.AXIAL, [10.0], [1e-4])
     np.testing.assert_allclose(found.stiffness.value, predict(result, Direction.AXIAL, [10.0], [1e-4]).stiffness.value)
     (line,) = found.warnings

@@ -107,7 +107,7 @@ def test_each_steady_part_is_a_loop_in_its_order(paper_model: Model, case: str) 
 @pytest.mark.parametrize("case", ["pauses", "one speed"])
 def test_without_time_parts_are_the_same(paper_model: Model, case: str) -> None:
     motions, expected = PROGRAMMES[case]
-    loops = programme(replace(recorded(paper_model, *motions), timed=False), LoopFile(file="", rate=1e-4))
+    loops = programme(replace(recorded(paper_model, *motions), has_recorded_time=False), LoopFile(file="", rate=1e-4))
     sizes = [drive_of(loop).amplitude for loop in loops]
     assert [1e3 * size for size in sizes] == pytest.approx([x for x, _ in expected], rel=1e-2)
     for loop, size in zip(loops, sizes, strict=True):

@@ -96,7 +96,7 @@ def _draw_history(figure: Figure, cell: SubplotSpec, history: Loop, loop: Axes |
         else:
             axes.fill_between(*envelope_over_time(history.time, values), step="post", color=_COLOR, lw=0.6)
         axes.set_label(str(history.direction))
-        style.label_axes(axes, "time [s]" if history.timed else "time rebuilt [s]", label)
+        style.label_axes(axes, "time [s]" if history.has_recorded_time else "time rebuilt [s]", label)
     figure.align_ylabels(over_time)
     over_time[0].set_xlabel("")
     if loop is None:
@@ -123,10 +123,10 @@ def _draw_sweep(pair: Sequence[Axes], sweep: Sweep) -> Axes:
     fixed_quantity, unit, scale = ("frequency", "Hz", 1.0) if by_amplitude else ("amplitude", *length)
     x = sweep.step * (length.factor if by_amplitude else 1.0)
     table = pd.DataFrame({"x": x, "stiffness": factor * magnitude, "loss": loss_factor(sweep.stiffness)})
-    levels = np.unique(sweep.held)
+    levels = np.unique(sweep.held_value)
     for axes, quantity, label in zip(pair, ("stiffness", "loss"), labels, strict=True):
         for level, look in zip(levels, style.styles(levels.size, fixed_quantity), strict=True):
-            rows = table[sweep.held == level]
+            rows = table[sweep.held_value == level]
             means = rows.groupby("x")[quantity].mean()
             axes.plot(means.index, means, color=look.color, ls=look.dashes, lw=0.8)
             axes.plot(rows["x"], rows[quantity], look.marker, color=look.color, alpha=0.75, **style.POINT)

@@ -194,13 +194,13 @@ def _sized(
     }
     amount, share = effect.amount, 1.0
     amounts = {qualified_name(effect, each): each for each in effect.parameters if each.neutral is not None}
-    if amount.bounds[0] < amount.sized(0.0) and random.random() < 0.5:
+    if amount.bounds[0] < amount.value_at_share(0.0) and random.random() < 0.5:
         share = -share
     size = 0.0
     for _ in range(4):
-        if not (amount.bounds[0] <= amount.sized(share) <= amount.bounds[1] and abs(share) <= 30.0):
+        if not (amount.bounds[0] <= amount.value_at_share(share) <= amount.bounds[1] and abs(share) <= 30.0):
             raise _OutOfReachError
-        values |= {name: each.sized(share) for name, each in amounts.items()}
+        values |= {name: each.value_at_share(share) for name, each in amounts.items()}
         model = plain.with_effect(effect.name, values)
         if not _plausible(model, plan):
             share *= 0.3
@@ -211,7 +211,7 @@ def _sized(
         share *= float(np.clip(wanted / size, 0.1, 10.0))
     if not 0.7 * visible[0] < size < 2.0 * visible[1]:
         raise _OutOfReachError
-    return values | {name: each.sized(share) for name, each in amounts.items()}, size
+    return values | {name: each.value_at_share(share) for name, each in amounts.items()}, size
 
 
 def _shape(plain: Model, plan: SimulateSettings, scale: str | None, typical: float, random: Generator) -> float:
