@@ -125,7 +125,7 @@ def _finish(output: Output, folder: Path, fitted: FitOutput, model: Path | None,
             action = action if result.fitted else f"free a parameter in [fit] of {file}, and fit again"
     if fitted.files[0].name == "static":
         action = f"bushfit fit-dynamic {file} --static {written} fits m and alpha"
-    elif left_open := result.left_open:
+    elif left_open := result.unknown_parameters:
         verdict, action = left_open, f"bushfit plan {file} --hours 1 chooses tests that determine them"
     output.print_headline(campaign.name, verdict, f"next: {action}")
     for title, step in fitted.steps:

@@ -9,7 +9,7 @@ from bushfit.cli.output import Output
 from bushfit.units import format_range, number
 
 if TYPE_CHECKING:
-    from bushfit.model.result import Misfit, Result, Usable
+    from bushfit.model.result import ExpectedError, Misfit, Result
 
 #: Correlation between two parameters above which it is shown without -v: the data determine only their combination.
 _STRONG_CORRELATION = 0.9
@@ -46,7 +46,7 @@ def print_result(output: Output, title: str, result: Result) -> None:
         )
 
 
-def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Usable]) -> None:
+def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[ExpectedError]) -> None:
     """Print the misfit of each test, with -v also of each run, and the expected error of the model."""
     from bushfit.report.tables import DISPLAYS
 

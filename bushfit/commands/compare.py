@@ -361,7 +361,7 @@ def _family_document(label: str, family: FittedFamily, result: Result) -> Family
         "label": label,
         "name": family.name,
         "parameters": evidence.parameters,
-        "reduced_chi_square": result.quality.reduced_chi_square if result.quality else evidence.reduced,
+        "reduced_chi_square": result.quality.reduced_chi_square if result.quality else evidence.reduced_chi_square,
         "bic": evidence.bic,
         "heldout": held_out.after,
         "first_there": held_out.before,

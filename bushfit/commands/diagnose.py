@@ -47,7 +47,7 @@ class DiagnosisOutput:
     @property
     def headline(self) -> str:
         """Verdict, and the parameters whose uncertainty is 100 % or more."""
-        return "; ".join(filter(None, (self.diagnosis.verdict, self.result.left_open)))
+        return "; ".join(filter(None, (self.diagnosis.verdict, self.result.unknown_parameters)))
 
     @property
     def result(self) -> Result:

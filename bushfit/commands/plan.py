@@ -165,7 +165,7 @@ def _wanted_points(
 def _targets(name: str, half: float, knowledge: Knowledge, points: Sequence[Points]) -> list[Target]:
     """Targets with a name such as "mu", "stiffness" (all predicted directions) or "stiffness.axial".
 
-    `half` is the wanted half-width of the 95 % interval relative to the value.
+    `half_width` is the wanted half-width of the 95 % interval relative to the value.
     """
     possible = {parameter: [Target(parameter, half)] for parameter in knowledge.names}
     for quantity in PREDICTED:

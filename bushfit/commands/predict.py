@@ -18,11 +18,11 @@ from bushfit.effects import Level
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError
-from bushfit.fitting.agreement import expected_error_without_refits, misfits
+from bushfit.fitting.agreement import expected_errors_without_refits, misfits
 from bushfit.fitting.preparation import MeasuredSweep, prepare_sweeps
 from bushfit.geometry import Bushing, Direction, Place, Specimen, get_place
 from bushfit.model.arms import Arms, model_arms
-from bushfit.model.result import Misfit, Result, Usable, transfer_compound
+from bushfit.model.result import ExpectedError, Misfit, Result, transfer_compound
 from bushfit.prediction.caveats import warnings_of
 from bushfit.prediction.grid import default_grid, grid_settings, requested_grid
 from bushfit.prediction.stiffness import PredictedResonance, Prediction, predict_resonance
@@ -104,9 +104,9 @@ class PredictionOutput:
         return misfits(self.result.model, *split_by_fit(self.result, self.measured))
 
     @cached_property
-    def usable(self) -> tuple[Usable, ...]:
+    def usable(self) -> tuple[ExpectedError, ...]:
         """Expected error of the prediction at each direction or specimen, from the measured sweeps."""
-        return expected_error_without_refits(self.result.model, *split_by_fit(self.result, self.measured))
+        return expected_errors_without_refits(self.result.model, *split_by_fit(self.result, self.measured))
 
 
 def predict(

@@ -9,7 +9,7 @@ from typing import Annotated, Literal, NotRequired
 from typing_extensions import Doc, TypedDict
 
 from bushfit.diagnosis.holdout import HeldOut, Skipped
-from bushfit.model.result import Usable
+from bushfit.model.result import ExpectedError
 
 Verdict = Literal["consistent", "named", "ambiguous", "described", "partly", "unexplained"]
 
@@ -48,8 +48,8 @@ class EffectEntry(TypedDict):
 
 
 #: Some keys contain a unit that is not a valid Python name, so this type is created by a call.
-WhereEntry = TypedDict(
-    "WhereEntry",
+MisfitRegionEntry = TypedDict(
+    "MisfitRegionEntry",
     {
         "direction": Annotated[str, Doc("of the bushing, or a specimen by its name.")],
         "kind": Annotated[Literal["sweep", "loop"], Doc("of the tests.")],
@@ -66,7 +66,7 @@ WhereEntry = TypedDict(
         "reading": Annotated[str, Doc("the same as a sentence.")],
     },
 )
-WhereEntry.__doc__ = "One region in which model and measurement disagree."
+MisfitRegionEntry.__doc__ = "One region in which model and measurement disagree."
 
 
 class BeforeAfter(TypedDict):
@@ -98,13 +98,13 @@ class OddsEntry(TypedDict):
     probability: Annotated[float, Doc("if anything is missing.")]
 
 
-class UsableEntry(TypedDict):
+class ExpectedErrorEntry(TypedDict):
     """Expected error of model.json for the worst direction or specimen: 95 % of its points have smaller errors."""
 
     stiffness: Annotated[float, Doc("relative difference of |K|.")]
     loss_factor: Annotated[float, Doc("difference of the loss factor.")]
     held_out: Annotated[bool, Doc("whether each point was predicted from a fit without its run.")]
-    places: Annotated[tuple[Usable, ...], Doc("the same place by place.")]
+    places: Annotated[tuple[ExpectedError, ...], Doc("the same place by place.")]
 
 
 @dataclass(frozen=True)
@@ -148,10 +148,10 @@ class DiagnosisFile(TypedDict):
     effects: Annotated[
         list[EffectEntry], Doc("effects that were added, or those of the most probable explanation if none was.")
     ]
-    where: Annotated[list[WhereEntry], Doc("regions of disagreement before anything was added.")]
-    remainder: Annotated[list[WhereEntry], Doc("regions of disagreement that remain.")]
+    where: Annotated[list[MisfitRegionEntry], Doc("regions of disagreement before anything was added.")]
+    remainder: Annotated[list[MisfitRegionEntry], Doc("regions of disagreement that remain.")]
     description: Annotated[Description | None, Doc("of a gap without a name; else null.")]
     gap: Annotated[GapEntry, Doc("misfit of model and tests, before and after.")]
-    usable: Annotated[UsableEntry | None, Doc("expected error of model.json; null if nothing was fitted.")]
+    usable: Annotated[ExpectedErrorEntry | None, Doc("expected error of model.json; null if nothing was fitted.")]
     next_test: Annotated[str, Doc("the test that would decide or confirm; empty if there is none.")]
     warnings: Annotated[list[str], Doc("warnings.")]

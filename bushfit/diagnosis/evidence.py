@@ -8,14 +8,14 @@ import numpy as np
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
-from bushfit.fitting.agreement import expected_error_without_refits, misfits, usable
+from bushfit.fitting.agreement import expected_errors, expected_errors_without_refits, misfits
 from bushfit.fitting.assess import FitStage, covariance, measured_range, quality, temperature_warning
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.design import fit_from
 from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.preparation import MeasuredTest, sources
 from bushfit.fitting.problem import FitResult
-from bushfit.fitting.procedures import cautions
+from bushfit.fitting.procedures import fit_warnings
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 
@@ -68,15 +68,15 @@ class Evidence:
         return len(self.solution.names)
 
     @property
-    def reduced(self) -> float:
+    def reduced_chi_square(self) -> float:
         """Chi-square per degree of freedom; 1 if the residuals are noise alone."""
-        counted = sum(data_set.counted for data_set in self.data_sets)
+        counted = sum(data_set.residual_count for data_set in self.data_sets)
         return self.chi_square / max(counted - self.parameters, 1)
 
     @property
     def bic(self) -> float:
         """Bayesian information criterion: chi-square + parameters ln n, n independent points; lower is better."""
-        independent = sum(data_set.independent for data_set in self.data_sets)
+        independent = sum(data_set.independent_count for data_set in self.data_sets)
         return self.chi_square + self.parameters * float(np.log(independent))
 
     @cached_property
@@ -153,13 +153,13 @@ def result_of(
             *([_CORRECTED] if corrected else []),
             *([model_error_warning(error)] if error else []),
             *temperature_warning(model, tests),
-            *cautions(solution.model, found, bounds, cov),
+            *fit_warnings(solution.model, found, bounds, cov),
         ),
         sources(tests),
         at_bound=solution.at_bound,
         tests=misfits(model, tests),
         # a correction has seen every run
-        usable=expected_error_without_refits(model, tests, ()) if corrected else usable(solution),
+        usable=expected_errors_without_refits(model, tests, ()) if corrected else expected_errors(solution),
         model_error=error,
         unresolved=tuple(effect.name for effect in model.records if effect.twins and effect.name not in resolved),
     )

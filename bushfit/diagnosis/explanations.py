@@ -99,7 +99,7 @@ class FaultyPart(Explanation):
         rows = np.flatnonzero(size)
         columns = np.zeros((rows.size, size.size))
         columns[np.arange(rows.size), rows] = size[rows]
-        return replace(self, group=Group(columns, np.eye(rows.size), together=True))
+        return replace(self, group=Group(columns, np.eye(rows.size), act_together=True))
 
     def distance(self, residual: Array) -> float:
         """Root mean square deviation of the faulty points, in units of noise, from whitened residuals, (n,)."""
@@ -202,7 +202,7 @@ def compound(evidence: Evidence) -> Group | None:
         columns = np.concatenate((columns, overtones / order[:, None]))
     unit = np.zeros((len(columns), share.shape[-1]), dtype=complex)
     unit[: len(share)] = share
-    return Group(columns, unit, together=True)
+    return Group(columns, unit, act_together=True)
 
 
 def unnamed(evidence: Evidence) -> list[Explanation]:
@@ -229,14 +229,14 @@ def unnamed(evidence: Evidence) -> list[Explanation]:
                     curves[_temperature_step(sweep)].append(sweep)
             parts = zip(*(_restricted(evidence, sweeps, c, columns, share) for c in curves.values()), strict=True)
             residuals, changes = map(np.concatenate, parts)
-            groups[f"{roughness} {direction}"] = Group(residuals, changes, together=True)
+            groups[f"{roughness} {direction}"] = Group(residuals, changes, act_together=True)
         if roughness == "rough" and len(directions) > 1:  # a smooth curve in all directions is the compound's
-            groups["rough all"] = Group(columns, share, together=True)
+            groups["rough all"] = Group(columns, share, act_together=True)
     if loops:
         repeats = group_repeats(loops)
         shapes = block_diag(*[smooth_waves(np.arange(_PHASES) / _PHASES)] * len(repeats))
         columns = np.concatenate([_harmonics(evidence, group) for group in repeats])
-        groups["loops"] = Group(columns, shapes, together=True)
+        groups["loops"] = Group(columns, shapes, act_together=True)
     return [Explanation("unnamed", "unnamed", name, group) for name, group in groups.items()]
 
 

@@ -193,7 +193,7 @@ def _gain(
         return None, None
     plain = np.concatenate([prediction.residuals[:, 0] for prediction in disjoint], axis=1)
     before, after = np.mean(np.square(plain), axis=1)
-    slope = np.sum([prediction.pulls[0] - prediction.pulls[1] for prediction in disjoint], axis=0)
+    slope = np.sum([prediction.noise_gradients[0] - prediction.noise_gradients[1] for prediction in disjoint], axis=0)
     error = 2.0 * _BEYOND_LINEAR * np.sqrt(max(1.0, min(before, after))) * float(np.linalg.norm(slope)) / plain.shape[1]
     gain = float(before - after)
     p = float(2.0 * ndtr(-abs(gain) / error)) if error else 1.0
@@ -201,7 +201,7 @@ def _gain(
 
 
 def _disjoint_parts(data_sets: Sequence[MeasuredTest], among: Collection[str]) -> Iterator[str]:
-    """Names of the held-out parts in `among` that share no point with an earlier part."""
+    """Names of the held-out parts in `covered_rows` that share no point with an earlier part."""
     used_rows = np.zeros(sum(data_set.size for data_set in data_sets), dtype=bool)
     for part in parts(data_sets):
         rows = part.rows(data_sets)

@@ -37,8 +37,8 @@ def faulty_places(evidence: Evidence) -> list[FaultyPart]:
         group = Group(
             np.array(loop.gain_and_offset()),
             np.eye(2),
-            together=True,
-            among=(evidence.place[loop], evidence.residual.size),
+            act_together=True,
+            covered_rows=(evidence.place[loop], evidence.residual.size),
         )
         ends = (loop.drive.frequency,) * 2, (loop.drive.amplitude,) * 2
         places.append(FaultyPart("place", "loop", f"the loop {loop.name}", group, loop.direction, *ends))
@@ -146,7 +146,7 @@ def _place(
         for axis in ("frequency", "amplitude")
     )
     ends = (float(frequency.min()), float(frequency.max())), (float(amplitude.min()), float(amplitude.max()))
-    group = Group(columns, unit, together=True, among=(_rows(evidence, sweeps), evidence.residual.size))
+    group = Group(columns, unit, act_together=True, covered_rows=(_rows(evidence, sweeps), evidence.residual.size))
     return FaultyPart("place", family, name, group, sweeps[0].direction, *ends)
 
 

@@ -16,25 +16,25 @@ class Group:
 
     Args:
         columns: change of the whitened residuals per unit amount of each column, (c, n).
-        unit: relative change of |K| per unit amount, (c,); complex at p operating points, (c, p), if `together`.
-        together: True if all columns act at once with independent amounts of one prior size; False if exactly one
+        unit: relative change of |K| per unit amount, (c,); complex at p operating points, (c, p), if `act_together`.
+        act_together: True if all columns act at once with independent amounts of one prior size; False if exactly one
             column acts, each with equal probability.
-        sense: +1 if only positive amounts are possible, for groups in which one column acts; else 0.
-        among: slice of the residual rows that `columns` covers, and the number of all rows; None if all are covered.
+        sign: +1 if only positive amounts are possible, for groups in which one column acts; else 0.
+        covered_rows: slice of the residuals that `columns` covers, and the number of all residuals; None for all.
     """
 
     columns: Array
     unit: Array
-    together: bool
-    sense: int = 0
-    among: tuple[slice, int] | None = None
+    act_together: bool
+    sign: int = 0
+    covered_rows: tuple[slice, int] | None = None
 
     @property
     def whole(self) -> Array:
         """Columns over all residual rows, zero outside the covered slice, (c, n)."""
-        if self.among is None:
+        if self.covered_rows is None:
             return self.columns
-        rows, count = self.among
+        rows, count = self.covered_rows
         whole = np.zeros((len(self.columns), count))
         whole[:, rows] = self.columns
         return whole
@@ -42,7 +42,7 @@ class Group:
     @property
     def scaled(self) -> Array:
         """Columns over all residual rows, (c, n); scaled to a 100 % change of |K| each if exactly one column acts."""
-        if self.together:
+        if self.act_together:
             return self.whole
         visible = self.unit > _UNSEEN
         return self.whole * np.where(visible, 1.0 / np.where(visible, self.unit, 1.0), 0.0)[:, None]
@@ -57,18 +57,18 @@ class GroupEvidence:
             group's amounts and of the rig's errors.
         size: relative change of |K| by the group, root mean square over the posterior.
         likeliest: most probable prior standard deviation of the amounts, relative to |K|, one of `priors.SIZES`.
-        beside: evidence for the group together with a deviation of the rubber compound from the model's laws; None if
-            no such deviation is considered.
+        with_compound: evidence for the group together with a smooth deviation of the rubber from the model's laws; None
+            if no such deviation is considered.
     """
 
     log_evidence: float
     size: float
     likeliest: float
-    beside: "GroupEvidence | None" = None
+    with_compound: "GroupEvidence | None" = None
 
     @property
     def total(self) -> float:
         """Natural log of the evidence, summed over the cases with and without a deviation of the compound."""
-        if self.beside is None:
+        if self.with_compound is None:
             return self.log_evidence
-        return float(np.logaddexp(self.log_evidence, self.beside.log_evidence))
+        return float(np.logaddexp(self.log_evidence, self.with_compound.log_evidence))

@@ -156,8 +156,8 @@ def predicted_parts(before: Evidence, after: Evidence, bounds: Bounds) -> tuple[
         if len(pairs) < len(models):
             skipped.append(next(prediction for prediction in attempts if isinstance(prediction, Skipped)))
             continue
-        residuals, pulls = zip(pairs[0], pairs[-1], strict=True)
-        predictions[part.name] = Predicted(np.array(residuals), np.array(pulls))
+        residuals, noise_gradients = zip(pairs[0], pairs[-1], strict=True)
+        predictions[part.name] = Predicted(np.array(residuals), np.array(noise_gradients))
     return predictions, skipped
 
 
@@ -173,12 +173,12 @@ class Predicted(NamedTuple):
     Args:
         residuals: predicted residuals, in units of noise and whitened by the prediction error as well,
             (2 models, 2, n).
-        pulls: derivatives of half the sum of squares of the plain residuals by the noise of each row of all tests,
-            (2 models, all rows); for the standard error of a comparison.
+        noise_gradients: derivatives of half the sum of squares of the residuals in units of noise by the noise of each
+            row of all tests, (2 models, all rows); for the standard error of a comparison.
     """
 
     residuals: Array
-    pulls: Array
+    noise_gradients: Array
 
 
 def _leave_out(solution: FitResult) -> LeaveOut:
@@ -219,7 +219,7 @@ def _predict(
         if rest.stopped or leave_out.open(rows).any():
             return failed
     residuals = np.array(leave_out.predicted(rows, _clusters(data_sets), stepped=is_step))
-    return residuals, leave_out.pulled(rows, residuals[0])
+    return residuals, leave_out.noise_gradient(rows, residuals[0])
 
 
 def _clusters(data_sets: Sequence[MeasuredTest]) -> Array:

@@ -17,11 +17,11 @@ from bushfit.diagnosis.groups import Group, GroupEvidence
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import LEVELS
 from bushfit.diagnosis.propose import Proposal, proposals
-from bushfit.diagnosis.rig_errors import RigErrors, rig_errors, scattering_alone
+from bushfit.diagnosis.rig_errors import RigErrors, in_scatter_units, rig_errors
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.rig_class import ASSUMED, of_class
+from bushfit.fitting.rig_class import ASSUMED, class_errors
 
 #: Natural log of the odds below the best at which a node (sizes of the rig's errors) is left out; chosen for time: a
 #: node of relative weight e^-8 changes no verdict.
@@ -97,9 +97,9 @@ class Hypothesis:
         return self.effects == self.state.effects
 
     @property
-    def chance(self) -> float:
+    def p_value(self) -> float:
         """Probability that tests would have a larger misfit than these if the hypothesis were true."""
-        return self.state.linear.chance(compound_deviates=self.compound_deviates)
+        return self.state.linear.p_value(compound_deviates=self.compound_deviates)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +123,7 @@ class Tests:
     @cached_property
     def bare(self) -> Evidence:
         """Fit with residuals in units of the scatter from point to point, without errors that points share."""
-        return scattering_alone(self.base)
+        return in_scatter_units(self.base)
 
     @cached_property
     def errors(self) -> RigErrors:
@@ -199,7 +199,7 @@ class SearchState:
     @cached_property
     def bare(self) -> Evidence:
         """Fit with residuals in units of the scatter from point to point, without errors that points share."""
-        return self.tests.bare if self.evidence is self.tests.base else scattering_alone(self.evidence)
+        return self.tests.bare if self.evidence is self.tests.base else in_scatter_units(self.evidence)
 
     @cached_property
     def linear(self) -> LinearModel:
@@ -290,13 +290,13 @@ class SearchState:
                 last_change=evidence.size,
             )
         ]
-        if evidence.beside and np.isfinite(evidence.beside.log_evidence):
+        if evidence.with_compound and np.isfinite(evidence.with_compound.log_evidence):
             bent = replace(
                 plain,
                 unnamed=plain.unnamed or COMPOUND,
-                log_posterior=log_prior + evidence.beside.log_evidence,
-                change=max(self.change, evidence.beside.size, self.linear.deviation[0]),
-                last_change=evidence.beside.size,
+                log_posterior=log_prior + evidence.with_compound.log_evidence,
+                change=max(self.change, evidence.with_compound.size, self.linear.deviation[0]),
+                last_change=evidence.with_compound.size,
                 compound_deviates=True,
             )
             extended.append(bent)
@@ -323,7 +323,7 @@ class SearchState:
             plain,
             levels=True,
             log_posterior=log_prior + linear.log_evidence_with_level_errors,
-            change=max(self.change, LEVELS[-1][0] * max(of_class(tests.rig, ASSUMED))),
+            change=max(self.change, LEVELS[-1][0] * max(class_errors(tests.rig, ASSUMED))),
         )
         if not np.isfinite(linear.log_evidence_with_compound):
             return [plain, wide]

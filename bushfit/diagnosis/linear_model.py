@@ -84,7 +84,7 @@ class LinearModel:
         by_width: dict[int, list[tuple[int, Array]]] = {}
         for number, (group, (start, stop)) in enumerate(zip(self.groups, pairwise(ends.tolist()), strict=True)):
             rows = np.arange(start, stop)
-            for block in rows[None] if group.together else rows[:, None]:
+            for block in rows[None] if group.act_together else rows[:, None]:
                 by_width.setdefault(block.size, []).append((number, block))
         return [tuple(map(np.array, zip(*blocks, strict=True))) for blocks in by_width.values()]  # type: ignore[misc]
 
@@ -183,8 +183,8 @@ class LinearModel:
         gains: list[list[tuple[Array, Array]]] = [[] for _ in self.groups]
         at_nodes = self._at_nodes
         for (numbers, _), projections, gram in zip(self._blocks, at_nodes.projections, at_nodes.grams, strict=True):
-            units = [self.groups[number].unit if self.groups[number].together else np.eye(1) for number in numbers]
-            senses = np.array([self.groups[number].sense for number in numbers])
+            units = [self.groups[number].unit if self.groups[number].act_together else np.eye(1) for number in numbers]
+            senses = np.array([self.groups[number].sign for number in numbers])
             for number, gain, changes in zip(numbers, *_block_gains(gram, projections, units, senses), strict=True):
                 gains[number].append((gain, changes))
         stacked = (zip(*blocks, strict=True) for blocks in gains)
@@ -202,7 +202,7 @@ class LinearModel:
     def _over_nodes(
         self, gains: tuple[Array, Array], chosen: Array, beside: GroupEvidence | None = None
     ) -> GroupEvidence:
-        """Evidence for a group, averaged over the nodes in the mask `chosen`; `beside` is passed on."""
+        """Evidence for a group, averaged over the nodes in the mask `chosen`; `with_compound` is passed on."""
         log_evidence = (self._at_nodes.base[:, None, None] + gains[0])[chosen]
         if not log_evidence.size:
             return GroupEvidence(-np.inf, 0.0, float(SIZES[0]), beside)
@@ -273,7 +273,7 @@ class LinearModel:
         led = (best[index] > best.max() - far) | (with_group > with_group[plain].max() - far)
         return self.nodes[near | (plain & led)]
 
-    def chance(self, *, compound_deviates: bool = False) -> float:
+    def p_value(self, *, compound_deviates: bool = False) -> float:
         """Probability that tests of a complete model would have a larger misfit r^T P r than these tests.
 
         Args:

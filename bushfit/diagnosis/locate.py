@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.record import Where
+from bushfit.diagnosis.record import MisfitRegion
 from bushfit.effects.contract import Array
 from bushfit.fitting.line_misfit import LineMisfit
 from bushfit.fitting.preparation import split_by_kind
@@ -33,14 +33,14 @@ _HARMONICS = {
 }
 
 
-def locate(evidence: Evidence) -> tuple[Where, ...]:
+def locate(evidence: Evidence) -> tuple[MisfitRegion, ...]:
     """Find the regions of frequency and amplitude where a fitted model and the tests disagree, the worst first."""
     found = [*_sweep_regions(evidence), *_loop_regions(evidence)]
     worth = [region for region in found if region.excess > _WORTH_A_LINE]
     return tuple(sorted(worth, key=lambda region: -region.excess)[:_MOST_LINES])
 
 
-def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
+def _sweep_regions(evidence: Evidence) -> Iterator[MisfitRegion]:
     """Regions of smooth misfit of storage and of loss stiffness, one each for the sweeps of a direction."""
     _, sweeps = split_by_kind(evidence.data_sets)
     lines = [line for sweep in sweeps for line in sweep.lines(evidence.model)]
@@ -61,7 +61,7 @@ def _sweep_regions(evidence: Evidence) -> Iterator[Where]:
                 continue
             band = float(frequencies.min()), float(frequencies.max())
             span = float(amplitudes.min()), float(amplitudes.max())
-            yield Where(
+            yield MisfitRegion(
                 direction, "sweep", band, span, name, excess, _read_sweep(name, mine, pieces, touched, (band, span))
             )
 
@@ -132,7 +132,7 @@ def _trend_word(first: float, last: float) -> str:
     return "growing" if abs(last) > abs(first) else "fading"
 
 
-def _loop_regions(evidence: Evidence) -> Iterator[Where]:
+def _loop_regions(evidence: Evidence) -> Iterator[MisfitRegion]:
     """Regions for loops: each with the harmonic in which its force deviates most from the model."""
     loops, _ = split_by_kind(evidence.data_sets)
     for data_set in loops:
@@ -145,7 +145,7 @@ def _loop_regions(evidence: Evidence) -> Iterator[Where]:
         if share < _LEAST:
             continue
         unit, factor = data_set.direction.display.displacement
-        yield Where(
+        yield MisfitRegion(
             data_set.direction,
             "loop",
             (data_set.drive.frequency,) * 2,

@@ -91,7 +91,7 @@ def deciding_test(
     """
     if len(models) < 2:
         return ""
-    undecided = float(entropy_left(odds, np.zeros((len(models), len(models)))))
+    undecided = float(remaining_entropy(odds, np.zeros((len(models), len(models)))))
     best, best_rate = "", _LEAST_INFORMATION
     for test in _candidates(data_sets):
         frequency, amplitude, place = _points(test, data_sets)
@@ -100,7 +100,7 @@ def deciding_test(
             continue
         points = (frequency[feasible], amplitude[feasible]) if test.mounted is None else (frequency, amplitude)
         distances = _distances(test, models, place, *points)
-        rate = (undecided - float(entropy_left(odds, distances))) / test.hours
+        rate = (undecided - float(remaining_entropy(odds, distances))) / test.hours
         if rate > best_rate * (1.0 + 1e-9):
             best, best_rate = test.sentence, rate
     return best
@@ -139,7 +139,7 @@ def within_limits(model: Model, rig: RigSettings, place: Place, frequency: Array
     return np.all([np.ones(np.shape(frequency), dtype=bool), *reachable], axis=0)
 
 
-def entropy_left(odds: Sequence[float] | Array, distances: Array) -> Array:
+def remaining_entropy(odds: Sequence[float] | Array, distances: Array) -> Array:
     """Upper limit of the entropy over rival explanations that remains after further tests.
 
     Args:

@@ -25,7 +25,7 @@ from bushfit.diagnosis.explanations import unnamed
 from bushfit.diagnosis.groups import Group
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import DECISIVE_CHI_SQUARE
-from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
+from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Bounds, Coordinates, coordinate_bounds, jacobian, residual
 from bushfit.fitting.preparation import MeasuredTest
@@ -246,7 +246,7 @@ def nearest_power_law(
     Returns:
         The power law; None if the tests show none.
     """
-    bare, model = scattering_alone(fitted), fitted.model
+    bare, model = in_scatter_units(fitted), fitted.model
     begun = model.with_values({name: value for name, value in start.items() if name in model.values})
     rows, smooth_curves = bare.solution.jacobian, [curve.group for curve in unnamed(bare) if curve.group]
     plain = LinearModel(bare.residual, rows, np.zeros(len(rows)), rig_errors(bare, rig), smooth_curves)
@@ -332,7 +332,7 @@ def _settled_grid(fitted: Evidence, term: Term, plain: LinearModel, model: Model
         step = np.ptp(ends, axis=0) / (_GRID - 1)
         shapes = term.scaled(np.exp(powers @ term.points.T), model)
         residuals, rows, columns = term.linearised(model, value, shapes)
-        groups = [Group(pair, np.ones(2), together=True) for pair in columns]
+        groups = [Group(pair, np.ones(2), act_together=True) for pair in columns]
         grid = _Grid(term.measure, replace(plain, residual=residuals, jacobian=rows, groups=groups), powers, step)
         before, middle = middle, grid.share @ powers
         spread = np.sqrt(grid.share @ np.square(powers - middle))

@@ -80,7 +80,7 @@ def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str
         suggested = float(np.clip(amounts[best] * amount.typical, *amount.bounds))
         shape = shapes[best] | ({qualified_name(effect, amount): suggested} if amount.log else {})
         model = evidence.model.with_effect(effect.name, shape)
-        group = Group(columns, np.abs(columns * relative_noise).max(axis=1), together=False, sense=sense)
+        group = Group(columns, np.abs(columns * relative_noise).max(axis=1), act_together=False, sign=sense)
         ranked.append(
             Proposal("effect", family, effect.name, group, model, float(gains[best]), visible=bool(visible.any()))
         )

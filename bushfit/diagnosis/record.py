@@ -10,11 +10,11 @@ from bushfit.diagnosis.document import (
     Description,
     DiagnosisFile,
     EffectEntry,
+    ExpectedErrorEntry,
     GapEntry,
+    MisfitRegionEntry,
     SizeEntry,
-    UsableEntry,
     Verdict,
-    WhereEntry,
 )
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.holdout import HoldOut
@@ -53,7 +53,7 @@ class DiagnosisSettings:
 
 
 @dataclass(frozen=True)
-class Where:
+class MisfitRegion:
     """One region in which model and measurement disagree.
 
     Args:
@@ -76,7 +76,7 @@ class Where:
 
 
 @dataclass(frozen=True)
-class Named:
+class NamedCause:
     """Effect or mistake in the record that was named, or the first of a set that the tests cannot distinguish.
 
     Args:
@@ -110,14 +110,14 @@ class Odds:
         explanations: text and probability (if anything is missing) of each explanation, the most probable first.
         models: fitted model of each explanation; None for an explanation that was not fitted.
         labels: names of the parts of each explanation, joined by " + ".
-        apart: True if the tests cannot decide between the explanations, so that each is an alternative.
+        are_alternatives: True if the tests cannot decide between the explanations, so that each is an alternative.
     """
 
     nothing: float
     explanations: tuple[tuple[str, float], ...] = ()
     models: tuple[Model | None, ...] = ()
     labels: tuple[str, ...] = ()
-    apart: bool = False
+    are_alternatives: bool = False
 
     def averaged(self, result: Result) -> Result:
         """Widen the uncertainty of a result by the probability of other explanations.
@@ -140,7 +140,7 @@ class Odds:
                 - current_values
             )
             matrix += (1.0 - self.nothing) * probability * np.outer(difference, difference)
-            if self.apart:
+            if self.are_alternatives:
                 alternatives.append(Alternative(model, (1.0 - self.nothing) * probability))
         return replace(result, covariance=replace(cov, matrix=matrix), alternatives=tuple(alternatives))
 
@@ -189,9 +189,9 @@ class Diagnosis:
 
     verdict: Verdict
     summary: str
-    effects: tuple[Named, ...]
-    where: tuple[Where, ...]
-    remainder: tuple[Where, ...]
+    effects: tuple[NamedCause, ...]
+    where: tuple[MisfitRegion, ...]
+    remainder: tuple[MisfitRegion, ...]
     holdout: HoldOut
     next_test: str
     candidates: tuple[CandidateResult, ...]
@@ -236,7 +236,7 @@ class Diagnosis:
             "parts": holdout.parts,
             "skipped": holdout.skipped,
         }
-        usable: UsableEntry | None = None
+        usable: ExpectedErrorEntry | None = None
         if places:
             usable = {
                 "stiffness": max(place.stiffness for place in places),
@@ -261,10 +261,10 @@ class Diagnosis:
         }
         return to_json_data(document, DiagnosisFile)
 
-    def _effect(self, named: Named) -> EffectEntry:
+    def _effect(self, named: NamedCause) -> EffectEntry:
         effect, model = get_candidate(named.name), self.result.model
-        judged = {judged.name: judged.parameters for judged in self.candidates}
-        values = model.values if named.name in model.effects else judged.get(named.name, {})
+        decide_verdict = {decide_verdict.name: decide_verdict.parameters for decide_verdict in self.candidates}
+        values = model.values if named.name in model.effects else decide_verdict.get(named.name, {})
         return {
             "name": named.name,
             "level": level_of(named.name),
@@ -338,10 +338,10 @@ def level_of(name: str) -> str:
 
 def _rms(evidence: Evidence) -> float:
     """Root mean square residual of a fit, in units of noise."""
-    return float((evidence.chi_square / max(sum(data_set.counted for data_set in evidence.data_sets), 1)) ** 0.5)
+    return float((evidence.chi_square / max(sum(data_set.residual_count for data_set in evidence.data_sets), 1)) ** 0.5)
 
 
-def _region_entry(region: Where) -> WhereEntry:
+def _region_entry(region: MisfitRegion) -> MisfitRegionEntry:
     """Convert a region of disagreement to its entry in diagnosis.json, with amplitudes in display units."""
     unit, factor = region.direction.display.displacement
     entry = {
@@ -353,4 +353,4 @@ def _region_entry(region: Where) -> WhereEntry:
         "excess": region.excess,
         "reading": region.reading,
     }
-    return cast(WhereEntry, entry)  # one of its keys is named after the unit
+    return cast(MisfitRegionEntry, entry)  # one of its keys is named after the unit

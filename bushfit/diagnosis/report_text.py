@@ -16,7 +16,7 @@ from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis
 from bushfit.diagnosis.locate import locate
 from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP
-from bushfit.diagnosis.record import CandidateResult, Diagnosis, Named, Odds, Where, format_probability
+from bushfit.diagnosis.record import CandidateResult, Diagnosis, MisfitRegion, NamedCause, Odds, format_probability
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Composition, Finding
 from bushfit.effects import get_effect, qualified_name
@@ -90,13 +90,13 @@ class DiagnosisWriter:
         base, plain = self._with_free_gains(request.base), self._with_free_gains(after)
         company = " with the other named effects" if len(names) > 1 else ""
         why = f"lowers chi-square by {base.chi_square - plain.chi_square:.0f}{company}; {self._probability(first)}"
-        entries = [Named(name, why) for name in names]
+        entries = [NamedCause(name, why) for name in names]
         doubt = _doubt(base, plain, names, request.bounds) if self.finding.verdict == "named" else ""
         if self.finding.verdict == "named" and not doubt:
             summary = f"{' and '.join(names)} {'closes' if len(names) == 1 else 'close'} the gap"
             return self._finished("named", summary, after, entries, places=first.best)
         excess = [
-            max(fitted.chi_square / sum(test.counted for test in fitted.data_sets) - 1.0, 0.0)
+            max(fitted.chi_square / sum(test.residual_count for test in fitted.data_sets) - 1.0, 0.0)
             for fitted in (base, plain)
         ]
         share = number(100.0 * (1.0 - excess[1] / excess[0] if excess[0] else 1.0), 2)
@@ -104,7 +104,7 @@ class DiagnosisWriter:
         rest = [place.name for place in first.places] + [_LEVELS] * first.best.levels
         gap = self._described(after) if not first.best.levels else None
         if gap:
-            entries.append(Named(UNNAMED, gap.evidence))
+            entries.append(NamedCause(UNNAMED, gap.evidence))
             rest.append(f"{_NAMELESS}, {gap.sentence}")
         elif first.unnamed:
             rest.append(_NAMELESS)
@@ -142,13 +142,13 @@ class DiagnosisWriter:
             result=replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning)),
         )
 
-    def _claim_entries(self, composition: Composition, alternatives: tuple[str, ...] = ()) -> list[Named]:
+    def _claim_entries(self, composition: Composition, alternatives: tuple[str, ...] = ()) -> list[NamedCause]:
         """Entries for the mistake of a composition, one for each affected test."""
         data, claim = self.request.data, composition.best.claim
         gain = self.request.base.chi_square - composition.best.state.evidence.chi_square
         why = f"lowers chi-square by {gain:.0f} without a new parameter; {self._probability(composition)}"
         return [
-            Named(
+            NamedCause(
                 single.mistake.name,
                 why,
                 alternatives,
@@ -168,12 +168,12 @@ class DiagnosisWriter:
         models = [composition.best.state.evidence.model for composition in fitted]
         odds = [composition.probability for composition in fitted]
         advice = deciding_test(models, odds, request.base.data_sets, request.data.campaign.rig)
-        entries: list[Named] = []
+        entries: list[NamedCause] = []
         if leader and leader.best.claim:
             entries = self._claim_entries(leader, alternatives)
             advice = f"check the records of the tests; {'; '.join(leader.best.claim.corrections(request.data))}"
         elif leader:
-            entries = [Named(name, self._probability(leader), alternatives) for name in leader.names]
+            entries = [NamedCause(name, self._probability(leader), alternatives) for name in leader.names]
         *labels, last = map(self.label, compositions)
         summary = f"these tests cannot distinguish between {', '.join(labels)} and {last}"
         places = next((composition.best for composition in compositions if composition.places), None)
@@ -188,7 +188,7 @@ class DiagnosisWriter:
         if not is_fault and (gap := self._described(self.request.base)):
             summary = f"no known effect closes the gap: {gap.sentence}{leads}"
             summary += f"; it is largest at {at_fault}" if at_fault else ""
-            return self._finished("described", summary, gap.after, [Named(UNNAMED, gap.evidence)], gap=gap)
+            return self._finished("described", summary, gap.after, [NamedCause(UNNAMED, gap.evidence)], gap=gap)
         summary, advice = "no known effect closes the gap" + leads, ""
         if at_fault:
             summary = f"{at_fault}: this deviates from all other tests; measure it again first"
@@ -233,7 +233,7 @@ class DiagnosisWriter:
         verdict: Verdict,
         summary: str,
         after: Evidence,
-        entries: Sequence[Named] = (),
+        entries: Sequence[NamedCause] = (),
         *,
         places: Hypothesis | None = None,
         next_test: str = "",
@@ -257,12 +257,14 @@ class DiagnosisWriter:
         )
         if not next_test and entries:
             next_test = get_effect(entries[0].name).confirmed_by
-        at_fault = list[Where]()
+        at_fault = list[MisfitRegion]()
         for place in places.places if places else ():
             kind, component = ("loop", "force") if place.family == "loop" else ("sweep", "storage")
             reading = f"{place.name} departs by {number(100 * places.change, 2)} % from all other tests"  # type: ignore[union-attr]
             excess = place.distance(base.residual)
-            at_fault.append(Where(place.direction, kind, place.frequency, place.amplitude, component, excess, reading))
+            at_fault.append(
+                MisfitRegion(place.direction, kind, place.frequency, place.amplitude, component, excess, reading)
+            )
         if places and places.places:
             next_test = f"measure again: {places.places[0].name}"
         lacking = verdict in ("partly", "ambiguous", "unexplained") and not (self.first and self.first.best.claim)

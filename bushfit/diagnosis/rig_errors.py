@@ -14,7 +14,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import COMPOUND, KNOWN, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, group_repeats, split_by_kind, with_gain_weighting
-from bushfit.fitting.rig_class import ASSUMED, of_class
+from bushfit.fitting.rig_class import ASSUMED, class_errors
 
 #: Kinds of errors of the rig; the values are indices of `Node.errors`.
 _RUN, _LEVEL, _WAVE, _LOOP = range(4)
@@ -105,7 +105,7 @@ class RigErrors:
         return np.linalg.inv(root) * (errors * share)[..., None, :], log_det
 
 
-def scattering_alone(evidence: Evidence) -> Evidence:
+def in_scatter_units(evidence: Evidence) -> Evidence:
     """Express the residuals of a fit in units of the scatter from point to point, without errors that points share.
 
     Residuals of sweeps are differences of ln K: relative to the measurement, noise would seem smaller where
@@ -167,7 +167,7 @@ def blocks(evidence: Evidence, rig: RigSettings) -> Iterator[Block]:
         Blocks that together contain every row once.
     """
     loops, sweeps = split_by_kind(evidence.data_sets)
-    classes = of_class(rig, ASSUMED)
+    classes = class_errors(rig, ASSUMED)
     for sweep in sweeps:
         first, count = evidence.place[sweep].start, sweep.frequency.size
         runs = np.split(np.arange(count), sweep.block_starts[1:])

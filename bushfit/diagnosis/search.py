@@ -22,7 +22,7 @@ from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.propose import has_what_it_uses
 from bushfit.diagnosis.refit import refit_with_free_columns, refitted, within_reach
-from bushfit.diagnosis.verdict import judged
+from bushfit.diagnosis.verdict import decide_verdict
 from bushfit.errors import FitError, ModelError
 from bushfit.progress import track
 
@@ -85,9 +85,9 @@ class Search:
 
     def _is_sure(self) -> bool:
         """True if the search can stop: one explanation, or none missing, is nearly certain and fits the tests."""
-        finding = judged(self._ordered(), self.request.tolerance)
+        finding = decide_verdict(self._ordered(), self.request.tolerance)
         if finding.verdict == "consistent":
-            return finding.nothing >= NAMED and self.root.linear.chance() >= DOES_NOT_FIT
+            return finding.nothing >= NAMED and self.root.linear.p_value() >= DOES_NOT_FIT
         return finding.verdict == "named" and finding.reported[0].best.refitted
 
     def _settle(self) -> None:
@@ -146,7 +146,7 @@ class Search:
 
         States without one of the earlier effects follow each extension: the last effect may make that one unnecessary.
         """
-        by_evidence, by_score = REFITS[1 if depth else 2 if state.evidence.reduced > _BENT else 0]
+        by_evidence, by_score = REFITS[1 if depth else 2 if state.evidence.reduced_chi_square > _BENT else 0]
         for grown in self._with_effects(state, self._promising(state, by_evidence, by_score), depth):
             yield grown
             yield from self._without_earlier(grown)
@@ -183,7 +183,7 @@ class Search:
         if not names or len(state.effects) >= request.max_effects:
             return []
         proposed = [proposal for proposal in state.proposals if proposal.name in names]
-        start = request.start if not state.effects and state.evidence.reduced > _BENT else {}
+        start = request.start if not state.effects and state.evidence.reduced_chi_square > _BENT else {}
         grown: dict[str, SearchState] = {}
         for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
             columns = state.free_columns(deviation)
@@ -223,7 +223,7 @@ class Search:
             if not improves or state.key | {place.name} in self._visited:
                 continue
             evidence = state.evidence
-            if evidence.reduced > _BENT:  # perhaps by the place
+            if evidence.reduced_chi_square > _BENT:  # perhaps by the place
                 start = {} if state.effects else self.request.start
                 evidence = refit_with_free_columns(evidence, state.bare, better.columns, start, self.request.bounds)
             grown = replace(

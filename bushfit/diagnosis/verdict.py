@@ -78,7 +78,7 @@ class Finding:
     names: tuple[str, ...] = ()
 
 
-def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
+def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
     """Decide the verdict from the probabilities of hypotheses.
 
     Args:
@@ -112,7 +112,7 @@ def judged(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
     if common and all(part.startswith("place: ") for part in common):  # whatever else there is, this has to go first
         return Finding("unexplained", nothing, reported, leads)
     nameless = sum(composition.probability for composition in likely if composition.parts == {"unnamed"})
-    fits = first.best.claim is not None or first.best.chance >= DOES_NOT_FIT
+    fits = first.best.claim is not None or first.best.p_value >= DOES_NOT_FIT
     if len(likely) <= MOST_REPORTED and nameless < 0.5 and fits:
         return Finding("ambiguous", nothing, reported)
     share = {name: sum(c.probability for c in compositions if name in c.names) for name in first.names}
@@ -129,7 +129,7 @@ def _single(first: Composition, nothing: float, leads: Sequence[str]) -> Finding
     if first.may_mislead or not (names or best.claim or first.unnamed):
         return Finding("unexplained", nothing, (first,), leads)
     curve = best.unnamed not in ("", COMPOUND) and best.last_change >= (1.0 - LEAST_NAMED_SHARE) * best.change
-    if not best.claim and (not names or curve or best.chance < DOES_NOT_FIT):
+    if not best.claim and (not names or curve or best.p_value < DOES_NOT_FIT):
         return Finding("described", nothing, (first,), leads)
     partly = first.unnamed or best.levels or first.places
     return Finding("partly" if partly else "named", nothing, (first,), names=names)

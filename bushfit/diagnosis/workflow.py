@@ -13,7 +13,7 @@ from bushfit.diagnosis.hypotheses import DiagnosisRequest
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.report_text import DiagnosisWriter
 from bushfit.diagnosis.search import Search
-from bushfit.diagnosis.verdict import judged
+from bushfit.diagnosis.verdict import decide_verdict
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.mistakes import get_candidate, get_mistake
 from bushfit.fitting.design import fit_from
@@ -78,7 +78,7 @@ def diagnose(
         )
     )
     hypotheses = search.run()
-    finding = judged(hypotheses, settings.tolerance)
+    finding = decide_verdict(hypotheses, settings.tolerance)
     diagnosis = DiagnosisWriter(search, finding, hypotheses, settings.unresolved).diagnosis()
     pairs = zip(whole.sweeps, data.sweeps, strict=True)
     reduced = {after.name for before, after in pairs if after.size < before.size}

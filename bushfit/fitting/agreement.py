@@ -13,7 +13,7 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, log_slopes, rows_of
 from bushfit.fitting.problem import FitResult
 from bushfit.model.model import Model
-from bushfit.model.result import Misfit, Usable
+from bushfit.model.result import ExpectedError, Misfit
 from bushfit.reading.measurement import loss_factor
 
 #: Largest growth of a parameter's variance when a part of the rows is held out: beyond it the other rows do not
@@ -110,7 +110,7 @@ class LeaveOut:
         directions, scale, _ = np.linalg.svd(error, full_matrices=False)
         return plain, plain - directions @ ((1.0 - 1.0 / np.hypot(1.0, scale)) * (directions.T @ plain))
 
-    def pulled(self, rows: Array, predicted: Array) -> Array:
+    def noise_gradient(self, rows: Array, predicted: Array) -> Array:
         """Derivatives of half the sum of squares of the predicted residuals with respect to the noise of each row.
 
         The noise acts directly on held-out rows, and on the others through the parameters that they determine.
@@ -155,7 +155,7 @@ def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[Mea
         runs = list(_runs(test))
         for run in (_Run(None, None, None, slice(None)), *(runs if len(runs) > 1 else ())):
             of_run = relative[run.points]
-            counted = test.counted * of_run.size / relative.size * test.test.weight
+            counted = test.residual_count * of_run.size / relative.size * test.test.weight
             misfit = Misfit(
                 test=test.name,
                 place=str(test.direction),
@@ -172,7 +172,7 @@ def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[Mea
     return tuple(found)
 
 
-def usable(solution: FitResult, unfitted: Sequence[MeasuredTest] = ()) -> tuple[Usable, ...]:
+def expected_errors(solution: FitResult, unfitted: Sequence[MeasuredTest] = ()) -> tuple[ExpectedError, ...]:
     """Expected error of a fitted model in stiffness and loss factor: 95 % of the points of a direction have less.
 
     Each run is held out, and predicted from the fit to the other runs, if these determine all parameters and change
@@ -205,9 +205,9 @@ def usable(solution: FitResult, unfitted: Sequence[MeasuredTest] = ()) -> tuple[
     return _by_place(parts)
 
 
-def expected_error_without_refits(
+def expected_errors_without_refits(
     model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest]
-) -> tuple[Usable, ...]:
+) -> tuple[ExpectedError, ...]:
     """Expected error of a model without refits: errors at fitted points are used where too few points were not fitted.
 
     Args:
@@ -225,7 +225,7 @@ def expected_error_without_refits(
     return _by_place(parts)
 
 
-def _by_place(parts: Sequence[tuple[str, Array, bool]]) -> tuple[Usable, ...]:
+def _by_place(parts: Sequence[tuple[str, Array, bool]]) -> tuple[ExpectedError, ...]:
     """Expected error of each direction, from its predicted points if these are at least half, else from all its points.
 
     Each part has the name of the direction, the differences in stiffness and loss factor, (2, n), and True if they are
@@ -239,7 +239,7 @@ def _by_place(parts: Sequence[tuple[str, Array, bool]]) -> tuple[Usable, ...]:
         enough = predicted.shape[1] >= _ENOUGH * differences.shape[1]
         compared = predicted if enough else differences
         stiffness, loss = np.quantile(compared, _SHARE, axis=1, method="higher").tolist()
-        found.append(Usable(place, stiffness, loss, compared.shape[1], enough))
+        found.append(ExpectedError(place, stiffness, loss, compared.shape[1], enough))
     return tuple(found)
 
 

@@ -166,7 +166,7 @@ def linear_errors(slope: Array) -> Array:
     return np.linalg.norm(_inverse(np.linalg.qr(slope.T)[1]), axis=1)
 
 
-def reduced(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> tuple[float, int]:
+def reduced_chi_square(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) -> tuple[float, int]:
     """Reduced chi-square of a model over all tests, and its degrees of freedom.
 
     Args:
@@ -175,7 +175,7 @@ def reduced(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) ->
         parameters: number of fitted parameters.
     """
     residuals = residual(model, data_sets)
-    freedom = max(sum(data_set.counted for data_set in data_sets) - parameters, 1)
+    freedom = max(sum(data_set.residual_count for data_set in data_sets) - parameters, 1)
     return float(residuals @ residuals) / freedom, freedom
 
 
@@ -187,7 +187,7 @@ def lack_of_fit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int
         data_sets: tests.
         parameters: number of fitted parameters.
     """
-    return beyond_noise(*reduced(model, data_sets, parameters))
+    return beyond_noise(*reduced_chi_square(model, data_sets, parameters))
 
 
 def beyond_noise(chi_square: float, freedom: int) -> float | None:
@@ -207,7 +207,7 @@ def misfit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int, adv
     Returns:
         The sentence, or an empty list.
     """
-    chi_square, freedom = reduced(model, data_sets, parameters)
+    chi_square, freedom = reduced_chi_square(model, data_sets, parameters)
     by_test = {test.name: lack for test in data_sets if (lack := lack_of_fit(model, [test], 0)) is not None}
     if beyond_noise(chi_square, freedom) is None and not by_test:
         return []
@@ -233,13 +233,13 @@ def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) ->
     """
     relative, counts = (
         np.concatenate([test.relative(model) for test in data_sets]),
-        [test.counted for test in data_sets],
+        [test.residual_count for test in data_sets],
     )
     loops, _ = split_by_kind(data_sets)
     repeats = np.count_nonzero(repeats_of(loops), axis=1)
     return Quality(
         nrmse=float(np.sqrt(np.mean(relative**2))),
-        reduced_chi_square=reduced(model, data_sets, parameters)[0],
+        reduced_chi_square=reduced_chi_square(model, data_sets, parameters)[0],
         points=sum(counts),
         noise=float(np.sqrt(np.average(np.square([test.relative_noise for test in data_sets]), weights=counts))),
         loop_gain_error=float(np.max([loop.gain_error for loop in loops] / np.sqrt(repeats))) if loops else None,
@@ -256,7 +256,7 @@ def measured_range(model: Model, data_sets: Sequence[MeasuredTest]) -> Range:
     return Range(ends[0], ends[1], directions, *ends[2:])
 
 
-def implausible(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> list[str]:
+def implausible_modulus(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> list[str]:
     """Warning about shear moduli that no rubber has, or that differ too much between tests, usually by a wrong unit.
 
     Returns:

@@ -74,7 +74,7 @@ def coordinate_bounds(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, 
 
 def residual(model: Model, data_sets: Sequence[MeasuredTest]) -> Array:
     """Whitened residuals of all tests in order, modelled minus measured in units of noise, (n,)."""
-    return together(data_sets, np.concatenate(list(map(methodcaller("residual", model), data_sets))))
+    return whiten_together(data_sets, np.concatenate(list(map(methodcaller("residual", model), data_sets))))
 
 
 def jacobian(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> Array:
@@ -87,9 +87,9 @@ def jacobian(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[st
     """
     slopes = Coordinates.of_parameters(model, names).slopes(model.values)
     by_value = np.concatenate(list(map(methodcaller("jacobian", model, names), data_sets)), axis=-1)
-    return together(data_sets, by_value * slopes[:, None])
+    return whiten_together(data_sets, by_value * slopes[:, None])
 
 
-def together(data_sets: Sequence[MeasuredTest], rows: Array) -> Array:
+def whiten_together(data_sets: Sequence[MeasuredTest], rows: Array) -> Array:
     """Whiten residuals or derivatives of all tests, (..., n), by the error that `CorrelatedTests` share, if any."""
     return data_sets.error.whiten(rows) if isinstance(data_sets, CorrelatedTests) else rows

@@ -145,7 +145,7 @@ class Drive:
         motion = History.steady(np.tile(self._motion.value, count), self.frequency, cycles=count)
         return replace(motion, accuracy=_ACCURACY)
 
-    def at_rows(self, response: Array) -> Array:
+    def interpolate_at_rows(self, response: Array) -> Array:
         """Interpolate a response of the model over `history`, (..., samples), linearly at the measured rows.
 
         The mean is subtracted if the fit uses the loop about its mean (`datum`).
@@ -168,7 +168,7 @@ class Drive:
         return rows
 
 
-def drive_of(loop: Loop, *, without_outliers: bool = False) -> Drive:
+def prepare_drive(loop: Loop, *, without_outliers: bool = False) -> Drive:
     """Prepare a loop for the model: find its cycles, remove the noise of its displacement, and weight its force.
 
     Outliers of displacement or force do not affect cycles, motion and noise. With `without_outliers`, rows whose force

@@ -82,7 +82,7 @@ _COMBINATIONS = (
 )
 
 
-def left_open(
+def undetermined_parameters(
     model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str], covariance: Covariance
 ) -> list[str]:
     """Warnings about parameters of a fitted model that the tests do not determine; none if all are determined.

@@ -28,7 +28,7 @@ _ERROR_SIZES /= np.linalg.norm(_ERROR_SIZES)
 class MeasuredLoop(MeasuredBase):
     """Measured loop: force at n rows, or bins of phase, driven by the measured displacement.
 
-    Rows that are left out have no weight, see `drive_of`, but are kept, because the response is computed in time.
+    Rows that are left out have no weight, see `prepare_drive`, but are kept, because the response is computed in time.
 
     Args:
         drive: loop prepared as an input of the model.
@@ -95,14 +95,14 @@ class MeasuredLoop(MeasuredBase):
         return 2 if self.fundamental_only else int(self.drive.force.size)
 
     @cached_property
-    def counted(self) -> int:
+    def residual_count(self) -> int:
         """Number of residuals with weight; for correlated rows the effective number."""
         return 2 if self.fundamental_only else round(self.drive.row_noise.share * np.count_nonzero(self._counting))
 
     @property
-    def independent(self) -> float:
-        """Effective number of independent points for slowly varying errors: below `counted` if noise is correlated."""
-        return self.counted / (1.0 if self.fundamental_only else self.drive.row_noise.rows_as_one)
+    def independent_count(self) -> float:
+        """Effective number of independent residuals for slowly varying errors; smaller if the noise is correlated."""
+        return self.residual_count / (1.0 if self.fundamental_only else self.drive.row_noise.rows_as_one)
 
     @property
     def weights(self) -> Array:
@@ -159,7 +159,7 @@ class MeasuredLoop(MeasuredBase):
             return last[2]
         history = self.drive.history(model.is_transient)
         force = model.force(self.direction, history, kind="loop", values=values, conditions=self.test_conditions)
-        force = self.drive.at_rows(force) + (self.drive.datum or 0.0)
+        force = self.drive.interpolate_at_rows(force) + (self.drive.datum or 0.0)
         return force if values is not None else self._keep("force", model, (), force)
 
     def residual(self, model: Model, values: Values | None = None) -> Array:
@@ -181,8 +181,8 @@ class MeasuredLoop(MeasuredBase):
         """Derivatives of the force at the rows by parameter value, (len(names), n); caches the force too."""
         history = self.drive.history(model.is_transient)
         force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
-        self._keep("force", model, (), self.drive.at_rows(force) + (self.drive.datum or 0.0))
-        return self.drive.at_rows(slopes)
+        self._keep("force", model, (), self.drive.interpolate_at_rows(force) + (self.drive.datum or 0.0))
+        return self.drive.interpolate_at_rows(slopes)
 
     def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
         """Derivatives of `residual_with` by parameter value, (k, size).

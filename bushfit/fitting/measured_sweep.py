@@ -84,8 +84,8 @@ class MeasuredSweep(MeasuredBase):
             coarse = f"{sizes.size} magnitudes at {self.measured.size} points, {number(100.0 * step, 2)} % apart"
             rounded = "they are rounded, and the rounding error is included in the noise; save more digits"
             found.append(f"{file}: {coarse}: {rounded}")
-        if self.name in self.noise.beyond:
-            found.append(self.noise.beyond[self.name])
+        if self.name in self.noise.excess_warnings:
+            found.append(self.noise.excess_warnings[self.name])
         return found
 
     @property
@@ -99,12 +99,12 @@ class MeasuredSweep(MeasuredBase):
         return 2 * int(self.order.size)
 
     @property
-    def counted(self) -> int:
+    def residual_count(self) -> int:
         return 2 * int(np.count_nonzero(self.weights))
 
     @property
-    def independent(self) -> float:
-        return float(self.counted)
+    def independent_count(self) -> float:
+        return float(self.residual_count)
 
     @property
     def relative_noise(self) -> float:

@@ -44,7 +44,7 @@ from bushfit.fitting.discrepancy import (
 from bushfit.fitting.levels import level_errors_of
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, rows_of
 from bushfit.fitting.problem import FitProblem, FitResult, SmoothError
-from bushfit.fitting.rig_class import of_class
+from bushfit.fitting.rig_class import class_errors
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
 from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood
@@ -233,7 +233,7 @@ def model_error_warning(error: Unnamed) -> str:
 
 def _exceeds_noise(found: FitResult, rig: RigSettings) -> bool:
     """True if chi-square of all tests, or of one, exceeds that of noise and errors of a rig of the given class."""
-    squares, counts = [], [test.counted for test in found.minimised]
+    squares, counts = [], [test.residual_count for test in found.minimised]
     for test, rows in zip(found.minimised, rows_of(found.minimised), strict=True):
         whitened = CommonError(_errors_of_class(test, rig)).whiten(found.residual[rows])
         squares.append(float(np.sum(np.square(whitened))))
@@ -265,7 +265,7 @@ def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
     if isinstance(test, MeasuredLoop):
         gain = test.gain_error * test.unit_gain[None]
         return gain[:0] if test.gain_weighs else gain
-    uncounted = np.sqrt(np.maximum(np.square(of_class(rig)) - np.square(test.noise.level), 0.0))
+    uncounted = np.sqrt(np.maximum(np.square(class_errors(rig)) - np.square(test.noise.level), 0.0))
     columns = level_errors_of(test)
     return columns * np.tile(uncounted, len(columns) // 2)[:, None]
 

@@ -13,8 +13,16 @@ from scipy.special import chdtrc, fdtrc
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
-from bushfit.fitting.repeats import FEWEST_SOUGHT, FLOOR, LineNoise, at_nominal, disturbed, free_of, line_noise
-from bushfit.fitting.rig_class import class_words, largest_error, of_class, words_of
+from bushfit.fitting.repeats import (
+    FEWEST_SOUGHT,
+    FLOOR,
+    LineNoise,
+    at_nominal,
+    difference_freedom,
+    disturbed,
+    line_noise,
+)
+from bushfit.fitting.rig_class import class_errors, describe_class, format_class_errors, largest_error
 from bushfit.reading.measurement import Sweep
 
 #: Degrees of freedom from which on repeats alone determine the errors shared by a run; chosen: those of three repeats
@@ -55,7 +63,7 @@ class SweepNoise:
             the scatter is that of `random`.
         level: standard deviation of the errors shared by all runs of a line, (ln|K|, phase [rad]).
         level_freedom: degrees of freedom behind `level`; 0 if it is exact.
-        beyond: warning on each sweep whose runs differ by more than a rig of its class explains, by name.
+        excess_warnings: warning on each sweep whose runs differ by more than a rig of its class explains, by name.
     """
 
     random: dict[LineKey, tuple[float, float]]
@@ -66,7 +74,7 @@ class SweepNoise:
     slopes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     level: tuple[float, float] = (0.0, 0.0)
     level_freedom: int = 0
-    beyond: Mapping[str, str] = field(default_factory=dict)
+    excess_warnings: Mapping[str, str] = field(default_factory=dict)
 
     def scatter(self, name: str, held_values: Array, step: Array) -> Array:
         """Standard deviation from point to point of gain and phase at points of a sweep, (2, n).
@@ -82,9 +90,9 @@ class SweepNoise:
 
     def describe(self) -> str:
         """Describe the noise in one line for reports."""
-        shared = f"{words_of(self.shared)} shared by a run"
+        shared = f"{format_class_errors(self.shared)} shared by a run"
         if any(self.level):
-            shared += f", {words_of(self.level)} by all repeats of a level"
+            shared += f", {format_class_errors(self.level)} by all repeats of a level"
         point = 100.0 * np.sqrt(np.mean(np.square(list(self.random.values()))))
         return f"{point:.2g} % from point to point, {shared} ({_ORIGINS[self.origin]})"
 
@@ -128,7 +136,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
             exponent, reference = slopes[key[0]]
             lines[key] = replace(line, scatter=line.scatter / ((line.steps / reference) ** exponent)[:, None])
     repeated = [line for line in lines.values() if line.shared_freedom]
-    measured = repeated or [line for line in lines.values() if line.calmer is not None]
+    measured = repeated or [line for line in lines.values() if line.scatter_without_largest is not None]
     variances, scatter_freedom = _pooled(lines, measured)
     stated_noise = {name: sweep.noise for name, sweep in by_name.items() if sweep.noise is not None}
     for name, sweep in by_name.items():
@@ -141,7 +149,10 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
         for key, variance in variances.items()
     }
     if repeated:
-        level, freedom = of_class(rig, (0.0, 0.0)), max(round(sum(line.shared_freedom for line in repeated)), _ENOUGH)
+        level, freedom = (
+            class_errors(rig, (0.0, 0.0)),
+            max(round(sum(line.shared_freedom for line in repeated)), _ENOUGH),
+        )
         largest, excesses = (
             np.maximum(largest_error(rig), largest_error(UNSTATED)),
             {},
@@ -150,14 +161,15 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
             error = _shared([line for key, line in lines.items() if key[0] == name], rig)
             if np.any(error > largest):
                 excesses[name] = (
-                    f"repeats differ as a whole by an error of {words_of(_pair(error))}, more than a rig of this class "
-                    f"causes ({class_words(rig)}): measure again, or state the class under [rig]"
+                    f"repeats differ as a whole by an error of {format_class_errors(_pair(error))}, "
+                    f"more than a rig of this class causes "
+                    f"({describe_class(rig)}): measure again, or state the class under [rig]"
                 )
         shared = _pair(_shared(repeated, rig))
-        return SweepNoise(random, shared, "repeats", freedom, scatter_freedom, slopes, level, beyond=excesses)
+        return SweepNoise(random, shared, "repeats", freedom, scatter_freedom, slopes, level, excess_warnings=excesses)
     if all(sweep.noise is not None for sweep in sweeps):
-        return SweepNoise(random, of_class(rig, (0.0, 0.0)), "stated", 0, scatter_freedom)
-    return SweepNoise(random, of_class(rig), "assumed", 0, scatter_freedom)
+        return SweepNoise(random, class_errors(rig, (0.0, 0.0)), "stated", 0, scatter_freedom)
+    return SweepNoise(random, class_errors(rig), "assumed", 0, scatter_freedom)
 
 
 def _slope(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
@@ -179,7 +191,7 @@ def _slope(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
         return None
     centred = np.concatenate([log - log.mean() for log in logs])
     ratio = np.concatenate(squares)
-    scale = float(np.var(ratio)) * centred.size / free_of(centred.size)
+    scale = float(np.var(ratio)) * centred.size / difference_freedom(centred.size)
     statistic = float(centred @ (ratio - 1.0)) ** 2 / max(float(centred @ centred) * scale, FLOOR**2)
     if chdtrc(1, statistic) > _BY_CHANCE:
         return None
@@ -204,8 +216,10 @@ def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -
     well_known = [line for line in measured if line.freedom >= _OWN_SCATTER]
     compared = sorted(well_known or measured, key=lambda line: -float(line.variance.sum()))
     for place, line in enumerate(compared):  # a single outlier may set a line apart
-        if line.calmer is not None and line.calmer.size and _unequal(compared):
-            compared[place] = replace(line, scatter=line.calmer, freedom=len(line.calmer))
+        if line.scatter_without_largest is not None and line.scatter_without_largest.size and _unequal(compared):
+            compared[place] = replace(
+                line, scatter=line.scatter_without_largest, freedom=len(line.scatter_without_largest)
+            )
     equal = not _unequal(compared)
     few = [line for line in measured if well_known and line.freedom < _OWN_SCATTER]
     counted = [*compared, *few] if equal else measured
@@ -230,7 +244,7 @@ def _shared(lines: Sequence[LineNoise], rig: RigSettings) -> Array:
     usual |= len(pairs) < FEWEST_SOUGHT
     variance = np.sum(pairs, axis=0, where=usual) / np.maximum(usual.sum(axis=0), 1)
     measured = min(freedom / _ENOUGH, 1.0)
-    return np.sqrt(measured * np.maximum(variance, 0.0) + (1.0 - measured) * np.square(of_class(rig)))
+    return np.sqrt(measured * np.maximum(variance, 0.0) + (1.0 - measured) * np.square(class_errors(rig)))
 
 
 def _pair(values: Array) -> tuple[float, float]:

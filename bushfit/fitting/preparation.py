@@ -9,12 +9,12 @@ import numpy as np
 
 from bushfit.campaign.schema import UNSTATED, Residuals, RigSettings
 from bushfit.effects.contract import Array
-from bushfit.fitting.drive import Drive, drive_of
+from bushfit.fitting.drive import Drive, prepare_drive
 from bushfit.fitting.measured_loop import MeasuredLoop
 from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.fitting.outliers import contradictions
-from bushfit.fitting.rig_class import of_class
+from bushfit.fitting.rig_class import class_errors
 from bushfit.geometry import Bushing, Place, Specimen, unit_strain
 from bushfit.model.model import Model
 from bushfit.model.sensitivity import stiffness_and_slopes
@@ -53,7 +53,7 @@ def prepare_loops(
         rig: class of the rig.
         without_outliers: True to give rows whose force is an outlier no weight.
     """
-    drives = [drive_of(loop, without_outliers=without_outliers) for loop in loops]
+    drives = [prepare_drive(loop, without_outliers=without_outliers) for loop in loops]
     found = [MeasuredLoop(drive).weighted(np.array(drive.loop.weight)) for drive in drives]
     first = np.argmax(repeats_of(found), axis=1) if found else np.empty(0)
     return with_gain_errors(_with_contradictions(found, [first]), rig)
@@ -66,7 +66,7 @@ def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[Me
         All n repeats of a loop share the gain error. It is represented by independent errors that are larger by
         sqrt(n), which give the mean of the repeats the same error.
     """
-    errors = of_class(rig)[0] * np.sqrt(np.count_nonzero(repeats_of(loops), axis=1))
+    errors = class_errors(rig)[0] * np.sqrt(np.count_nonzero(repeats_of(loops), axis=1))
     weighs = rig.stiffness_errors[0] is not None
     return [
         replace(loop, gain_error=float(error), gain_weighs=weighs) for loop, error in zip(loops, errors, strict=True)

@@ -23,7 +23,7 @@ from bushfit.fitting.preparation import (
     prepare_sweeps,
     with_level_errors,
 )
-from bushfit.fitting.rig_class import class_words
+from bushfit.fitting.rig_class import describe_class
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction, Specimen, get_place
 from bushfit.model.model import Model
@@ -101,7 +101,7 @@ class PreparedCampaign:
             sweep.noise.origin != "assumed" for sweep in self.sweeps
         ):
             return []
-        shared = class_words(self.campaign.rig)
+        shared = describe_class(self.campaign.rig)
         return [
             "no test was repeated at three points or more: the errors shared by a run are assumed from the class "
             f"of the rig, {shared}"

@@ -9,11 +9,11 @@ import numpy as np
 from bushfit.effects import BASE, get_effect
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.agreement import misfits, usable
+from bushfit.fitting.agreement import expected_errors, misfits
 from bushfit.fitting.assess import (
     FitStage,
     covariance,
-    implausible,
+    implausible_modulus,
     lack_of_fit,
     measured_range,
     misfit,
@@ -22,14 +22,14 @@ from bushfit.fitting.assess import (
     unfitted,
 )
 from bushfit.fitting.coordinates import Bounds, Coordinates
-from bushfit.fitting.identify import left_open
+from bushfit.fitting.identify import undetermined_parameters
 from bushfit.fitting.levels import level_errors
 from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.preparation import MeasuredTest, sources, split_by_kind, with_level_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.fitting.profile import limit95, profile95
-from bushfit.fitting.rig_class import largest_error, words_of
+from bushfit.fitting.rig_class import format_class_errors, largest_error
 from bushfit.fitting.robust import estimate, outlier_warnings
 from bushfit.fitting.solve import solve_with_lmfit
 from bushfit.geometry import get_place
@@ -106,13 +106,13 @@ def fit_joint(
         found = estimate(replace(problem, model=found.model, tests=tests), robust=data.robust)
     notes = [model_error_warning(error) + NEXT] if error else []
     if errors.matters and not at_limit and not error:
-        size = words_of(errors.error)
+        size = format_class_errors(errors.error)
         notes.append(
             f"levels disagree by more than their repeats: an error of {size} for each level is included in the noise"
         )
     notes += unfitted(found.model, unused, NEXT)
     result = replace(
-        _result(data, [found], notes=notes, unused=unused), usable=usable(found, unused), model_error=error
+        _result(data, [found], notes=notes, unused=unused), usable=expected_errors(found, unused), model_error=error
     )
     return replace(result, profile=profile95(found, result.covariance)) if profile else result
 
@@ -262,11 +262,11 @@ def _result(
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
     warnings = (
         *notes,
-        *implausible(data.campaign.bushing, tests),
+        *implausible_modulus(data.campaign.bushing, tests),
         *temperature_warning(model, tests),
         *data.assumed,
         *outlier_warnings(outliers, robust=data.robust),
-        *(sentence for step in steps for sentence in cautions(model, step, data.bounds, cov, NEXT)),
+        *(sentence for step in steps for sentence in fit_warnings(model, step, data.bounds, cov, NEXT)),
     )
     return Result(
         model,
@@ -283,7 +283,7 @@ def _result(
     )
 
 
-def cautions(model: Model, step: FitResult, bounds: Bounds, covariance: Covariance, advice: str = "") -> list[str]:
+def fit_warnings(model: Model, step: FitResult, bounds: Bounds, covariance: Covariance, advice: str = "") -> list[str]:
     """Warnings about the tests of a fit, parameters at bounds, parameters not determined, and a misfit.
 
     Args:
@@ -307,7 +307,7 @@ def cautions(model: Model, step: FitResult, bounds: Bounds, covariance: Covarian
             f"nothing was fitted, because every parameter is fixed; the given values {how} the tests {extent} "
             f"(NRMSE {number(100.0 * found.nrmse, 2)} %, reduced chi-square {number(found.reduced_chi_square, 3)})",
         ]
-    unknown = covariance.restricted(names).left_open(model.values)
+    unknown = covariance.restricted(names).describe_unknown(model.values)
     sentences = [*([unknown] if unknown else []), *notes]
     if step.stopped:
         sentences.append(
@@ -324,5 +324,7 @@ def cautions(model: Model, step: FitResult, bounds: Bounds, covariance: Covarian
             unit, factor = display_unit(step.model.parameters[name].unit, 1.0, limit)
             how = f"at {'most' if end == 'min' else 'least'} {number(factor * limit, 2)} {unit}".rstrip(" -")
             sentences.append(f"{name} ended at a limit of the model: the tests only show that it is {how} (95 %)")
-    sentences += left_open(model, step.minimised, [name for name in names if name not in at_bound], covariance)
+    sentences += undetermined_parameters(
+        model, step.minimised, [name for name in names if name not in at_bound], covariance
+    )
     return sentences if step.smooth_error else [*sentences, *misfit(model, tests, len(names), advice)]

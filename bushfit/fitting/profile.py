@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from bushfit.errors import FitError
-from bushfit.fitting.assess import linear_errors, reduced
+from bushfit.fitting.assess import linear_errors, reduced_chi_square
 from bushfit.fitting.coordinates import Coordinates
 from bushfit.fitting.problem import FitResult
 from bushfit.fitting.solve import solve
@@ -132,7 +132,7 @@ def profile95(best: FitResult, covariance: Covariance) -> Mapping[str, Interval]
     start, limits = best.coordinates.point(best.model.values), np.transpose(best.problem.limits)
     linear = linear_errors(best.jacobian)
     half = np.array(
-        [covariance.half(name) if name in covariance.names else 0.0 for name in names]
+        [covariance.half_width_of(name) if name in covariance.names else 0.0 for name in names]
     )  # 0 of one at a bound
     missed = any(test.model_error for test in best.minimised)  # how far it bends parameters, no weight tells
     widest = np.inf if missed else _WIDEST * Z95 * np.sqrt(_excess(best))
@@ -163,4 +163,4 @@ def limit95(best: FitResult, name: str) -> float | None:
 
 def _excess(best: FitResult) -> float:
     """Reduced chi-square of a fit, at least 1."""
-    return max(reduced(best.model, best.minimised, len(best.names))[0], 1.0)
+    return max(reduced_chi_square(best.model, best.minimised, len(best.names))[0], 1.0)

@@ -48,7 +48,7 @@ class LineNoise:
         freedom: degrees of freedom of the sum of squares of `scatter`.
         shared: variances of the gain and phase errors shared by a run, estimated from each pair of repeats, (pairs, 2).
         shared_freedom: degrees of freedom of the mean of `shared`; 0 without repeats.
-        calmer: scatter without the point that contributes most, (k - 1, 2); None with repeats or too few points.
+        scatter_without_largest: `scatter` without its largest deviation, (k - 1, 2); None with repeats or few points.
         steps: frequency [Hz] or amplitude [m or rad] of each deviation, (k,); empty without repeats.
         squared_distances: squared distance of the point at each step from the smooth curve, in units of the robust
             scatter; empty with repeats.
@@ -58,7 +58,7 @@ class LineNoise:
     freedom: float
     shared: Array
     shared_freedom: float = 0.0
-    calmer: Array | None = None
+    scatter_without_largest: Array | None = None
     steps: Array = field(default_factory=lambda: np.empty(0))
     squared_distances: Mapping[float, float] = field(default_factory=dict)
 
@@ -97,15 +97,17 @@ def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed:
     ]
     independent = 2.0 / numbers.size  # of each pair: m repeats have m (m - 1)/2 pairs, and m - 1 of them are free
     return LineNoise(
-        np.concatenate([spread * np.sqrt(free_of(len(spread)) / len(spread) / numbers.size) for spread in scatter]),
-        independent * sum(free_of(len(spread)) for spread in scatter),
+        np.concatenate(
+            [spread * np.sqrt(difference_freedom(len(spread)) / len(spread) / numbers.size) for spread in scatter]
+        ),
+        independent * sum(difference_freedom(len(spread)) for spread in scatter),
         np.array(shared),
         independent * len(pairs),
         steps=np.concatenate([np.sqrt(pair_steps[1:] * pair_steps[:-1]) for _, pair_steps in pairs]),
     )
 
 
-def free_of(steps: int) -> float:
+def difference_freedom(steps: int) -> float:
     """Effective degrees of freedom of the mean square of `steps` successive differences."""
     return 2.0 * steps**2 / (3.0 * steps - 1.0)
 
@@ -147,7 +149,9 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
     calmer = _freed(np.delete(basis, worst, axis=0), np.delete(values, worst, axis=0))
     squares = np.square(residual / np.maximum(MEDIAN_TO_SIGMA * usual, FLOOR)).sum(axis=1)
     squared_distance = dict(zip(steps.tolist(), squares.tolist(), strict=True))
-    return LineNoise(scatter, len(scatter), np.empty((0, 2)), calmer=calmer, squared_distances=squared_distance)
+    return LineNoise(
+        scatter, len(scatter), np.empty((0, 2)), scatter_without_largest=calmer, squared_distances=squared_distance
+    )
 
 
 def disturbed(lines: Iterable[LineNoise]) -> list[float]:

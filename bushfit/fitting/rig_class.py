@@ -10,7 +10,7 @@ ASSUMED = (5e-3, float(np.radians(0.25)))
 _MOST_CLASSES = 3.0
 
 
-def of_class(rig: RigSettings, unstated: tuple[float, float] = ASSUMED) -> tuple[float, float]:
+def class_errors(rig: RigSettings, unstated: tuple[float, float] = ASSUMED) -> tuple[float, float]:
     """Relative gain error and phase error [rad] of a rig, as stated in [rig], else those of `unstated`."""
     gain, phase = (default if one is None else one for one, default in zip(rig.stiffness_errors, unstated, strict=True))
     return gain, phase
@@ -18,17 +18,17 @@ def of_class(rig: RigSettings, unstated: tuple[float, float] = ASSUMED) -> tuple
 
 def largest_error(rig: RigSettings) -> tuple[float, float]:
     """Largest standard deviation of shared errors, in gain and phase [rad], that the class of the rig explains."""
-    gain, phase = of_class(rig)
+    gain, phase = class_errors(rig)
     return _MOST_CLASSES * gain, _MOST_CLASSES * phase
 
 
-def words_of(error: tuple[float, float]) -> str:
+def format_class_errors(error: tuple[float, float]) -> str:
     """Format a relative gain error and a phase error [rad] as text, such as "0.5 % gain and 0.25 deg phase"."""
     return f"{100.0 * error[0]:.2g} % gain and {np.degrees(error[1]):.2g} deg phase"
 
 
-def class_words(rig: RigSettings) -> str:
+def describe_class(rig: RigSettings) -> str:
     """Class of a rig as text: gain and phase error, and which of them is assumed."""
     unstated = [name for name, error in zip(("gain", "phase"), rig.stiffness_errors, strict=True) if error is None]
     whose = f"{' and '.join(unstated)} assumed" if unstated else "as [rig] states"
-    return f"{words_of(of_class(rig))}, {whose}"
+    return f"{format_class_errors(class_errors(rig))}, {whose}"

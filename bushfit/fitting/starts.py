@@ -12,7 +12,7 @@ from bushfit.effects import get_parameter
 from bushfit.effects.contract import Array
 from bushfit.effects.friction import harmonic_shape
 from bushfit.errors import FitError
-from bushfit.fitting.assess import implausible
+from bushfit.fitting.assess import implausible_modulus
 from bushfit.fitting.preparation import MeasuredTest, operating_conditions
 from bushfit.geometry import Bushing, stiffness_per_modulus
 
@@ -84,7 +84,7 @@ def start_values(
     found = {"mu": mu, "m": m, "alpha": alpha, "sigma_fmax": sigma_fmax, "eps_half": eps_half}
     found = {name: value for name, value in found.items() if name not in fixed}
     inside = {name: float(np.clip(value, *get_parameter(name).bounds)) for name, value in found.items()}
-    if inside != found and (reasons := implausible(bushing, data_sets)):
+    if inside != found and (reasons := implausible_modulus(bushing, data_sets)):
         raise FitError(
             "the moduli of these tests are outside those of all rubbers",
             found=reasons[0],

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.effects.mistakes import MISTAKES
-from bushfit.fitting.drive import TOLD_MEAN, Drive, drive_of
+from bushfit.fitting.drive import TOLD_MEAN, Drive, prepare_drive
 from bushfit.fitting.loop_cycles import waveform
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.plausible import implausible_sizes
@@ -182,7 +182,7 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     Raises:
         FitError: no whole cycle, or a loop that runs the wrong way round.
     """
-    drive, units, names = drive_of(loop), loop.direction.display, loop.direction.motion.words
+    drive, units, names = prepare_drive(loop), loop.direction.display, loop.direction.motion.words
     (length, to_length), half_force = units.displacement, float(np.ptp(loop.force)) / 2.0
     force, to_force = display_unit(*units.force, half_force)
     half_motion = np.ptp(loop.displacement) / 2.0
@@ -263,7 +263,7 @@ def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> F
     Raises:
         FitError: a part without a whole cycle, or one that runs the wrong way round.
     """
-    drives = [drive_of(loop) for loop in loops]
+    drives = [prepare_drive(loop) for loop in loops]
     unit, factor = record.direction.display.displacement
     amplitudes, frequencies = [drive.amplitude for drive in drives], [drive.frequency for drive in drives]
     cycles = sorted(drive.cycles for drive in drives)

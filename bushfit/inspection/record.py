@@ -86,7 +86,7 @@ class Inspection:
         written, columns, facts, odd: format of the file, its columns, facts and oddities, see `InspectedFile`.
         entry: further keys of the test's table in a campaign, with values as TOML gives them.
         measured: the test in SI.
-        counted: True if the header of a sweep states zero-to-peak or peak-to-peak.
+        states_convention: True if the header of a sweep states zero-to-peak or peak-to-peak.
     """
 
     file: Path
@@ -98,7 +98,7 @@ class Inspection:
     odd: tuple[str, ...]
     entry: Mapping[str, Any] = field(default_factory=dict)
     measured: Loop | Sweep | None = None
-    counted: bool = False
+    states_convention: bool = False
 
     @property
     def label(self) -> str:
@@ -119,7 +119,7 @@ class Inspection:
     @property
     def amplitude_convention_unknown(self) -> bool:
         """True for a sweep that does not state whether its amplitudes are zero-to-peak or peak-to-peak."""
-        return self.kind == "sweep" and not self.counted and "amplitude" not in self.entry
+        return self.kind == "sweep" and not self.states_convention and "amplitude" not in self.entry
 
     @property
     def assumed(self) -> str | None:

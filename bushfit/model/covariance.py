@@ -29,7 +29,7 @@ class Covariance:
             matrix per figure.
 
     >>> known = Covariance(("mu", "m"), np.array([[4.0, 3.0], [3.0, 9.0]]))
-    >>> known.stderr("m"), known.correlations(), round(known.half("mu"), 2)
+    >>> known.stderr("m"), known.correlations(), round(known.half_width_of("mu"), 2)
     (3.0, [('mu', 'm', 0.5)], 3.92)
     """
 
@@ -64,7 +64,7 @@ class Covariance:
         """
         return stdtrit(self.freedom(slopes), 0.975) * np.linalg.norm(self.root.T @ slopes, axis=0)
 
-    def half(self, name: str) -> float:
+    def half_width_of(self, name: str) -> float:
         """Half width of the 95 % interval of the named parameter [its SI unit]."""
         return self._halves[name]
 
@@ -72,9 +72,9 @@ class Covariance:
     def _halves(self) -> dict[str, float]:
         return dict(zip(self.names, self.half_width(np.eye(len(self.names))).tolist(), strict=True))
 
-    def left_open(self, values: Mapping[str, float]) -> str:
+    def describe_unknown(self, values: Mapping[str, float]) -> str:
         """Sentence that names the parameters whose 95 % half-width is at least their value; "" if there are none."""
-        unknown = ", ".join(name for name in self.names if self.half(name) >= abs(values[name]))
+        unknown = ", ".join(name for name in self.names if self.half_width_of(name) >= abs(values[name]))
         return unknown and f"the tests leave {unknown} open (unknown by 100 % or more)"
 
     def freedom(self, slopes: Array) -> Array:

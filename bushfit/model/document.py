@@ -15,7 +15,7 @@ from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import Shape, SpecimenKind, StatedStrain
 from bushfit.model.result import CampaignTable as CampaignTable
-from bushfit.model.result import End, Misfit, Outlier, Quality, Range, Usable
+from bushfit.model.result import End, ExpectedError, Misfit, Outlier, Quality, Range
 from bushfit.model.result import TestTable as TestTable
 from bushfit.units import SIZES
 from bushfit.validation import Flag, Name, Number, WholeNumber
@@ -124,7 +124,7 @@ class FitTable(Quality):
     tests: Annotated[
         tuple[Misfit, ...], Field(description="Misfit of every test, fitted or not, and of its runs.")
     ] = ()
-    usable: Annotated[tuple[Usable, ...], Field(description="Expected error by direction or specimen.")] = ()
+    usable: Annotated[tuple[ExpectedError, ...], Field(description="Expected error by direction or specimen.")] = ()
 
     def __post_init__(self) -> None:
         if self.strain and not self.frequency_Hz:

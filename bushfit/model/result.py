@@ -94,7 +94,7 @@ class Misfit:
 
 
 @dataclass(frozen=True)
-class Usable:
+class ExpectedError:
     """Expected error of a model for one direction or specimen: 95 % of the measured points have a smaller error.
 
     Args:
@@ -252,7 +252,7 @@ class Result:
     at_bound: Mapping[str, End] = field(default_factory=dict)
     specimens: tuple[Specimen, ...] = ()
     tests: tuple[Misfit, ...] = ()
-    usable: tuple[Usable, ...] = ()
+    usable: tuple[ExpectedError, ...] = ()
     unresolved: tuple[str, ...] = ()
     model_error: Unnamed | None = None
     alternatives: tuple[Alternative, ...] = ()
@@ -279,9 +279,9 @@ class Result:
         return self.specimens[0].name if self.specimens and not self.model.bushing else self.model.name
 
     @property
-    def left_open(self) -> str:
+    def unknown_parameters(self) -> str:
         """Sentence on the parameters that are unknown by 100 % or more; "" if every parameter is known."""
-        return self.covariance.left_open(self.model.values)
+        return self.covariance.describe_unknown(self.model.values)
 
     @property
     def undecided(self) -> list[str]:
@@ -315,7 +315,7 @@ class Result:
         if stderr is None:
             return None
         parameter = self.model.parameters[name]
-        half = self.covariance.half(name)
+        half = self.covariance.half_width_of(name)
         low, high = value - half, value + half
         if parameter.log and value > 0.0:
             factor = float(np.exp(min(half / value, _LARGEST_EXPONENT)))

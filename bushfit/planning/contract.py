@@ -140,13 +140,13 @@ class Target:
 
     Args:
         quantity: name of a parameter, or "stiffness" or "loss_factor".
-        half: largest allowed half width of the 95 % interval, relative to the value. A prediction has to reach it at
-            every operating point of the request.
+        half_width: largest allowed half width of the 95 % interval, relative to the value; for a prediction, at every
+            operating point of the request.
         place: direction or specimen of the prediction; None for a parameter.
     """
 
     quantity: str
-    half: float
+    half_width: float
     place: Place | None = None
 
     def __str__(self) -> str:

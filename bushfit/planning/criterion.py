@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bushfit.diagnosis.next_test import entropy_left
+from bushfit.diagnosis.next_test import remaining_entropy
 from bushfit.effects.contract import Array
 from bushfit.planning.information import Information, ModelInformation, rival_chi_squares
 from bushfit.progress import track
@@ -59,7 +59,7 @@ class Criterion:
             Value of the objective for each choice, (choices,).
         """
         if self.weight is None:
-            entropy = entropy_left(self.probabilities, rival_chi_squares(informations[1:]))
+            entropy = remaining_entropy(self.probabilities, rival_chi_squares(informations[1:]))
             aim = np.log(np.maximum(entropy, np.finfo(float).tiny))
         else:
             aim = np.log(np.einsum("tij,ij->t", self.models[0].error_covariance(informations[0]), self.weight))

@@ -140,7 +140,7 @@ def plan_document(plan: Plan, check: Check | None = None) -> PlanFile:
     targets: dict[str, TargetEntry] = {}
     halves = zip(*(programme.halves for programme in programmes), strict=True)
     for target, reason, half in zip(request.targets, plan.missed, halves, strict=True):
-        targets[str(target)] = {"asked": target.half, **_reached(half), "met": reason is None, "why": reason}
+        targets[str(target)] = {"asked": target.half_width, **_reached(half), "met": reason is None, "why": reason}
     predicted: dict[str, dict[str, ErrorComparison]] = {"stiffness": {}, "loss": {}}
     ends = np.cumsum([points.frequency.size for points in request.points])[:-1]
     for quantity, by_place in predicted.items():

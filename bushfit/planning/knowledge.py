@@ -19,7 +19,7 @@ from bushfit.fitting.coordinates import Bounds, Coordinates
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind
 from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.rig_class import of_class
+from bushfit.fitting.rig_class import class_errors
 from bushfit.model.result import Result
 from bushfit.planning.contract import Knowledge, Noise, Test
 from bushfit.planning.information import ROWS_PER_CYCLE, relative_slopes
@@ -195,7 +195,7 @@ def noise_of(data: PreparedCampaign) -> Noise:
         Estimated standard deviations; typical values for errors that the tests do not determine.
     """
     loops, sweeps = split_by_kind(data.data_sets)
-    estimate = replace(Noise(), level=of_class(data.campaign.rig))
+    estimate = replace(Noise(), level=class_errors(data.campaign.rig))
     if sweeps:
         noise = sweeps[0].noise
         gain, phase = np.sqrt(np.mean(np.square(list(noise.random.values())), axis=0)).tolist()

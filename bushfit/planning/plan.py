@@ -133,7 +133,7 @@ def describe_purpose(search: PlanSearch, test: int) -> str:
             goal for goal in problem.goals if goal.half_width(wider) >= _NOTABLE_RATIO * goal.half_width(covariance)
         ]
         if widened:
-            goal = max(widened, key=lambda goal: goal.half_width(wider) / goal.target.half)
+            goal = max(widened, key=lambda goal: goal.half_width(wider) / goal.target.half_width)
             without, planned = (percent(goal.half_width(errors), 3) for errors in (wider, covariance))
             return f"{goal.target}: {without} without it, {planned} with it"
     else:
@@ -198,7 +198,7 @@ def plan_warnings(search: PlanSearch, planned: Programme, missed: Sequence[str |
     yield from knowledge.warnings
     for target, half, reason in zip(request.targets, planned.halves, missed, strict=True):
         if reason:
-            yield f"{target}: {percent(target.half)} asked for, {percent(half)} planned: {reason}"
+            yield f"{target}: {percent(target.half_width)} asked for, {percent(half)} planned: {reason}"
     if knowledge.bounded:
         yield (
             f"{' and '.join(knowledge.bounded)} ended at a bound: the errors of the others include half of the "

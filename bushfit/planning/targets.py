@@ -127,7 +127,7 @@ class TargetSensitivity:
 
     def met(self, error_covariance: Array) -> bool:
         """True if the intervals are as narrow as the target for this covariance of the parameters, (k, k)."""
-        return self.half_width(error_covariance) <= self.target.half * (1.0 + 1e-9)
+        return self.half_width(error_covariance) <= self.target.half_width * (1.0 + 1e-9)
 
     def reached(self, error_covariance: Array, limit: Array) -> bool:
         """True if the target is met, or nearly as well as unlimited tests would.
@@ -152,7 +152,7 @@ class TargetSensitivity:
             Weight matrix W, (k, k): trace(W covariance) is the mean ratio of variances.
         """
         if self.met(limit):
-            allowed = np.square(np.maximum(self.target.half - self.undecided, 0.0) / Z95) - self.model_error**2
+            allowed = np.square(np.maximum(self.target.half_width - self.undecided, 0.0) / Z95) - self.model_error**2
         else:
             nearly = np.square(_NEARLY * self.half_widths(limit) / Z95)
             allowed = nearly - self.model_error**2 - np.square(self.undecided / Z95)

@@ -12,7 +12,7 @@ from bushfit.errors import MeasurementError
 from bushfit.reading.headers import WORDS, Column, plain
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.layout import FileFormat, Layout, is_comment, is_row, is_summary_row, is_units_row
-from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, is_like_number, weigh
+from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, consistent_notations, is_like_number
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 from bushfit.reading.times import clock
 
@@ -249,12 +249,12 @@ class Cells:
         notations = self.possible_numerals()
         if layout.delimiter == "," and isinstance(source, Text) and not source.may_have_comma(layout):
             notations = tuple(way for way in notations if "," not in (way.decimal, way.thousands)) or notations
-        evidence = weigh(self.number_texts(), notations)
+        evidence = consistent_notations(self.number_texts(), notations)
         may_have_thousands_separators = isinstance(source, Sheet) or source.may_have_thousands_separators(
             layout, evidence.ways[0].decimal
         )
         if evidence.contrary is None and may_have_thousands_separators:
-            evidence = weigh(self.number_texts(), notations, all_cells=True)
+            evidence = consistent_notations(self.number_texts(), notations, all_cells=True)
         columns = {column.index: column for column in self.roles.values()}
         if evidence.contrary:
             (line, index), text = evidence.contrary

@@ -87,7 +87,7 @@ def is_like_number(text: str) -> bool:
     return _LIKE_NUMBER.fullmatch(text) is not None and any(way.allows(text) for way in ALL_NUMERALS)
 
 
-def weigh(
+def consistent_notations(
     cells: Iterable[tuple[Place, str]], ways: tuple[Numerals, ...] = ALL_NUMERALS, *, all_cells: bool = False
 ) -> NumeralEvidence:
     """Find the notations of numbers in which all cells of a table can be read.

@@ -32,7 +32,7 @@ from bushfit.reading.headers import (
 from bushfit.reading.labelled import Rows, find_labels, select_rows
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, Line, find_layout, is_comment
 from bushfit.reading.measurement import Floats
-from bushfit.reading.numerals import Numerals, weigh
+from bushfit.reading.numerals import Numerals, consistent_notations
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, Channels, RowSource, Sheet, Text, cells_of
 from bushfit.reading.times import clock
@@ -349,7 +349,7 @@ class Table(Cells):
         if isinstance(source, Channels) and source.numeric >= indices:
             arrays = {index: source.arrays[index] for index in indices}
         elif isinstance(source, Text):
-            ways = weigh(islice(self.number_texts(), _FIRST), self.possible_numerals()).ways
+            ways = consistent_notations(islice(self.number_texts(), _FIRST), self.possible_numerals()).ways
             first = [str(cell) for cell in self.first_row]
             numerals = Numerals(ways[0].decimal)
             are_settled = len({way.decimal for way in ways}) == 1 and len(first) == len(self.headers)

@@ -13,7 +13,7 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
-from bushfit.diagnosis.rig_errors import scattering_alone
+from bushfit.diagnosis.rig_errors import in_scatter_units
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE, get_effect
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -82,4 +82,4 @@ def fitted() -> Fitted:
 @pytest.fixture(scope="session")
 def bare(measured: Measured, fitted: Fitted) -> Evidence:
     """The paper's model fitted to a clean campaign, its residuals in units of what scatters from point to point."""
-    return scattering_alone(fitted(measured(plan=SHARED)))
+    return in_scatter_units(fitted(measured(plan=SHARED)))

@@ -19,7 +19,7 @@ from bushfit.diagnosis.explanations import Explanation, unnamed
 from bushfit.diagnosis.faulty_places import faulty_places
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.propose import proposals, scores, sensitivity
-from bushfit.diagnosis.rig_errors import rig_errors, scattering_alone
+from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
 from bushfit.effects import BASE, LIBRARY, get_effect
 from bushfit.effects.contract import Array, Values
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind
@@ -61,7 +61,7 @@ def test_the_place_that_went_wrong_is_the_likeliest(
     measured: Measured, fitted: Fitted, tamper: Tamper, kind: str, words: str
 ) -> None:
     """Errors of the rig, of all sizes, are counted beside it."""
-    evidence = scattering_alone(fitted(tamper(measured(plan=SHARED))))
+    evidence = in_scatter_units(fitted(tamper(measured(plan=SHARED))))
     found = best(evidence, faulty_places(evidence))
     assert (found.kind, found.family) == ("place", kind)
     assert found.name == words
@@ -87,7 +87,7 @@ def test_a_level_may_be_off_by_a_slope_over_the_logarithm_of_frequency(bare: Evi
 def test_places_are_those_of_the_tests_there_are(
     measured: Measured, fitted: Fitted, part: Tamper, gone: set[str]
 ) -> None:
-    evidence = scattering_alone(fitted(part(measured(plan=SHARED))))
+    evidence = in_scatter_units(fitted(part(measured(plan=SHARED))))
     assert {each.family for each in faulty_places(evidence)} == {"frequency", "level", "repeat", "loop"} - gone
 
 
@@ -117,7 +117,7 @@ def test_effects_are_sized_by_what_they_change(bare: Evidence) -> None:
     assert found["kraus"].group is None
     group = found["inertia"].group
     assert group is not None
-    assert (group.sense, found["inertia"].family) == (1, "inertia")
+    assert (group.sign, found["inertia"].family) == (1, "inertia")
     assert found["stiffness_factor.radial"].family == "stiffness_factor"
     effect = get_effect("inertia")
     heavy = bare.model.with_effect("inertia", {"inertia.mass": effect.amount.value_at_share(0.01)})

@@ -37,11 +37,11 @@ def ledger(seed: int, *, flat: int = 2, known: int = 1, rows: int = 10, groups: 
     columns = 10.0 * random.normal(size=(9, rows))
     share = random.uniform(0.2, 2.0, size=9)
     made = (
-        Group(columns[:2], np.eye(2), together=True),
-        Group(columns[2:4], np.eye(2), together=True),
-        Group(columns[4:7], share[4:7], together=False),
-        Group(columns[7:9], share[7:9], together=False, sense=1),
-        Group(columns[:3], np.eye(3), together=True),
+        Group(columns[:2], np.eye(2), act_together=True),
+        Group(columns[2:4], np.eye(2), act_together=True),
+        Group(columns[4:7], share[4:7], act_together=False),
+        Group(columns[7:9], share[7:9], act_together=False, sign=1),
+        Group(columns[:3], np.eye(3), act_together=True),
     )
     precision = np.repeat([0.0, 0.5], [flat, known])
     jacobian = random.normal(size=(flat + known, rows))
@@ -86,11 +86,11 @@ def test_worth_is_that_of_the_covariance_in_full(seed: int) -> None:
     assert of.log_evidence == pytest.approx(over_nodes(of, plain), abs=1e-6)
     assert of.log_evidence_with_level_errors == pytest.approx(over_nodes(of, plain, wide=True), abs=1e-6)
     for group, worth in zip(of.groups, of.group_evidence, strict=True):
-        if group.sense:
+        if group.sign:
             continue
         parts = (
             [group.columns]
-            if group.together
+            if group.act_together
             else [column[None] / unit for column, unit in zip(group.columns, group.unit, strict=True)]
         )
         cases = [size * part for size in SIZES for part in parts]
@@ -106,7 +106,7 @@ def test_an_amount_is_integrated_over_its_sense(sense: int) -> None:
     of = ledger(4, flat=1, known=0)
     column, unit, own = of.groups[0].columns[0], 0.7, of.jacobian[0]
     of = replace(
-        of, chosen_nodes=np.array([0]), groups=(Group(column[None], np.array([unit]), together=False, sense=sense),)
+        of, chosen_nodes=np.array([0]), groups=(Group(column[None], np.array([unit]), act_together=False, sign=sense),)
     )
     noise, spreads = multivariate_normal(cov=covariance(of, NODES[0])), SIZES / unit
     low, high = {1: (0.0, 1.0), -1: (-1.0, 0.0), 0: (-1.0, 1.0)}[sense]
@@ -128,7 +128,7 @@ def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed: int) -> Non
     columns = np.random.default_rng(seed).normal(size=(2, plain.residual.size))
     sizes = (0.0, 0.3, 0.7)
     nodes = [replace(node, compound=size) for node in NODES[:2] for size in sizes]
-    of = replace(plain, rig=RigErrors(plain.rig.blocks, nodes), compound=Group(columns, np.eye(2), together=True))
+    of = replace(plain, rig=RigErrors(plain.rig.blocks, nodes), compound=Group(columns, np.eye(2), act_together=True))
     group, size = of.groups[0].columns, SIZES[:, None, None]
 
     def evidence(bent: bool, added: Array) -> float:
@@ -141,7 +141,10 @@ def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed: int) -> Non
     assert of.log_evidence_with_compound == pytest.approx(evidence(True, nothing), abs=1e-6)
     added = size**2 * (group.T @ group)
     worth = of.group_evidence[0]
-    for bent, found in ((False, worth.log_evidence), (True, worth.beside.log_evidence if worth.beside else 0.0)):
+    for bent, found in (
+        (False, worth.log_evidence),
+        (True, worth.with_compound.log_evidence if worth.with_compound else 0.0),
+    ):
         over_sizes = logsumexp([evidence(bent, each) for each in added]) - np.log(SIZES.size)
         assert found == pytest.approx(over_sizes, abs=1e-6)
 
@@ -151,9 +154,9 @@ def test_what_does_nothing_leaves_the_evidence_as_it_is(seed: int) -> None:
     """Columns of nothing, or of what the parameters do too, or that the tests hardly see."""
     of = ledger(seed)
     nothing, spanned = np.zeros((2, of.residual.size)), of.jacobian[:2] + of.jacobian[1]
-    groups = [Group(each, np.eye(2), together=True) for each in (nothing, spanned)]
-    groups += [Group(each, np.ones(2), together=False) for each in (nothing, spanned)]
-    groups += [replace(of.groups[3], unit=np.zeros(2)), Group(nothing, np.ones(2), together=False, sense=1)]
+    groups = [Group(each, np.eye(2), act_together=True) for each in (nothing, spanned)]
+    groups += [Group(each, np.ones(2), act_together=False) for each in (nothing, spanned)]
+    groups += [replace(of.groups[3], unit=np.zeros(2)), Group(nothing, np.ones(2), act_together=False, sign=1)]
     for each in replace(of, groups=groups).group_evidence:
         assert each.log_evidence == pytest.approx(of.log_evidence, abs=1e-5)
 
@@ -200,8 +203,8 @@ def test_the_chance_of_clean_tests_is_even(node: int) -> None:
     of, random = ledger(7, groups=False, rows=14), np.random.default_rng(2)
     noise = np.linalg.cholesky(covariance(of, NODES[node]))
     drawn = [noise @ random.normal(size=of.residual.size) for _ in range(200)]
-    alone = [replace(of, residual=row, chosen_nodes=np.array([node])).chance() for row in drawn]
-    every = [replace(of, residual=row).chance() for row in drawn]
+    alone = [replace(of, residual=row, chosen_nodes=np.array([node])).p_value() for row in drawn]
+    every = [replace(of, residual=row).p_value() for row in drawn]
     print(f"p {kstest(alone, 'uniform').pvalue:.3f}; below 5 %: {np.mean(np.array(every) < 0.05):.3f}")
     assert kstest(alone, "uniform").pvalue > 1e-3
     assert np.mean(np.array(every) < 0.05) < 0.09
@@ -232,7 +235,7 @@ def test_columns_that_move_together_change_what_their_sum_does_where_it_is_large
     columns = plain.groups[0].columns
     sizes = []
     for unit in ([[1.0], [0.0]], [[0.0], [1.0]], [[1.0], [1.0j]], [[1.0, 3.0], [1.0j, 3.0j]], [[1.0, 0.0], [0.0, 1.0]]):
-        (worth,) = replace(plain, groups=[Group(columns, np.array(unit), together=True)]).group_evidence
+        (worth,) = replace(plain, groups=[Group(columns, np.array(unit), act_together=True)]).group_evidence
         sizes.append(worth.size)
         assert worth.log_evidence == pytest.approx(plain.group_evidence[0].log_evidence)
     first, second, both, thrice, larger = sizes

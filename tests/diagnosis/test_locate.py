@@ -12,13 +12,13 @@ from rigged import INERTIA, LEVELS, SHARED, SLIP, TWO, Effects, Fitted, Measured
 from bushfit.diagnosis.evidence import fit
 from bushfit.diagnosis.holdout import hold_out, parts
 from bushfit.diagnosis.locate import locate
-from bushfit.diagnosis.record import Where
+from bushfit.diagnosis.record import MisfitRegion
 from bushfit.fitting.coordinates import residual
 
 DELAY = {"delay": {"tau": 1e-4}}
 
 
-def one(found: tuple[Where, ...], direction: str, component: str) -> Where:
+def one(found: tuple[MisfitRegion, ...], direction: str, component: str) -> MisfitRegion:
     """The region of a direction and a part."""
     (where,) = [where for where in found if (where.direction, where.component) == (direction, component)]
     print(f"{where.excess:.1f} x noise: {where.reading}")
@@ -32,7 +32,7 @@ def test_a_clean_campaign_has_no_place(measured: Measured, fitted: Fitted) -> No
 
 
 @pytest.fixture(scope="module")
-def where_of(measured: Measured, fitted: Fitted) -> Callable[[Effects], tuple[Where, ...]]:
+def where_of(measured: Measured, fitted: Fitted) -> Callable[[Effects], tuple[MisfitRegion, ...]]:
     return lambda effects: locate(fitted(measured(effects, SHARED)))
 
 
@@ -45,7 +45,11 @@ def where_of(measured: Measured, fitted: Fitted) -> Callable[[Effects], tuple[Wh
     ],
 )
 def test_trends(
-    where_of: Callable[[Effects], tuple[Where, ...]], effects: Effects, direction: str, component: str, trend: str
+    where_of: Callable[[Effects], tuple[MisfitRegion, ...]],
+    effects: Effects,
+    direction: str,
+    component: str,
+    trend: str,
 ) -> None:
     """The worst comes first, and all are real."""
     found = where_of(effects)
@@ -64,7 +68,7 @@ def test_trends(
 
 
 def test_slip_shows_at_the_smallest_amplitude_and_in_odd_harmonics(
-    where_of: Callable[[Effects], tuple[Where, ...]],
+    where_of: Callable[[Effects], tuple[MisfitRegion, ...]],
 ) -> None:
     found = where_of(SLIP)
     loss = one(found, "axial", "loss")
@@ -74,7 +78,7 @@ def test_slip_shows_at_the_smallest_amplitude_and_in_odd_harmonics(
 
 
 @pytest.mark.parametrize("effects", [{"force_offset": {"offset": 15.0}}, {"asymmetry": {"c2": 2.0}}])
-def test_loops_alone(where_of: Callable[[Effects], tuple[Where, ...]], effects: Effects) -> None:
+def test_loops_alone(where_of: Callable[[Effects], tuple[MisfitRegion, ...]], effects: Effects) -> None:
     found = where_of(effects)
     assert {where.kind for where in found} == {"loop"}
     assert all("a constant force" in where.reading for where in found)

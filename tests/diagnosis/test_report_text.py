@@ -12,7 +12,7 @@ import pytest
 from rigged import SHARED, Measured, asked, no_loops, no_repeats, no_sweeps, one_direction, said
 
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.next_test import BUSHING_TESTS, FIXTURE_TESTS, deciding_test, entropy_left
+from bushfit.diagnosis.next_test import BUSHING_TESTS, FIXTURE_TESTS, deciding_test, remaining_entropy
 from bushfit.effects import BASE
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -82,7 +82,7 @@ def test_compliance_in_one_direction_alone_is_never_a_bold_name(measured: Measur
     assert settled.result.model.values["rig_compliance.compliance"] == pytest.approx(
         whole.result.model.values["sleeve_compliance.compliance"], rel=1e-3
     )
-    proposed = {judged.name for judged in settled.candidates}
+    proposed = {decide_verdict.name for decide_verdict in settled.candidates}
     assert not proposed & {"sleeve_compliance", "rig_compliance"}
 
 
@@ -187,9 +187,9 @@ def test_what_stays_open_is_bounded_from_above(odds: tuple[float, float]) -> Non
         weighed = p[:, None] * np.exp(-0.5 * np.square(x - np.array([[0.0], [distance]]))) / np.sqrt(2.0 * np.pi)
         share = weighed / weighed.sum(axis=0)
         left = -float(np.trapezoid((weighed * np.log(np.maximum(share, 1e-300))).sum(axis=0), x))
-        bound = float(entropy_left(odds, distance**2 * (1.0 - np.eye(2))))
+        bound = float(remaining_entropy(odds, distance**2 * (1.0 - np.eye(2))))
         print(f"{distance:g} apart: {left:.4f} nats stay open, at most {bound:.4f}")
         assert left - 1e-6 <= bound <= left + 0.2
-    assert entropy_left(odds, np.zeros((2, 2))) == pytest.approx(-float(p @ np.log(p)))
-    far = [float(entropy_left((*odds, 0.0), d * (1.0 - np.eye(3)))) for d in (300.0, 1000.0, 3000.0)]
+    assert remaining_entropy(odds, np.zeros((2, 2))) == pytest.approx(-float(p @ np.log(p)))
+    far = [float(remaining_entropy((*odds, 0.0), d * (1.0 - np.eye(3)))) for d in (300.0, 1000.0, 3000.0)]
     assert far[0] > far[1] > far[2] > 0.0, "no rounding stands in for what is left"

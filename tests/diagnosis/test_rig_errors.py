@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import WAVES
-from bushfit.diagnosis.rig_errors import blocks, nodes, scattering_alone
+from bushfit.diagnosis.rig_errors import blocks, in_scatter_units, nodes
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
 
@@ -77,7 +77,7 @@ def test_waves_are_independent_of_what_the_run_shares(bare: Evidence) -> None:
 def test_repeated_loops_share_their_gain(measured: Measured, fitted: Fitted) -> None:
     campaign = no_sweeps(measured(plan=SHARED))
     first, second = campaign.loops
-    bare = scattering_alone(fitted(replace(campaign, loops=(first, second, replace(first, name="again")))))
+    bare = in_scatter_units(fitted(replace(campaign, loops=(first, second, replace(first, name="again")))))
     assert sorted(block.rows.size for block in blocks(bare, RIG)) == [second.time.size, 2 * first.time.size]
     assert all(block.kinds.tolist() == [LOOP] for block in blocks(bare, RIG))
 
@@ -86,7 +86,7 @@ def test_sizes_have_weights_that_sum_to_one(measured: Measured, fitted: Fitted, 
     """The scatter has sizes of its own where few points tell it, loops alone have no runs."""
     sweep = split_by_kind(bare.data_sets)[1][0]
     few = replace(bare, data_sets=(replace(sweep, noise=replace(sweep.noise, scatter_freedom=4)),))
-    alone = scattering_alone(fitted(no_sweeps(measured(plan=SHARED))))
+    alone = in_scatter_units(fitted(no_sweeps(measured(plan=SHARED))))
     for evidence, scatters, runs in ((bare, 1, 5), (few, 3, 5), (alone, 1, 1)):
         made = nodes(evidence)
         assert logsumexp([node.log_weight for node in made]) == pytest.approx(0.0, abs=1e-9)

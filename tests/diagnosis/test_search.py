@@ -116,7 +116,7 @@ def test_a_wild_row_is_a_warning(measured: Measured, effects: Effects, factor: f
 def test_chance_alone_names_nothing_however_small_a_gap_counts(measured: Measured) -> None:
     """Something always fits noise a little."""
     diagnosis = asked(measured({}, SHARED), tolerance=0.0)
-    assert max(judged.score for judged in diagnosis.candidates) > 1.0
+    assert max(decide_verdict.score for decide_verdict in diagnosis.candidates) > 1.0
     assert said(diagnosis) == "consistent "
 
 

@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 
 from bushfit.diagnosis.hypotheses import Hypothesis
-from bushfit.diagnosis.verdict import Finding, judged
+from bushfit.diagnosis.verdict import Finding, decide_verdict
 from bushfit.effects.mistakes import MISTAKES
 
 TOLERANCE = 0.01
 
 
-def one(parts: str, odds: float, *, size: float = 0.05, last: float = 0.0, chance: float = 0.5) -> Hypothesis:
+def one(parts: str, odds: float, *, size: float = 0.05, last: float = 0.0, p_value: float = 0.5) -> Hypothesis:
     """Of parts joined by +: effects, "unnamed", "levels", places as "kind:name", a mistake by its name; "" of none."""
     names = parts.split("+") if parts else []
     spots = [name.split(":") for name in names if ":" in name]
@@ -24,7 +24,7 @@ def one(parts: str, odds: float, *, size: float = 0.05, last: float = 0.0, chanc
     claims: list[Any] = [SimpleNamespace(mistake=MISTAKES[name], key=name) for name in names if name in MISTAKES]
     others = {"unnamed", "levels", *MISTAKES}
     effects = tuple(name for name in names if ":" not in name and name not in others)
-    state: Any = SimpleNamespace(effects=effects, linear=SimpleNamespace(chance=lambda **_: chance))
+    state: Any = SimpleNamespace(effects=effects, linear=SimpleNamespace(p_value=lambda **_: p_value))
     claim, curve = claims[0] if claims else None, "smooth all" if "unnamed" in names else ""
     size = size if names else 0.0
     return Hypothesis(effects, claim, places, curve, "levels" in names, log(odds), size, last, state)
@@ -32,7 +32,7 @@ def one(parts: str, odds: float, *, size: float = 0.05, last: float = 0.0, chanc
 
 def of(**odds: float) -> Finding:
     found = [one(parts.replace("__", "."), share) for parts, share in odds.items()]
-    return judged(sorted(found, key=lambda each: -each.log_posterior), TOLERANCE)
+    return decide_verdict(sorted(found, key=lambda each: -each.log_posterior), TOLERANCE)
 
 
 def told(finding: Finding) -> dict[str, float]:
@@ -70,8 +70,8 @@ def test_verdicts(odds: dict[str, float], verdict: str, expected: dict[str, floa
 
 def test_what_changes_less_than_the_tolerance_is_nothing() -> None:
     small, large = one("inertia", 0.2, size=0.009), one("inertia+delay", 0.8)
-    assert judged([large, small], TOLERANCE).verdict == "consistent"
-    finding = judged([large, small], 0.001)
+    assert decide_verdict([large, small], TOLERANCE).verdict == "consistent"
+    finding = decide_verdict([large, small], 0.001)
     assert (finding.verdict, finding.nothing) == ("named", 0.0)
 
 
@@ -84,7 +84,7 @@ def test_of_more_than_can_be_told_it_is_described_by_what_nearly_all_have_in_com
 
 @pytest.mark.parametrize(("last", "verdict"), [(0.002, "partly"), (0.02, "described")])
 def test_names_stand_beside_what_has_none_where_they_change_most(last: float, verdict: str) -> None:
-    finding = judged([one("inertia+unnamed", 0.99, size=0.05, last=last), one("inertia", 0.01)], TOLERANCE)
+    finding = decide_verdict([one("inertia+unnamed", 0.99, size=0.05, last=last), one("inertia", 0.01)], TOLERANCE)
     assert finding.verdict == verdict
     assert finding.leads == (("inertia",) if verdict == "described" else ())
     assert told(finding) == {"inertia+unnamed": 1.0}
@@ -92,11 +92,11 @@ def test_names_stand_beside_what_has_none_where_they_change_most(last: float, ve
 
 @pytest.mark.parametrize("more", [(), ("inertia+delay",)])
 def test_a_leader_that_does_not_fit_is_a_lead(more: tuple[str, ...]) -> None:
-    finding = judged([*(one(parts, 2.0) for parts in more), one("inertia", 1.0, chance=1e-4)], TOLERANCE)
+    finding = decide_verdict([*(one(parts, 2.0) for parts in more), one("inertia", 1.0, p_value=1e-4)], TOLERANCE)
     assert (finding.verdict, finding.leads) == ("described", ("inertia",))
 
 
 def test_only_ratios_count() -> None:
     every = [one("inertia", 0.5), one("delay", 0.3), one("unnamed", 0.19), one("", 0.01)]
     far = [replace(each, log_posterior=each.log_posterior - 5000.0) for each in every]
-    assert told(judged(far, TOLERANCE)) == told(judged(every, TOLERANCE))
+    assert told(decide_verdict(far, TOLERANCE)) == told(decide_verdict(every, TOLERANCE))

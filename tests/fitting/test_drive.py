@@ -10,7 +10,7 @@ import pytest
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.drive import drive_of
+from bushfit.fitting.drive import prepare_drive
 from bushfit.fitting.loop_cycles import steady_cycles
 from bushfit.fitting.loop_harmonics import MOST_ROWS
 from bushfit.fitting.preparation import MeasuredLoop
@@ -71,7 +71,7 @@ CASES: dict[str, dict[str, Any]] = {
 def test_the_motion_is_cleared_and_the_true_model_leaves_only_noise(paper_model: Model, case: str) -> None:
     """One peak and one trough a cycle, where the motion has them, although the sensor turns at every other row."""
     loop = measured(paper_model, **CASES[case])
-    data_set = MeasuredLoop(drive_of(loop))
+    data_set = MeasuredLoop(prepare_drive(loop))
     cycle = data_set.drive.history(is_transient=False).value
     turns = np.flatnonzero(np.diff(np.sign(np.diff(np.append(cycle, cycle[0])))) != 0)
     residual = data_set.residual(paper_model)
@@ -88,13 +88,13 @@ def test_the_motion_is_cleared_and_the_true_model_leaves_only_noise(paper_model:
 def test_from_rest_the_virgin_curve_is_followed(paper_model: Model) -> None:
     whole = rig.record(paper_model, Direction.AXIAL, FREQUENCY, AMPLITUDE, cycles=3, steps_per_cycle=1000)
     loop = Loop("loop", Direction.AXIAL, whole.time, whole.displacement, whole.force)
-    drive = drive_of(loop)
+    drive = prepare_drive(loop)
     assert drive.from_rest
     assert not drive.history(is_transient=False).periodic
     gap = np.max(np.abs(MeasuredLoop(drive).force(paper_model) - loop.force)) / drive.half_range
     print(f"from rest: model within {gap:.1e} of the record")
     assert gap < 2e-3
-    settled = drive_of(measured(paper_model))
+    settled = prepare_drive(measured(paper_model))
     assert not settled.from_rest
 
 
@@ -105,20 +105,20 @@ def test_rest_may_be_a_preload(paper_model: Model, cycles: float, amplitude: flo
     noise = 3e-3 * np.ptp(whole.force) * np.random.default_rng(0).standard_normal(whole.force.size)
     force, settled = whole.force + 640.0 + noise, slice(2000, None)
     loop = Loop("loop", Direction.AXIAL, whole.time[rows], whole.displacement[rows] + 1.2e-3, force[rows])
-    data_set = MeasuredLoop(drive_of(loop))
+    data_set = MeasuredLoop(prepare_drive(loop))
     residual = data_set.residual(paper_model)
-    reduced = float(residual @ residual) / data_set.counted
+    reduced = float(residual @ residual) / data_set.residual_count
     print(f"{cycles} cycles of {1e3 * amplitude:g} mm from rest about a preload: reduced chi-square {reduced:.3f}")
     assert data_set.drive.from_rest
     assert reduced < 1.2
     assert "recorded about a mean displacement of 1.2 mm" in " ".join(data_set.notes)
     later = Loop("loop", Direction.AXIAL, whole.time[settled], whole.displacement[settled] + 1.2e-3, force[settled])
-    assert not drive_of(later).from_rest
+    assert not prepare_drive(later).from_rest
 
 
 def test_many_rows_are_binned_without_loss(paper_model: Model) -> None:
     loop = measured(paper_model, cycles=5.0, rows=40_000)
-    drive = drive_of(loop)
+    drive = prepare_drive(loop)
     assert drive.force.size <= 5 * 1024 + 1
     assert 0.99 * loop.force.size < drive.weight.sum() < loop.force.size  # the turning points carry none
     assert loop.force.size > MOST_ROWS
@@ -126,13 +126,13 @@ def test_many_rows_are_binned_without_loss(paper_model: Model) -> None:
     reduced = float(residual @ residual) / residual.size
     print(f"{loop.force.size} rows in {drive.force.size} bins: reduced chi-square {reduced:.3f}")
     assert 0.9 < reduced < 1.15
-    few = drive_of(measured(paper_model, cycles=5.0, rows=500))
+    few = prepare_drive(measured(paper_model, cycles=5.0, rows=500))
     assert drive.first_harmonic() == pytest.approx(few.first_harmonic(), rel=2e-3)
 
 
 def test_a_wrong_zero_of_the_load_cell_alone_stays_visible(paper_model: Model) -> None:
     """Only where the displacement is off zero too is the mean force taken for unknown."""
-    data_set = MeasuredLoop(drive_of(measured(paper_model, preload=5.0)))
+    data_set = MeasuredLoop(prepare_drive(measured(paper_model, preload=5.0)))
     assert np.mean(data_set.drive.force - data_set.force(paper_model)) == pytest.approx(5.0, abs=0.3)
 
 
@@ -147,7 +147,7 @@ def with_hole(loop: Loop, begin: float, end: float) -> Loop:
 def test_rows_that_are_missing_do_not_change_the_frequency(
     paper_model: Model, waveform: str, hole: tuple[float, float]
 ) -> None:
-    drive = drive_of(with_hole(measured(paper_model, waveform=waveform, cycles=3.0), *hole))
+    drive = prepare_drive(with_hole(measured(paper_model, waveform=waveform, cycles=3.0), *hole))
     assert drive.frequency == pytest.approx(FREQUENCY, rel=1e-3)
     assert drive.amplitude == pytest.approx(AMPLITUDE, rel=5e-3)
     if hole[1] - hole[0] > 0.4:
@@ -158,7 +158,7 @@ def test_rows_that_are_missing_do_not_change_the_frequency(
 def test_where_no_stroke_is_whole_the_hole_is_named(paper_model: Model) -> None:
     loop = with_hole(measured(paper_model, cycles=2.0, start=0.1), 0.3, 1.6)
     with pytest.raises(FitError, match=r"rows are missing inside the loop\n.*none from 2\.99 to 16 s"):
-        drive_of(loop)
+        prepare_drive(loop)
 
 
 PERIOD = 10.0
@@ -220,7 +220,7 @@ def recorded(model: Model, *motions: Array, noise: float = 3e-3) -> Loop:
 
 @pytest.mark.parametrize("case", RUN_INS)
 def test_the_true_model_leaves_only_noise_of_the_steady_cycles(paper_model: Model, case: str) -> None:
-    drive = drive_of(recorded(paper_model, *RUN_INS[case]))
+    drive = prepare_drive(recorded(paper_model, *RUN_INS[case]))
     gap = float(np.sqrt(np.mean(np.square(MeasuredLoop(drive).relative(paper_model)))))
     print(f"{case}: {drive.notes}; true model within {100 * gap:.2f} % of half the force range, noise 0.3 %")
     (note,) = drive.notes

@@ -10,7 +10,7 @@ import pytest
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings, SimulateSettings
-from bushfit.fitting.drive import drive_of
+from bushfit.fitting.drive import prepare_drive
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.fitting.preparation import MeasuredLoop
 from bushfit.fitting.rig_class import ASSUMED
@@ -183,14 +183,14 @@ def cycles_of(loop: Loop, cycles: int, noise: np.ndarray, rows: int = 1000) -> L
 
 @pytest.mark.parametrize("correlation", [0.0, 0.9, 0.98])
 def test_the_rig_s_filter_is_found_and_taken_out(rig: Rig, paper_model: Model, correlation: float) -> None:
-    found = [MeasuredLoop(drive_of(rig(seed, force_correlation=correlation).loops[0])) for seed in range(15)]
+    found = [MeasuredLoop(prepare_drive(rig(seed, force_correlation=correlation).loops[0])) for seed in range(15)]
     rows = np.array([data_set.drive.row_noise.rows_as_one for data_set in found])
     true = (1.0 + correlation) / (1.0 - correlation)
     assert rows.mean() == pytest.approx(true, rel=0.15)
     assert np.mean([data_set.relative_noise for data_set in found]) == pytest.approx(3e-3, rel=0.06)
-    assert found[0].independent == pytest.approx(found[0].counted / rows[0])
+    assert found[0].independent_count == pytest.approx(found[0].residual_count / rows[0])
     white = [data_set.residual(paper_model)[data_set.residual(paper_model) != 0.0] for data_set in found]
-    assert np.mean([each @ each / data_set.counted for each, data_set in zip(white, found, strict=True)]) == (
+    assert np.mean([each @ each / data_set.residual_count for each, data_set in zip(white, found, strict=True)]) == (
         pytest.approx(1.0, abs=0.03)
     )
     assert abs(np.mean([np.corrcoef(each[1:], each[:-1])[0, 1] for each in white])) < 0.02
@@ -202,7 +202,7 @@ def test_the_rig_s_filter_is_found_and_taken_out(rig: Rig, paper_model: Model, c
 
 
 def test_a_row_left_out_tells_nothing(rig: Rig, paper_model: Model) -> None:
-    data_set = MeasuredLoop(drive_of(rig(2, force_correlation=0.9).loops[0]))
+    data_set = MeasuredLoop(prepare_drive(rig(2, force_correlation=0.9).loops[0]))
     weight = np.ones(data_set.size)
     weight[400:420] = 0.0
     light = data_set.weighted(weight)
@@ -259,7 +259,7 @@ def test_harmonics_err_as_the_noise_says(kind: str, cycles: int, rows: int, corr
         made = low_passed(random, phase.size) if kind == "low-passed" else filtered(random, phase.size, correlation)
         motion = 1e-3 * np.sin(2.0 * np.pi * phase + 0.4)
         force = true_force(phase) + 0.3 * made
-        data_set = MeasuredLoop(drive_of(Loop("long", Direction.AXIAL, 10.0 * phase, motion, force)))
+        data_set = MeasuredLoop(prepare_drive(Loop("long", Direction.AXIAL, 10.0 * phase, motion, force)))
         drive = data_set.drive
         assert drive.force.size < phase.size or cycles < 5
         error = data_set._whitened((true_force(drive.phase) - drive.force) * data_set._per_noise)
@@ -294,4 +294,4 @@ def test_settling_is_no_noise(rig: Rig) -> None:
     settled = replace(loop, force=loop.force * (1.0 + 0.02 * np.exp(-loop.time / 10.0)))
     drifting = replace(loop, force=loop.force + 0.06 * np.ptp(loop.force) * loop.time / loop.time[-1])
     for changed in (settled, drifting):
-        assert drive_of(changed).row_noise.order == 0
+        assert prepare_drive(changed).row_noise.order == 0

@@ -116,7 +116,7 @@ def test_magnitude_and_loss_factor_are_what_they_say(sweep: MeasuredSweep, paper
 def test_the_right_model_of_a_loop_leaves_noise_alone(loop: MeasuredLoop, paper_model: Model) -> None:
     residual, counted = loop.residual(paper_model), loop.drive.weight > 0.0
     assert residual.size == loop.size == loop.test.time.size
-    assert loop.counted == np.count_nonzero(counted) > 0.99 * loop.size
+    assert loop.residual_count == np.count_nonzero(counted) > 0.99 * loop.size
     assert np.std(residual[counted]) == pytest.approx(1.0, abs=0.05)
     assert abs(np.corrcoef(residual[1:], residual[:-1])[0, 1]) < 0.06
     assert loop.relative_noise == pytest.approx(3e-3, rel=0.1)
@@ -128,12 +128,12 @@ def test_the_right_model_of_a_loop_leaves_noise_alone(loop: MeasuredLoop, paper_
 
 def test_rows_without_weight_count_for_nothing_and_are_still_shown(loop: MeasuredLoop, paper_model: Model) -> None:
     light = loop.weighted(np.where(np.arange(loop.size) < 500, 0.0, 1.0))
-    assert light.counted == np.count_nonzero(loop.drive.weight[500:])
+    assert light.residual_count == np.count_nonzero(loop.drive.weight[500:])
     assert np.all(light.residual(paper_model)[:500] == 0.0)
     off = (loop.force(paper_model) - loop.drive.force) / loop.drive.noise
     np.testing.assert_allclose(light.displayed_residual(paper_model)[:500], off[:500], rtol=1e-9)
     np.testing.assert_allclose(light.residual(paper_model)[500:], loop.residual(paper_model)[500:], rtol=1e-12)
-    assert light.relative(paper_model).size == light.counted
+    assert light.relative(paper_model).size == light.residual_count
     quarter = loop.weighted(np.full(loop.size, 0.25))
     np.testing.assert_allclose(quarter.residual(paper_model), 0.5 * loop.residual(paper_model), rtol=1e-12)
 

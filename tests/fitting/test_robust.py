@@ -11,7 +11,7 @@ import pytest
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, SimulatedLoop, SimulatedSweep
-from bushfit.fitting.drive import drive_of
+from bushfit.fitting.drive import prepare_drive
 from bushfit.fitting.loop_harmonics import MOST_ROWS
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
@@ -108,8 +108,8 @@ def test_outliers_do_not_spoil_the_bins_of_a_long_loop(rig: Rig, kind: str) -> N
 def test_an_outlier_of_the_displacement_does_not_disturb_the_motion(rig: Rig, kind: str) -> None:
     for seed in range(4):
         (loop,) = rig(seed).loops
-        clean, rng = drive_of(loop), np.random.default_rng(seed)
-        drive = drive_of(replace(loop, displacement=spoilt(loop.displacement, kind, rng)))
+        clean, rng = prepare_drive(loop), np.random.default_rng(seed)
+        drive = prepare_drive(replace(loop, displacement=spoilt(loop.displacement, kind, rng)))
         assert drive.frequency == pytest.approx(clean.frequency, rel=1e-4)
         assert drive.amplitude == pytest.approx(clean.amplitude, rel=1e-3)
         assert kind == "stuck" or drive.outliers["displacement"].rows.size > 0.8 * SHARE * loop.force.size

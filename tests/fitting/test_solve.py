@@ -18,7 +18,7 @@ from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
-from bushfit.fitting.procedures import cautions
+from bushfit.fitting.procedures import fit_warnings
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
 from bushfit.model.model import FIVE, Model
@@ -72,7 +72,7 @@ def test_a_fit_that_is_stopped_where_chi_square_is_flat_is_one_and_is_told(
     near = result.model.with_values({"mu": 1.0001 * result.model.values["mu"]})
     stopped = solve(FitProblem(near, axial, FIVE), evaluations=2)
     assert (stopped.stopped, stopped.flat) == (True, True)
-    notes = cautions(stopped.model, stopped, {}, result.covariance)
+    notes = fit_warnings(stopped.model, stopped, {}, result.covariance)
     assert any(note.startswith("the fit was stopped after 2 evaluations") for note in notes)
 
 

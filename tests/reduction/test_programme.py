@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.effects.contract import Array
 from bushfit.errors import MeasurementError
-from bushfit.fitting.drive import drive_of
+from bushfit.fitting.drive import prepare_drive
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.model import Model
@@ -92,7 +92,7 @@ def test_each_steady_part_is_a_loop_in_its_order(paper_model: Model, case: str) 
     motions, expected = PROGRAMMES[case]
     record = recorded(paper_model, *motions)
     loops = programme(record)
-    drives = [drive_of(loop) for loop in loops]
+    drives = [prepare_drive(loop) for loop in loops]
     assert [loop.name for loop in loops] == [f"loop_part_{number}" for number in range(1, len(expected) + 1)]
     assert [1e3 * drive.amplitude for drive in drives] == pytest.approx([x for x, _ in expected], rel=5e-3)
     assert [drive.frequency for drive in drives] == pytest.approx([f for _, f in expected], rel=2e-3)
@@ -108,10 +108,10 @@ def test_each_steady_part_is_a_loop_in_its_order(paper_model: Model, case: str) 
 def test_without_time_parts_are_the_same(paper_model: Model, case: str) -> None:
     motions, expected = PROGRAMMES[case]
     loops = programme(replace(recorded(paper_model, *motions), has_recorded_time=False), LoopFile(file="", rate=1e-4))
-    sizes = [drive_of(loop).amplitude for loop in loops]
+    sizes = [prepare_drive(loop).amplitude for loop in loops]
     assert [1e3 * size for size in sizes] == pytest.approx([x for x, _ in expected], rel=1e-2)
     for loop, size in zip(loops, sizes, strict=True):
-        assert drive_of(loop).frequency == pytest.approx(1e-4 / (4.0 * size), rel=2e-2)
+        assert prepare_drive(loop).frequency == pytest.approx(1e-4 / (4.0 * size), rel=2e-2)
 
 
 ALONE: dict[str, Sequence[Array]] = {
@@ -171,7 +171,7 @@ def test_a_softening_is_told_of_each_part(paper_model: Model) -> None:
     loops = programme(virgin(recorded(paper_model, *[cycles(5, x) for x in (0.2, 0.5, 1)]), 0.12))
     found = [100.0 * (loop.softening or 0.0) for loop in loops]
     assert found == pytest.approx([12.0] * 3, abs=4.0)  # with what a springpot and friction make from rest
-    assert any("stiffer than the last (Mullins)" in note for note in drive_of(loops[1]).notes)
+    assert any("stiffer than the last (Mullins)" in note for note in prepare_drive(loops[1]).notes)
     (one,) = programme(virgin(recorded(paper_model, cycles(5, 1)), 0.12))
     assert one.softening == pytest.approx(0.12, abs=0.03)
 

@@ -102,7 +102,7 @@ def ellipses_figure(result: Result, title: str) -> style.Chart | None:
         return None
     covariance = result.covariance
     correlations = {frozenset(pair): correlation for *pair, correlation in covariance.correlations()}
-    halves = {row.name: covariance.half(row.name) / (covariance.stderr(row.name) or np.inf) for row in rows}
+    halves = {row.name: covariance.half_width_of(row.name) / (covariance.stderr(row.name) or np.inf) for row in rows}
     angle = np.linspace(0.0, 2.0 * np.pi, 60)
     corners = _HALF_CELL * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
     figure = style.Chart(title, _CELL * (len(rows) - 1))
