@@ -102,7 +102,7 @@ def _entry(source: Path, directions: tuple[str, ...]) -> ComparedResult:
 
 def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> None:
     """Print which results differ by more than chance, the next step, the sources of the results, and tables."""
-    from bushfit.report.compared import FAMILY_HEADS, ComparisonDocument, chance, parameter_cells
+    from bushfit.report.compared import FAMILY_HEADS, ComparisonDocument, format_p_value, parameter_cells
 
     first, *labels = compared.labels
     if compared.families:
@@ -137,7 +137,7 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
         output.print_table(title, columns, map(parameter_cells, comparison.parameters))
         if comparison.joint:
             p, count = comparison.joint
-            output.print(f"all {count} together, with correlations: p {chance(p)}")
+            output.print(f"all {count} together, with correlations: p {format_p_value(p)}")
     if compared.families:
         title = "families; held out: root mean square in units of noise (1: noise alone)"
         output.print_table(title, FAMILY_HEADS, ComparisonDocument.from_document(compared.document).family_cells())

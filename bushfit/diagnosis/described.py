@@ -9,7 +9,7 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.document import Description
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.holdout import HoldOut, HoldOutPart
-from bushfit.diagnosis.locate import locate
+from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.power_law import PowerLaw, nearest_power_law
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import NAME, Unnamed
@@ -120,7 +120,7 @@ def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
         )
         rows = part.rows(tests)
         pairs = [(fit, np.pad(rows, (0, fit.residual.size - rows.size))) for fit in both]
-        if not any(fit.open(mask).any() for fit, mask in pairs):  # else the rest does not determine the model
+        if not any(fit.undetermined(mask).any() for fit, mask in pairs):  # else the rest does not determine the model
             residuals[name] = np.array([fit.predicted(mask, np.arange(mask.size)) for fit, mask in pairs])
     return HoldOut.from_residuals(residuals)
 
@@ -148,7 +148,7 @@ def _validity(correction: Unnamed, whole: Evidence) -> str:
         f"{', '.join(patch.directions)} {span(patch.frequency_Hz)} Hz, {span(patch.strain, 100.0)} % strain"
         for patch in correction.patches
     )
-    misfit = max((region.excess for region in locate(whole) if region.kind == "loop"), default=0.0)
+    misfit = max((region.excess for region in find_regions(whole) if region.kind == "loop"), default=0.0)
     stays = f" (their form still differs by {number(misfit, 2)} times the noise)" if misfit else ""
     loops = f", of loops the first harmonic only{stays}" if split_by_kind(whole.data_sets)[0] else ""
     return f"valid only between these tests ({patches}){loops}, and of this bushing"

@@ -205,7 +205,7 @@ def compound(evidence: Evidence) -> Group | None:
     return Group(columns, unit, act_together=True)
 
 
-def unnamed(evidence: Evidence) -> list[Explanation]:
+def unnamed_curves(evidence: Evidence) -> list[Explanation]:
     """List smooth curves without a name as explanations of a gap that no effect of the library explains.
 
     All sweeps of one direction and temperature share a curve.

@@ -203,7 +203,7 @@ def _predict(
     """
     solution, data_sets = evidence.solution, evidence.data_sets
     rows, names = part.rows(data_sets), solution.coordinates.names
-    if left_open := [names[solution.moving[i]] for i in np.flatnonzero(leave_out.open(rows))]:
+    if left_open := [names[solution.moving[i]] for i in np.flatnonzero(leave_out.undetermined(rows))]:
         reason = f"the other tests do not determine {', '.join(left_open)}"
         return Skipped(part.name, reason, tuple(dict.fromkeys(map(effect_name_of, left_open))))
     is_step = leave_out.step(rows) is not None
@@ -216,7 +216,7 @@ def _predict(
             return failed
         slopes = jacobian(rest.model, data_sets, names)
         leave_out = _leave_out(replace(rest, residual=residual(rest.model, data_sets), jacobian=slopes))
-        if rest.stopped or leave_out.open(rows).any():
+        if rest.stopped or leave_out.undetermined(rows).any():
             return failed
     residuals = np.array(leave_out.predicted(rows, _clusters(data_sets), stepped=is_step))
     return residuals, leave_out.noise_gradient(rows, residuals[0])

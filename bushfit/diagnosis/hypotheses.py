@@ -11,7 +11,7 @@ import numpy as np
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart, OutlierCluster, compound, unnamed
+from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart, OutlierCluster, compound, unnamed_curves
 from bushfit.diagnosis.faulty_places import faulty_places
 from bushfit.diagnosis.groups import Group, GroupEvidence
 from bushfit.diagnosis.linear_model import LinearModel
@@ -152,7 +152,7 @@ class Tests:
     @cached_property
     def explanations(self) -> list[Explanation]:
         """Explanations that do not depend on the model's effects: faulty parts of the tests, and smooth curves."""
-        return [*faulty_places(self.bare), *unnamed(self.bare)]
+        return [*faulty_places(self.bare), *unnamed_curves(self.bare)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,7 @@ _HARMONICS = {
 }
 
 
-def locate(evidence: Evidence) -> tuple[MisfitRegion, ...]:
+def find_regions(evidence: Evidence) -> tuple[MisfitRegion, ...]:
     """Find the regions of frequency and amplitude where a fitted model and the tests disagree, the worst first."""
     found = [*_sweep_regions(evidence), *_loop_regions(evidence)]
     worth = [region for region in found if region.excess > _WORTH_A_LINE]

@@ -21,7 +21,7 @@ from scipy.special import logsumexp
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import unnamed
+from bushfit.diagnosis.explanations import unnamed_curves
 from bushfit.diagnosis.groups import Group
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import DECISIVE_CHI_SQUARE
@@ -248,7 +248,7 @@ def nearest_power_law(
     """
     bare, model = in_scatter_units(fitted), fitted.model
     begun = model.with_values({name: value for name, value in start.items() if name in model.values})
-    rows, smooth_curves = bare.solution.jacobian, [curve.group for curve in unnamed(bare) if curve.group]
+    rows, smooth_curves = bare.solution.jacobian, [curve.group for curve in unnamed_curves(bare) if curve.group]
     plain = LinearModel(bare.residual, rows, np.zeros(len(rows)), rig_errors(bare, rig), smooth_curves)
     plain = replace(plain, chosen_nodes=plain.likely(_NEAR))
     terms = [term for measure in _MEASURES if (term := Term(bare, measure)).has_one_meaning]

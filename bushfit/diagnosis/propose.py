@@ -145,7 +145,7 @@ def _replacement(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> tu
         The model at these values, and the expected decrease of chi-square; None if the effect has no response.
     """
     ends = list[tuple[float, Model]]()
-    for start in evidence.model.starts(effect):
+    for start in evidence.model.start_values_for(effect):
         with suppress(FitError, ModelError):  # no response from there
             fit = fit_from(evidence.model.with_effect(effect.name, start), evidence.data_sets, fixed, {})
             ends.append((fit.chi_square - fit.expected_fall, fit.model))

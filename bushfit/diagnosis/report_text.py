@@ -13,7 +13,7 @@ from bushfit.diagnosis.document import Verdict
 from bushfit.diagnosis.evidence import Evidence, fit, result_of
 from bushfit.diagnosis.holdout import hold_out
 from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis
-from bushfit.diagnosis.locate import locate
+from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP
 from bushfit.diagnosis.record import CandidateResult, Diagnosis, MisfitRegion, NamedCause, Odds, format_probability
@@ -137,7 +137,7 @@ class DiagnosisWriter:
         return replace(
             diagnosis,
             after=after,
-            remainder=locate(after),
+            remainder=find_regions(after),
             holdout=hold_out(diagnosis.before, after, self.request.bounds),
             result=replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning)),
         )
@@ -269,7 +269,7 @@ class DiagnosisWriter:
             next_test = f"measure again: {places.places[0].name}"
         lacking = verdict in ("partly", "ambiguous", "unexplained") and not (self.first and self.first.best.claim)
         resolved, corrected = {*base.model.effects} - {*self.unresolved}, gap.fitted if gap else None
-        regions = (*at_fault, *locate(base))
+        regions = (*at_fault, *find_regions(base))
         result = self.odds.averaged(result_of(after, bounds, resolved, lacking=lacking, corrected=corrected))
         amounts = filter(None, (_format_amount(entry.name, result) for entry in entries))
         return Diagnosis(
@@ -277,7 +277,7 @@ class DiagnosisWriter:
             "; ".join([summary, *amounts]),
             tuple(entries),
             regions,
-            regions if after is base else locate(after),
+            regions if after is base else find_regions(after),
             gap.holdout if gap else hold_out(base, after, bounds),
             next_test,
             tuple(self._candidates()),

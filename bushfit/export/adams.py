@@ -32,7 +32,7 @@ from bushfit.export.deck import (
     stiffness_tables,
 )
 from bushfit.geometry import ROTATION, TRANSLATION
-from bushfit.prediction.caveats import percent_off
+from bushfit.prediction.caveats import format_deviation
 from bushfit.reading.measurement import loss_factor
 from bushfit.units import number
 
@@ -86,7 +86,7 @@ class _Element(NamedTuple):
         loss = number(float(np.max(np.abs(loss_factor(element) - loss_factor(model)))), 2)
         return (
             f"{self.reference.direction}, {kind}: frequency, one damping, of {number(self.frequency, 4)} Hz: over "
-            f"the grid |K| is {percent_off(np.abs(element / model))} off, the loss factor up to {loss}"
+            f"the grid |K| is {format_deviation(np.abs(element / model))} off, the loss factor up to {loss}"
         )
 
 

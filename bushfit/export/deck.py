@@ -12,7 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.export.contract import ExportRequest, UnitSystem
 from bushfit.geometry import Direction
-from bushfit.prediction.caveats import percent_off
+from bushfit.prediction.caveats import format_deviation
 from bushfit.prediction.stiffness import Prediction
 from bushfit.units import number
 from bushfit.version import __version__
@@ -224,7 +224,7 @@ def table_losses(request: ExportRequest, form: Form) -> Iterator[str]:
             low, value, high = (number(table.amplitude * factor, 4) for table in (tables[0], reference, tables[-1]))
             yield (
                 f"{place}: one amplitude per property: with {value} {unit}, the error of |K| is "
-                f"{percent_off(ratios)} at {low} to {high} {unit}"
+                f"{format_deviation(ratios)} at {low} to {high} {unit}"
             )
         if tables[0].frequency.size > 1:
             worst = 0.0
@@ -261,5 +261,5 @@ def band_losses(prediction: Prediction) -> Iterator[str]:
     if (width := float(np.max((band.high - band.low) / (2.0 * band.value)))) > 0.0:
         yield f"{place}: the 95 % band, up to {number(100.0 * width, 2)} % of |K| either way"
     if prediction.if_rigs:
-        deviation = percent_off(prediction.if_rigs.stiffness.value / band.value)
+        deviation = format_deviation(prediction.if_rigs.stiffness.value / band.value)
         yield f"{place}: the other reading: |K| is {deviation} if the unresolved effect belongs to the rig"

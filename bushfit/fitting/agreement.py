@@ -44,13 +44,13 @@ class LeaveOut:
 
     Args:
         basis: orthonormal basis of the column space of the Jacobian of the whitened residuals, (n, m).
-        back: change of the k parameter coordinates per unit step along each basis vector, (k, m).
+        coordinate_steps: change of the k parameter coordinates per unit step along each basis vector, (k, m).
         components: components of the residuals along the basis, (m,).
         residual: whitened residuals of the fit, (n,).
     """
 
     basis: Array
-    back: Array
+    coordinate_steps: Array
     components: Array
     residual: Array
 
@@ -65,11 +65,11 @@ class LeaveOut:
         basis = basis[:, determined]
         return cls(basis, directions[determined].T / size[determined], basis.T @ residual, residual)
 
-    def open(self, rows: Array) -> Array:
+    def undetermined(self, rows: Array) -> Array:
         """Mask of the parameters that are not determined once `rows` (indices or mask) are left out, (k,)."""
         size, vectors = np.linalg.eigh(self._rest(rows))
-        without = np.square(self.back @ vectors) @ (1.0 / np.maximum(size, _LEAST_SEEN**2))
-        return without > _MOST_GROWTH * np.sum(np.square(self.back), axis=1)
+        without = np.square(self.coordinate_steps @ vectors) @ (1.0 / np.maximum(size, _LEAST_SEEN**2))
+        return without > _MOST_GROWTH * np.sum(np.square(self.coordinate_steps), axis=1)
 
     def step(self, rows: Array) -> Array | None:
         """Change of the parameters if `rows` (indices or mask) are left out of the fit, in coordinates, (k,).
@@ -77,9 +77,9 @@ class LeaveOut:
         The change is one Gauss-Newton step, which is exact for a linear model. None if the step is too long to predict
         a refit, or if the remaining rows do not determine one of the parameters.
         """
-        if self.open(rows).any():
+        if self.undetermined(rows).any():
             return None
-        change = self.back @ self._basis_step(rows)
+        change = self.coordinate_steps @ self._basis_step(rows)
         return None if np.abs(change).max(initial=0.0) > _LONGEST_STEP else change
 
     def predicted(self, rows: Array, clusters: Array, *, stepped: bool = True) -> tuple[Array, Array]:

@@ -187,15 +187,15 @@ def lack_of_fit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int
         data_sets: tests.
         parameters: number of fitted parameters.
     """
-    return beyond_noise(*reduced_chi_square(model, data_sets, parameters))
+    return excess_chi_square(*reduced_chi_square(model, data_sets, parameters))
 
 
-def beyond_noise(chi_square: float, freedom: int) -> float | None:
+def excess_chi_square(chi_square: float, freedom: int) -> float | None:
     """The given reduced chi-square if it exceeds 1 by more than noise explains (5 standard deviations); else None."""
     return chi_square if chi_square > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else None
 
 
-def misfit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int, advice: str = "") -> list[str]:
+def misfit_warnings(model: Model, data_sets: Sequence[MeasuredTest], parameters: int, advice: str = "") -> list[str]:
     """Warning that the model misses all tests together, or one test, by more than the noise; none if it does not.
 
     Args:
@@ -209,7 +209,7 @@ def misfit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int, adv
     """
     chi_square, freedom = reduced_chi_square(model, data_sets, parameters)
     by_test = {test.name: lack for test in data_sets if (lack := lack_of_fit(model, [test], 0)) is not None}
-    if beyond_noise(chi_square, freedom) is None and not by_test:
+    if excess_chi_square(chi_square, freedom) is None and not by_test:
         return []
     worst = max(by_test, key=lambda name: by_test[name], default="")
     worst_words = f", {number(by_test[worst], 2)} in {worst}" if len(data_sets) > 1 and worst else ""

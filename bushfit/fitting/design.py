@@ -84,7 +84,10 @@ def with_effect(
     """
     # what has a neutral amount starts at a tenth of its typical one: at its neutral value a fit may not see its shape
     small_amount = {} if effect.replaces else {qualified_name(effect, effect.amount): effect.amount.value_at_share(0.1)}
-    starts = [solution.model.with_effect(effect.name, small_amount | start) for start in solution.model.starts(effect)]
+    starts = [
+        solution.model.with_effect(effect.name, small_amount | start)
+        for start in solution.model.start_values_for(effect)
+    ]
     first = starts[0]
     for parameter in effect.parameters:
         if parameter.neutral is None:

@@ -29,7 +29,7 @@ class ShiftedSweep:
         sweep: sweep as fitted, at its own temperature.
         temperature: mean temperature of its points [K].
         shift: natural log of the shift factor a_T by the fitted law, and its standard error; nan if unknown.
-        own: ln a_T that fits this sweep best, with the moduli as fitted, and its standard error from the residuals.
+        best_shift: ln a_T that fits this sweep best, with the moduli as fitted, and its standard error.
         reduced_frequency: frequency times a_T of each point [Hz], (n,).
         reduced_stiffness: measured stiffness reduced to 23 degC, complex [N/m or N m/rad], (n,): multiplied by the
             model's stiffness at 23 degC and f a_T over the model's stiffness at the conditions of the point.
@@ -38,7 +38,7 @@ class ShiftedSweep:
     sweep: MeasuredSweep
     temperature: float
     shift: tuple[float, float]
-    own: tuple[float, float]
+    best_shift: tuple[float, float]
     reduced_frequency: Array
     reduced_stiffness: Array
 

@@ -29,7 +29,7 @@ from bushfit.effects import BASE
 from bushfit.effects.contract import Array
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.assess import beyond_noise
+from bushfit.fitting.assess import excess_chi_square
 from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates
 from bushfit.fitting.discrepancy import (
@@ -124,7 +124,7 @@ def closest_fit(found: FitResult, bounds: Bounds) -> tuple[FitResult, float]:
     with suppress(FitError):  # tests that no rubber gives
         # a second start, with the branches read off the tests: a fit bent by noise may have lost one for good
         paper = Model.with_defaults(found.model.bushing, BASE, start_values(found.model.bushing, tests, fixed))
-        of_effects = [paper.starts(effect)[0] for effect in found.model.records]
+        of_effects = [paper.start_values_for(effect)[0] for effect in found.model.records]
         values = {**paper.values, **{name: value for start in of_effects for name, value in start.items()}}
         starts.append(found.model.with_values({name: values[name] for name in names if name in values}))
     sizes = [likeliest_size(start, tests, names) for start in starts]
@@ -239,7 +239,7 @@ def _exceeds_noise(found: FitResult, rig: RigSettings) -> bool:
         squares.append(float(np.sum(np.square(whitened))))
     freedom = max(sum(counts) - len(found.names), 1)
     pairs = [(sum(squares), freedom), *zip(squares, counts, strict=True)]
-    return any(beyond_noise(square / count, count) is not None for square, count in pairs if count)
+    return any(excess_chi_square(square / count, count) is not None for square, count in pairs if count)
 
 
 def _is_smooth(found: FitResult, rig: RigSettings) -> bool:

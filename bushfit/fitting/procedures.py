@@ -16,7 +16,7 @@ from bushfit.fitting.assess import (
     implausible_modulus,
     lack_of_fit,
     measured_range,
-    misfit,
+    misfit_warnings,
     quality,
     temperature_warning,
     unfitted,
@@ -327,4 +327,4 @@ def fit_warnings(model: Model, step: FitResult, bounds: Bounds, covariance: Cova
     sentences += undetermined_parameters(
         model, step.minimised, [name for name in names if name not in at_bound], covariance
     )
-    return sentences if step.smooth_error else [*sentences, *misfit(model, tests, len(names), advice)]
+    return sentences if step.smooth_error else [*sentences, *misfit_warnings(model, tests, len(names), advice)]

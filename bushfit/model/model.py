@@ -163,10 +163,10 @@ class Model:
         """
         effect = get_effect(name)
         names = [present for present in self.effects if present != effect.replaces]
-        start = {**self.values, **self.starts(effect)[0], **(values or {})}
+        start = {**self.values, **self.start_values_for(effect)[0], **(values or {})}
         return Model.with_defaults(self.bushing, (*names, name), start, self.unnamed)
 
-    def starts(self, effect: Effect) -> list[dict[str, float]]:
+    def start_values_for(self, effect: Effect) -> list[dict[str, float]]:
         """Start values for a fit with an additional effect, derived from the branch that the effect replaces.
 
         Returns:

@@ -206,7 +206,7 @@ class Programme:
         loss: standard error of the loss factor at these points, absolute, (n,).
         rival_chi_square: expected chi-square between the two nearest rivals that can be separated, after the best
             refit of either; None without rivals.
-        halves: half width of the 95 % interval of each target, relative to the value, at its worst point.
+        half_widths: half width of the 95 % interval of each target, relative to the value, at its worst point.
         detectable: smallest detectable amount of each effect that the standard programme can show.
         drift: largest shift of a parameter by a gain drift of 1 % over the session, in standard errors.
     """
@@ -218,7 +218,7 @@ class Programme:
     stiffness: Array
     loss: Array
     rival_chi_square: float | None
-    halves: tuple[float, ...]
+    half_widths: tuple[float, ...]
     detectable: tuple[DetectableAmount, ...]
     drift: float
 

@@ -138,7 +138,7 @@ def plan_document(plan: Plan, check: Check | None = None) -> PlanFile:
             "enough": RIVALS_APART,
         }
     targets: dict[str, TargetEntry] = {}
-    halves = zip(*(programme.halves for programme in programmes), strict=True)
+    halves = zip(*(programme.half_widths for programme in programmes), strict=True)
     for target, reason, half in zip(request.targets, plan.missed, halves, strict=True):
         targets[str(target)] = {"asked": target.half_width, **_reached(half), "met": reason is None, "why": reason}
     predicted: dict[str, dict[str, ErrorComparison]] = {"stiffness": {}, "loss": {}}

@@ -196,7 +196,7 @@ def plan_warnings(search: PlanSearch, planned: Programme, missed: Sequence[str |
             "which no test reduces; bushfit diagnose looks for the missing effect"
         )
     yield from knowledge.warnings
-    for target, half, reason in zip(request.targets, planned.halves, missed, strict=True):
+    for target, half, reason in zip(request.targets, planned.half_widths, missed, strict=True):
         if reason:
             yield f"{target}: {percent(target.half_width)} asked for, {percent(half)} planned: {reason}"
     if knowledge.bounded:

@@ -19,7 +19,7 @@ from bushfit.planning.criterion import Budget, Criterion, DriftEffect, best_runs
 from bushfit.planning.information import eliminate_line_errors
 from bushfit.planning.problem import DETECTABLE, RIVALS_APART, PlanningProblem
 from bushfit.planning.targets import TargetSensitivity
-from bushfit.prediction.caveats import unfitted
+from bushfit.prediction.caveats import unfitted_warnings
 
 #: Weight of the logarithm of each lack of power beside the logarithm of the variance, and the weight that is used if
 #: the first leaves a lack; chosen.
@@ -152,7 +152,7 @@ class PlanSearch:
         if place is None or str(place) in tested:
             return None
         fitted = replace(measured or Range((1.0, 1.0), (1.0, 1.0)), directions=tuple(dict.fromkeys(tested)))
-        return next(unfitted(Result(knowledge.model, knowledge.names, measured=fitted), place), None)
+        return next(unfitted_warnings(Result(knowledge.model, knowledge.names, measured=fitted), place), None)
 
     def less_visible_effects(self, counts: Array) -> list[str]:
         """Names of the effects that these runs detect less well than the standard programme."""
@@ -299,7 +299,7 @@ class PlanSearch:
             stiffness=stiffness,
             loss=loss,
             rival_chi_square=problem.nearest_rivals(counts) if problem.knowledge.rivals else None,
-            halves=tuple(goal.half_width(covariance) for goal in problem.goals),
+            half_widths=tuple(goal.half_width(covariance) for goal in problem.goals),
             detectable=tuple(self.detectable_amounts(information.noncentralities()[0], drift.noncentrality(runs))),
             drift=0.01 * float(np.abs(shift[:k]).max()),
         )

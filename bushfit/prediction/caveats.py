@@ -88,7 +88,7 @@ def caveats(result: Result) -> list[str]:
     """
     fitted = result.measured.directions if result.measured else ()
     places = {*Direction, *(specimen.name for specimen in result.specimens)}  # a compound was fitted on other bodies
-    lines = [line for name in fitted if name in places for line in unfitted(result, result.place(name))]
+    lines = [line for name in fitted if name in places for line in unfitted_warnings(result, result.place(name))]
     for name in result.unresolved:
         twins = " or ".join(get_effect(name).twins)
         lines.append(f"{name} is assigned to the bushing, but these tests cannot distinguish it from {twins}")
@@ -125,7 +125,7 @@ def agrees_within_noise(result: Result, direction: Place) -> bool:
     return bool(misfits) and all(test.reduced_chi_square <= _AGREEMENT for test in misfits)
 
 
-def unfitted(result: Result, direction: Place) -> Iterator[str]:
+def unfitted_warnings(result: Result, direction: Place) -> Iterator[str]:
     """Generate warnings for a direction that was not fitted, or whose formula deviates from finite elements.
 
     Args:
@@ -217,23 +217,23 @@ def point_warnings(
     """
     frequency, amplitude, stiffness = points
     yield from result.undecided
-    yield from unfitted(result, place)
+    yield from unfitted_warnings(result, place)
     yield from extrapolations(result, place, frequency, amplitude, temperature)
     conditions = set() if temperature is None else {"temperature"}
     effects = result.model.without(Level.INSTRUMENT).records
     yield from (effect.assumption for effect in effects if effect.assumption and not conditions & {*effect.depends_on})
     rig = rig_effects(result)
     if rig and measured is not None and not np.isnan(measured).all():
-        percent = percent_off(stiffness / np.abs(measured))
+        percent = format_deviation(stiffness / np.abs(measured))
         yield (
             f"{place}: without {' and '.join(rig)} the predicted stiffness is {percent} compared with the measured one"
         )
     if rig_stiffness is not None and not np.allclose(rig_stiffness, stiffness, rtol=_SAME):
-        percent, names = percent_off(rig_stiffness / stiffness), " and ".join(result.unresolved)
+        percent, names = format_deviation(rig_stiffness / stiffness), " and ".join(result.unresolved)
         yield f"{place}: stiffness {percent} if {names} belongs to the rig; the band, low to high, includes both"
 
 
-def percent_off(ratio: Array) -> str:
+def format_deviation(ratio: Array) -> str:
     """Format the smallest and largest deviation of ratios from 1 as percentages: "+1.2 to +3.4 %"."""
     ends = [number(100.0 * end - 100.0, 2, "+") for end in (np.nanmin(ratio), np.nanmax(ratio))]
     return f"{' to '.join(dict.fromkeys(ends))} %"

@@ -24,7 +24,7 @@ from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_and_slopes
-from bushfit.prediction.caveats import MARGIN, extrapolations, point_warnings, unfitted
+from bushfit.prediction.caveats import MARGIN, extrapolations, point_warnings, unfitted_warnings
 from bushfit.reading.runs import nominal
 from bushfit.reduction.resonance import response
 from bushfit.units import number
@@ -339,7 +339,7 @@ def predict_resonance(
     near = np.abs(predicted.transmissibility) >= min(_NEAR_PEAK, predicted.peak[1])
     subject = f"{place}, resonance of {number(mass, 3)} kg"
     warnings = [
-        *unfitted(result, place),
+        *unfitted_warnings(result, place),
         *extrapolations(result, place, frequency[near], predicted.amplitude[near], temperature, subject),
     ]
     if result.alternatives:

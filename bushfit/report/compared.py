@@ -16,7 +16,7 @@ from bushfit.errors import ModelError
 from bushfit.model.file import require_schema
 from bushfit.prediction.comparison import Comparison, Contrast, ParameterContrast, relative
 from bushfit.report.compare_document import SCHEMA, ComparisonFile
-from bushfit.report.tables import required, response_headers, words
+from bushfit.report.tables import require_columns, response_headers, words
 from bushfit.units import display_unit, number, split_header
 from bushfit.validation import validate_tables
 
@@ -242,7 +242,7 @@ class ContrastHeaders(NamedTuple):
         headers = cls(amplitude, stiffness, relative, "difference of loss factor [-]")
         values = [f"{side} {name}" for side in ("reference", "other") for name in (stiffness, "loss factor [-]")]
         banded = [f"{name}{end}" for name in (*values, *headers[2:]) for end in ("", ", low", ", high")]
-        required(table, "frequency [Hz]", amplitude, *banded, *(f"{name}, sure" for name in headers[2:]))
+        require_columns(table, "frequency [Hz]", amplitude, *banded, *(f"{name}, sure" for name in headers[2:]))
         return headers
 
 
@@ -259,11 +259,11 @@ def parameter_cells(row: ParameterContrast) -> list[str]:
         return [row.name, *values, "", row.note, "", unit]
     scale, percent = (100.0, " %") if row.relative else (factor, "")
     low, high = (scale * end for end in row.interval)
-    difference, *ends = (signed(value * scale, high - low) for value in (row.difference, *row.interval))
-    return [row.name, *values, difference + percent, " to ".join(ends), chance(row.holm), unit]
+    difference, *ends = (format_difference(value * scale, high - low) for value in (row.difference, *row.interval))
+    return [row.name, *values, difference + percent, " to ".join(ends), format_p_value(row.holm), unit]
 
 
-def signed(value: float, width: float) -> str:
+def format_difference(value: float, width: float) -> str:
     """Format a difference with its sign, to two significant digits of the `width` of its interval (same unit)."""
     if width >= _OPEN:
         return number(value, 2, "+")
@@ -272,6 +272,6 @@ def signed(value: float, width: float) -> str:
     return f"{round(value, decimals) + 0.0:+.{decimals}f}"
 
 
-def chance(p: float) -> str:
+def format_p_value(p: float) -> str:
     """Format a probability with two significant digits, or as "< 0.001"."""
     return f"< {_LEAST_PROBABILITY:g}" if p < _LEAST_PROBABILITY else number(p, 2)

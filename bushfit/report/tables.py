@@ -324,7 +324,7 @@ def shift_factors_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:
         "direction": [str(shifted.sweep.direction) for shifted in shifted_sweeps],
         "temperature [degC]": [shifted.temperature - CELSIUS for shifted in shifted_sweeps],
     }
-    for name, key in (("log10 a_T [-]", "shift"), ("own log10 a_T [-]", "own")):
+    for name, key in (("log10 a_T [-]", "shift"), ("own log10 a_T [-]", "best_shift")):
         value, error = np.array([getattr(shifted, key) for shifted in shifted_sweeps]).T / np.log(10.0)
         columns |= {name: value, f"{name}, low": value - Z95 * error, f"{name}, high": value + Z95 * error}
     return pd.DataFrame(columns)
@@ -362,16 +362,16 @@ def spread(count: int, maximum: int) -> Array:
     return np.linspace(0, count - 1, min(maximum, count)).round().astype(int)
 
 
-def numbers(rows: pd.DataFrame, *headers: str) -> Array:
+def numeric_columns(rows: pd.DataFrame, *headers: str) -> Array:
     """Columns of a table with the k given headers as an array of floats, (k, n).
 
     Raises:
         ModelError: a column is missing.
     """
-    return required(rows, *headers)[list(headers)].to_numpy(dtype=float).T
+    return require_columns(rows, *headers)[list(headers)].to_numpy(dtype=float).T
 
 
-def required(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
+def require_columns(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
     """Check that a table has columns with the given headers, and return the table.
 
     Raises:

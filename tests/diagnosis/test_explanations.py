@@ -15,7 +15,7 @@ from rigged import LEVELS, SHARED, Fitted, Measured, Tamper, both, loop_too_stro
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import Explanation, unnamed
+from bushfit.diagnosis.explanations import Explanation, unnamed_curves
 from bushfit.diagnosis.faulty_places import faulty_places
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.propose import proposals, scores, sensitivity
@@ -93,7 +93,7 @@ def test_places_are_those_of_the_tests_there_are(
 
 def test_curves_have_unit_variance_and_fall_off_with_distance(bare: Evidence) -> None:
     """In shares of |K|, of one direction or of all, and of the loops their harmonics; a rough one as far as it goes."""
-    made = {each.name: each for each in unnamed(bare)}
+    made = {each.name: each for each in unnamed_curves(bare)}
     of_one = {f"{how} {where}" for how in ("smooth", "rough") for where in ("axial", "radial")}
     assert set(made) == of_one | {"rough all", "loops"}  # what is smooth in all is the compound's
     sweep = split_by_kind(bare.data_sets)[1][0]

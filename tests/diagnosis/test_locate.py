@@ -11,7 +11,7 @@ from rigged import INERTIA, LEVELS, SHARED, SLIP, TWO, Effects, Fitted, Measured
 
 from bushfit.diagnosis.evidence import fit
 from bushfit.diagnosis.holdout import hold_out, parts
-from bushfit.diagnosis.locate import locate
+from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.record import MisfitRegion
 from bushfit.fitting.coordinates import residual
 
@@ -27,13 +27,13 @@ def one(found: tuple[MisfitRegion, ...], direction: str, component: str) -> Misf
 
 def test_a_clean_campaign_has_no_place(measured: Measured, fitted: Fitted) -> None:
     evidence = fitted(measured(plan=SHARED))
-    assert locate(evidence) == ()
+    assert find_regions(evidence) == ()
     assert max(test.smooth_misfit(evidence.model) for test in evidence.data_sets) < 0.01
 
 
 @pytest.fixture(scope="module")
 def where_of(measured: Measured, fitted: Fitted) -> Callable[[Effects], tuple[MisfitRegion, ...]]:
-    return lambda effects: locate(fitted(measured(effects, SHARED)))
+    return lambda effects: find_regions(fitted(measured(effects, SHARED)))
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_loops_alone(where_of: Callable[[Effects], tuple[MisfitRegion, ...]], ef
 def test_a_region_that_lies_on_either_side_of_the_model_says_so(measured: Measured, fitted: Fitted) -> None:
     """One level above, another below: the sentence names both, as the map shows them."""
     tampered = both(off(1, 1.06, amplitude=LEVELS[0]), off(1, 0.95, amplitude=LEVELS[2]))(measured(plan=SHARED))
-    reading = one(locate(fitted(tampered)), "radial", "storage").reading
+    reading = one(find_regions(fitted(tampered)), "radial", "storage").reading
     assert "above the model" in reading
     assert "most at 0.1 mm, nearly constant over frequency there" in reading
     assert reading.endswith("; below it at 0.5 mm")

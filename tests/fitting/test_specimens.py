@@ -153,7 +153,7 @@ def test_shift_factors_are_those_of_the_law_where_it_holds(clean: Undisturbed) -
     result = fit_joint(data, effects=(*BASE, "temperature"))
     found = master_curve(result, data.sweeps)
     assert [round(each.temperature - CELSIUS) for each in found] == list(DEGREES)
-    off = np.array([(each.own[0] - each.shift[0]) / np.hypot(each.own[1], each.shift[1] + 1e-3) for each in found])
+    off = [(each.best_shift[0] - each.shift[0]) / np.hypot(each.best_shift[1], each.shift[1] + 1e-3) for each in found]
     assert np.max(np.abs(off)) < 3.5
     for each in found:
         line = result.model.stiffness(Direction.AXIAL, each.reduced_frequency, each.sweep.amplitude)
@@ -164,7 +164,7 @@ def test_shift_factors_are_those_of_the_law_where_it_holds(clean: Undisturbed) -
     assert len(curve) == sum(each.sweep.frequency.size for each in found)
     assert factors["log10 a_T [-]"].to_numpy() == pytest.approx([each.shift[0] / np.log(10.0) for each in found])
     own = factors[["own log10 a_T [-]", "own log10 a_T [-], low", "own log10 a_T [-], high"]].to_numpy().T
-    half = [1.96 * each.own[1] / np.log(10.0) for each in found]
+    half = [1.96 * each.best_shift[1] / np.log(10.0) for each in found]
     assert own[0] - own[1] == pytest.approx(half, rel=1e-3)
     assert own[2] - own[0] == pytest.approx(half, rel=1e-3)
 
@@ -177,7 +177,7 @@ def test_a_sweep_off_the_law_says_so(truth: Model) -> None:
     stated = tuple(replace(sweep, temperature=CELSIUS + at) for sweep, at in pairs)
     data = PreparedCampaign.from_campaign(replace(simulated, sweeps=stated))
     found = master_curve(fit_joint(data, effects=(*BASE, "temperature")), data.sweeps)
-    off = np.array([(each.own[0] - each.shift[0]) / each.own[1] for each in found])
+    off = np.array([(each.best_shift[0] - each.shift[0]) / each.best_shift[1] for each in found])
     assert abs(off[1]) > 4.0 * max(abs(off[0]), abs(off[-1]))
     assert off[1] < -4.0
 

@@ -11,12 +11,19 @@ from bushfit.geometry import Bushing
 from bushfit.model.file import read_document
 from bushfit.prediction.caveats import by_importance, consequence_of
 from bushfit.report import plots
-from bushfit.report.compared import FAMILY_HEADS, ComparisonDocument, ContrastHeaders, chance, parameter_cells, signed
+from bushfit.report.compared import (
+    FAMILY_HEADS,
+    ComparisonDocument,
+    ContrastHeaders,
+    format_difference,
+    format_p_value,
+    parameter_cells,
+)
 from bushfit.report.page.report import MOST, conditions, tube_description
 from bushfit.report.page.svg import picture
 from bushfit.report.page.values import grid_corners
 from bushfit.report.results import ResultFile, contents, json_file
-from bushfit.report.tables import numbers
+from bushfit.report.tables import numeric_columns
 from bushfit.units import format_aligned, format_range, number, split_header
 
 #: Largest product of the numbers of results and of directions and specimens for which the page has a figure.
@@ -94,7 +101,7 @@ def comparison_context(files: Sequence[ResultFile]) -> dict[str, Any]:
         "judged": families and len(other_names) + document["words"][0].startswith("use "),
         "most": MOST,
         "cells": parameter_cells,
-        "chance": chance,
+        "chance": format_p_value,
         "pictures": pictures,
         "tabled": [*value_rows(comparison)][: 2 * _ROWS],
         "warnings": [(line, consequence_of(line)) for line in by_importance(document["warnings"])],
@@ -117,13 +124,13 @@ def difference_sizes(comparison: ComparisonDocument, place: str) -> Iterator[dic
         heads = ContrastHeaders.from_table(table)
         row: dict[str, Any] = {"label": label, "place": place}
         for key, header, scale, unit in (("stiffness", heads.relative, 100.0, " %"), ("loss", heads.loss, 1.0, "")):
-            (values,) = scale * numbers(table, header)
+            (values,) = scale * numeric_columns(table, header)
             finite_ends = np.sort(values[np.isfinite(values)])[[0, -1]].tolist() if np.isfinite(values).any() else []
-            ends = dict.fromkeys(signed(end, 0.1 * max(map(abs, finite_ends))) for end in finite_ends)
+            ends = dict.fromkeys(format_difference(end, 0.1 * max(map(abs, finite_ends))) for end in finite_ends)
             row[key] = " to ".join(ends) + unit
             significant = int((table[f"{header}, sure"] == "yes").sum())
             count = "all" if significant == len(table) else f"{significant} of"
-            certain = np.ptp(numbers(table, f"{header}, low", f"{header}, high"), axis=0).any()
+            certain = np.ptp(numeric_columns(table, f"{header}, low", f"{header}, high"), axis=0).any()
             sentence = f"significant at {count} {len(table)} points" if significant else "not significant"
             row[f"{key}_sure"] = sentence if certain else "error not known"
         yield row
@@ -147,12 +154,12 @@ def value_rows(comparison: ComparisonDocument) -> Iterator[tuple[Any, ...]]:
         heads, loss = ContrastHeaders.from_table(table), "loss factor [-]"
         ((_, length), (_, unit)) = (split_header(header) for header in heads[:2])
         kinds = ((heads.stiffness, heads.relative, f" {unit}", 100.0, " %"), (loss, heads.loss, "", 1.0, ""))
-        amplitude, frequency = numbers(table, heads.amplitude, "frequency [Hz]")
+        amplitude, frequency = numeric_columns(table, heads.amplitude, "frequency [Hz]")
         for index in grid_corners(amplitude, frequency, amplitudes, min(point_limit // amplitudes, _FREQUENCIES)):
             row, cells = table.iloc[index], []
             for quantity, difference, suffix, scale, percent in kinds:
                 value, low, high = (scale * row[f"{difference}{end}"] for end in ("", ", low", ", high"))
-                size, *ends = (signed(end, high - low) for end in (value, low, high))
+                size, *ends = (format_difference(end, high - low) for end in (value, low, high))
                 sides = format_aligned([row[f"{who} {quantity}"] for who in ("reference", "other")], 4)
                 significant = row[f"{difference}, sure"] == "yes"
                 cells.append((*(side + suffix for side in sides), size + percent, " to ".join(ends), significant))

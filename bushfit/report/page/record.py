@@ -23,7 +23,7 @@ from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.files import read_utf8
 from bushfit.reading.tablefile import unescape_formula
 from bushfit.report.results import ResultFile, contents, json_file, place_names, table_file
-from bushfit.report.tables import required, response_headers, spread
+from bushfit.report.tables import require_columns, response_headers, spread
 from bushfit.validation import validate_tables
 
 #: Documents with a model in order of preference; document of the fit without the effects that a diagnosis added.
@@ -113,7 +113,7 @@ def _tests(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
     """Tables `gap`, `sweeps` and `loops` that are known; missing ones of sweeps and loops are taken from the gap."""
     tested = {name: tables[name] for name in ("gap", "sweeps", "loops") if name in tables}
     if "gap" in tested:
-        gap = required(tested["gap"], "test", "kind", "direction")
+        gap = require_columns(tested["gap"], "test", "kind", "direction")
         parts = {"force": "residual", "storage": "stiffness residual", "loss": "loss residual"}
         rows = gap.rename(columns={f"{part} after [noise]": f"{name} [noise]" for part, name in parts.items()})
         for name, kind in (("sweeps", "sweep"), ("loops", "loop")):
@@ -121,7 +121,7 @@ def _tests(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
                 tested[name] = rows[gap["kind"] == kind]
     for name, header in (("sweeps", "stepped"), ("loops", "frequency [Hz]")):
         if name in tested:
-            required(tested[name], "direction", header, "frequency [Hz]", "outlier")
+            require_columns(tested[name], "direction", header, "frequency [Hz]", "outlier")
     return tested
 
 
@@ -138,7 +138,7 @@ def _predictions(
         if table is None or table.empty:
             continue
         headers = ["frequency [Hz]", response_headers(place)[0]]
-        axes = [np.unique(column) for column in required(table, *headers)[headers].to_numpy(dtype=float).T]
+        axes = [np.unique(column) for column in require_columns(table, *headers)[headers].to_numpy(dtype=float).T]
         if name not in tables:
             axes = [levels[spread(levels.size, _MOST_LEVELS)] for levels in axes]
         predictions[name] = predict(result, place, axes[0], axes[1] / place.display.displacement.factor)

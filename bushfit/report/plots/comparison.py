@@ -5,7 +5,7 @@ from matplotlib.lines import Line2D
 
 from bushfit.report.compared import ComparisonDocument, ContrastHeaders
 from bushfit.report.plots import style
-from bushfit.report.tables import numbers
+from bushfit.report.tables import numeric_columns
 from bushfit.units import display_unit, format_range, split_header
 
 #: Width of a line [point].
@@ -35,7 +35,7 @@ def comparison_figure(comparison: ComparisonDocument) -> style.Chart:
     for row, place in enumerate(comparison.places):
         tables = comparison.differences_at(place)
         heads = ContrastHeaders.from_table(tables[other_labels[0]])
-        frequency, amplitude = numbers(tables[other_labels[0]], "frequency [Hz]", heads.amplitude)
+        frequency, amplitude = numeric_columns(tables[other_labels[0]], "frequency [Hz]", heads.amplitude)
         over_frequency = bool(np.ptp(frequency))
         x_header, fixed_header = ("frequency [Hz]", heads.amplitude)[:: 1 if over_frequency else -1]
         levels = np.unique(np.unique(amplitude if over_frequency else frequency)[[0, -1]])
@@ -58,7 +58,7 @@ def comparison_figure(comparison: ComparisonDocument) -> style.Chart:
         ):
             for label, table, side in sides:
                 ends = [f"{side}{header}{end}" for end in ("", ", low", ", high")]
-                x, level, *band = numbers(table, x_header, fixed_header, *ends)
+                x, level, *band = numeric_columns(table, x_header, fixed_header, *ends)
                 look = looks[label]
                 for drawn_level, dashes in zip(levels, style.DASHES, strict=False):
                     value, low, high = (scale * end[level == drawn_level] for end in band)
@@ -66,7 +66,7 @@ def comparison_figure(comparison: ComparisonDocument) -> style.Chart:
                     line.set(marker=look.marker, markevery=max(value.size // _MARKS, 1), **style.POINT)
                     # transparent: bands of several results overlap
                     axes.fill_between(x[level == drawn_level], low, high, color=look.color, alpha=0.18, lw=0)
-            style.label_axes(axes, x_header, y_label, numbers(tables[other_labels[0]], x_header)[0])
+            style.label_axes(axes, x_header, y_label, numeric_columns(tables[other_labels[0]], x_header)[0])
             if least_span:
                 axes.axhline(0.0, color=looks[first].color, lw=_STROKE)
                 style.widen_span(axes, least_span)

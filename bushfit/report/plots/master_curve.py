@@ -85,7 +85,7 @@ def shift_factors_figure(result: Result, shifted_sweeps: Sequence[ShiftedSweep],
     kelvin = np.array([shifted.temperature for shifted in shifted_sweeps])
     fine = np.linspace(kelvin.min(), kelvin.max(), _FINE)
     line, error = (values / np.log(10.0) for values in law(result, fine))
-    single, unsure = np.array([shifted.own for shifted in shifted_sweeps]).T / np.log(10.0)
+    single, unsure = np.array([shifted.best_shift for shifted in shifted_sweeps]).T / np.log(10.0)
     at_law = np.array([shifted.shift[0] for shifted in shifted_sweeps]) / np.log(10.0)
     color = style.styles(1, "amplitude")[0].color
     for axes, base, points in ((factors, line, single), (differences, 0.0 * line, single - at_law)):
