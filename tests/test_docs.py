@@ -9,7 +9,6 @@ import json
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 import tarfile
@@ -269,22 +268,37 @@ def test_the_wheel_is_for_every_machine_and_holds_every_file_of_the_package(root
 
 
 @pytest.mark.slow
-def test_the_wheel_works_elsewhere(root: Path, wheel: Path, tmp_path: Path) -> None:
-    """Unpacked into another folder, with nothing of the repository but a campaign."""
+def test_the_wheel_works_elsewhere(wheel: Path, tmp_path: Path) -> None:
+    """Unpacked into another folder, with nothing of the repository."""
     zipfile.ZipFile(wheel).extractall(tmp_path / "site")
-    for name in ("configs", "data/cmp_15961"):
-        shutil.copytree(root / name, tmp_path / "work" / name)
     code = "import bushfit, sys\nfrom bushfit.cli import main\nprint(bushfit.__file__, file=sys.stderr)\nmain()"
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code, "run", "configs/cmp_15961.toml", "-o", "results", "--json"],
-        cwd=tmp_path / "work",
-        env={**os.environ, "PYTHONPATH": str(tmp_path / "site")},
-        capture_output=True,
-        text=True,
-        check=False,
-        encoding="utf-8",
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stderr.startswith(str(tmp_path / "site"))
+    for arguments in (["example"], ["run", "bushfit-example/campaign.toml", "-o", "results", "--json"]):
+        done = subprocess.run(
+            [sys.executable, "-W", "error", "-c", code, *arguments],
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": str(tmp_path / "site")},
+            capture_output=True,
+            text=True,
+            check=False,
+            encoding="utf-8",
+        )
+        assert done.returncode == 0, done.stderr
+        assert done.stderr.startswith(str(tmp_path / "site"))
     assert json.loads(done.stdout)["diagnosis"]["verdict"] == "consistent"
-    assert (tmp_path / "work/results/axial.png").exists()
+    assert (tmp_path / "results/axial.png").exists()
+
+
+def test_the_citation_names_the_paper_and_the_version(root: Path) -> None:
+    citation = yaml.safe_load((root / "CITATION.cff").read_text(encoding="utf-8"))
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert (citation["version"], citation["license"]) == (project["version"], project["license"])
+    assert citation["references"][0]["doi"] in (root / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_workflow_covers_every_python_of_the_project_and_three_systems(root: Path) -> None:
+    workflow = yaml.safe_load((root / ".github/workflows/ci.yml").read_text(encoding="utf-8"))
+    matrix = workflow["jobs"]["quick"]["strategy"]["matrix"]
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    named = {line.rpartition(" ")[2] for line in project["classifiers"] if "Python :: 3." in line}
+    assert set(matrix["python"]) == named
+    assert {system.partition("-")[0] for system in matrix["os"]} == {"ubuntu", "windows", "macos"}

@@ -36,6 +36,10 @@ _GROUPS = {
         "fit-static": ("fit.static", "mu, sigma_fmax and eps_half from the loops."),
         "fit-dynamic": ("fit.dynamic", "m and alpha from the sweep of the smallest amplitude."),
     },
+    "To learn bushfit": {
+        "example": ("example", "A simulated campaign to try bushfit on."),
+        "manual": ("manual", "The manual in the browser, without a network."),
+    },
     "Before a test, and for other programs": {
         "plan": ("plan", "The most informative next tests within your hours."),
         "simulate": ("simulate", "A simulated campaign of tests from a model, with noise."),

@@ -1,0 +1,29 @@
+"""`bushfit example`: a simulated campaign of the paper's bushing, to try bushfit without test files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bushfit.cli.options import command_called
+from bushfit.cli.output import Output, with_output
+
+
+@command_called("example", "-o results/example")
+@with_output("bushfit-example", "tables")
+def command(output: Output) -> None:
+    """Write a campaign of the paper's bushing with simulated tests, to try bushfit without test files.
+
+    Writes campaign.toml, the tables of a hysteresis loop and two sweeps, and truth.json, the model behind them.
+    """
+    from bushfit import simulation
+    from bushfit.campaign.campaign import load_campaign, model_of
+    from bushfit.campaign.schema import SimulateSettings
+    from bushfit.commands.simulate import simulate_campaign
+    from bushfit.errors import quote_path
+
+    campaign = load_campaign(Path(simulation.__file__).with_name("example.toml"))
+    tests = campaign.simulate or SimulateSettings()
+    simulated = simulate_campaign(model_of(campaign), tests, output.formats.table_form)
+    folder = output.output or Path("bushfit-example")
+    output.write(folder, simulated.files, simulated.document)
+    output.print(f"next: bushfit run {quote_path(folder / 'campaign.toml')}")

@@ -1,0 +1,43 @@
+"""`bushfit manual`: the manual as one page in the browser, without a network."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from bushfit.cli.options import command_called
+from bushfit.cli.output import Output, with_output
+
+
+def _pages(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
+    from bushfit.report.page.manual import page_names
+
+    return [name for name in page_names() if name.startswith(incomplete)]
+
+
+@command_called("manual", "diagnosis -o results/manual")
+@click.argument("page", required=False, shell_complete=_pages)
+@with_output("a temporary folder, opened in the browser")
+def command(page: str | None, output: Output) -> None:
+    """Open the manual in the browser, at PAGE if it is given, such as `diagnosis`.
+
+    The manual is one file that needs no network. With -o, the command writes the file to a folder and opens no browser.
+
+    Writes manual.html.
+    """
+    import tempfile
+
+    from bushfit.errors import BushfitError, did_you_mean
+    from bushfit.report.page.manual import manual_page, page_names
+    from bushfit.report.results import page_file
+
+    names = page_names()
+    if page not in (None, *names):
+        hint = did_you_mean(page or "", names)
+        raise BushfitError("no such page", place="PAGE", found=page, expected=f"one of {', '.join(names)}", hint=hint)
+    folder = output.output or Path(tempfile.mkdtemp(prefix="bushfit-manual-"))
+    file = (folder / "manual.html").resolve()
+    output.write(folder, [page_file("manual", lambda _: manual_page(), ())], {"file": str(file), "pages": names})
+    if output.output is None:
+        click.launch(f"{file.as_uri()}#{page}" if page else file.as_uri())

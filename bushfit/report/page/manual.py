@@ -1,0 +1,77 @@
+"""The manual as one HTML page without outside links, made from its Markdown files."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bushfit.report.page import rendered
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from markdown_it.token import Token
+
+#: Folder of the Markdown files.
+FOLDER = Path(__file__).parents[2] / "manual"
+#: Name of the first page, which lists the commands; the others follow in alphabetical order.
+_FIRST = "commands"
+
+
+def page_names() -> list[str]:
+    """Names of the pages of the manual in their order: files of the folder without their extension."""
+    return sorted((file.stem for file in FOLDER.glob("*.md")), key=lambda name: (name != _FIRST, name))
+
+
+def manual_page() -> str:
+    """Convert the Markdown files of the manual to one HTML page with a table of contents.
+
+    Headings get the identifiers `<page>--<anchor>`, with the anchors that code hosts give them. Links between the pages
+    become links within the page; links to other files of the source tree, which an installation does not have, become
+    plain text.
+    """
+    from markdown_it import MarkdownIt
+    from markupsafe import Markup
+
+    names, parser = page_names(), MarkdownIt("commonmark", {"html": False}).enable("table")
+    chapters = []
+    for name in names:
+        tokens = parser.parse((FOLDER / f"{name}.md").read_text(encoding="utf-8"))
+        title = _add_identifiers(tokens, name)
+        for token in tokens:
+            _redirect_links(token.children or (), name, names)
+        chapters.append((name, title, Markup(parser.renderer.render(tokens, parser.options, {}))))
+    return rendered("manual.html", {"chapters": chapters})
+
+
+def _add_identifiers(tokens: Sequence[Token], name: str) -> str:
+    """Add identifiers to the headings of a page, and return its title."""
+    count, title = Counter[str](), name
+    for heading, text in pairwise(tokens):
+        if heading.type == "heading_open":
+            words = "".join(part.content for part in text.children or () if part.type in ("text", "code_inline"))
+            anchor = re.sub(r"[^\w\- ]", "", words.lower()).replace(" ", "-")
+            heading.attrSet("id", f"{name}--{anchor}" + (f"-{count[anchor]}" if count[anchor] else ""))
+            count[anchor] += 1
+            title = words if heading.tag == "h1" else title
+    return title
+
+
+def _redirect_links(parts: Sequence[Token], name: str, names: Sequence[str]) -> None:
+    """Change the links of a paragraph of page `name` in place, and replace images by their descriptions."""
+    hidden = False
+    for part in parts:
+        if part.type == "link_open":
+            file, _, anchor = str(part.attrGet("href")).partition("#")
+            target = Path(file).stem if file else name
+            hidden = not file.startswith("https:")
+            if hidden and target in names and file in ("", f"{target}.md"):
+                part.attrSet("href", f"#{target}--{anchor}" if anchor else f"#{target}")
+                hidden = False
+        if part.type in ("link_open", "link_close"):
+            part.hidden = hidden
+        elif part.type == "image":
+            part.type = "text"
