@@ -19,7 +19,7 @@ ROW_SCHEMA: Literal["bushfit/row/3"] = "bushfit/row/3"
 class Estimate:
     """A value with its 95 % interval and standard error; null where the tests do not determine them."""
 
-    value: Annotated[float, Field(description="Value.")]
+    value: Annotated[float, Field(description="Value of the quantity.")]
     low: Annotated[float | None, Field(description="Lower end of the 95 % interval.")] = None
     high: Annotated[float | None, Field(description="Upper end of the 95 % interval.")] = None
     stderr: Annotated[float | None, Field(description="Standard error.")] = None
@@ -60,17 +60,21 @@ class Estimate:
 class RowFile:
     """Results of one part, and the hashes by which a later run recognises that the results are still valid."""
 
-    schema: Annotated[Literal["bushfit/row/3"], Field(description="Layout of the file.")] = ROW_SCHEMA
+    schema: Annotated[Literal["bushfit/row/3"], Field(description="Name and version of the layout of this file.")] = (
+        ROW_SCHEMA
+    )
     status: Annotated[Literal["done", "failed"], Field(description="A failed row has an error and no results.")]
-    error: Annotated[str, Field(description="Why the row failed; empty if it is done.")] = ""
+    error: Annotated[str, Field(description="Reason why the row failed; empty if it is done.")] = ""
     seconds: Annotated[float, Field(description="Computing time of the row [s].")] = 0.0
     key: Annotated[str, Field(description="Hash of the settings of the row and of the version of bushfit.")] = ""
     inputs: Annotated[Mapping[str, str], Field(description="SHA-256 of each input file.")] = field(default_factory=dict)
     files: Annotated[Mapping[str, str], Field(description="SHA-256 of each result file.")] = field(default_factory=dict)
-    campaign_name: Annotated[str, Field(description="Name that the campaign gives the part.")] = ""
+    campaign_name: Annotated[str, Field(description="Name of the campaign.")] = ""
     verdict: Annotated[document.Verdict | None, Field(description="Verdict of diagnose; null without it.")] = None
     effects: Annotated[Sequence[str], Field(description="Effects that diagnose named.")] = ()
-    alternatives: Annotated[Sequence[str], Field(description="Effects that these tests cannot distinguish.")] = ()
+    alternatives: Annotated[
+        Sequence[str], Field(description="Effects that these tests cannot distinguish from the named effects.")
+    ] = ()
     warnings: Annotated[Sequence[str], Field(description="Warnings of the fit and of the predictions.")] = ()
     quantities: Annotated[
         Mapping[str, Estimate],
@@ -79,7 +83,9 @@ class RowFile:
     measured: Annotated[
         Mapping[str, Estimate], Field(description="Stiffness and loss factor as measured at the points, where known.")
     ] = field(default_factory=dict)
-    at_bound: Annotated[Mapping[str, End], Field(description="Parameters at a bound.")] = field(default_factory=dict)
+    at_bound: Annotated[
+        Mapping[str, End], Field(description="Parameters whose fitted value is at a bound, with the bound: min or max.")
+    ] = field(default_factory=dict)
     curve: Annotated[
         Mapping[str, float], Field(description="|K| [SI] of the first sweep at its middle level, by operating point.")
     ] = field(default_factory=dict)

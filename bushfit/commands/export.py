@@ -34,15 +34,20 @@ FORMATS = {
 class FormatEntry(TypedDict):
     """Entry of an export format in `export --json`."""
 
-    files: Annotated[list[str], Field(description="Names of its files.")]
-    left_out: Annotated[list[str], Field(description="Properties that it cannot hold, with the error that this makes.")]
+    files: Annotated[list[str], Field(description="Names of the files of the format.")]
+    left_out: Annotated[
+        list[str],
+        Field(description="Properties of the model that the format cannot represent, with the error that this causes."),
+    ]
 
 
 class ExportDocument(TypedDict):
     """Content of `export --json`."""
 
-    formats: Annotated[dict[str, FormatEntry], Field(description="Formats by name.")]
-    warnings: Annotated[list[str], Field(description="Limits of the numbers.")]
+    formats: Annotated[
+        dict[str, FormatEntry], Field(description="Files and limitations of each exported format, by name.")
+    ]
+    warnings: Annotated[list[str], Field(description="Warnings on the use of the numbers.")]
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,53 +17,57 @@ Verdict = Literal["consistent", "named", "ambiguous", "described", "partly", "un
 class SizeEntry(TypedDict):
     """Value of one parameter of an effect, with its uncertainty if the model to use has this parameter."""
 
-    value: Annotated[float, Doc("in the unit.")]
-    stderr: Annotated[float | None, Doc("standard error, in the unit; null where the parameter was not fitted.")]
+    value: Annotated[float, Doc("value of the parameter, in `unit`.")]
+    stderr: Annotated[float | None, Doc("standard error, in `unit`; null if the parameter was not fitted.")]
     ci95: Annotated[
         list[float] | None,
-        Doc("least and largest value of the 95 % interval; null where the parameter was not fitted."),
+        Doc("ends of the 95 % interval, in `unit`; null if the parameter was not fitted."),
     ]
-    unit: Annotated[str, Doc('SI; "1" of a ratio.')]
+    unit: Annotated[str, Doc('SI unit of the parameter; "1" for a ratio.')]
 
 
 class EffectEntry(TypedDict):
     """Effect or mistake in the record that was added, or the first of a set that the tests cannot distinguish."""
 
-    name: Annotated[str, Doc("of the effect or mistake.")]
+    name: Annotated[str, Doc("name of the effect or mistake.")]
     level: Annotated[
         str,
-        Doc('level: material, component, instrument or record; "unresolved" if it has twins.'),
+        Doc('material, component, instrument or record; "unresolved" for an effect that has twins.'),
     ]
-    twins: Annotated[list[str], Doc("effects of the rig that tests of the bushing cannot distinguish from it.")]
-    replaces: Annotated[str | None, Doc("the branch of the paper that it replaces, or null.")]
-    test: Annotated[str | None, Doc("the test with the mistake; null for an effect.")]
-    sentence: Annotated[str, Doc("description.")]
+    twins: Annotated[
+        list[str], Doc("effects of the rig that tests of the bushing cannot distinguish from this effect.")
+    ]
+    replaces: Annotated[str | None, Doc("branch of the paper's model that the effect replaces; null if it is added.")]
+    test: Annotated[str | None, Doc("name of the test with the mistake; null for an effect.")]
+    sentence: Annotated[str, Doc("description of the effect or mistake.")]
     correction: Annotated[
         str | None,
-        Doc("what to write into the campaign to correct a mistake; null for an effect."),
+        Doc("line for the campaign file that corrects the mistake; null for an effect."),
     ]
-    parameters: Annotated[dict[str, SizeEntry], Doc("by name.")]
-    evidence: Annotated[str, Doc("the reason for the name.")]
-    alternatives: Annotated[list[str], Doc("explanations that these tests cannot distinguish from it.")]
+    parameters: Annotated[dict[str, SizeEntry], Doc("fitted parameters of the effect by name.")]
+    evidence: Annotated[str, Doc("reason why the diagnosis names this effect or mistake.")]
+    alternatives: Annotated[
+        list[str], Doc("explanations that these tests cannot distinguish from this effect or mistake.")
+    ]
 
 
 #: Some keys contain a unit that is not a valid Python name, so this type is created by a call.
 MisfitRegionEntry = TypedDict(
     "MisfitRegionEntry",
     {
-        "direction": Annotated[str, Doc("of the bushing, or a specimen by its name.")],
-        "kind": Annotated[Literal["sweep", "loop"], Doc("of the tests.")],
-        "frequency_Hz": Annotated[list[float], Doc("least and largest [Hz].")],
+        "direction": Annotated[str, Doc("direction of the bushing, or name of a specimen.")],
+        "kind": Annotated[Literal["sweep", "loop"], Doc("kind of the tests in this region.")],
+        "frequency_Hz": Annotated[list[float], Doc("lowest and highest frequency [Hz].")],
         "amplitude_mm": NotRequired[
-            Annotated[list[float], Doc("least and largest, zero-to-peak [mm], of a displacement.")]
+            Annotated[list[float], Doc("smallest and largest zero-to-peak displacement [mm].")]
         ],
-        "amplitude_deg": NotRequired[
-            Annotated[list[float], Doc("least and largest, zero-to-peak [deg], of a rotation.")]
+        "amplitude_deg": NotRequired[Annotated[list[float], Doc("smallest and largest zero-to-peak rotation [deg].")]],
+        "amplitude_%": NotRequired[Annotated[list[float], Doc("smallest and largest zero-to-peak strain [%].")]],
+        "component": Annotated[
+            Literal["storage", "loss", "force"], Doc("storage or loss stiffness of sweeps, or force of a loop.")
         ],
-        "amplitude_%": NotRequired[Annotated[list[float], Doc("least and largest, zero-to-peak [%], of a strain.")]],
-        "component": Annotated[Literal["storage", "loss", "force"], Doc("of the stiffness, or the force of a loop.")],
-        "excess": Annotated[float, Doc("root mean square of the smooth misfit there, in units of its own noise.")],
-        "reading": Annotated[str, Doc("the same as a sentence.")],
+        "excess": Annotated[float, Doc("root mean square of the smooth misfit in the region, in units of its noise.")],
+        "reading": Annotated[str, Doc("description of the region as a sentence.")],
     },
 )
 MisfitRegionEntry.__doc__ = "One region in which model and measurement disagree."
@@ -72,39 +76,43 @@ MisfitRegionEntry.__doc__ = "One region in which model and measurement disagree.
 class BeforeAfter(TypedDict):
     """Root mean square residual in units of noise, before and after the additions; 1 is noise alone."""
 
-    before: Annotated[float | None, Doc("of the model at the start.")]
+    before: Annotated[float | None, Doc("root mean square residual of the starting model.")]
     after: Annotated[
         float | None,
-        Doc("of the model with the added effects, or with the corrected record."),
+        Doc("root mean square residual with the added effects, or with the corrected record."),
     ]
 
 
 class GapEntry(TypedDict):
     """Misfit between model and tests, in units of noise."""
 
-    calibration: Annotated[BeforeAfter, Doc("on the data that were fitted.")]
+    calibration: Annotated[BeforeAfter, Doc("misfit of the data that were fitted.")]
     heldout: Annotated[
         BeforeAfter | None,
-        Doc("on data that were left out and predicted from the rest; null if no data can be left out."),
+        Doc("misfit of data that were left out of the fit and predicted; null if none can be left out."),
     ]
-    parts: Annotated[tuple[HeldOut, ...], Doc("the held-out figures part by part.")]
-    skipped: Annotated[tuple[Skipped, ...], Doc("parts that were not held out.")]
+    parts: Annotated[
+        tuple[HeldOut, ...], Doc("misfit of each part of the tests that was left out of a fit and predicted.")
+    ]
+    skipped: Annotated[
+        tuple[Skipped, ...], Doc("parts of the tests that could not be left out of a fit, with the reason.")
+    ]
 
 
 class OddsEntry(TypedDict):
     """One explanation of a gap, with its probability."""
 
-    words: Annotated[str, Doc("what it is.")]
-    probability: Annotated[float, Doc("if anything is missing.")]
+    words: Annotated[str, Doc("description of the explanation.")]
+    probability: Annotated[float, Doc("probability of the explanation if anything is missing.")]
 
 
 class ExpectedErrorEntry(TypedDict):
     """Expected error of model.json for the worst direction or specimen: 95 % of its points have smaller errors."""
 
-    stiffness: Annotated[float, Doc("relative difference of |K|.")]
-    loss_factor: Annotated[float, Doc("difference of the loss factor.")]
-    held_out: Annotated[bool, Doc("whether each point was predicted from a fit without its run.")]
-    places: Annotated[tuple[ExpectedError, ...], Doc("the same place by place.")]
+    stiffness: Annotated[float, Doc("error of |K|, relative to |K|.")]
+    loss_factor: Annotated[float, Doc("absolute error of the loss factor.")]
+    held_out: Annotated[bool, Doc("true if each point was predicted from a fit without its run.")]
+    places: Annotated[tuple[ExpectedError, ...], Doc("expected error of each direction or specimen.")]
 
 
 @dataclass(frozen=True)
@@ -128,7 +136,7 @@ class Description:
 class DiagnosisFile(TypedDict):
     """Content of diagnosis.json, the result of a diagnosis."""
 
-    schema: Annotated[Literal["bushfit/diagnosis/3"], Doc("of this file.")]
+    schema: Annotated[Literal["bushfit/diagnosis/3"], Doc("name and version of the layout of this file.")]
     verdict: Annotated[
         Verdict,
         Doc(
@@ -137,7 +145,7 @@ class DiagnosisFile(TypedDict):
             "nothing closes the gap."
         ),
     ]
-    summary: Annotated[str, Doc("the verdict in a sentence.")]
+    summary: Annotated[str, Doc("verdict as a sentence.")]
     nothing: Annotated[float, Doc("probability that nothing is missing beyond noise and tolerance.")]
     odds: Annotated[
         list[OddsEntry],
@@ -148,10 +156,14 @@ class DiagnosisFile(TypedDict):
     effects: Annotated[
         list[EffectEntry], Doc("effects that were added, or those of the most probable explanation if none was.")
     ]
-    where: Annotated[list[MisfitRegionEntry], Doc("regions of disagreement before anything was added.")]
-    remainder: Annotated[list[MisfitRegionEntry], Doc("regions of disagreement that remain.")]
-    description: Annotated[Description | None, Doc("of a gap without a name; else null.")]
-    gap: Annotated[GapEntry, Doc("misfit of model and tests, before and after.")]
+    where: Annotated[list[MisfitRegionEntry], Doc("regions in which the starting model and the tests disagree.")]
+    remainder: Annotated[list[MisfitRegionEntry], Doc("regions in which the final model and the tests disagree.")]
+    description: Annotated[
+        Description | None, Doc("power law nearest to a gap that no known effect explains; null without such a gap.")
+    ]
+    gap: Annotated[GapEntry, Doc("misfit between model and tests, before and after the additions.")]
     usable: Annotated[ExpectedErrorEntry | None, Doc("expected error of model.json; null if nothing was fitted.")]
-    next_test: Annotated[str, Doc("the test that would decide or confirm; empty if there is none.")]
-    warnings: Annotated[list[str], Doc("warnings.")]
+    next_test: Annotated[
+        str, Doc("test that would decide between the explanations or confirm the verdict; empty without one.")
+    ]
+    warnings: Annotated[list[str], Doc("warnings on the tests, the fit and the model to use.")]

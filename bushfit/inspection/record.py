@@ -54,25 +54,27 @@ class ColumnDescription:
 class InspectedFile(TypedDict):
     """Result of the inspection of a file or a sheet of a workbook, as JSON."""
 
-    file: Annotated[str, Doc("as it was named.")]
-    sheet: Annotated[str | int | None, Doc("of a workbook; null where there is one only.")]
-    kind: Annotated[Kind, Doc("a hysteresis loop, a sweep, or the raw history of a stepped sine.")]
-    direction: Annotated[str | None, Doc("of the test, or specimen; null where neither file nor options say it.")]
+    file: Annotated[str, Doc("test file, as the user names it.")]
+    sheet: Annotated[str | int | None, Doc("sheet of the workbook; null if the file has only one.")]
+    kind: Annotated[Kind, Doc("hysteresis loop, sweep, or raw history of a stepped sine.")]
+    direction: Annotated[str | None, Doc("tested direction or specimen; null if neither file nor options state it.")]
     written: Annotated[dict[str, str], Doc("format of the file by label: encoding, delimiter, decimal mark and so on.")]
-    columns: Annotated[tuple[ColumnDescription, ...], Doc("all of them, in order.")]
-    facts: Annotated[dict[str, str], Doc("in words, by label.")]
+    columns: Annotated[tuple[ColumnDescription, ...], Doc("all columns of the file, in order.")]
+    facts: Annotated[
+        dict[str, str], Doc("properties of the test as texts, by label, such as frequencies, amplitudes and noise.")
+    ]
     assumed: Annotated[
         str | None, Doc("assumptions, each with the option or key that changes it; null if there are none.")
     ]
-    odd: Annotated[list[str], Doc("a sentence for each unusual finding.")]
+    odd: Annotated[list[str], Doc("one sentence for each oddity, such as an outlier or a gap.")]
 
 
 class InspectionDocument(TypedDict):
     """Result of the inspection of several test files, as JSON."""
 
-    files: Annotated[list[InspectedFile], Doc("that can be used.")]
-    left_out: Annotated[list[str], Doc("a sentence for each file or sheet that holds no test.")]
-    campaign: Annotated[str, Doc("the text for a campaign, or a whole one.")]
+    files: Annotated[list[InspectedFile], Doc("inspected files that contain a test.")]
+    left_out: Annotated[list[str], Doc("one sentence for each file or sheet without a test.")]
+    campaign: Annotated[str, Doc("text for a campaign file, or a whole campaign file.")]
 
 
 @dataclass(frozen=True, eq=False)

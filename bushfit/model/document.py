@@ -48,11 +48,11 @@ class SpecimenTable:
 
     name: Annotated[Name, Field(description="Name of the specimen.")]
     kind: Annotated[SpecimenKind, Field(description='"modulus" for tests of the modulus, "shear" for blocks in shear.')]
-    strain: Annotated[StatedStrain, Field(description="Kind of strain in the test files, of kind modulus.")] = (
+    strain: Annotated[StatedStrain, Field(description="Kind of strain in the test files; for the kind modulus.")] = (
         "engineering"
     )
-    area_m2: Annotated[Number | None, Field(description="Sheared area of a block [m^2], of kind shear.")] = None
-    thickness_m: Annotated[Number | None, Field(description="Thickness of a block [m], of kind shear.")] = None
+    area_m2: Annotated[Number | None, Field(description="Sheared area of a block [m^2]; for the kind shear.")] = None
+    thickness_m: Annotated[Number | None, Field(description="Thickness of a block [m]; for the kind shear.")] = None
     elements: Annotated[WholeNumber, Field(description="Number of blocks in parallel.")] = 1
 
 
@@ -60,7 +60,7 @@ class SpecimenTable:
 class ParameterTable:
     """Value and uncertainty of one parameter in a model file."""
 
-    value: Annotated[Number, Field(description="Value in the unit.")]
+    value: Annotated[Number, Field(description="Value of the parameter, in `unit`.")]
     unit: Annotated[str | None, Field(description='SI unit; "1" for a ratio.')] = None
     stderr: Annotated[Number | None, Field(description="Standard error; null for an exact value.")] = None
     ci95: Annotated[Interval | None, Field(description="Ends of the 95 % interval; null for an exact value.")] = None
@@ -115,9 +115,9 @@ def _check_covariance(table: CovarianceTable) -> CovarianceTable:
 class FitTable(Quality):
     """Quality of the fit, and ranges of the fitted tests, in a model file."""
 
-    frequency_Hz: Annotated[Interval | None, Field(description="Least and largest frequency [Hz].")] = None  # noqa: N815
-    strain: Annotated[Interval | None, Field(description="Least and largest equivalent strain amplitude.")] = None
-    directions: Annotated[tuple[Name, ...], Field(description="Fitted directions, and names of specimens.")] = ()
+    frequency_Hz: Annotated[Interval | None, Field(description="Lowest and highest frequency [Hz].")] = None  # noqa: N815
+    strain: Annotated[Interval | None, Field(description="Smallest and largest equivalent strain amplitude.")] = None
+    directions: Annotated[tuple[Name, ...], Field(description="Names of the fitted directions and specimens.")] = ()
     temperature_K: Annotated[  # noqa: N815
         Interval | None, Field(description="Lowest and highest temperature [K]; null if no test states one.")
     ] = None
@@ -157,7 +157,7 @@ class InputTable:
     """Name, checksum and conditions of a test's data file, in the provenance of a model file."""
 
     file: Annotated[str, Field(description="Name of the file as in the campaign.")]
-    sha256: Annotated[str, Field(description="SHA-256 of its content.")]
+    sha256: Annotated[str, Field(description="SHA-256 of the content of the file.")]
     conditions: Annotated[
         Mapping[str, str | Number], Field(description="Conditions in the campaign, such as preload and date.")
     ] = field(default_factory=dict)
@@ -178,9 +178,11 @@ class ProvenanceTable:
 class AlternativeTable:
     """Another model of the same bushing that the tests do not rule out."""
 
-    effects: Annotated[tuple[str, ...], Field(description="Names of its effects.")]
-    values: Annotated[Mapping[str, Number], Field(description="Values of its parameters [SI].")]
-    probability: Annotated[Number, Field(ge=0.0, le=1.0, description="Probability from the diagnosis.")]
+    effects: Annotated[tuple[str, ...], Field(description="Names of the effects of the other model.")]
+    values: Annotated[Mapping[str, Number], Field(description="Parameter values of the other model by name [SI].")]
+    probability: Annotated[
+        Number, Field(ge=0.0, le=1.0, description="Probability of the other model by the diagnosis.")
+    ]
 
 
 @dataclass(frozen=True)
@@ -190,8 +192,10 @@ class ModelFile:
     __pydantic_config__ = ConfigDict(str_max_length=10_000)  # for texts that pages show
 
     schema: Annotated[Literal["bushfit/model/1"], Field(description="Schema of the file.")]
-    bushing: Annotated[BushingTable | None, Field(description="The bushing; null for specimens alone.")]
-    effects: Annotated[tuple[str, ...], Field(description="Names of the effects.")]
+    bushing: Annotated[
+        BushingTable | None, Field(description="Geometry of the bushing; null if only specimens were tested.")
+    ]
+    effects: Annotated[tuple[str, ...], Field(description="Names of the effects of the model.")]
     parameters: Annotated[Mapping[str, ParameterTable], Field(description="Parameters by name.")]
     specimens: Annotated[tuple[SpecimenTable, ...], Field(description="Other bodies of the compound.")] = ()
     covariance: Annotated[
@@ -210,7 +214,9 @@ class ModelFile:
     alternatives: Annotated[
         tuple[AlternativeTable, ...], Field(description="Other models that the tests do not rule out.")
     ] = ()
-    warnings: Annotated[tuple[str, ...], Field(max_length=10_000, description="Limits of the numbers.")] = ()
+    warnings: Annotated[
+        tuple[str, ...], Field(max_length=10_000, description="Warnings on the use of the numbers.")
+    ] = ()
     outliers: Annotated[tuple[Outlier, ...], Field(description="Points far outside their noise.")] = ()
     provenance: Annotated[ProvenanceTable, Field(description="Origin of the file.")] = field(
         default_factory=ProvenanceTable

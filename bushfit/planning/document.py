@@ -32,26 +32,32 @@ class PlannedRun(TypedDict):
 class ErrorComparison(TypedDict):
     """Standard error before further tests, with the planned tests, and with the standard programme."""
 
-    before: Annotated[float, Field(description="Without further tests.")]
-    planned: Annotated[float, Field(description="With the tests of the plan.")]
-    standard: Annotated[float, Field(description="With the standard programme of as many hours instead.")]
+    before: Annotated[float, Field(description="Standard error without further tests.")]
+    planned: Annotated[float, Field(description="Standard error with the tests of the plan.")]
+    standard: Annotated[
+        float, Field(description="Standard error with the standard programme of as many hours instead.")
+    ]
 
 
 class TargetEntry(ErrorComparison):
     """Half width of the 95 % interval of a target, relative to its value, at the worst operating point."""
 
-    asked: Annotated[float, Field(description="Largest half width that was asked for.")]
-    met: Annotated[bool, Field(description="Whether the planned tests reach the target.")]
+    asked: Annotated[float, Field(description="Largest half width of the interval that the target allows.")]
+    met: Annotated[bool, Field(description="True if the planned tests reach the target.")]
     why: Annotated[str | None, Field(description="Reason why the target is not reached; null if it is.")]
 
 
 class DetectableEntry(TypedDict):
     """Smallest amount of an effect that a test at the 5 % level detects in 90 % of the cases."""
 
-    parameter: Annotated[str, Field(description="Parameter of the effect that the amount is of.")]
+    parameter: Annotated[str, Field(description="Parameter of the effect that measures the amount.")]
     unit: Annotated[str, Field(description='SI unit of the amount; "1" for a ratio.')]
-    planned: Annotated[float | None, Field(description="With the tests of the plan; null if no amount is detected.")]
-    standard: Annotated[float | None, Field(description="With the standard programme.")]
+    planned: Annotated[
+        float | None, Field(description="Smallest amount that the tests of the plan detect; null if none.")
+    ]
+    standard: Annotated[
+        float | None, Field(description="Smallest amount that the standard programme detects; null if none.")
+    ]
 
 
 class Rivalry(TypedDict):
@@ -65,7 +71,9 @@ class Rivalry(TypedDict):
             "tests of the plan."
         ),
     ]
-    standard: Annotated[float, Field(description="The same with the standard programme.")]
+    standard: Annotated[
+        float, Field(description="Expected chi-square between the two nearest models with the standard programme.")
+    ]
     enough: Annotated[float, Field(description="Chi-square above which nine of ten campaigns separate the models.")]
 
 
@@ -74,10 +82,14 @@ class SimulationCheck(TypedDict):
 
     campaigns: Annotated[int, Field(description="Number of simulated campaigns.")]
     failed: Annotated[int, Field(description="Number of campaigns that could not be fitted.")]
-    seed: Annotated[int, Field(description="Seed of the first campaign; the others count on from it.")]
-    predicted: Annotated[dict[str, float], Field(description="Relative standard error that the plan predicts.")]
-    found: Annotated[dict[str, float], Field(description="Relative standard error from the scatter of the fits.")]
-    ci95: Annotated[dict[str, list[float]], Field(description="Ends of the 95 % interval of the latter.")]
+    seed: Annotated[int, Field(description="Seed of the first campaign; each further campaign has the next integer.")]
+    predicted: Annotated[
+        dict[str, float], Field(description="Relative standard error of each parameter that the plan predicts.")
+    ]
+    found: Annotated[
+        dict[str, float], Field(description="Relative standard error of each parameter from the scatter of the fits.")
+    ]
+    ci95: Annotated[dict[str, list[float]], Field(description="Ends of the 95 % interval of each entry of `found`.")]
 
 
 class PlanFile(TypedDict):
@@ -85,7 +97,7 @@ class PlanFile(TypedDict):
 
     schema: Annotated[str, Field(description="Name and version of this schema.")]
     source: Annotated[str, Field(description="Starting point of the plan.")]
-    aim: Annotated[Aim, Field(description="Aim of the plan.")]
+    aim: Annotated[Aim, Field(description="Quantity that the plan makes more accurate, or the separation of rivals.")]
     hours: Annotated[float, Field(description="Available time on the rig [h].")]
     tests: Annotated[list[PlannedRun], Field(description="Runs of the rig in their order.")]
     hours_planned: Annotated[float, Field(description="Duration of the planned tests [h].")]
@@ -93,7 +105,7 @@ class PlanFile(TypedDict):
         float,
         Field(description="Duration of the standard programme, repeated as often as fits into that of the plan [h]."),
     ]
-    hours_left: Annotated[float, Field(description="Hours of the rig that no test takes [h].")]
+    hours_left: Annotated[float, Field(description="Available time that the plan does not use [h].")]
     enough: Annotated[str | None, Field(description="Reason why hours are left; null if they are used.")]
     targets: Annotated[dict[str, TargetEntry], Field(description="Targets by name; empty if none was given.")]
     parameters: Annotated[dict[str, ErrorComparison], Field(description="Relative standard error of each parameter.")]
@@ -114,7 +126,7 @@ class PlanFile(TypedDict):
     ]
     rivals: Annotated[Rivalry | None, Field(description="Models to separate; null if there are none.")]
     check: Annotated[SimulationCheck | None, Field(description="Simulations of the plan; null if none were asked for.")]
-    warnings: Annotated[list[str], Field(description="Limits of the plan.")]
+    warnings: Annotated[list[str], Field(description="Warnings on the plan.")]
 
 
 def plan_document(plan: Plan, check: Check | None = None) -> PlanFile:

@@ -22,14 +22,19 @@ _MOST_LISTED = 5
 class ReductionDocument(TypedDict, total=False):
     """JSON document of a sweep obtained by reduction of raw histories or of a resonance test."""
 
-    direction: Annotated[str, Doc("what was tested: one of the two.")]
-    specimen: Annotated[str, Doc("what was tested: one of the two.")]
-    points: Required[Annotated[dict[str, list[float | str | None]], Doc("the columns of sweep.csv, by header.")]]
+    direction: Annotated[str, Doc("tested direction of the bushing; missing for a specimen.")]
+    specimen: Annotated[str, Doc("tested specimen; missing for a bushing.")]
+    points: Required[
+        Annotated[
+            dict[str, list[float | str | None]],
+            Doc("columns of sweep.csv by header, one entry for each operating point."),
+        ]
+    ]
     warnings: Required[Annotated[list[str], Doc("warnings on the use of the numbers.")]]
-    campaign: Required[Annotated[str, Doc("the text for a campaign.")]]
-    mass_kg: Annotated[float, Doc("that stood on the mount [kg]; of a resonance test, as the next two.")]
+    campaign: Required[Annotated[str, Doc("text of the [[sweeps]] table for a campaign.")]]
+    mass_kg: Annotated[float, Doc("mass on the mount [kg]; only for a resonance test, like the next two keys.")]
     resonance_Hz: Annotated[float, Doc("frequency of the largest transmissibility [Hz].")]
-    transmissibility_at_resonance: Annotated[float, Doc("the largest.")]
+    transmissibility_at_resonance: Annotated[float, Doc("largest magnitude of the transmissibility [1].")]
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ class SimulationDocument(TypedDict):
     """JSON document on a simulated campaign: the true model and the names of the files."""
 
     truth: Annotated[ModelFile, Field(description="True model, as in truth.json.")]
-    files: Annotated[list[str], Field(description="Names of the files.")]
+    files: Annotated[list[str], Field(description="Names of the written files.")]
 
 
 def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
