@@ -113,7 +113,7 @@ def export(request: ExportRequest) -> Exported:
 
 
 def _element(tables: Sequence[StiffnessTable]) -> _Element:
-    """Make the element of one direction, with a curve through the storage force at each amplitude.
+    """Make the Adams element of one direction, with a curve through the force of its tables at each amplitude.
 
     A single amplitude is extrapolated linearly, because splines need five points.
     """

@@ -38,7 +38,7 @@ class UnitSystem:
 
     @classmethod
     def parse(cls, text: str) -> UnitSystem:
-        """Parse a unit system such as "mm t s N", with the units in any order.
+        """Parse a unit system of a solver such as "mm t s N", with the units in any order.
 
         Returns:
             The system, each unit with its factor from SI.
@@ -168,7 +168,7 @@ class ExportRequest:
 
 @dataclass(frozen=True, eq=False)
 class Exported:
-    """Output of an export format.
+    """Files that an export format makes, and properties of the model that it cannot represent.
 
     Args:
         files: content by file name.

@@ -74,7 +74,7 @@ def _property(names: Sequence[str], form: Form, units: UnitSystem, pid: int, lev
 
 
 def _by_dof(names: Sequence[str], rows: Sequence[dict[int, str]]) -> list[str]:
-    """List the fields of a property after its number: for each table, a name and values of six degrees of freedom."""
+    """List the fields of a property: for each table, its name, then the entry of each of the six degrees of freedom."""
     fields: list[str] = []
     for name, row in zip(names, rows, strict=True):
         fields += [*([""] if fields else []), name, *(row.get(dof, "") for dof in range(1, 7))]

@@ -32,7 +32,7 @@ class Unit(NamedTuple):
 
 
 class Display(NamedTuple):
-    """Display units of displacement, force and stiffness."""
+    """Units in which displacement, force and stiffness are printed, each with its factor from SI."""
 
     displacement: Unit
     force: Unit
@@ -41,7 +41,7 @@ class Display(NamedTuple):
 
 @dataclass(frozen=True)
 class Motion:
-    """Kind of motion in a test (translation, rotation or strain), with the names and units of its quantities.
+    """Kind of motion in a test (translation, rotation or strain), with the names and units of displacement and force.
 
     Args:
         words: names of displacement, force and stiffness, such as "rotation", "moment" and "stiffness".
@@ -317,7 +317,7 @@ def _present(bushing: Bushing | None, place: Direction) -> Bushing:
 
 
 class _Definition(NamedTuple):
-    """Kind of motion of a direction, and formulas for its unit strain and stiffness as functions of sizes [m]."""
+    """Kind of motion of a direction, and formulas for its strain and stiffness as functions of radii and length [m]."""
 
     motion: Motion
     unit_strain: Callable[[float, float], float]

@@ -48,7 +48,7 @@ class Arms:
 
     Args:
         stands_for: names of the effects that the arms replace, such as "springpot".
-        size: name of the parameter that all moduli are proportional to.
+        size: name, in files and reports, of the model parameter that all moduli are proportional to.
         modulus: G_k [Pa], contributions to the shear modulus mu^, shortest relaxation time first, (k,).
         time: relaxation times tau_k [s], (k,).
         band: lowest and highest frequency [Hz] of the approximation.
@@ -86,7 +86,7 @@ def fitted_arms(
     stands_for: str = "",
     size: str = "",
 ) -> Arms:
-    """Fit the smallest number of Maxwell arms that approximate a complex modulus within a relative error.
+    """Fit the smallest number of Maxwell arms (spring and dashpot in series) that approximate a complex modulus.
 
     Args:
         modulus: complex modulus [Pa] at angular frequencies [rad/s], (n,) -> (n,).
@@ -177,7 +177,7 @@ def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float
 
 
 def qualified_size(branch: Branch) -> str:
-    """Name, in files and reports, of the parameter that the branch's modulus is proportional to."""
+    """Name, in files and reports, of the parameter that the modulus of a viscoelastic branch is proportional to."""
     qualified_names = {parameter.name: qualified_name(branch, parameter) for parameter in branch.parameters}
     assert branch.size is not None
     return qualified_names.get(branch.size, branch.size)
@@ -215,7 +215,7 @@ def values_under(model: Model, conditions: RubberConditions) -> Values:
 
 
 def _basis(omega: Array, time: Array) -> Array:
-    """Moduli of arms with G_k = 1: i w tau_k/(1 + i w tau_k), (n, k)."""
+    """Complex moduli of Maxwell arms of unit stiffness: i w tau_k/(1 + i w tau_k), (n, k)."""
     turn = 1j * omega[:, None] * time
     return turn / (1.0 + turn)
 
@@ -235,7 +235,7 @@ def _starts(omega: Array, target: Array, arms: int) -> Iterator[tuple[Array, Arr
 
 
 def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 1) -> tuple[float, Array, Array]:
-    """Fit arms to a target modulus from a start; return the largest relative error, moduli [Pa] and times [s].
+    """Fit Maxwell arms to complex moduli [Pa] from start values; return largest relative error, moduli and times [s].
 
     Notes: repeated least squares in the logarithms, with weights multiplied by the error (Lawson's method for the
     smallest maximum error); the logarithms keep all moduli and times positive.

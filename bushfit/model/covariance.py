@@ -20,7 +20,7 @@ _LEAST_FREEDOM = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Covariance:
-    """Covariance matrix of parameter values in their SI units, and its own uncertainty.
+    """Covariance matrix of parameter values in their SI units, and the uncertainty of the matrix.
 
     Args:
         names: names of the k parameters.
@@ -103,7 +103,7 @@ class Covariance:
         return sorted(pairs, key=lambda pair: -abs(pair[2]))
 
     def restricted(self, names: Sequence[str]) -> "Covariance":
-        """Covariance of the named parameters alone, in their order in this covariance; unknown names are ignored."""
+        """Covariance of the named parameters only, in the order of this covariance; unknown names are ignored."""
         indices = [i for i, name in enumerate(self.names) if name in names]
         square = np.ix_(indices, indices)
         names = tuple(self.names[i] for i in indices)

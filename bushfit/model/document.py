@@ -44,7 +44,8 @@ class BushingTable:
 
 @dataclass(frozen=True)
 class SpecimenTable:
-    """Specimen of the compound other than a bushing, such as a coupon or blocks in shear, in a model file."""
+    """Entry of a model file for a specimen of the compound, such as a coupon or blocks in shear: kind and
+    dimensions."""
 
     name: Annotated[Name, Field(description="Name of the specimen.")]
     kind: Annotated[SpecimenKind, Field(description='"modulus" for tests of the modulus, "shear" for blocks in shear.')]
@@ -58,7 +59,7 @@ class SpecimenTable:
 
 @dataclass(frozen=True)
 class ParameterTable:
-    """Value and uncertainty of one parameter in a model file."""
+    """Entry of a model file for one parameter: value, unit, standard error, 95 % interval and bound."""
 
     value: Annotated[Number, Field(description="Value of the parameter, in `unit`.")]
     unit: Annotated[str | None, Field(description='SI unit; "1" for a ratio.')] = None
@@ -74,7 +75,7 @@ class ParameterTable:
 
 @dataclass(frozen=True)
 class CovarianceTable:
-    """Covariance matrix of the parameters, in their SI units, in a model file."""
+    """Covariance matrix of the parameters [SI] in a model file, with the names of its rows and columns."""
 
     names: Annotated[tuple[str, ...], Field(description="Names of the parameters that have errors.")]
     matrix: Annotated[Matrix, Field(description="Covariance matrix, in the order of the names.")]
@@ -113,7 +114,7 @@ def _check_covariance(table: CovarianceTable) -> CovarianceTable:
 
 @dataclass(frozen=True)
 class FitTable(Quality):
-    """Quality of the fit, and ranges of the fitted tests, in a model file."""
+    """Entry of a model file on its fit: quality, ranges of the fitted tests, misfit by test, and expected error."""
 
     frequency_Hz: Annotated[Interval | None, Field(description="Lowest and highest frequency [Hz].")] = None  # noqa: N815
     strain: Annotated[Interval | None, Field(description="Smallest and largest equivalent strain amplitude.")] = None
@@ -165,7 +166,7 @@ class InputTable:
 
 @dataclass(frozen=True)
 class ProvenanceTable:
-    """Provenance of a model file: versions of the software, and the test files."""
+    """Entry of a model file on its origin: version of bushfit, versions of numerical packages, and test files."""
 
     bushfit: Annotated[str | None, Field(description="Version of bushfit that wrote the file.")] = None
     inputs: Annotated[tuple[InputTable, ...], Field(description="Files of the tests.")] = ()
@@ -176,7 +177,7 @@ class ProvenanceTable:
 
 @dataclass(frozen=True)
 class AlternativeTable:
-    """Another model of the same bushing that the tests do not rule out."""
+    """Entry of a model file for another model that the tests do not rule out: effects, values and probability."""
 
     effects: Annotated[tuple[str, ...], Field(description="Names of the effects of the other model.")]
     values: Annotated[Mapping[str, Number], Field(description="Parameter values of the other model by name [SI].")]
@@ -187,7 +188,7 @@ class AlternativeTable:
 
 @dataclass(frozen=True)
 class ModelFile:
-    """Content of a model file: model, parameters with uncertainty, fit and provenance."""
+    """Content of a model file such as model.json: model, parameters with uncertainty, fit and provenance."""
 
     __pydantic_config__ = ConfigDict(str_max_length=10_000)  # for texts that pages show
 

@@ -51,7 +51,7 @@ def load_result(file: Path) -> Result:
 
 
 def read_document(file: Path) -> dict[str, Any]:
-    """Read a result file of any schema as a dictionary.
+    """Read any JSON result file, such as a model or a diagnosis, as a dictionary, without checking its keys.
 
     Raises:
         ModelError: the file is missing, too large or not a JSON object.

@@ -86,12 +86,12 @@ class Model:
 
     @property
     def only_branches(self) -> bool:
-        """True if the response is the plain sum of the branches, without modifiers and layers."""
+        """True if the model consists of branches only: their stresses add up, and no modifier and no layer acts."""
         return len(self.structure.branches) == len(self.records)
 
     @property
     def depends_on_conditions(self) -> bool:
-        """True if the response depends on the temperature or the history of the rubber."""
+        """True if the response depends on the temperature or the earlier strains of the rubber in a test."""
         return any(effect.depends_on for effect in self.records)
 
     @property
@@ -110,11 +110,13 @@ class Model:
         return self.bushing.name if self.bushing else "compound"
 
     def unit_strain(self, place: Place) -> float:
-        """Equivalent strain per unit displacement [1/m], rotation [1/rad] or strain [1]."""
+        """Equivalent strain of the rubber in a direction or specimen, per displacement [1/m], rotation [1/rad] or
+        strain."""
         return geometry.unit_strain(self.bushing, place)
 
     def stiffness_per_modulus(self, place: Place) -> float:
-        """Stiffness per unit shear modulus: [m] for translation, [m^3/rad] for rotation, [1] for a modulus specimen."""
+        """Stiffness in a direction or of a specimen, per shear modulus: [m], [m^3/rad] for rotation, [1] for a
+        modulus."""
         return geometry.stiffness_per_modulus(self.bushing, place)
 
     def with_values(self, values: Mapping[str, float]) -> "Model":
@@ -167,7 +169,7 @@ class Model:
         return Model.with_defaults(self.bushing, (*names, name), start, self.unnamed)
 
     def start_values_for(self, effect: Effect) -> list[dict[str, float]]:
-        """Start values for a fit with an additional effect, derived from the branch that the effect replaces.
+        """Compute start values of an effect that is added to the model, from the branch that the effect replaces.
 
         Returns:
             Parameter values [SI] of each start by qualified name; one empty start if the effect replaces no branch.
@@ -199,7 +201,7 @@ class Model:
         return Model.with_defaults(self.bushing, [*effects, *added], {**self.values, **twin_values}, self.unnamed)
 
     def without(self, *left: Level | str) -> "Model":
-        """Create a model without the effects that have one of the given levels or names.
+        """Create a model without the effects of the given levels (such as the rig's) or names.
 
         >>> paper.with_effect("inertia").without(Level.INSTRUMENT).effects
         ('elastic', 'springpot', 'friction')
@@ -318,7 +320,8 @@ class Model:
         return Setting(self.bushing, direction, kind, conditions, self.unnamed)
 
     def layers(self, setting: Setting) -> tuple[Layer, ...]:
-        """Layers of the model that act in a test, from the rubber outward; a test of a modulus has no rig layers."""
+        """List the layers (effects around the rubber, such as the rig's) that act in a test, from the rubber
+        outward."""
         place, layers = setting.direction, self.structure.layers
         if place.motion is STRAINING:
             layers = tuple(layer for layer in layers if layer.corrects)

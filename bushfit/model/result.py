@@ -66,13 +66,13 @@ class Range:
 
 @dataclass(frozen=True)
 class Misfit:
-    """Misfit between a model and one test, or one run of a test (points of one amplitude or frequency).
+    """Misfit between a model and one test, or one run of a sweep (its points at one amplitude or frequency).
 
     Args:
         test: name of the test.
         place: name of the direction or specimen.
         fitted: True if the model was fitted to this test.
-        held: quantity that is constant in the run; None for the whole test.
+        held: quantity that is constant in the run, "amplitude" or "frequency"; None for the whole test.
         value: constant value of this quantity; None for the whole test.
         unit: SI unit of the value: "m", "rad" or "1" for an amplitude, "Hz" for a frequency.
         points: number of points with weight: operating points of a sweep, rows of a loop.
@@ -280,7 +280,7 @@ class Result:
 
     @property
     def unknown_parameters(self) -> str:
-        """Sentence on the parameters that are unknown by 100 % or more; "" if every parameter is known."""
+        """Sentence that names the parameters with a 95 % half width of at least their value; "" if there are none."""
         return self.covariance.describe_unknown(self.model.values)
 
     @property
@@ -296,7 +296,8 @@ class Result:
         return [f"{lacking if names else open_values} the bands, low to high, include each alternative"]
 
     def place(self, name: str) -> Place:
-        """Return the specimen or direction with the given name; raise a ModelError for other names."""
+        """Return the direction of the bushing or the specimen with the given name; raise a ModelError for other
+        names."""
         return get_place(name, self.specimens)
 
     def interval(self, name: str) -> tuple[float, float] | None:

@@ -127,7 +127,7 @@ def _add_slopes(
 def _differences_at(
     place: Place, model: Model, names: Sequence[str], respond: Callable[[Values], Array]
 ) -> tuple[Array, Array]:
-    """Call `differences` for the parameters that act in this direction; the derivatives by other parameters are 0."""
+    """Response and derivatives as from `differences`, but 0 for parameters without effect in the direction `place`."""
     local = [i for i, name in enumerate(names) if place_suffix(name) in (None, str(place))]
     response, local_slopes = differences(model, [names[i] for i in local], respond)
     slopes = np.zeros((len(names), response.size), dtype=response.dtype)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def layered_stiffness(
     model: Model, setting: Setting, values: Values, layers: Sequence[Layer], omega: Array, amplitude: Array
 ) -> Array:
-    """Complex stiffness of the rubber and the layers around it.
+    """Complex stiffness in a test of the rubber and the layers around it, such as the rig.
 
     Args:
         model: the model.
@@ -40,7 +40,7 @@ def layered_stiffness(
     }
 
     def below(count: int) -> StiffnessBelow:
-        """Build the response of the rubber and the innermost groups of layers.
+        """Build the steady response of the rubber and the innermost groups of layers.
 
         Args:
             count: number of groups of layers, from the rubber outward.
@@ -166,7 +166,7 @@ def branch_stiffness(
 def adjusted_values(
     model: Model, setting: Setting, values: Values, omega: Array, amplitude: Array, strain: Array
 ) -> Values:
-    """Parameter values after all modifiers at operating points.
+    """Compute the parameter values at operating points, after the changes by all modifiers.
 
     Args:
         model: the model.

@@ -74,7 +74,7 @@ class Structure:
 
 
 def in_groups(layers: Sequence[Layer]) -> list[list[Layer]]:
-    """Group adjacent layers with the same equation and an additive amount, such as two compliances in series.
+    """Group adjacent layers whose amounts can be added up, such as two compliances in series.
 
     Other layers form groups of one. The order, from the rubber outward, is kept.
     """
@@ -82,7 +82,7 @@ def in_groups(layers: Sequence[Layer]) -> list[list[Layer]]:
 
 
 def as_one_layer(group: Sequence[Layer], values: Values) -> tuple[Layer, Values]:
-    """Combine a group of layers with the same equation into the first layer, with the sum of their amounts."""
+    """Combine a group from `in_groups` into its first layer, with values that have the sum of all amounts."""
     first, layer_values = group[0], [values_for_effect(layer, values) for layer in group]
     return first, {
         **layer_values[0],

@@ -50,7 +50,7 @@ _AGREEMENT = 1.4
 
 
 def consequence_of(warning: str) -> str:
-    """Sentence of `uses.toml` on the consequence of a warning for the use of the numbers."""
+    """Return the sentence of `uses.toml` that states the consequence of a warning for the use of the numbers."""
     return next(use for pattern, use in _USES.items() if re.search(pattern, warning))
 
 
@@ -126,7 +126,7 @@ def agrees_within_noise(result: Result, direction: Place) -> bool:
 
 
 def unfitted_warnings(result: Result, direction: Place) -> Iterator[str]:
-    """Generate warnings for a direction that was not fitted, or whose formula deviates from finite elements.
+    """Generate warnings on a predicted direction that was not fitted, or whose formula deviates from finite elements.
 
     Args:
         result: fitted result.

@@ -208,7 +208,7 @@ def holm(probabilities: Sequence[float]) -> list[float]:
 
 
 def relative(logarithm: Array) -> Array:
-    """Convert the logarithm of a ratio, limited to +-ln(1e10), to a relative difference: exp(logarithm) - 1."""
+    """Convert natural logarithms of ratios, limited to +-ln(1e10), to relative differences: exp(logarithm) - 1."""
     return np.expm1(np.clip(logarithm, -_FURTHEST, _FURTHEST))
 
 
@@ -281,7 +281,7 @@ def exponent_of(name: str, parameter: Parameter) -> str | None:
 
 
 def quantities_of(result: Result, rows: Sequence[tuple[str, str | None]], omega: float) -> tuple[Array, Array]:
-    """Compute the compared quantities of a result and their derivatives by its parameters.
+    """Compute the quantities of a result that are compared, and their derivatives by the parameters.
 
     Args:
         result: fitted result.

@@ -121,7 +121,7 @@ def common_grid(
 
 
 def _limit(values: Array, ranges: Sequence[Any], count: int) -> Array:
-    """Values within all ranges, or `count` even values if fewer than two are; all values without a common range."""
+    """Select the values within all ranges; if fewer than two are, `count` even values over the common range, if any."""
     inside, low, high = _inside(values, ranges), max(low for low, _ in ranges), min(high for _, high in ranges)
     if low > high * (1 + MARGIN):
         return values
@@ -129,7 +129,7 @@ def _limit(values: Array, ranges: Sequence[Any], count: int) -> Array:
 
 
 def _inside(values: Array, ranges: Sequence[Any]) -> Array:
-    """Values within all ranges."""
+    """Select the values, (n,), within all ranges (low, high), with a margin for set points that the rig missed."""
     return values[np.all([(values >= a * (1 - MARGIN)) & (values <= b * (1 + MARGIN)) for a, b in ranges], axis=0)]
 
 
@@ -167,7 +167,7 @@ def _even(low: float, high: float, count: int) -> Array:
 
 
 def _distinct(values: Array) -> Array:
-    """Sort values and merge values within 1 % of each other, which are one set point that the rig missed."""
+    """Sort values, (n,), and merge those within 1 % of each other, which are one set point that the rig missed."""
     distinct: list[float] = []
     for value in np.unique(values):
         if not distinct or value > distinct[-1] * (1.0 + MARGIN):

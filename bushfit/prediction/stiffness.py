@@ -58,12 +58,12 @@ class Band:
     root: Array = field(default_factory=lambda: np.empty((0, 1)))
 
     def logarithm(self) -> Band:
-        """Convert to the natural logarithm of the (positive) quantity; the ends of the band become relative to it."""
+        """Band of the natural logarithm of the (positive) quantity."""
         low, high = (np.log(self.value) + end / self.value - 1.0 for end in (self.low, self.high))
         return Band(np.log(self.value), low, high, self.root / self.value)
 
     def minus(self, subtrahend: Band) -> Band:
-        """Subtract a quantity with independent errors.
+        """Band of the difference from another quantity, at the same points and with independent errors.
 
         Notes: the distance from the difference to an end of its band is the root sum of squares of the distances in the
         two bands (G. Zou, A. Donner, Stat. Med. 27 (2008) 1693).
@@ -182,7 +182,7 @@ def car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
 
 
 def _alternatives(result: Result, *, rig: bool) -> Iterator[Model]:
-    """Alternative models that agree with the tests: with the effects of the rig, or as in the car (`car_models`)."""
+    """Yield each model that the tests do not rule out, with the effects of the rig or as in the car (`car_models`)."""
     resolved = {*result.model.effects} - {*result.unresolved}
     for model in (alternative.model for alternative in result.alternatives):
         twins = [effect.name for effect in model.records if effect.twins and effect.name not in resolved]
