@@ -130,12 +130,6 @@ def test_many_rows_are_binned_without_loss(paper_model: Model) -> None:
     assert drive.first_harmonic() == pytest.approx(few.first_harmonic(), rel=2e-3)
 
 
-def test_a_wrong_zero_of_the_load_cell_alone_stays_visible(paper_model: Model) -> None:
-    """Only where the displacement is off zero too is the mean force taken for unknown."""
-    data_set = MeasuredLoop(prepare_drive(measured(paper_model, preload=5.0)))
-    assert np.mean(data_set.drive.force - data_set.force(paper_model)) == pytest.approx(5.0, abs=0.3)
-
-
 def with_hole(loop: Loop, begin: float, end: float) -> Loop:
     """A loop without the rows from one cycle count to another."""
     kept = (loop.time * FREQUENCY < begin) | (loop.time * FREQUENCY >= end)
@@ -155,12 +149,6 @@ def test_rows_that_are_missing_do_not_change_the_frequency(
         assert "rows are missing" in note
 
 
-def test_where_no_stroke_is_whole_the_hole_is_named(paper_model: Model) -> None:
-    loop = with_hole(measured(paper_model, cycles=2.0, start=0.1), 0.3, 1.6)
-    with pytest.raises(FitError, match=r"rows are missing inside the loop\n.*none from 2\.99 to 16 s"):
-        prepare_drive(loop)
-
-
 PERIOD = 10.0
 
 
@@ -170,12 +158,6 @@ def frequency_found(waveform: str, phase: Array) -> float:
     motion = AMPLITUDE * (rig.wave(waveform, phase) + noise)
     loop = Loop("loop", Direction.AXIAL, (phase - phase[0]) * PERIOD, motion, motion)
     return steady_cycles(loop).frequency * PERIOD
-
-
-@pytest.mark.parametrize(("rows", "cycles"), [(50, 1000), (200, 500), (500, 200)])
-def test_rows_that_keep_time_with_the_cycles_do_no_harm(rows: int, cycles: int) -> None:
-    """So many rows that some stand for all: every n-th of them may come at the same few phases again and again."""
-    assert abs(frequency_found("sine", np.arange(rows * cycles) / rows) - 1.0) * cycles < 1e-3
 
 
 @pytest.mark.parametrize("waveform", ["sine", "triangle"])
@@ -229,14 +211,3 @@ def test_the_true_model_leaves_only_noise_of_the_steady_cycles(paper_model: Mode
     assert drive.amplitude == pytest.approx(AMPLITUDE, rel=1e-2)
     assert drive.cycles == pytest.approx(round(drive.cycles * 4) / 4, abs=0.05)
     assert gap < 6e-3  # a long hold is remembered for longer than a cycle
-
-
-@pytest.mark.parametrize("motion", [sine(3), sine(1, start=0.25), sine(2.6, start=0.4), sine(1.1, start=0.1)])
-def test_a_steady_record_is_left_alone(motion: Array) -> None:
-    """From rest, one closed cycle, broken cycles and a little more than one; also with noise and outliers."""
-    rng = np.random.default_rng(1)
-    noisy = motion + 5e-3 * AMPLITUDE * rng.standard_normal(motion.size)
-    for one in (motion, noisy, np.where(rng.random(motion.size) < 0.003, 0.0, motion)):
-        loop = Loop("loop", Direction.AXIAL, np.arange(motion.size) * PERIOD / 1000, one, one)
-        found = steady_cycles(loop)
-        assert (found.loop, found.left_out) == (loop, None)

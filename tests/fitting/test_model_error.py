@@ -16,7 +16,6 @@ from scipy.optimize import least_squares
 from tries import SEEDS, some
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import FitSettings, ParameterSetting
 from bushfit.errors import FitError
 from bushfit.fitting.assess import FitStage, covariance
 from bushfit.fitting.coordinates import Coordinates, jacobian
@@ -171,19 +170,6 @@ def test_a_band_opens_by_the_model_error_beyond_the_tests(off_by_waves: tuple[Ca
     wider, narrow = (float((each.stiffness.high - each.stiffness.low)[0]) / 2.0 for each in (far, alone))
     own = 1.96 * result.model_error.far_deviation * float(far.stiffness.value[0])
     assert np.hypot(narrow, own) == pytest.approx(wider, rel=1e-3)
-
-
-@pytest.mark.parametrize("held", [(), ("m", "alpha", "sigma_fmax", "eps_half")], ids=["one on its bound", "no other"])
-def test_parameters_on_their_bounds_beside_a_model_error(rig: Rig, paper_model: Model, held: tuple[str, ...]) -> None:
-    campaign = spoiled(rig(3, shared=True), waves(0.03, 3))
-    given = {name: ParameterSetting(value=paper_model.values[name], vary=False) for name in held}
-    fit = FitSettings(parameters={**given, "mu": ParameterSetting(max=0.7 * paper_model.values["mu"])})
-    result = fit_joint(PreparedCampaign.from_campaign(replace(campaign, fit=fit)), profile=not held)
-    assert result.model_error is not None
-    assert set(result.profile) == (set() if held else set(FIVE))
-    assert result.at_bound == {"mu": "max"}
-    assert result.covariance.stderr("mu") is None
-    assert any("mu is at the max given in [fit]" in line for line in result.warnings)
 
 
 def test_the_closest_fit_is_as_near_as_five_parameters_can_be(off_by_waves: tuple[Campaign, Result]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import RigSettings, SimulateSettings
+from bushfit.campaign.schema import RigSettings
 from bushfit.fitting.drive import prepare_drive
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.fitting.preparation import MeasuredLoop
@@ -56,17 +56,6 @@ def scatter_of(found: Sequence[SweepNoise]) -> np.ndarray:
     return np.sqrt(np.mean([np.square(list(noise.random.values())) for noise in found], axis=(0, 1)))
 
 
-def kept(sweep: Sweep, rows: np.ndarray) -> Sweep:
-    columns = ("frequency", "amplitude", "stiffness", "repeat")
-    return replace(sweep, **{name: getattr(sweep, name)[rows] for name in columns}, reached=None)
-
-
-def with_a_loud_level(quiet: Sweep, loud: Sweep) -> dict[tuple[str, float], tuple[float, float]]:
-    """The scatter of each line where the largest level is that of another sweep."""
-    stiffness = np.where(quiet.amplitude == 5e-4, loud.stiffness, quiet.stiffness)
-    return sweep_noise([replace(quiet, stiffness=stiffness)]).random
-
-
 @pytest.mark.parametrize(("random", "gain", "phase"), [(5e-3, 0.0, 0.0), (1e-3, 8e-3, 1e-3), (1e-2, 3e-3, 6e-3)])
 def test_both_parts_are_recovered(noisy_sweep: Noisy, random: float, gain: float, phase: float) -> None:
     found = [sweep_noise([noisy_sweep(seed, random, gain, phase)]) for seed in range(200)]
@@ -76,14 +65,6 @@ def test_both_parts_are_recovered(noisy_sweep: Noisy, random: float, gain: float
     np.testing.assert_allclose(scatter_of(found), random, rtol=0.015)
     # a variance of nothing is estimated as nothing or a little, never as less
     np.testing.assert_allclose(shared, [gain, phase], rtol=0.1, atol=0.25 * random)
-
-
-def test_a_noisier_level_keeps_noise_of_its_own(noisy_sweep: Noisy) -> None:
-    quiet = noisy_sweep(1, 1e-3)
-    random = with_a_loud_level(quiet, noisy_sweep(2, 2e-2))
-    assert random["sweep", 5e-4][0] == pytest.approx(2e-2, rel=0.4)
-    assert random["sweep", 1e-4][0] == pytest.approx(1e-3, rel=0.4)
-    assert len(set(sweep_noise([quiet]).random.values())) == 1
 
 
 def test_scatter_grows_towards_low_frequency_where_repeats_show_it(noisy_sweep: Noisy) -> None:
@@ -116,39 +97,8 @@ def test_no_repeats_fall_back_to_a_smooth_curve_and_an_assumption(noisy_sweep: N
     assert "from the class of [rig]" in found[0].describe()
 
 
-def test_stated_noise_replaces_the_random_part(noisy_sweep: Noisy) -> None:
-    stated = sweep_noise([replace(noisy_sweep(0, repeats=1), noise=7e-3)])
-    assert stated.origin == "stated"
-    assert set(stated.random.values()) == {(7e-3, 7e-3)}
-    assert stated.shared == (0.0, 0.0)
-
-
-def test_no_noise_is_zero(noisy_sweep: Noisy) -> None:
-    """Neither of equal repeats nor of one, two or three points."""
-    whole = noisy_sweep(0)
-    tiny = [kept(whole, np.arange(rows)) for rows in (1, 2, 3)]
-    for sweep in (noisy_sweep(0, 0.0), *tiny):
-        noise = sweep_noise([sweep])
-        assert all(np.isfinite(pair).all() and min(pair) > 0.0 for pair in noise.random.values())
-
-
-def test_frequencies_where_many_lines_scatter_are_no_noise() -> None:
-    """Hum of 8 % at 55 and 65 Hz: the noise elsewhere stays 0.5 %, and a sweep of these two alone is no error."""
-    frequency, amplitude = map(np.ravel, np.meshgrid(np.arange(5.0, 156.0, 10.0), [1e-4, 2e-4, 4e-4, 8e-4]))
-    scatter = np.random.default_rng(3).normal(size=(2, 2, frequency.size))
-    hum = np.isin(frequency, [55.0, 65.0])
-    off = (5e-3 * scatter[0] + 0.08 * hum * scatter[1]).T @ [1.0, 1.0j]
-    stiffness = (1e6 + 1e5j) * (frequency / 50.0) ** 0.1 * (1.0 + off)
-    once = np.ones(frequency.size, dtype=int)
-    whole = Sweep("whole", Direction.AXIAL, frequency, amplitude, stiffness, once)
-    only = Sweep("only", Direction.RADIAL, frequency[hum], amplitude[hum], stiffness[hum], once[hum])
-    noise = np.array([*sweep_noise([whole, only]).random.values()])
-    assert np.all((noise > 3.5e-3) & (noise < 6.5e-3))
-
-
 Rig = Callable[..., Campaign]
 ROWS = 3000
-IDEAL = SimulateSettings()
 
 
 def filtered(random: np.random.Generator, rows: int, correlation: float) -> np.ndarray:
@@ -169,18 +119,6 @@ def low_passed(random: np.random.Generator, rows: int) -> np.ndarray:
     return noise / np.linalg.norm(response)
 
 
-def cycles_of(loop: Loop, cycles: int, noise: np.ndarray, rows: int = 1000) -> Loop:
-    """The second cycle of a loop so many times over, with noise on its force in 0.3 % of half its range."""
-    once = slice(rows, 2 * rows)
-    force = np.tile(loop.force[once], cycles)
-    return replace(
-        loop,
-        time=(loop.time[1] - loop.time[0]) * np.arange(force.size),
-        displacement=np.tile(loop.displacement[once], cycles),
-        force=force + 3e-3 * np.ptp(force) / 2.0 * noise,
-    )
-
-
 @pytest.mark.parametrize("correlation", [0.0, 0.9, 0.98])
 def test_the_rig_s_filter_is_found_and_taken_out(rig: Rig, paper_model: Model, correlation: float) -> None:
     found = [MeasuredLoop(prepare_drive(rig(seed, force_correlation=correlation).loops[0])) for seed in range(15)]
@@ -199,17 +137,6 @@ def test_the_rig_s_filter_is_found_and_taken_out(rig: Rig, paper_model: Model, c
         assert found[0].drive.correlated == ""
     if correlation == 0.9:
         assert found[0].drive.correlated.startswith(", correlated over about ")
-
-
-def test_a_row_left_out_tells_nothing(rig: Rig, paper_model: Model) -> None:
-    data_set = MeasuredLoop(prepare_drive(rig(2, force_correlation=0.9).loops[0]))
-    weight = np.ones(data_set.size)
-    weight[400:420] = 0.0
-    light = data_set.weighted(weight)
-    wild = replace(light, drive=replace(light.drive, force=np.where(weight > 0.0, light.drive.force, 1e6)))
-    assert np.array_equal(wild.residual(paper_model), light.residual(paper_model))
-    assert np.all(light.residual(paper_model)[400:421] == 0.0)
-    assert light.misfit(paper_model)[420] != 0.0
 
 
 def test_whitening_is_exact_from_the_first_row_on() -> None:
@@ -267,31 +194,3 @@ def test_harmonics_err_as_the_noise_says(kind: str, cycles: int, rows: int, corr
     mean, unsure = np.mean(squares), np.std(squares) / np.sqrt(len(squares))
     print(f"{kind}, {cycles} of {rows} rows: mean square of the harmonics {mean:.2f} +- {unsure:.2f}, 1 if right")
     assert 0.7 < mean < 1.5
-
-
-def test_how_an_unsure_filter_moves_the_covariance() -> None:
-    noise, _ = row_noise(*2 * [filtered(np.random.default_rng(0), ROWS, 0.9)], 3)
-    assert noise.order == 1
-    assert noise.error is not None
-    influence = np.cos(np.arange(ROWS) / 40.0)[None]
-
-    def variance(coefficient: float) -> float:
-        """Of the influence on rows that the found filter whitens, where the true one has another coefficient."""
-        true = RowNoise(noise.filter[0] * np.array([1.0, coefficient]), np.ones((1, 1)))
-        impulse = true._coloured(np.eye(1, ROWS)[0], 0) / true.filter[0]
-        share = noise.filter @ np.stack([influence[0], np.append(influence[0][1:], 0.0)])
-        return float(np.sum(np.square(np.convolve(share[::-1], impulse)[:ROWS])))
-
-    coefficient, step = noise.filter[1] / noise.filter[0], 1e-4
-    expected = (variance(coefficient + step) - variance(coefficient - step)) / (2.0 * step)
-    by_coefficient = noise.noise_sensitivity(influence)[1] / noise.error[1, 1]
-    assert float(by_coefficient[0] @ influence[0]) == pytest.approx(expected, rel=0.03)
-
-
-def test_settling_is_no_noise(rig: Rig) -> None:
-    (clean,) = rig(settings=IDEAL).loops
-    loop = cycles_of(clean, 3, np.random.default_rng(1).standard_normal(ROWS))
-    settled = replace(loop, force=loop.force * (1.0 + 0.02 * np.exp(-loop.time / 10.0)))
-    drifting = replace(loop, force=loop.force + 0.06 * np.ptp(loop.force) * loop.time / loop.time[-1])
-    for changed in (settled, drifting):
-        assert prepare_drive(changed).row_noise.order == 0

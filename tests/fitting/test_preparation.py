@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -13,7 +12,7 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, RigSettings
 from bushfit.errors import FitError
 from bushfit.fitting.noise import SweepNoise
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, prepare_loops, prepare_sweeps
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, prepare_loops
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
@@ -126,29 +125,6 @@ def test_the_right_model_of_a_loop_leaves_noise_alone(loop: MeasuredLoop, paper_
     assert np.max(np.abs(loop.noise_free(paper_model).residual(paper_model))) < 1e-9
 
 
-def test_rows_without_weight_count_for_nothing_and_are_still_shown(loop: MeasuredLoop, paper_model: Model) -> None:
-    light = loop.weighted(np.where(np.arange(loop.size) < 500, 0.0, 1.0))
-    assert light.residual_count == np.count_nonzero(loop.drive.weight[500:])
-    assert np.all(light.residual(paper_model)[:500] == 0.0)
-    off = (loop.force(paper_model) - loop.drive.force) / loop.drive.noise
-    np.testing.assert_allclose(light.displayed_residual(paper_model)[:500], off[:500], rtol=1e-9)
-    np.testing.assert_allclose(light.residual(paper_model)[500:], loop.residual(paper_model)[500:], rtol=1e-12)
-    assert light.relative(paper_model).size == light.residual_count
-    quarter = loop.weighted(np.full(loop.size, 0.25))
-    np.testing.assert_allclose(quarter.residual(paper_model), 0.5 * loop.residual(paper_model), rtol=1e-12)
-
-
-def test_answers_to_the_same_model_are_kept_and_cannot_be_written_over(loop: MeasuredLoop, paper_model: Model) -> None:
-    found = loop.force(paper_model)
-    assert np.array_equal(loop.force(paper_model.with_values({})), found)
-    assert not np.array_equal(loop.force(paper_model.with_values({"mu": 2e6})), found)
-    slopes = loop.jacobian(paper_model, ["mu", "m"])
-    assert loop.jacobian(paper_model, ["mu", "m"]) is slopes
-    with pytest.raises(ValueError, match="read-only"):
-        slopes[0] = 0.0
-    assert not np.array_equal(loop.jacobian(paper_model, ["m", "mu"]), slopes)
-
-
 def test_a_gain_error_of_the_rig_pulls_no_fit(rig: Rig, paper_model: Model) -> None:
     """The gain that each of eight loops asks for, all of gain 1: noise in the gain's own column would make it small.
 
@@ -175,25 +151,6 @@ def test_repeats_of_a_loop_share_the_error_of_its_gain(campaign: Campaign) -> No
     np.testing.assert_allclose([each.gain_error for each in found], [1e-2] * 4 + [5e-3])
 
 
-def test_only_tests_of_the_same_points_contradict_one_another(measured: PreparedCampaign) -> None:
-    """Dense sweeps that follow one another do not, nor do tests at other temperatures; the same ones 15 % apart do."""
-    sweep, frequency = measured.sweeps[0].sweep, np.geomspace(20.0, 200.0, 4000)
-    low, high = (
-        Sweep(name, Direction.AXIAL, part, np.full(part.size, 1e-4), 1e6 * part**0.1 * (1.0 + 0.1j))
-        for name, part in (("low", frequency[:2000]), ("high", frequency[2000:]))
-    )
-    other = replace(sweep, name="other", stiffness=1.15 * sweep.stiffness)
-    warm, cold = replace(other, temperature=313.15), replace(sweep, temperature=296.15)
-    loop = measured.loops[0].test
-    hot = replace(loop, name="hot", force=1.15 * loop.force, temperature=313.15)
-    for tests in ([low, high], [cold, warm]):
-        assert [one.contradiction for one in prepare_sweeps(tests)] == [None, None]
-    assert [one.contradiction for one in prepare_loops([replace(loop, temperature=296.15), hot])] == [None, None]
-    for _, one in (prepare_sweeps([sweep, other]), prepare_loops([loop, replace(hot, temperature=None)])):
-        assert one.contradiction is not None
-        assert re.search(r"differs by 1[5-7] %", one.contradiction)
-
-
 def test_dynamic_amplitudes_choose_the_levels(measured: PreparedCampaign) -> None:
     assert set(measured.smallest_sweep.amplitude) == {1e-4}
     other = replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(2e-4, 5e-4)))
@@ -201,13 +158,3 @@ def test_dynamic_amplitudes_choose_the_levels(measured: PreparedCampaign) -> Non
     absent = PreparedCampaign.from_campaign(replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(3e-4,))))
     with pytest.raises(FitError, match="no sweep at these amplitudes"):
         _ = absent.smallest_sweep
-
-
-def test_magnitudes_in_coarse_steps_are_told(campaign: Campaign) -> None:
-    """In steps of 50 N/mm they are few, in steps of 0.05 N/mm they are as many as the points."""
-    sweep = campaign.sweeps[0]
-    size, turn = np.abs(sweep.stiffness), sweep.stiffness / np.abs(sweep.stiffness)
-    for step, told in ((5e4, True), (50.0, False)):
-        (data_set,) = prepare_sweeps([replace(sweep, stiffness=np.round(size / step) * step * turn)])
-        lines = [note for note in data_set.notes if "are rounded" in note]
-        assert bool(lines) == told

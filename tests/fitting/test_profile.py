@@ -12,7 +12,6 @@ from tries import SEEDS
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
-from bushfit.effects import BASE
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import fit_joint
@@ -153,10 +152,6 @@ def sweep(*amplitudes: float, band: tuple[float, ...] = BAND) -> SimulatedSweep:
     return SimulatedSweep(Direction.AXIAL, amplitudes, band)
 
 
-#: Noise that leaves several parameters open, and no loop.
-ROUGH: dict[str, Any] = {"repeats": 1, "noise": 1e-2, "loops": ()}
-
-
 def warnings(campaign: Campaign, **asked: Any) -> tuple[str, ...]:
     return fit_joint(PreparedCampaign.from_campaign(campaign), **asked).warnings
 
@@ -188,30 +183,3 @@ def test_what_is_lacking_is_said_with_what_is_known_and_what_would_help(rig: Rig
         if known:
             assert any(line.startswith("what is known nevertheless") and known in line for line in lines)
         assert any(line.startswith("the most helpful further test") and further in line for line in lines)
-
-
-def test_an_effect_that_is_not_there_is_said_to_be_no_different_from_zero(rig: Rig) -> None:
-    lines = warnings(rig(1, **ROUGH, sweeps=(sweep(1e-4, 5e-4),)), effects=(*BASE, "viscous"))
-    assert "viscous.eta is no different from zero: these tests do not show viscous" in lines
-    assert not any("standard errors:" in line and "viscous" in line for line in lines)
-
-
-@pytest.mark.parametrize(("largest", "proposed"), [(1e-4, True), (3e-3, False)])
-def test_no_test_is_proposed_that_would_tear_the_rubber(
-    rig: Rig, paper_model: Model, largest: float, proposed: bool
-) -> None:
-    """Friction that gives way at strains beyond all reach: what would help is more amplitude, as far as rubber goes."""
-    model = paper_model.with_values({"sigma_fmax": 2e6, "eps_half": 2.0})
-    lines = warnings(rig(1, model, loops=(loop(largest, 0.1),), sweeps=(sweep(0.3 * largest, largest),)))
-    assert any("of eps_half: " in line for line in lines)
-    assert any("times the largest amplitude" in line for line in lines) is proposed
-
-
-def test_directions_that_share_no_parameter_have_sentences_of_their_own(rig: Rig) -> None:
-    result = fit_joint(PreparedCampaign.from_campaign(rig(1, **ROUGH, sweeps=(sweep(1e-4, 5e-4),))))
-    friction, springpot = [line for line in result.warnings if "standard errors:" in line]
-    assert "sigma_fmax and eps_half are determined only as a ratio" in friction
-    assert "m and alpha cannot be determined separately" in springpot
-    stderr, value = result.covariance.stderr("sigma_fmax"), result.model.values["sigma_fmax"]
-    assert stderr is not None
-    assert f"sigma_fmax {100 * stderr / value:.2g} %" in friction

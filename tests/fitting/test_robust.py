@@ -11,7 +11,6 @@ import pytest
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, SimulatedLoop, SimulatedSweep
-from bushfit.fitting.drive import prepare_drive
 from bushfit.fitting.loop_harmonics import MOST_ROWS
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
@@ -104,17 +103,6 @@ def test_outliers_do_not_spoil_the_bins_of_a_long_loop(rig: Rig, kind: str) -> N
     )
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_an_outlier_of_the_displacement_does_not_disturb_the_motion(rig: Rig, kind: str) -> None:
-    for seed in range(4):
-        (loop,) = rig(seed).loops
-        clean, rng = prepare_drive(loop), np.random.default_rng(seed)
-        drive = prepare_drive(replace(loop, displacement=spoilt(loop.displacement, kind, rng)))
-        assert drive.frequency == pytest.approx(clean.frequency, rel=1e-4)
-        assert drive.amplitude == pytest.approx(clean.amplitude, rel=1e-3)
-        assert kind == "stuck" or drive.outliers["displacement"].rows.size > 0.8 * SHARE * loop.force.size
-
-
 @pytest.mark.parametrize("seeds", [1, pytest.param(6, marks=pytest.mark.slow)])
 def test_clean_tests_have_no_outliers_and_the_same_answer(rig: Rig, other_models: dict[str, Model], seeds: int) -> None:
     shifts = []
@@ -125,19 +113,6 @@ def test_clean_tests_have_no_outliers_and_the_same_answer(rig: Rig, other_models
         shifts.append(moved(after, before))
     print(f"{len(shifts)} clean campaigns: soft_l1 moves a parameter by {np.max(np.abs(shifts)):.2f} errors at most")
     assert np.max(np.abs(shifts)) < 0.5
-
-
-@pytest.mark.parametrize("effect", ["bump_stop", "clearance", "fixture_resonance", "mullins_softening"])
-def test_physics_that_the_model_lacks_makes_no_outliers(rig: Rig, paper_model: Model, effect: str) -> None:
-    values = {
-        "bump_stop": {"bump_stop.gap": 3e-4, "bump_stop.stiffness": 3e5},
-        "clearance": {"clearance.delta": 2e-5},
-        "fixture_resonance": {
-            "fixture_resonance.mass": 0.05, "fixture_resonance.frequency": 170.0, "fixture_resonance.damping": 0.02,
-        },
-        "mullins_softening": {"mullins_softening.share": 0.2, "mullins_softening.cycles": 1.0},
-    }[effect]  # fmt: skip
-    assert fit_joint(PreparedCampaign.from_campaign(rig(1, paper_model.with_effect(effect, values)))).outliers == ()
 
 
 def test_outliers_are_listed_by_file_and_row_and_told(rig: Rig) -> None:
@@ -170,10 +145,3 @@ def test_one_outlier_of_a_short_sweep_without_repeats_is_found_at_any_row(
         found.append([entry.row - 1 for entry in robust(with_factor(campaign, [row], factor)).outliers])
     assert all(rows in ([row], []) for row, rows in zip(tried, found, strict=True))
     assert found.count([]) <= missed
-
-
-def test_outliers_side_by_side_do_not_hide_each_other_from_their_repeats(rig: Rig) -> None:
-    for seed in range(3):
-        rows = 20 + seed + np.arange(3)
-        found = robust(with_factor(rig(seed), rows, 1.1)).outliers
-        assert [entry.row - 1 for entry in found] == rows.tolist()

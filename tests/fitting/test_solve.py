@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import lmfit
@@ -18,7 +17,6 @@ from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
-from bushfit.fitting.procedures import fit_warnings
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
 from bushfit.model.model import FIVE, Model
@@ -64,16 +62,6 @@ def test_a_parameter_pushed_against_a_bound_rests_on_it_and_is_named(
     free = solve(FitProblem(paper_model, axial, FIVE))
     assert not free.at_bound
     assert free.chi_square < solution.chi_square
-
-
-def test_a_fit_that_is_stopped_where_chi_square_is_flat_is_one_and_is_told(
-    axial: list[MeasuredTest], result: Result
-) -> None:
-    near = result.model.with_values({"mu": 1.0001 * result.model.values["mu"]})
-    stopped = solve(FitProblem(near, axial, FIVE), evaluations=2)
-    assert (stopped.stopped, stopped.flat) == (True, True)
-    notes = fit_warnings(stopped.model, stopped, {}, result.covariance)
-    assert any(note.startswith("the fit was stopped after 2 evaluations") for note in notes)
 
 
 @pytest.mark.parametrize("many", [10, pytest.param(100, marks=pytest.mark.slow)])
@@ -136,29 +124,6 @@ def test_it_ends_where_lmfit_ends(
     assert found.chi_square == pytest.approx(known.chisqr, abs=1e-2)
     assert np.max(np.abs(found.point - end) / errors) < 0.05
     assert found.solution.at_bound == problem.at_bound(end)
-
-
-def test_it_never_climbs_and_counts_its_evaluations(paper_model: Model, data_sets: list[MeasuredTest]) -> None:
-    model = started(paper_model, data_sets)
-    here = Descent.start(FitProblem(model, data_sets, tuple(model.parameters)))
-    path = [here]
-    while not here.converged:
-        here = here.stepped()
-        path.append(here)
-    chi_square = [float(np.sum(residual(step.model, data_sets) ** 2)) for step in path]
-    print(", ".join(f"{x:.6g}" for x in chi_square))
-    assert chi_square == pytest.approx([step.chi_square for step in path], rel=1e-12)
-    assert all(np.diff(chi_square) <= 0.0)
-    assert [step.evaluations for step in path] == list(range(1, len(path) + 1))
-    assert path[-1].expected_fall < 0.01 < path[0].expected_fall
-
-
-def test_too_few_points_are_refused(data_sets: list[MeasuredTest], paper_model: Model) -> None:
-    sweep = data_sets[-1].test
-    columns = {name: getattr(sweep, name)[:2] for name in ("frequency", "amplitude", "stiffness", "repeat")}
-    few = replace(data_sets[-1], sweep=replace(sweep, **columns))  # type: ignore[call-arg]
-    with pytest.raises(FitError, match="too few points"):
-        Descent.start(FitProblem(paper_model, [few], tuple(paper_model.parameters)))
 
 
 def elsewhere(model: Model, names: list[str], rng: np.random.Generator) -> Model:
