@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rigged import LEVELS, cut
+from rigged import LEVELS
 
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.schema import RigSettings
@@ -54,18 +54,8 @@ def grid(levels: Array) -> Sweep:
     return silent(np.tile([5.0, 20.0, 60.0, 150.0], levels.size), np.repeat(levels, 4))
 
 
-def joined(*sweeps: Sweep) -> Sweep:
-    columns = ("frequency", "amplitude", "stiffness", "repeat")
-    return replace(sweeps[0], **{name: np.concatenate([getattr(each, name) for each in sweeps]) for name in columns})
-
-
 def off(sweep: Sweep) -> Array:
     return np.asarray(np.log(sweep.stiffness / PAPER.stiffness(Direction.AXIAL, sweep.frequency, sweep.amplitude)))
-
-
-def test_a_campaign_without_long_runs_is_as_it_was() -> None:
-    data = data_of(swept(PAPER, points=100))
-    assert condensed(data) == (data, ())
 
 
 def test_means_are_as_sharp_as_their_points() -> None:
@@ -77,19 +67,6 @@ def test_means_are_as_sharp_as_their_points() -> None:
     assert sweep.relative_noise == pytest.approx(expected, rel=0.1)
     assert abs(np.mean(off(sweep.sweep))) < 4.0 * expected / np.sqrt(600)
     assert set(sweep.sweep.amplitude) == set(LEVELS)
-
-
-def test_short_runs_beside_long_ones_stay_points_and_rows_without_weight_count_nowhere() -> None:
-    data = data_of(swept(PAPER), replace(swept(PAPER, points=30), name="short"), replace(swept(PAPER), name="off"))
-    long, short, off = data.sweeps
-    wild = long.without(np.arange(7)), short.without(np.array([3])), off.without(np.arange(5400))
-    banded, said = condensed(replace(data, sweeps=wild))
-    assert len(said) == 1
-    lowest = banded.sweeps[0].sweep.frequency[0]
-    assert lowest > condensed(data)[0].sweeps[0].sweep.frequency[0]  # the mean of what is left of the band
-    assert banded.sweeps[1].sweep is short.sweep
-    assert np.flatnonzero(banded.sweeps[1].weights == 0.0).tolist() == [3]
-    assert not banded.sweeps[2].weights.any()
 
 
 def test_of_very_many_levels_some_are_diagnosed_and_none_forgotten() -> None:
@@ -136,22 +113,6 @@ def test_means_lie_on_the_curve(sweep: Sweep, largest: float) -> None:
         assert made.frequency.tolist() == [10.0] * 100 + [100.0] * 100
 
 
-def test_lines_keep_their_own_noise_beside_means() -> None:
-    """A short level in a long sweep, and a short sweep beside one: 1 % stays 1 %, stated or found."""
-    few = swept(PAPER, points=30, repeats=1, seed=5)
-    whole = swept(PAPER)
-    mixed = joined(cut(whole, whole.amplitude < LEVELS[2]), cut(few, few.amplitude == LEVELS[2]))
-    in_means = SCATTER / np.sqrt(POINTS / 100)
-    for stated in (None, SCATTER):
-        data = data_of(replace(mixed, noise=stated), replace(few, name="short", noise=stated))
-        long, short = condensed(data)[0].sweeps
-        found = {key: gain for key, (gain, _) in long.noise.random.items()}
-        assert long.noise is short.noise
-        assert found["swept", LEVELS[0]] == pytest.approx(in_means, rel=0.15)
-        assert found["swept", LEVELS[2]] == pytest.approx(SCATTER, rel=0.25)
-        assert found["short", LEVELS[0]] == pytest.approx(SCATTER, rel=0.25)
-
-
 def test_a_hidden_lag_is_named_in_a_long_sweep_and_the_means_are_told() -> None:
     lagging = PAPER.with_effect("delay", {"delay.tau": 2e-4})
     found = diagnose(data_of(swept(lagging)))
@@ -159,27 +120,6 @@ def test_a_hidden_lag_is_named_in_a_long_sweep_and_the_means_are_told() -> None:
     assert any("narrow bands" in note for note in found.notes)
     low, high = found.result.interval("delay.tau") or (0.0, 0.0)
     assert low < 2e-4 < high
-
-
-@pytest.mark.parametrize("beside", [False, True], ids=["alone", "beside a short one"])
-def test_a_clean_long_sweep_is_consistent(beside: bool) -> None:
-    """The noise is white and of the fit's own kind, which proves half."""
-    short = [replace(swept(PAPER, 30, 1, 100), name="short")] * beside
-    assert diagnose(data_of(swept(PAPER), *short)).verdict == "consistent"
-
-
-def test_means_that_a_robust_fit_leaves_out_are_told() -> None:
-    """Rows of two bands 2.5 standard deviations off are no outliers; the mean of one is."""
-    sweep = swept(PAPER)
-    band = (sweep.frequency > 40.0) & (sweep.frequency < 43.0) & (sweep.amplitude == LEVELS[1]) & (sweep.repeat == 1)
-    assert np.count_nonzero(band) == 19
-    off_there = replace(sweep, stiffness=np.where(band, 1.0 + 2.5 * SCATTER, 1.0) * sweep.stiffness)
-    data = data_of(off_there)
-    robust = PreparedCampaign.from_campaign(replace(data.campaign, fit=replace(data.campaign.fit, loss="soft_l1")))
-    (told,) = [note for note in diagnose(robust).notes if "left out" in note]
-    assert told == "swept: 1 of these points are left out, because they deviate by more than noise"
-    as_it_was = replace(robust.campaign, sweeps=(sweep,))
-    assert not any("left out" in note for note in diagnose(PreparedCampaign.from_campaign(as_it_was)).notes)
 
 
 @pytest.mark.parametrize(("most", "kept"), [(6.0, "012345"), (5.0, "01235"), (4.1, "0125"), (3.2, "015"), (0.1, "15")])
@@ -208,15 +148,3 @@ def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_re
     assert fewer.sweeps == data.sweeps
     whole = sum(made[int(name)][1] == 1.0 and made[int(name)][2] == 0 for name in kept)
     assert fewer.loops[0].gain_error == pytest.approx(0.01 * np.sqrt(whole if kept[0] != "1" else 1))
-
-
-def test_points_left_out_meet_at_their_own_frequency_in_runs_that_are_diagnosed_in_means() -> None:
-    """Rows count in the sweep as it was read: in its means the points that were left out are no more."""
-    sweep = swept(PAPER, points=450)
-    rows = np.flatnonzero(sweep.frequency == sweep.frequency[200])
-    factor = np.ones(sweep.frequency.size)
-    factor[rows] += np.where(np.arange(rows.size) % 2, 0.2, -0.2)
-    diagnosis = diagnose(data_of(replace(sweep, stiffness=sweep.stiffness * factor)))
-    assert rows.size > 3
-    assert diagnosis.verdict == "unexplained"
-    assert f"{sweep.frequency[200]:.4g} Hz in axial ({rows.size} points left out)" in diagnosis.summary

@@ -24,13 +24,12 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.power_law import Measure, PowerLaw, Term, nearest_power_law
 from bushfit.effects.contract import Array, Level
 from bushfit.effects.unnamed import Patch, Unnamed
-from bushfit.errors import ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import Model
-from bushfit.model.result import Alternative, Range, Result, transfer_compound
+from bushfit.model.result import Range, Result, transfer_compound
 from bushfit.prediction.caveats import caveats
 from bushfit.prediction.stiffness import predict, predict_resonance
 from bushfit.report.results import to_json
@@ -91,24 +90,6 @@ def test_the_parameters_beside_it_are_no_longer_bent(
     assert described.after.chi_square < 1.15 * evidence.residual.size
 
 
-def test_a_gap_beside_a_replaced_branch_is_described(measured: Measured, fitted: Fitted) -> None:
-    """Starting values that were read off for the branch are none of the model's."""
-    evidence = fitted(with_relaxation(measured()), "distributed_sliders")
-    start = {**evidence.model.values, "sigma_fmax": 1e4, "eps_half": 1e-2}
-    assert describe(evidence, RigSettings(), start, (), {}) is not None
-
-
-def test_errors_of_levels_are_not_described(measured: Measured, fitted: Fitted) -> None:
-    """The middle level 8 % off in both directions: nothing predicts it from the others."""
-    campaign = replace(measured(), loops=())
-    sweeps = [
-        replace(sweep, stiffness=sweep.stiffness * np.where(sweep.amplitude == LEVELS[1], 1.08, 1.0))
-        for sweep in campaign.sweeps
-    ]
-    wrong = fitted(replace(campaign, sweeps=tuple(sweeps)))
-    assert describe(wrong, RigSettings(), wrong.model.values, (), {}) is None
-
-
 def test_what_the_diagnosis_says(measured: Measured) -> None:
     """On a rig of which it is known that no error of a level makes it up."""
     rig = RigSettings(gain_error=5e-4, phase_error=5e-4)
@@ -126,32 +107,6 @@ def test_what_the_diagnosis_says(measured: Measured) -> None:
     assert complaints("diagnosis", json.loads(to_json(document)), whole=True) == []
     inside = predict(found.result, Direction.AXIAL, [45.0, 95.0], [LEVELS[1]]).stiffness
     assert np.all(inside.high - inside.value < 0.01 * inside.value)
-
-
-@pytest.mark.parametrize(
-    ("spoil", "place"),
-    [
-        (lambda data: data["patches"][0]["in_phase"].pop(), "patches"),
-        (lambda data: data["patches"][0].update(strain=[-1.0] * len(data["patches"][0]["strain"])), "patches"),
-        (lambda data: data.update(size=0.0), "unnamed"),
-        (lambda data: data.update(lengths=["a", 1.0]), "lengths"),
-        (lambda data: data.pop("patches"), "patches"),
-    ],
-)
-def test_spoiled_data_is_one_clear_error(spoil: object, place: str, result: Result) -> None:
-    document = json.loads(json.dumps(to_document(result)))
-    spoil(document["unnamed"])  # type: ignore[operator]
-    with pytest.raises(ModelError) as error:
-        from_document(document)
-    print(error.value)
-    assert place in str(error.value)
-
-
-def test_an_effect_without_its_data_is_refused(result: Result) -> None:
-    document = to_document(result)
-    del document["unnamed"]
-    with pytest.raises(ModelError, match="without its data"):
-        from_document(document)
 
 
 def test_predictions_use_it_inside_the_range_and_open_outside(result: Result) -> None:
@@ -225,18 +180,6 @@ def test_they_are_told_of_a_resonance_and_stay_with_a_compound_that_is_carried(m
     said = caveats(other)
     assert not any("the prediction uses the plain model" in line for line in (*other.warnings, *said))
     assert any("permit other values of the parameters" in line for line in said)
-
-
-def test_a_file_keeps_a_correction_that_alternatives_have_too(paper_model: Model) -> None:
-    rows = ((5.0, 50.0), (0.01, 0.01), (0.01, 0.02), (0.0, 0.0), (0.001, 0.001), (0.001, 0.001))
-    data = Unnamed(0.02, (0.9, 0.9), (Patch(("axial",), *rows),))
-    corrected = replace(paper_model, effects=(*paper_model.effects, "unnamed"), unnamed=data)
-    found = Result(corrected, alternatives=(Alternative(corrected.with_effect("inertia"), 0.6),))
-    document = json.loads(json.dumps(to_document(found)))
-    assert from_document(document).alternatives == found.alternatives
-    document["alternatives"][0]["values"]["mu"] = -1.0
-    with pytest.raises(ModelError, match="alternatives, #1"):
-        from_document(document)
 
 
 def test_what_was_corrected_counts_as_error_where_the_compound_is_carried(paper_model: Model) -> None:

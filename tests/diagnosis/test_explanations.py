@@ -7,24 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 import pytest
-from rigged import LEVELS, SHARED, Fitted, Measured, Tamper, both, loop_too_strong, no_loops, no_repeats, no_sweeps, off
+from rigged import LEVELS, SHARED, Fitted, Measured, Tamper, both, loop_too_strong, off
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation, unnamed_curves
 from bushfit.diagnosis.faulty_places import faulty_places
 from bushfit.diagnosis.linear_model import LinearModel
-from bushfit.diagnosis.propose import proposals, scores, sensitivity
+from bushfit.diagnosis.propose import proposals, scores
 from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
-from bushfit.effects import BASE, LIBRARY, get_effect
-from bushfit.effects.contract import Array, Values
-from bushfit.fitting.preparation import MeasuredTest, split_by_kind
+from bushfit.effects import BASE, LIBRARY
+from bushfit.fitting.preparation import split_by_kind
 from bushfit.gaussian_process import matern
-from bushfit.model.model import Model
 
 SHARED_RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
 
@@ -80,17 +77,6 @@ def test_a_level_may_be_off_by_a_slope_over_the_logarithm_of_frequency(bare: Evi
     assert np.ptp(ratio - expected[touched]) < 1e-9
 
 
-@pytest.mark.parametrize(
-    ("part", "gone"),
-    [(no_loops, {"loop"}), (no_repeats, {"repeat"}), (no_sweeps, {"level", "repeat", "frequency", "loop"})],
-)
-def test_places_are_those_of_the_tests_there_are(
-    measured: Measured, fitted: Fitted, part: Tamper, gone: set[str]
-) -> None:
-    evidence = in_scatter_units(fitted(part(measured(plan=SHARED))))
-    assert {each.family for each in faulty_places(evidence)} == {"frequency", "level", "repeat", "loop"} - gone
-
-
 def test_curves_have_unit_variance_and_fall_off_with_distance(bare: Evidence) -> None:
     """In shares of |K|, of one direction or of all, and of the loops their harmonics; a rough one as far as it goes."""
     made = {each.name: each for each in unnamed_curves(bare)}
@@ -110,21 +96,6 @@ def test_curves_have_unit_variance_and_fall_off_with_distance(bare: Evidence) ->
         assert not group.columns[:, : bare.place[sweep].start].any()
 
 
-def test_effects_are_sized_by_what_they_change(bare: Evidence) -> None:
-    """A typical amount times its unit is its largest share of |K|; of one that replaces a branch its refit tells."""
-    found = {each.name: each for each in proposals(bare, ("delay",), ())}
-    assert "delay" not in found
-    assert found["kraus"].group is None
-    group = found["inertia"].group
-    assert group is not None
-    assert (group.sign, found["inertia"].family) == (1, "inertia")
-    assert found["stiffness_factor.radial"].family == "stiffness_factor"
-    effect = get_effect("inertia")
-    heavy = bare.model.with_effect("inertia", {"inertia.mass": effect.amount.value_at_share(0.01)})
-    largest = max(each.change(heavy, bare.model) for each in bare.data_sets)
-    assert 0.01 * group.unit[0] == pytest.approx(largest, rel=0.1)
-
-
 def test_every_effect_is_proposed_but_twins_and_what_the_tests_do_not_state(bare: Evidence) -> None:
     found = {each.name: each for each in proposals(bare, (), ())}
     twins = {twin for effect in LIBRARY.values() for twin in effect.twins}
@@ -134,34 +105,6 @@ def test_every_effect_is_proposed_but_twins_and_what_the_tests_do_not_state(bare
     temperature = found["temperature"]  # none is stated
     assert temperature is not None
     assert (temperature.score, temperature.visible) == (0.0, False)
-
-
-class Gapped:
-    """A test that answers the stiffness of a stop, and nothing finite where its gap is wide."""
-
-    direction, frequency, amplitude = "axial", np.array([5.0, 50.0]), np.array([1e-4, 1e-3])
-
-    def residual(self, model: Model, values: Values | None = None) -> Array:
-        if "bump_stop" not in model.effects:
-            return np.array([3.0])
-        values = values or model.values
-        return np.where(values["bump_stop.gap"] > 5e-4, np.nan, 3.0 + 2.0 * values["bump_stop.stiffness"])
-
-
-def test_shapes_without_a_response_are_left_out(paper_model: Model) -> None:
-    """The widest gap, at which no stop is asked for its stiffness either, is one of them."""
-    stop = get_effect("bump_stop")
-    shapes, columns = sensitivity(paper_model, cast(Sequence[MeasuredTest], [Gapped()]), stop)
-    assert 0 < len(shapes) == len(columns)
-    assert all(shape["bump_stop.gap"] <= 5e-4 for shape in shapes)
-    np.testing.assert_allclose(columns, 2.0 * stop.amount.typical, rtol=1e-6)
-
-
-def test_an_effect_is_visible_where_any_of_its_shapes_is(bare: Evidence) -> None:
-    """Of a second springpot one shape is the first, and noise may speak against all others."""
-    against = replace(bare, solution=replace(bare.solution, residual=-bare.residual))
-    for evidence in (bare, against):
-        assert all(each.visible for each in proposals(evidence, (), ()) if each.name == "second_springpot")
 
 
 def test_scores_are_those_of_a_linear_refit(bare: Evidence) -> None:
@@ -176,18 +119,3 @@ def test_scores_are_those_of_a_linear_refit(bare: Evidence) -> None:
         assert seen
         assert gain == pytest.approx(float((before - after)[0]), rel=1e-6)
         assert amount == pytest.approx(-answer[-1], rel=1e-6)
-
-
-def test_columns_that_the_model_absorbs_are_not_seen(bare: Evidence) -> None:
-    own = bare.solution.jacobian
-    for found in scores(bare, np.vstack((own[:1], own[0] + own[2], np.zeros(own.shape[1])))):
-        assert not found.any()
-
-
-def test_two_powers_that_would_follow_any_law_between_them_are_not_looked_for_together(bare: Evidence) -> None:
-    """Stiffening with the square and with the fourth power of amplitude: one of them is asked of each model."""
-    powers = {"strain_stiffening", "fifth_power_stiffening"}
-    assert powers <= {proposal.name for proposal in proposals(bare, (), ())}
-    for power in powers:
-        solution = replace(bare.solution, model=bare.model.with_effect(power))
-        assert not powers & {proposal.name for proposal in proposals(replace(bare, solution=solution), (), ())}

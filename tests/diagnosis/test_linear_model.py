@@ -7,8 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.special import logsumexp
 from scipy.stats import kstest, multivariate_normal, norm
 
@@ -24,7 +22,6 @@ NODES = (
     Node(1.4, (2.0, 0.0), np.log(0.3)),
     Node(0.8, (1.0, 2.5), np.log(0.2), wide=True),
 )
-SEEDS = st.integers(0, 2**32 - 1)
 
 
 def ledger(seed: int, *, flat: int = 2, known: int = 1, rows: int = 10, groups: bool = True) -> LinearModel:
@@ -149,18 +146,6 @@ def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed: int) -> Non
         assert found == pytest.approx(over_sizes, abs=1e-6)
 
 
-@given(SEEDS)
-def test_what_does_nothing_leaves_the_evidence_as_it_is(seed: int) -> None:
-    """Columns of nothing, or of what the parameters do too, or that the tests hardly see."""
-    of = ledger(seed)
-    nothing, spanned = np.zeros((2, of.residual.size)), of.jacobian[:2] + of.jacobian[1]
-    groups = [Group(each, np.eye(2), act_together=True) for each in (nothing, spanned)]
-    groups += [Group(each, np.ones(2), act_together=False) for each in (nothing, spanned)]
-    groups += [replace(of.groups[3], unit=np.zeros(2)), Group(nothing, np.ones(2), act_together=False, sign=1)]
-    for each in replace(of, groups=groups).group_evidence:
-        assert each.log_evidence == pytest.approx(of.log_evidence, abs=1e-5)
-
-
 def test_the_size_is_that_of_what_was_put_there() -> None:
     of = ledger(6)
     group = of.groups[3]
@@ -208,37 +193,3 @@ def test_the_chance_of_clean_tests_is_even(node: int) -> None:
     print(f"p {kstest(alone, 'uniform').pvalue:.3f}; below 5 %: {np.mean(np.array(every) < 0.05):.3f}")
     assert kstest(alone, "uniform").pvalue > 1e-3
     assert np.mean(np.array(every) < 0.05) < 0.09
-
-
-@given(SEEDS, st.floats(0.5, 12.0))
-def test_nodes_that_nothing_more_makes_likely_are_kept(seed: int, far: float) -> None:
-    of = ledger(seed)
-    exact = [restricted(of, covariance(of, node)) + node.log_weight for node in of.rig.nodes]
-    within = max(value for value, node in zip(exact, of.rig.nodes, strict=True) if not node.wide)
-    kept = [of.rig.nodes[number] for number in of.likely(far)]
-    near = zip(of.rig.nodes, exact, strict=True)
-    assert all(node in kept for node, value in near if value > within - far + 1e-6 and not node.wide)
-
-
-@given(SEEDS)
-def test_nodes_that_a_group_makes_likely_are_kept(seed: int) -> None:
-    """They are others than nothing more makes likely: what a group explains is no error of the rig."""
-    of = ledger(seed)
-    best = int(np.argmax([each.log_evidence for each in of.group_evidence]))
-    kept = replace(of, chosen_nodes=of.likely(8.0)).group_evidence[best].log_evidence
-    assert kept == pytest.approx(of.group_evidence[best].log_evidence, abs=0.1)
-
-
-def test_columns_that_move_together_change_what_their_sum_does_where_it_is_largest() -> None:
-    """Of gain and phase the length; of patterns that meet at a point their sum, however small each is elsewhere."""
-    plain = ledger(3)
-    columns = plain.groups[0].columns
-    sizes = []
-    for unit in ([[1.0], [0.0]], [[0.0], [1.0]], [[1.0], [1.0j]], [[1.0, 3.0], [1.0j, 3.0j]], [[1.0, 0.0], [0.0, 1.0]]):
-        (worth,) = replace(plain, groups=[Group(columns, np.array(unit), act_together=True)]).group_evidence
-        sizes.append(worth.size)
-        assert worth.log_evidence == pytest.approx(plain.group_evidence[0].log_evidence)
-    first, second, both, thrice, larger = sizes
-    assert both == pytest.approx(np.hypot(first, second))
-    assert thrice == pytest.approx(3.0 * both)
-    assert max(first, second) <= larger <= both

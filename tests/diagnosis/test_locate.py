@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigged import INERTIA, LEVELS, SHARED, SLIP, TWO, Effects, Fitted, Measured, both, off, one_loop
+from rigged import INERTIA, LEVELS, SHARED, SLIP, TWO, Effects, Fitted, Measured
 
 from bushfit.diagnosis.evidence import fit
 from bushfit.diagnosis.holdout import hold_out, parts
@@ -84,15 +83,6 @@ def test_loops_alone(where_of: Callable[[Effects], tuple[MisfitRegion, ...]], ef
     assert all("a constant force" in where.reading for where in found)
 
 
-def test_a_region_that_lies_on_either_side_of_the_model_says_so(measured: Measured, fitted: Fitted) -> None:
-    """One level above, another below: the sentence names both, as the map shows them."""
-    tampered = both(off(1, 1.06, amplitude=LEVELS[0]), off(1, 0.95, amplitude=LEVELS[2]))(measured(plan=SHARED))
-    reading = one(find_regions(fitted(tampered)), "radial", "storage").reading
-    assert "above the model" in reading
-    assert "most at 0.1 mm, nearly constant over frequency there" in reading
-    assert reading.endswith("; below it at 0.5 mm")
-
-
 #: A mass that bends a plain model far.
 HEAVY = {"inertia": {"mass": 0.2}}
 
@@ -163,19 +153,3 @@ def test_the_prediction_s_own_error_is_that_of_a_sandwich_of_runs_and_loops(meas
     expected = np.sqrt(left[rows] @ np.linalg.solve(whole, left[rows]) / len(whole))
     print(f"{which}: {found.after:.3f}, in units of its own error too {expected:.3f}")
     assert found.whitened == pytest.approx((expected, expected), rel=1e-6)
-
-
-def test_what_cannot_be_predicted_is_told_with_the_reason(measured: Measured, fitted: Fitted) -> None:
-    """Without its own rows nothing is known of a gain that only loops show."""
-    campaign = measured()
-    evidence = fitted(replace(campaign, loops=campaign.loops[:1]), "force_gain")
-    found = hold_out(evidence, evidence, {})
-    assert not any("axial direction" in part.part for part in found.parts)
-    (skipped,) = [skipped for skipped in found.skipped if skipped.part == "axial direction"]
-    print(skipped)
-    assert "force_gain" in skipped.effects
-    assert "force_gain.g" in skipped.reason
-    alone = fitted(one_loop(campaign))
-    nothing = hold_out(alone, alone, {})
-    assert nothing.parts == ()
-    assert nothing.before is nothing.after is None

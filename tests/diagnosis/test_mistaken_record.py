@@ -17,11 +17,8 @@ from rigged import SHARED, Measured, Tamper, asked, said
 from tries import some
 
 from bushfit.campaign.campaign import Campaign, load_campaign
-from bushfit.campaign.schema import RigSettings
 from bushfit.commands.diagnose import diagnose
-from bushfit.diagnosis.claims import adopted
 from bushfit.diagnosis.record import Diagnosis
-from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Direction
 from bushfit.reading.measurement import Loop, Sweep
 
@@ -94,16 +91,6 @@ def test_what_cannot_be_told_apart_is_ambiguous(measured: Measured) -> None:
         "twice_in_newton:sweep_axial + twice_in_newton:sweep_radial",
     }
     assert diagnosis.after is diagnosis.before
-
-
-def test_mended_repeats_still_share_the_error_of_their_gain(measured: Measured) -> None:
-    campaign = replace(measured(None, SHARED), rig=RigSettings(gain_error=5e-3))
-    again = replace(campaign.loops[0], name="again")
-    campaign = replace(campaign, loops=(*campaign.loops, again))
-    wrong = on_loops(lambda x: replace(x, time=x.time / 10), 2)(campaign)
-    mended, _ = adopted(PreparedCampaign.from_campaign(wrong), ["ten_times_slower:again"])
-    right = PreparedCampaign.from_campaign(campaign)
-    assert [loop.gain_error for loop in mended.loops] == [loop.gain_error for loop in right.loops]
 
 
 def test_what_all_tests_share_is_not_seen_and_not_named(measured: Measured) -> None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigged import SHARED, Measured, asked, no_loops, no_repeats, no_sweeps, one_direction, said
+from rigged import SHARED, Measured, asked, no_loops, no_repeats, no_sweeps, said
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.next_test import BUSHING_TESTS, FIXTURE_TESTS, deciding_test, remaining_entropy
@@ -97,12 +97,6 @@ def data_sets(measured: Measured) -> list[MeasuredTest]:
     return [*data.loops, *data.sweeps]
 
 
-def test_one_model_needs_none(paper_model: Model, data_sets: list[MeasuredTest]) -> None:
-    assert deciding_test([paper_model], EVEN[:1], data_sets) == ""
-    assert deciding_test([], (), data_sets) == ""
-    assert deciding_test([paper_model, paper_model], EVEN, data_sets) == ""
-
-
 def with_each(model: Model, *effects: dict[str, float]) -> list[Model]:
     """The model with one effect more, each in turn, by the values of its parameters."""
     return [model.with_effect(next(iter(values)).partition(".")[0], values) for values in effects]
@@ -139,18 +133,6 @@ def test_pairs(
     assert deciding_test(models[::-1], EVEN, data_sets) == found
 
 
-def test_a_direction_that_is_swept_is_no_next_test(paper_model: Model, measured: Measured) -> None:
-    """Compliance and a softer rubber differ most in the stiff direction: to be swept where it has not been."""
-    models = with_each(paper_model, {"viscous.eta": 100.0}, {"interface_slip.force": 1.0})
-    campaign = measured()
-    alone, both = (
-        PreparedCampaign.from_campaign(one_direction(campaign)).sweeps,
-        PreparedCampaign.from_campaign(campaign).sweeps,
-    )
-    assert "axial" not in deciding_test(models, EVEN, alone)
-    assert not any(direction in deciding_test(models, EVEN, both) for direction in ("axial", "radial"))
-
-
 def test_a_factor_of_one_direction_is_settled_by_a_reference_spring_in_its_fixture(
     paper_model: Model, data_sets: list[MeasuredTest]
 ) -> None:
@@ -168,15 +150,6 @@ def test_the_next_test_is_within_the_limits_of_the_rig(paper_model: Model, data_
     top = max(float(data_set.frequency.max()) for data_set in data_sets)
     assert "highest frequency" in deciding_test(models, EVEN, data_sets)
     assert "highest frequency" not in deciding_test(models, EVEN, data_sets, RigSettings(max_frequency=top))
-
-
-def test_a_test_without_the_rig_parts_nothing_inside_the_rubber(
-    paper_model: Model, data_sets: list[MeasuredTest]
-) -> None:
-    models = with_each(paper_model, {"viscous.eta": 100.0}, {"strain_stiffening.c3": 20.0})
-    found = deciding_test(models, EVEN, data_sets)
-    assert found in SENTENCES
-    assert not any(words in found for words in ("fixture", "dummy"))
 
 
 @pytest.mark.parametrize("odds", [(1.0, 1.0), (0.8, 0.2)])

@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from rigged import LEVELS, SHARED, Fitted, Measured, no_sweeps
-from scipy.special import logsumexp
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import WAVES
-from bushfit.diagnosis.rig_errors import blocks, in_scatter_units, nodes
+from bushfit.diagnosis.rig_errors import blocks, in_scatter_units
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
 
@@ -52,19 +51,6 @@ def test_what_shares_an_error_moves_together(
     assert np.abs(best - wanted).max() < 0.02 * np.abs(wanted).max()
 
 
-def test_every_point_is_in_one_block_and_scatters_as_its_sweep(bare: Evidence) -> None:
-    """Loops each by itself, and each level of a sweep in gain and in phase."""
-    loops, sweeps = split_by_kind(bare.data_sets)
-    made = list(blocks(bare, RIG))
-    rows = np.concatenate([block.rows for block in made])
-    assert np.array_equal(np.sort(rows), np.arange(bare.residual.size))
-    assert [block.scatters for block in made].count(False) == len(loops)
-    assert sum(block.scatters for block in made) == 2 * len(LEVELS) * len(sweeps)
-    kinds = np.concatenate([block.kinds for block in made if block.scatters])
-    runs = 2 * 3 * len(LEVELS) * len(sweeps)
-    assert [np.count_nonzero(kinds == kind) for kind in (RUN, LEVEL, WAVE)] == [runs, runs // 3, runs * WAVES]
-
-
 def test_waves_are_independent_of_what_the_run_shares(bare: Evidence) -> None:
     """And fall in variance as the square of their order."""
     block = next(block for block in blocks(bare, RIG) if block.scatters)
@@ -80,17 +66,3 @@ def test_repeated_loops_share_their_gain(measured: Measured, fitted: Fitted) -> 
     bare = in_scatter_units(fitted(replace(campaign, loops=(first, second, replace(first, name="again")))))
     assert sorted(block.rows.size for block in blocks(bare, RIG)) == [second.time.size, 2 * first.time.size]
     assert all(block.kinds.tolist() == [LOOP] for block in blocks(bare, RIG))
-
-
-def test_sizes_have_weights_that_sum_to_one(measured: Measured, fitted: Fitted, bare: Evidence) -> None:
-    """The scatter has sizes of its own where few points tell it, loops alone have no runs."""
-    sweep = split_by_kind(bare.data_sets)[1][0]
-    few = replace(bare, data_sets=(replace(sweep, noise=replace(sweep.noise, scatter_freedom=4)),))
-    alone = in_scatter_units(fitted(no_sweeps(measured(plan=SHARED))))
-    for evidence, scatters, runs in ((bare, 1, 5), (few, 3, 5), (alone, 1, 1)):
-        made = nodes(evidence)
-        assert logsumexp([node.log_weight for node in made]) == pytest.approx(0.0, abs=1e-9)
-        assert len({node.scatter for node in made}) == scatters
-        assert len({node.errors[RUN] for node in made}) == runs
-        assert {node.wide for node in made} == {False, True}
-        assert all(node.wide == (node.errors[LEVEL] > 1.5) for node in made)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import log
 from types import SimpleNamespace
 from typing import Any
@@ -88,15 +87,3 @@ def test_names_stand_beside_what_has_none_where_they_change_most(last: float, ve
     assert finding.verdict == verdict
     assert finding.leads == (("inertia",) if verdict == "described" else ())
     assert told(finding) == {"inertia+unnamed": 1.0}
-
-
-@pytest.mark.parametrize("more", [(), ("inertia+delay",)])
-def test_a_leader_that_does_not_fit_is_a_lead(more: tuple[str, ...]) -> None:
-    finding = decide_verdict([*(one(parts, 2.0) for parts in more), one("inertia", 1.0, p_value=1e-4)], TOLERANCE)
-    assert (finding.verdict, finding.leads) == ("described", ("inertia",))
-
-
-def test_only_ratios_count() -> None:
-    every = [one("inertia", 0.5), one("delay", 0.3), one("unnamed", 0.19), one("", 0.01)]
-    far = [replace(each, log_posterior=each.log_posterior - 5000.0) for each in every]
-    assert told(decide_verdict(far, TOLERANCE)) == told(decide_verdict(every, TOLERANCE))

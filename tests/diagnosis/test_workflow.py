@@ -31,10 +31,9 @@ from rigged import (
 from tries import some
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import FitSettings, ParameterSetting, SimulateSettings
+from bushfit.campaign.schema import SimulateSettings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
-from bushfit.errors import BushfitError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
@@ -110,15 +109,6 @@ def test_with_less_no_bolder_name(measured: Measured, part: Callable[..., Campai
         assert said(found) == "consistent "
 
 
-def test_held_parameters_stay(measured: Measured) -> None:
-    settings = {"alpha": ParameterSetting(value=0.24, vary=False)}
-    diagnosis = asked(replace(measured(INERTIA, SHARED), fit=FitSettings(parameters=settings)))
-    assert said(diagnosis) == "named inertia"
-    assert diagnosis.before.model.values["alpha"] == diagnosis.after.model.values["alpha"] == 0.24
-    assert "alpha" not in diagnosis.result.fitted
-    assert diagnosis.result.covariance.stderr("alpha") is None
-
-
 @pytest.mark.slow
 def test_inputs_are_left_alone_and_the_same_comes_twice(measured: Measured) -> None:
     campaign = measured(INERTIA, SHARED)
@@ -128,8 +118,3 @@ def test_inputs_are_left_alone_and_the_same_comes_twice(measured: Measured) -> N
     one, other = (json.dumps(diagnose(PreparedCampaign.from_campaign(campaign)).to_document()) for _ in range(2))
     assert one == other
     assert all(np.array_equal(array, copy) for array, copy in zip(arrays, copies, strict=True))
-
-
-def test_nothing_to_diagnose(measured: Measured) -> None:
-    with pytest.raises(BushfitError, match="nothing to diagnose"):
-        diagnose(PreparedCampaign.from_campaign(replace(measured(), loops=(), sweeps=())))
