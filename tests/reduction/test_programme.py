@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from bushfit.campaign.schema import SimulateSettings
 from bushfit.effects.contract import Array
-from bushfit.errors import MeasurementError
 from bushfit.fitting.drive import prepare_drive
 from bushfit.geometry import Direction
 from bushfit.model import rig
@@ -114,53 +110,6 @@ def test_without_time_parts_are_the_same(paper_model: Model, case: str) -> None:
         assert prepare_drive(loop).frequency == pytest.approx(1e-4 / (4.0 * size), rel=2e-2)
 
 
-ALONE: dict[str, Sequence[Array]] = {
-    "from rest": [cycles(4, 1)],
-    "one cycle": [cycles(1, 1, start=0.25)],
-    "smaller cycles before": [cycles(1, 0.3), cycles(1, 0.6), cycles(4, 1)],
-    "broken by a hold": [cycles(4, 1), hold(30), cycles(4, 1)],
-    "a hole": [cycles(4, 1)],
-    "a ramp and a hold": [ramp(0, 1, 3), np.full(2000, 1e-3), cycles(4, 1, start=0.25)],
-}
-
-
-@pytest.mark.parametrize("case", ALONE)
-def test_one_amplitude_and_rate_is_the_record_itself(paper_model: Model, case: str) -> None:
-    record = recorded(paper_model, *ALONE[case])
-    if case == "a hole":
-        kept = np.r_[0:1500, 2600 : record.time.size]
-        record = replace(record, **{name: getattr(record, name)[kept] for name in ("time", "displacement", "force")})
-    (loop,) = programme(record)
-    assert (loop.name, loop.part, loop.softening) == ("loop", None, None)
-    assert (loop.time, loop.displacement, loop.force) == (record.time, record.displacement, record.force)
-
-
-def test_amplitudes_that_change_all_the_time_are_refused(paper_model: Model) -> None:
-    record = recorded(paper_model, *(cycles(1, x) for x in (0.2, 0.4, 0.6, 0.8, 1)))
-    with pytest.raises(MeasurementError, match="no part of the record is a loop"):
-        programme(record)
-
-
-@given(
-    st.lists(st.floats(0.1, 2.0), min_size=2, max_size=5),
-    st.integers(3, 6),
-    st.floats(0.0, 1.0),
-    st.sampled_from(["sine", "triangle"]),
-    st.booleans(),
-)
-def test_any_programme(sizes: list[float], count: int, start: float, shape: str, rests: bool) -> None:
-    """Of any amplitudes, phase and waveform; a sensor's force stands for the rubber's, which is not looked at."""
-    if any(abs(np.log(one / other)) < 0.15 for one, other in pairwise(sizes)):
-        return
-    if not rests:
-        start = round(2.0 * start) / 2.0  # no rig jumps from one amplitude to the next but through zero
-    motions = [part for x in sizes for part in (hold(7.0 * rests), cycles(count, x, start=start, shape=shape))]
-    motion = np.concatenate(motions)
-    loop = Loop("loop", Direction.AXIAL, STEP * np.arange(motion.size), motion, 5e5 * motion)
-    found = [float(np.ptp(part.displacement)) * 500.0 for part in programme(loop)]
-    assert found == pytest.approx(sizes, rel=5e-3)
-
-
 def virgin(loop: Loop, share: float) -> Loop:
     """The first cycle of each of three parts of five cycles stiffer by a share, as rubber is that never went so far."""
     at = loop.time / 10.0 % 5.0
@@ -174,8 +123,3 @@ def test_a_softening_is_told_of_each_part(paper_model: Model) -> None:
     assert any("stiffer than the last (Mullins)" in note for note in prepare_drive(loops[1]).notes)
     (one,) = programme(virgin(recorded(paper_model, cycles(5, 1)), 0.12))
     assert one.softening == pytest.approx(0.12, abs=0.03)
-
-
-def test_what_rubber_remembers_is_no_softening(paper_model: Model, other_models: dict[str, Model]) -> None:
-    for model in (paper_model, *other_models.values()):
-        assert {loop.softening for loop in programme(recorded(model, *PROGRAMMES["up and down"][0]))} == {None}
