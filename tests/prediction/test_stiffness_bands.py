@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.schema import SimulatedSweep, SimulateSettings
-from bushfit.errors import ModelError
 from bushfit.fitting.preparation import prepare_sweeps
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
-from bushfit.geometry import Bushing, Direction, Shape, Specimen
+from bushfit.geometry import Bushing, Direction, Shape
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result, transfer_compound
@@ -131,16 +130,6 @@ def test_the_measured_stiffness_stands_beside_and_what_the_rig_took_is_said(pape
     assert not [line for line in elsewhere.warnings if "measured" in line and "without" in line]
 
 
-def test_default_grid_is_the_papers_within_the_measured_range(result: Result) -> None:
-    frequencies, amplitudes = default_grid(result, Direction.AXIAL)
-    assert (tuple(frequencies), tuple(amplitudes)) == (PAPER_FREQUENCIES, PAPER_AMPLITUDES)
-    narrow = replace(result, measured=Range((20.0, 80.0), result.measured.strain))  # type: ignore[union-attr]
-    assert default_grid(narrow, Direction.AXIAL)[0].tolist() == [25.0, 35.0, 45.0, 55.0, 65.0, 75.0]
-    tiny = replace(result, measured=Range((5.0, 155.0), (1e-6, 1e-5)))
-    assert default_grid(tiny, Direction.AXIAL)[1].size == 3
-    assert predict(tiny, Direction.AXIAL, *default_grid(tiny, Direction.AXIAL)).warnings == ()
-
-
 def swept(frequency: object, amplitude: object, **more: Any) -> Sweep:
     f, x = np.broadcast_arrays(np.asarray(frequency, dtype=float), amplitude)
     return Sweep("s.csv", more.pop("direction", Direction.AXIAL), f, x, np.full(f.size, 1e6 + 1e5j), **more)
@@ -160,20 +149,6 @@ def test_default_grid_is_that_of_the_sweeps_in_the_direction_where_there_are_any
     assert (frequencies.tolist(), amplitudes.tolist()) == ([1.0, 10.0, 50.0], levels.tolist())
 
 
-def test_default_grid_of_what_was_taken_as_it_came(result: Result) -> None:
-    """Amplitudes that were stepped, and all of a resonance test, at ten values at most; what was held as it is."""
-    strain = swept(np.repeat([10.0, 40.0], 15), np.tile(np.geomspace(2e-5, 1e-3, 15), 2), stepped="amplitude")
-    frequencies, amplitudes = default_grid(result, Direction.AXIAL, [strain])
-    assert frequencies.tolist() == [10.0, 40.0]
-    assert (amplitudes.size, amplitudes[0], amplitudes[-1]) == (10, 2e-5, 1e-3)
-    free = swept(np.geomspace(50, 500, 200), np.geomspace(1e-4, 1e-6, 200), stepped=None)
-    assert [axis.size for axis in default_grid(result, Direction.AXIAL, [free])] == [10, 10]
-    planned = swept(np.arange(5.0, 156.0, 5.0), 3e-4)
-    frequencies, amplitudes = default_grid(result, Direction.AXIAL, [planned, strain])
-    assert set(planned.frequency) <= set(frequencies)
-    assert 3e-4 in amplitudes
-
-
 def test_the_compound_is_carried_to_another_bushing(result: Result) -> None:
     """Same material, other shape: stiffness goes as the shape does; what belongs to the old bushing stays there."""
     model = result.model.with_effect("stiffness_factor.radial", {"stiffness_factor.radial": 1.1})
@@ -189,58 +164,6 @@ def test_the_compound_is_carried_to_another_bushing(result: Result) -> None:
         2.0 * np.subtract(here.stiffness.high, here.stiffness.low),
     )
     assert any("extrapolated" in line for line in predict(other, Direction.RADIAL, [10.0], [5e-3]).warnings)
-
-
-def test_a_coupon_predicts_a_bushing_and_says_what_it_does_not_know(result: Result) -> None:
-    coupon = Specimen("DMA", "modulus")
-    assert result.measured is not None
-    alone = replace(
-        result,
-        model=replace(result.model, bushing=None),
-        specimens=(coupon,),
-        measured=replace(result.measured, directions=("DMA",)),
-    )
-    table = prediction_table(predict(alone, coupon, [10.0], default_grid(alone, coupon)[1]))
-    assert list(table.columns[:6]) == [
-        *("frequency [Hz]", "strain amplitude [%]", "modulus [MPa]", "loss factor [-]"),
-        *("storage modulus [MPa]", "loss modulus [MPa]"),
-    ]
-    assert 1.0 < table["modulus [MPa]"].iloc[0] < 3.0
-    with pytest.raises(ModelError, match=r"axial: there is no bushing[\s\S]*--bushing other.toml"):
-        predict(alone, Direction.AXIAL, [10.0], [1e-4])
-    bushing, _ = transfer_compound(alone, result.model.bushing)  # type: ignore[arg-type]
-    found = predict(bushing, Direction.AXIAL, [10.0], [1e-4])
-    np.testing.assert_allclose(found.stiffness.value, predict(result, Direction.AXIAL, [10.0], [1e-4]).stiffness.value)
-    (line,) = found.warnings
-    assert line.startswith(
-        "axial: not fitted, predicted from the DMA tests. The band excludes the difference between two bodies"
-    )
-
-
-def test_extrapolation_is_said(result: Result) -> None:
-    inside = predict(result, Direction.AXIAL, [5.0, 155.0], [1e-4, 5e-4])
-    assert inside.warnings == ()
-    high = predict(result, Direction.AXIAL, [5.0, 400.0], [1e-4])
-    assert high.warnings == (
-        "axial: predicted at frequencies of 5 to 400 Hz, but fitted at 0.1 to 155 Hz only: extrapolated beyond",
-    )
-    far = predict(result, Direction.AXIAL, [5.0], [5e-3])
-    assert len(far.warnings) == 1
-    assert "predicted at strains of 31 %, but fitted at " in far.warnings[0]
-    assert len(predict(result, Direction.AXIAL, [0.01], [1e-6]).warnings) == 2
-
-
-def test_a_resonance_says_what_its_peak_extrapolates(result: Result) -> None:
-    """Frequencies and strains near the peak count, not those far from it; so does a place that was not fitted."""
-    inside = predict_resonance(result, Direction.AXIAL, 3.0, 20.0, None)
-    assert inside.frequency[-1] > 155.0, "beyond what was fitted, but far from the peak"
-    assert inside.peak[0] == pytest.approx(75.0, rel=0.2)
-    assert inside.warnings == ()
-    fast, low = predict_resonance(result, Direction.AXIAL, 0.2, 0.1, None).warnings
-    assert fast.startswith("axial, resonance of 0.2 kg: predicted at frequencies of ")
-    assert low.startswith("axial, resonance of 0.2 kg: predicted at strains of ")
-    fitted, *_ = predict_resonance(result, Direction.RADIAL, 3.0, 20.0, None).warnings
-    assert fitted.startswith("radial: not fitted")
 
 
 def test_a_model_given_by_hand_has_no_bands_and_says_so(paper_model: Model) -> None:
