@@ -1,34 +1,29 @@
 """A plan against what is worked out another way: full covariances, every choice there is, and fits."""
 
 from dataclasses import replace
-from itertools import permutations, product
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.campaign.campaign import load_campaign
 from bushfit.campaign.quantities import Compound
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
 from bushfit.commands.plan import plan as plan_tests
 from bushfit.effects import get_effect
 from bushfit.effects.contract import Array
-from bushfit.errors import ModelError
 from bushfit.fitting.coordinates import residual
 from bushfit.fitting.preparation import MeasuredSweep, new_loop, new_sweep
-from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.solve import solve
 from bushfit.geometry import Bushing, Direction, Place
-from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
-from bushfit.model.result import Result
 from bushfit.planning.candidates import candidates, run_minutes
 from bushfit.planning.compound import guess_parameters
 from bushfit.planning.contract import Aim, Knowledge, Noise, Plan, PlanRequest, Points, Programme, Target, Test, motions
-from bushfit.planning.criterion import Budget, Criterion, DriftEffect, best_runs, order_runs
+from bushfit.planning.criterion import Budget, Criterion, best_runs
 from bushfit.planning.information import CandidateGrid, ModelInformation, relative_slopes, rival_chi_squares
-from bushfit.planning.knowledge import from_result, noise_of
 from bushfit.planning.plan import plan
 from bushfit.planning.problem import PlanningProblem
 
@@ -184,22 +179,6 @@ def test_no_choice_is_much_better_than_the_one_found(known: Knowledge) -> None:
     assert min(values) - 1e-9 <= criterion.value(found) <= min(values) + 0.02
 
 
-def test_no_order_shows_a_drift_much_better(known: Knowledge) -> None:
-    """Six runs of four tests at one place in every order that begins and ends with one test."""
-    random = np.random.default_rng(1)
-    drifting = DriftEffect(random.uniform(2e4, 4e4, 4), random.uniform(1e3, 9e3, 4), random.normal(0.0, 60.0, (4, 3)))
-    counts = np.array([2, 1, 1, 2])
-    runs = order_runs(counts, np.zeros(4, dtype=int), drifting)
-
-    def worth(order: tuple[int, ...]) -> float:
-        return drifting.noncentrality(order) - 99.0 * float(np.sum(np.square(drifting.shift(order))))
-
-    every = [order for order in permutations(sorted(runs)) if order[0] == order[-1] == runs[0]]
-    assert runs[0] == runs[-1]
-    assert np.bincount(runs).tolist() == counts.tolist()
-    assert worth(tuple(runs)) >= 0.9 * max(map(worth, every))
-
-
 def test_a_plan_is_better_than_the_standard_programme_and_errors_before_are_those_known(
     planned: Plan, known: Knowledge
 ) -> None:
@@ -245,37 +224,6 @@ def test_no_test_is_beyond_the_rig(known: Knowledge, limit: str, most: float) ->
         assert reached[limit].max() <= most * (1 + 1e-6)
     assert {type(test) for test in found} == {SimulatedLoop, SimulatedSweep}
     assert {*found} != {*candidates(known, wanted("predictions", 4.0))}
-
-
-def test_what_is_given_by_hand_half_of_the_rows_and_a_rig_that_can_make_no_test(
-    paper_model: Model, known: Knowledge, campaign: Campaign
-) -> None:
-    knowledge = from_result(Result(paper_model))
-    assert knowledge.names == tuple(paper_model.parameters)
-    np.testing.assert_allclose(knowledge.covariance, 0.25 * np.eye(5))
-    assert "a factor of 2.7" in knowledge.source
-    with pytest.raises(ModelError, match="the rig cannot test"):
-        plan(known, wanted("predictions", 4.0, max_force=1e-3))
-    # Whatever its sampling, the noise of a force is that of as many rows as planned loops have.
-    (loop,) = campaign.loops
-    thin = replace(loop, **{key: getattr(loop, key)[::2] for key in ("time", "displacement", "force")})
-    whole, half = (
-        noise_of(PreparedCampaign.from_campaign(replace(campaign, loops=(each,)))).force for each in (loop, thin)
-    )
-    assert half == pytest.approx(np.sqrt(2.0) * whole, rel=0.05)
-
-
-def test_what_tests_leave_open_a_thousand_times_over_stops_no_plan(paper_model: Model) -> None:
-    """Three parameters that trade off all but exactly, in numbers that are rounded as files are."""
-    random, names = np.random.default_rng(1), tuple(paper_model.parameters)
-    values = np.array([paper_model.values[name] for name in names])
-    along = np.array([130.0, 0.17, -0.07, -1900.0, -4000.0])
-    apart = random.normal(size=(5, 5)) * 3e-5
-    relative = np.outer(along, along) + apart @ apart.T
-    result = Result(paper_model, names, Covariance(names, relative * np.outer(values, values)))
-    plan = plan_tests(result, aim="parameters", hours=1.0).plan
-    print(plan.planned.errors)
-    assert np.all(plan.planned.errors < 0.5)
 
 
 def test_a_rig_without_limits_and_an_error_of_the_model_are_told(root: Path) -> None:
