@@ -7,10 +7,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from bushfit.effects import BASE
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
-from bushfit.model.arms import Arms, arm_rows, fitted_arms, model_arms, part_modulus
+from bushfit.model.arms import Arms, fitted_arms, model_arms, part_modulus
 from bushfit.model.model import Model
 
 
@@ -57,12 +56,6 @@ def test_the_springpot_and_the_spring_in_series_are_one_part(paper_model: Model)
     rest = paper_model.without("springpot").stiffness(Direction.AXIAL, 1.0, 1.0) / shape
     np.testing.assert_allclose(part_modulus(model, "m", omega), whole - rest, rtol=1e-6)
     assert np.abs(part.complex_modulus(omega) / (whole - rest) - 1.0).max() <= 0.005
-
-
-def test_a_model_without_memory_has_none(paper_model: Model) -> None:
-    still = Model.with_defaults(paper_model.bushing, BASE, {**paper_model.values, "m": 0.0})
-    assert model_arms(still, (5.0, 155.0)) == ()
-    assert arm_rows(still, ()) == [("elastic", 1.09e6, pytest.approx(float("nan"), nan_ok=True))]
 
 
 def test_what_no_passive_arms_can_do_is_refused() -> None:
