@@ -80,19 +80,6 @@ def harmonic_error(model: Model) -> float:
     return sum(effect.harmonic_error for effect in model.records)
 
 
-def test_record_is_complete(effect: Effect) -> None:
-    assert effect.sentence.endswith(".")
-    assert effect.equation
-    assert effect.source
-    assert any(parameter.neutral is not None for parameter in effect.parameters)
-    for parameter in effect.parameters:
-        low, high = parameter.bounds
-        assert low < parameter.value_at_share(1.0) < high
-        assert parameter.log == (parameter.neutral is None)
-        assert not parameter.log or low > 0.0
-        assert parameter.neutral is None or low <= parameter.neutral <= high
-
-
 def test_neutral_value_gives_the_plain_model_back(effect: Effect, rng: np.random.Generator) -> None:
     """Of the effect of temperature, but for the spring of a network, which goes with the absolute temperature."""
     plain = random_model(rng)

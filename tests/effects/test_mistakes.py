@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,35 +10,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bushfit.effects import LIBRARY
-from bushfit.effects.mistakes import MISTAKES, file_or_name, get_candidate, get_mistake
-from bushfit.errors import ModelError
+from bushfit.effects.mistakes import MISTAKES
 from bushfit.geometry import Bushing, Direction
-from bushfit.reading.measurement import Loop, Source, Sweep
+from bushfit.reading.measurement import Loop, Sweep
 
 PHASE = np.linspace(0.0, 4.0 * np.pi, 200)
 LOOP = Loop("slow", Direction.AXIAL, PHASE, 1e-3 * np.sin(PHASE), 400.0 * np.sin(PHASE + 0.1))
-NAMES = sorted(name for name, mistake in MISTAKES.items() if mistake.kinds)
 
 
 def swept(loss: float, direction: Direction = Direction.AXIAL, magnitude: float = 5e5) -> Sweep:
     stiffness = magnitude * (1.0 + 1j * loss) / np.hypot(1.0, loss) * np.ones(4)
     return Sweep("swept", direction, np.array([5.0, 15.0, 25.0, 35.0]), np.full(4, 2e-4), stiffness)
-
-
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("direction", list(Direction))
-def test_a_test_keeps_its_shape_name_and_weight(name: str, direction: Direction) -> None:
-    for test in (swept(0.1, direction), Loop("slow", direction, LOOP.time, LOOP.displacement, LOOP.force)):
-        found = MISTAKES[name].corrected_test(test)
-        kind = "sweep" if isinstance(test, Sweep) else "loop"
-        if found is None:
-            mistake = MISTAKES[name]
-            turned = mistake.motion is not None and mistake.motion is not direction.motion
-            assert kind not in mistake.kinds or turned or mistake.doubt or (mistake.swaps and direction == "torsion")
-        else:
-            assert type(found) is type(test)
-            assert (found.name, found.weight, found.noise) == (test.name, test.weight, test.noise)
 
 
 def mended(name: str, test: Any) -> Any:
@@ -80,28 +61,3 @@ def test_amplitudes_rates_units_and_directions_are_mended() -> None:
     of_loop = MISTAKES["inch"].corrected_harmonic(cycle)
     assert (of_loop.amplitude, of_loop.stiffness) == (pytest.approx(25.4e-3), pytest.approx(cycle.stiffness / 25.4))
     assert MISTAKES["milliseconds"].corrected_harmonic(cycle).frequency == pytest.approx(1000.0)
-
-
-def test_a_correction_names_file_table_and_line() -> None:
-    test = Sweep(
-        "a", Direction.RADIAL, *np.ones((2, 3)), np.ones(3, complex), source=Source(Path("tests/radial.csv"), "0")
-    )
-    assert MISTAKES["peak_to_peak"].correction_line(test) == '[[sweeps]] of radial.csv: amplitude = "peak-to-peak"'
-    assert MISTAKES["other_direction"].correction_line(test) == '[[sweeps]] of radial.csv: direction = "axial"'
-    assert 'units = { force = "kgf" }' in MISTAKES["kilogram_force"].correction_line(LOOP)
-    assert 'units = { stiffness = "kgf/mm" }' in MISTAKES["kilogram_force"].correction_line(test)
-    assert "inner_radius" in MISTAKES["diameters"].correction_line(None)
-    assert file_or_name(test) == "radial.csv"
-    assert not any(
-        "{{" in MISTAKES[name].correction_line(test) + MISTAKES[name].correction_line(LOOP) for name in NAMES
-    )
-
-
-def test_a_name_with_its_test_is_known_and_another_refused() -> None:
-    assert get_candidate("peak_to_peak:sweep_axial") is get_candidate("peak_to_peak") is MISTAKES["peak_to_peak"]
-    assert get_candidate("inertia") is LIBRARY["inertia"]
-    assert get_mistake("inertia") is None
-    with pytest.raises(ModelError, match="unknown mistake"):
-        get_candidate("peak_to_pique:sweep_axial")
-    with pytest.raises(ModelError, match="unknown effect"):
-        get_candidate("peak_to_pique")
