@@ -137,23 +137,6 @@ def test_adams_holds_curve_and_damping(export_request: ExportRequest, known: pd.
 ENDS = ("FX", "FY", "FZ", "TX", "TY", "TZ")
 
 
-def test_one_frequency_and_one_amplitude(export_request: ExportRequest, tmp_path: Path) -> None:
-    """A table needs two rows and a spline five points: PBUSH alone, and a straight line."""
-    one = replace(export_request, predictions=(predict(export_request.result, Direction.AXIAL, [20.0], [2e-4]),))
-    exact = complex(export_request.result.model.stiffness("axial", 20.0, 2e-4)[()])
-    text = nastran.export(one).files["bushing.bdf"].decode()
-    assert "PBUSHT" not in text.replace("PBUSHT*", "")
-    assert "TABLED1" not in text
-    assert f"{exact.real / 1e3:.4E}" in text
-    blocks = teimorbit(adams.export(one).files["bushing_car.bus"].decode())
-    moved, force = blocks["FZ_CURVE"][2].T
-    assert moved.size == 5
-    np.testing.assert_allclose(force, moved * exact.real / 1e3, rtol=DIGITS)
-    assert "one frequency, 20 Hz" in " ".join(nastran.export(one).losses)
-    (found,) = read("abaqus", one, tmp_path)[1].values()
-    assert found[1][0] * 1e3 == pytest.approx(exact, rel=DIGITS)
-
-
 WRITERS: list[Callable[[ExportRequest], Exported]] = [nastran.export, abaqus.export, adams.export]
 
 

@@ -15,11 +15,8 @@ from readers import abaqus_options, bulk_cards, teimorbit
 
 from bushfit.export import abaqus, adams, nastran
 from bushfit.export.contract import ExportRequest, UnitSystem
-from bushfit.geometry import Direction, Specimen
-from bushfit.prediction.stiffness import Band, predict
-from bushfit.reading.tablefile import to_xlsx
+from bushfit.geometry import Direction
 from bushfit.report import spreadsheets
-from bushfit.report.tables import wide_table
 
 #: Agreement of the model with the kept computation, and what seven digits of a CSV file leave.
 MODEL, SEVEN = 2e-4, 1e-6
@@ -82,33 +79,6 @@ def test_parameters_provenance_and_units_asked_for(export_request: ExportRequest
     assert table["axial"]["stiffness [N/m]"][0] == pytest.approx(export_request.predictions[0].stiffness.value[0])
 
 
-def test_specimens_have_tables_and_points_that_a_grid_lacks_are_empty(export_request: ExportRequest) -> None:
-    bodies = [
-        predict(export_request.result, Specimen(name, "modulus"), [5.0], [0.01])
-        for name in ("parameters", "axial", "x", "x")
-    ]
-    tables = sheets(
-        spreadsheets.xlsx(replace(export_request, predictions=(export_request.predictions[0], *bodies))).files[
-            "bushing.xlsx"
-        ]
-    )
-    assert len(tables) == 2 * 5 + 2
-    assert sum("modulus [MPa]" in table for table in tables.values()) == 4
-    assert "parameter" in tables["parameters"]
-    assert len(spreadsheets.csv(replace(export_request, predictions=tuple(bodies))).files) == 2 * 4 + 2
-    prediction = export_request.predictions[0]
-    kept = np.arange(prediction.frequency.size) != 3
-
-    def band(of: Band) -> Band:
-        return Band(of.value[kept], of.low[kept], of.high[kept])
-
-    parts = {name: band(getattr(prediction, name)) for name in ("stiffness", "loss_factor")}
-    holes = replace(prediction, frequency=prediction.frequency[kept], amplitude=prediction.amplitude[kept], **parts)
-    table = wide_table(holes)
-    assert table.isna().sum().sum() == 2
-    assert np.isnan(table.iloc[3, 1])
-
-
 #: Names that break out of what is not escaped: line ends, comment marks, cards, keywords, formulas, markup.
 NASTY = (
     "a\nPBUSH          1       K     1.0\n$",
@@ -136,12 +106,3 @@ def test_decks_and_workbook_hold_the_same_under_any_name(
     assert content(named(name)) == content(named("plain"))
     book = openpyxl.load_workbook(io.BytesIO(spreadsheets.xlsx(named(name)).files["bushing.xlsx"]))
     assert {cell.data_type for sheet in book for row in sheet.iter_rows() for cell in row} <= {"s", "n"}, "no formula"
-
-
-def test_sheets_have_names_that_excel_takes() -> None:
-    """At most 31 characters, none of []:*?/\\, and each once, capitals aside."""
-    table = pd.DataFrame({"x": [1.5, np.nan, np.inf], "text": ["a", None, ""]})
-    book = openpyxl.load_workbook(io.BytesIO(to_xlsx({"a[1]/" + 40 * "b": table, "Same": table, "same": table})))
-    assert len({title.lower() for title in book.sheetnames}) == 3
-    assert all(0 < len(title) <= 31 and not set(title) & set("[]:*?/\\") for title in book.sheetnames)
-    assert [cell.value for cell in book.worksheets[0]["A"]][1:] == [1.5, None, None]
