@@ -8,6 +8,8 @@ import math
 from damage import entry, without
 
 nan = math.nan
+NODES = {"frequency_Hz": [5.0], **{key: [0.01] for key in ("strain", "in_phase", "in_quadrature", "in_phase_error", "in_quadrature_error")}}
+PATCH = {"directions": ["axial"], **NODES}
 #: (name, change of the model file, what the error says ...)
 IN_MODEL = [
     ("another schema", entry("schema", value="bushfit/model/9"), "model.json, schema: not a model this version reads", "use a file written by bushfit fit-static, fit-dynamic, fit or diagnose"),
@@ -18,6 +20,10 @@ IN_MODEL = [
     ("name without end", entry("bushing", "name", value="x" * 5000), "model.json, bushing.name: this value is not understood", "at most 200 characters"),
     ("effect without its values", entry("effects", value=["elastic", "springpot", "friction", "inertia"]), "model.json, inertia.mass: a parameter has no value", "a number [kg]"),
     ("values of an effect that is not there", entry("effects", value=["elastic", "friction"]), "model.json, m: unknown parameter", "one of mu, sigma_fmax, eps_half"),
+    ("a correction without its data", entry("effects", value=["elastic", "springpot", "friction", "unnamed"]), "model.json, unnamed: an effect without its data"),
+    ("a correction of no size", entry("unnamed", value={"size": 0.0, "lengths": [1.0, 1.0], "patches": [PATCH]}), "model.json, ", "a correction of no size or length"),
+    ("a correction with a value too few", entry("unnamed", value={"size": 0.1, "lengths": [1.0, 1.0], "patches": [{**PATCH, "strain": []}]}), "model.json, unnamed", "no values at nodes"),
+    ("a correction at no strain", entry("unnamed", value={"size": 0.1, "lengths": [1.0, 1.0], "patches": [{**PATCH, "strain": [0.0]}]}), "model.json, unnamed", "a node without motion"),
     ("parameter is missing", without("parameters", "mu"), "model.json, mu: a parameter has no value", "a number [Pa]"),
     ("value is NaN", entry("parameters", "mu", "value", value=nan), "model.json: this is not valid JSON", "give the file as bushfit fit wrote it"),
     ("value below zero", entry("parameters", "mu", "value", value=-1.0), "model.json, mu: impossible value", "0 to 1e+09 Pa (elastic shear modulus)"),
