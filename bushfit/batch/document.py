@@ -17,7 +17,7 @@ ROW_SCHEMA: Literal["bushfit/row/3"] = "bushfit/row/3"
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """A value with its 95 % interval and standard error; null where the tests do not determine them."""
+    """Value of a quantity with its 95 % interval and standard error; None if the tests do not determine them."""
 
     value: Annotated[float, Field(description="Value of the quantity.")]
     low: Annotated[float | None, Field(description="Lower end of the 95 % interval.")] = None

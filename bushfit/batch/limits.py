@@ -54,7 +54,7 @@ _BEYOND_NOISE = 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class Bounds:
-    """Limits of one quantity.
+    """Limits of one quantity of the parts of a batch.
 
     Args:
         min, max: smallest and largest allowed value.
@@ -118,7 +118,7 @@ class PointLimits:
 
 @dataclass(frozen=True, kw_only=True)
 class StiffnessBounds(Bounds, PointLimits):
-    """[[stiffness]]: limits of the dynamic stiffness |K| at an operating point."""
+    """Table [[stiffness]] of a limits file: limits of the dynamic stiffness |K| at an operating point."""
 
     min: Stiffness | None = None
     max: Stiffness | None = None
@@ -127,7 +127,7 @@ class StiffnessBounds(Bounds, PointLimits):
 
 @dataclass(frozen=True, kw_only=True)
 class LossFactorBounds(Bounds, PointLimits):
-    """[[loss_factor]]: limits of the loss factor at an operating point."""
+    """Table [[loss_factor]] of a limits file: limits of the loss factor at an operating point."""
 
     min: Ratio | None = None
     max: Ratio | None = None
@@ -136,7 +136,7 @@ class LossFactorBounds(Bounds, PointLimits):
 
 @dataclass(frozen=True)
 class Limits:
-    """A limits file.
+    """Content of a limits file: allowed values of parameters, stiffness, loss factor and quality of the fit.
 
     Args:
         parameters: limits of parameters by name, with units as in [fit] of a campaign.

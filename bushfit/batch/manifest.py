@@ -142,7 +142,7 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Manifest:
-    """Title and rows of a batch in order, and the operating points for stiffness and loss factor."""
+    """Batch as read from a manifest: title, rows in order, and operating points for stiffness and loss factor."""
 
     title: str
     rows: Sequence[Row]

@@ -84,19 +84,19 @@ PointText = Annotated[Point, converter(lambda raw, _: parse_point(raw) if isinst
 
 @dataclass(frozen=True)
 class PartQuantity:
-    """A quantity of a part: name, display unit, and the factor that converts SI values to this unit."""
+    """Quantity that is evaluated for each part of a batch: name, display unit, and factor from SI to this unit."""
 
     name: str
     unit: str
     factor: float = 1.0
 
     def displayed(self, value: float) -> PartQuantity:
-        """The quantity with the display unit for a value of this magnitude [SI], such as MPa for 2e6 Pa."""
+        """Copy of the quantity with the display unit for a value of this magnitude [SI], such as MPa for 2e6 Pa."""
         return PartQuantity(self.name, *display_unit(self.unit, self.factor, value))
 
     @property
     def tabled(self) -> PartQuantity:
-        """The quantity with the unit of the batch table; a parameter has the display unit of its typical value."""
+        """Copy of the quantity with its unit in the batch table: for a parameter, that of its typical value."""
         return self.displayed(get_parameter(self.name).typical) if is_parameter(self.name) else self
 
     @property
@@ -114,7 +114,7 @@ STIFFNESS, LOSS_FACTOR = "stiffness", "loss factor"
 
 
 def point_quantity(point: Point, name: str) -> PartQuantity:
-    """Quantity at an operating point; `name` is `STIFFNESS` or `LOSS_FACTOR`."""
+    """Make the quantity "stiffness" or "loss factor" (`name`) at an operating point."""
     unit, factor = point.motion.display.stiffness if name == STIFFNESS else ("-", 1.0)
     return PartQuantity(f"{name} {point}", unit, factor)
 

@@ -35,7 +35,7 @@ _ZERO = 1e-3
 
 @dataclass(frozen=True)
 class RowTask:
-    """Settings that all rows of a batch share.
+    """Function that evaluates a row of a batch on a worker, with the settings that all rows share.
 
     Args:
         output: results folder of the batch.
@@ -86,7 +86,7 @@ class RowTask:
 
 @cache
 def limit_threads() -> Any:
-    """Run linear algebra on one thread in this process: the cores are for rows, and sums keep their order."""
+    """Return a context that runs linear algebra on one thread, as the rows of a batch use the cores."""
     from threadpoolctl import threadpool_limits
 
     return threadpool_limits(1)

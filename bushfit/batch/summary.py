@@ -82,7 +82,7 @@ class BatchResult:
 
     @cached_property
     def figures(self) -> dict[str, Array]:
-        """Value, low and high end of the 95 % interval, and standard error by quantity [SI], (4, n); NaN if unknown.
+        """Value, ends of the 95 % interval and standard error of each quantity [SI], (4, n); NaN if unknown.
 
         The keys are the names of the quantities.
         """
@@ -101,7 +101,7 @@ class BatchResult:
 
     @cached_property
     def quantities(self) -> dict[str, PartQuantity]:
-        """All quantities of the batch by name."""
+        """All quantities of the batch, with their display units, by name."""
         return list_quantities(self.figures, self.plan.task.points)
 
     @cached_property

@@ -253,7 +253,7 @@ def reader_keywords(
 
 
 def _test_names(tests: Sequence[LoopFile | SweepFile]) -> list[str]:
-    """Unique names of tests, in order."""
+    """Make unique names for tests from their files, sheets and conditions, in order."""
     keys = ("direction", "specimen_number")
     stems, values = Counter(Path(test.file).stem for test in tests), defaultdict[str, list[tuple[Any, ...]]](list)
     for test in tests:

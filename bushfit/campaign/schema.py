@@ -183,7 +183,7 @@ UNSTATED = RigSettings()
 
 @dataclass(frozen=True)
 class FitSettings:
-    """[fit]: how the model is fitted.
+    """Table [fit] of a campaign: settings of the fit.
 
     Args:
         dynamic_amplitudes: amplitudes [m or rad] that fit-dynamic uses; empty for the smallest.

@@ -102,9 +102,9 @@ def session(bushing: Bushing | None, visits: Sequence[SessionTest]) -> list[Rubb
 
 
 def _last_larger(strain: Array, turn: Array) -> tuple[Array, Array]:
-    """Last strain amplitude before each point that was of a larger level, and the turn elapsed since then, (n,) each.
+    """Last earlier strain amplitude of a larger level for each point, and the session time since then, (n,) each.
 
-    If no earlier strain was larger, the values are 0 and the turn of the point.
+    If no earlier strain was larger, the values are 0 and the session time of the point.
     """
     # an unknown strain, of a resonance test, counts as none
     level = np.round(np.log(np.maximum(strain, 1e-9)) / np.log1p(_LEVEL_STEP))

@@ -72,7 +72,7 @@ def _parsed(path: Path, description: str, largest: int) -> dict[str, Any]:
 
 
 def body_lines(bushing: Bushing | None, specimens: Iterable[Specimen]) -> list[str]:
-    """Lines of the tables [bushing] and [[specimens]].
+    """Write the tables [bushing] and [[specimens]] of a campaign file.
 
     Args:
         bushing: the bushing; None for specimens only.
@@ -94,7 +94,7 @@ def body_lines(bushing: Bushing | None, specimens: Iterable[Specimen]) -> list[s
 
 
 def specimen_lines(specimen: Specimen) -> list[str]:
-    """Lines of one [[specimens]] table.
+    """Write one [[specimens]] table of a campaign file.
 
     Args:
         specimen: body of the compound.
@@ -112,7 +112,7 @@ def specimen_lines(specimen: Specimen) -> list[str]:
 
 
 def table_lines(kind: str, file: str, place: Place, temperature: Any = None) -> list[str]:
-    """Lines of one [[loops]] or [[sweeps]] table.
+    """Write one [[loops]] or [[sweeps]] table of a campaign file.
 
     Args:
         kind: "loops" or "sweeps".
@@ -128,7 +128,7 @@ def table_lines(kind: str, file: str, place: Place, temperature: Any = None) -> 
 
 
 def place_line(place: Place) -> str:
-    """Line of TOML that states the specimen or direction of a test."""
+    """Write the TOML line that states the specimen or direction of a test."""
     return f"specimen = {toml_value(place.name)}" if isinstance(place, Specimen) else f'direction = "{place}"'
 
 

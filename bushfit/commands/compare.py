@@ -52,7 +52,7 @@ _plain: Callable[[Any], Any] = asdict
 
 @dataclass(frozen=True, eq=False)
 class ComparedResult:
-    """One of the results that are compared.
+    """Result that takes part in a comparison: fitted model, its name, and the sweeps of its campaign.
 
     Args:
         name: name of the result in tables.
@@ -75,7 +75,7 @@ Comparable = Result | HasResult | Campaign | ComparedResult
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ComparisonOutput:
-    """Results of a comparison.
+    """Output of the command compare: compared results or model families, sentences, and result files.
 
     Args:
         entries: compared results, the reference first.
@@ -180,7 +180,7 @@ def _compared(
     notes: Sequence[str] = (),
     command: str = "",
 ) -> ComparisonOutput:
-    """Compare each result with the first, in the directions and on the grid of `grid`."""
+    """Compare each result with the first, in the directions and at the operating points of `grid`."""
     results, labels = [entry.result for entry in entries], list(ascii_uppercase[: len(entries)])
     columns, grids = _common_places(results, grid.directions), []
     for places in columns:
@@ -338,7 +338,7 @@ def _family_to_use(families: Sequence[FittedFamily], entries: Sequence[ComparedR
 
 
 def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
-    """Entry of a compared result in compare.json."""
+    """Make the entry of a compared result, by its letter (`label`), in compare.json."""
     result, bushing = entry.result, model_document(entry.result.model)["bushing"]
     return {
         "label": label,
@@ -355,7 +355,7 @@ def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
 
 
 def _family_document(label: str, family: FittedFamily, result: Result) -> FamilyEntry:
-    """Entry of a family in compare.json: its fit and held-out error."""
+    """Make the entry of a model family, by its letter (`label`), in compare.json: its fit and held-out error."""
     evidence, held_out = family.evidence, family.holdout
     return {
         "label": label,

@@ -25,7 +25,7 @@ from bushfit.report.results import ResultFile, figure_file, json_file, page_file
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DiagnosisOutput:
-    """Results of a diagnosis.
+    """Output of the command diagnose: verdict, model to use, and result files.
 
     Args:
         name: name of the campaign.

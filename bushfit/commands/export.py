@@ -32,7 +32,7 @@ FORMATS = {
 
 
 class FormatEntry(TypedDict):
-    """Entry of an export format in `export --json`."""
+    """Entry of an export format in `export --json`: its files, and properties of the model that it cannot represent."""
 
     files: Annotated[list[str], Field(description="Names of the files of the format.")]
     left_out: Annotated[
@@ -52,7 +52,7 @@ class ExportDocument(TypedDict):
 
 @dataclass(frozen=True, eq=False)
 class ExportOutput:
-    """Results of an export.
+    """Output of the command export: predictions, exported files and their limitations.
 
     Args:
         predicted: prediction over the exported grid.

@@ -21,7 +21,7 @@ from bushfit.report.results import ResultFile, figure_file, json_file, table_fil
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FitOutput:
-    """Results of a fit.
+    """Output of the commands fit, fit-static and fit-dynamic: result of each step, and result files.
 
     Args:
         data: the campaign, prepared for the fit.

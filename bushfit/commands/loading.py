@@ -12,7 +12,7 @@ from bushfit.reading.measurement import Source
 
 
 class HasResult(Protocol):
-    """Output of a command that contains a result."""
+    """Protocol of a command's output that contains a fitted model."""
 
     @property
     def result(self) -> Result:

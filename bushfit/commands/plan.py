@@ -41,7 +41,7 @@ _COLUMNS = (
 
 @dataclass(frozen=True, eq=False)
 class PlanOutput:
-    """Plan of the next tests, with its result files.
+    """Output of the command plan: planned tests, check by simulations, and result files.
 
     Args:
         plan: planned tests with their expected results.

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class CommandOutput(Protocol):
-    """Output of a command that contains result files."""
+    """Protocol of a command's output that contains result files."""
 
     @property
     def files(self) -> Sequence[ResultFile]:

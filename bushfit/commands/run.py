@@ -25,7 +25,7 @@ from bushfit.report.results import ResultFile, json_file, page_file
 
 
 class RunDocument(TypedDict, total=False):
-    """Documents of the whole chain, as `bushfit run --json` prints them."""
+    """JSON documents of all steps (fits, diagnosis), as `bushfit run --json` prints them."""
 
     static: Annotated[ModelFile, Field(description="Fit of the loops, if there are loops.")]
     dynamic: Annotated[ModelFile, Field(description="Two-step procedure, if there are loops and sweeps.")]
@@ -39,7 +39,7 @@ class RunDocument(TypedDict, total=False):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RunOutput:
-    """Results of the whole chain: fits, diagnosis and prediction.
+    """Output of the command run: all fits, diagnosis, prediction, and result files.
 
     Args:
         data: the campaign, prepared for the fits.

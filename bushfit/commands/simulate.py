@@ -23,7 +23,7 @@ from bushfit.simulation.measured import simulate as simulate_tests
 
 @dataclass(frozen=True, eq=False)
 class SimulationOutput:
-    """Results of a simulation.
+    """Output of the command simulate: simulated tests, and the files of the campaign.
 
     Args:
         simulated: the simulated tests and the true model.

@@ -40,7 +40,7 @@ _RIDGE = 1e-12
 
 @dataclass(frozen=True)
 class Claim:
-    """Claim that the record of a campaign contains one mistake, the same in one or several tests.
+    """Hypothesis that the record of a campaign has one mistake, such as a wrong unit, in one or several tests.
 
     Args:
         mistake: kind of mistake, such as a wrong unit, with its correction.
@@ -57,7 +57,7 @@ class Claim:
 
     @property
     def single_tests(self) -> list[Claim]:
-        """Separate claims of the same mistake for each affected test; the claim itself for [bushing]."""
+        """Claims of the same mistake, one for each affected test; the claim itself for a mistake in [bushing]."""
         return [Claim(self.mistake, (place,)) for place in self.tests] or [self]
 
     def test(self, data: PreparedCampaign) -> str | None:
@@ -82,7 +82,7 @@ class Claim:
         )
 
     def corrected(self, data: PreparedCampaign) -> PreparedCampaign:
-        """Correct the mistake in a campaign.
+        """Return a campaign in which this mistake is corrected.
 
         Args:
             data: the campaign as it was read.
@@ -215,7 +215,7 @@ class Screen:
         return [found[place] for place in order if changed[place] and misfits[place] < _WORTH_A_FIT * before][:limit]
 
     def misfit(self, claim: Claim | None) -> float:
-        """Compute the least sum of squares of the model's residuals over the grid of alpha and eps_half.
+        """Compute the misfit of the paper's model to the tests: least sum of squared residuals over its parameters.
 
         Args:
             claim: mistake that is corrected first; None for the tests as recorded.
@@ -252,7 +252,7 @@ class Screen:
         return self._known[key]
 
     def _columns(self, bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
-        """Result of the function `_columns`, cached for mistakes that leave the operating points unchanged."""
+        """Complex stiffness as from the function `_columns`, cached for mistakes that keep the operating points."""
         key = (bushing, direction, frequency.tobytes(), amplitude.tobytes())
         if key not in self._responses:
             self._responses[key] = _columns(bushing, direction, frequency, amplitude)

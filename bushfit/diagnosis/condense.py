@@ -24,7 +24,7 @@ _MOST_ROWS = 50_000
 
 
 class _Means(NamedTuple):
-    """Reduced sweep that is diagnosed in place of a long one.
+    """Sweep with fewer points that is diagnosed in place of a long one, and a sentence on its reduction.
 
     Args:
         sweep: means over narrow bands, or the selected points.
@@ -40,7 +40,7 @@ class _Means(NamedTuple):
 
 
 def condensed(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, ...]]:
-    """Reduce a campaign to the points that are diagnosed.
+    """Reduce long sweeps and many loops of a campaign to fewer points, so that a diagnosis takes less time.
 
     Long runs of sweeps become means over narrow bands. If a sweep has very many lines, or the loops very many rows, a
     selection is diagnosed. Rows without weight are left out. The point-to-point noise of a line that is reduced to
@@ -173,7 +173,7 @@ class _Groups:
 
     @classmethod
     def from_keys(cls, rows: Array, keys: Array) -> "_Groups":
-        """Group the rows, (n,), whose columns of `keys`, (k, n), are equal."""
+        """Build the groups of sweep rows, (n,), whose columns of `keys`, (k, n), are equal."""
         _, first, place, counts = np.unique(keys, axis=1, return_index=True, return_inverse=True, return_counts=True)
         turn = np.argsort(np.bincount(place, rows) / counts, kind="stable")
         return cls(rows, np.argsort(turn)[place], rows[first[turn]], counts[turn])

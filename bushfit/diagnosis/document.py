@@ -15,7 +15,7 @@ Verdict = Literal["consistent", "named", "ambiguous", "described", "partly", "un
 
 
 class SizeEntry(TypedDict):
-    """Value of one parameter of an effect, with its uncertainty if the model to use has this parameter."""
+    """Entry of diagnosis.json for one parameter of an effect: value, standard error, 95 % interval and unit."""
 
     value: Annotated[float, Doc("value of the parameter, in `unit`.")]
     stderr: Annotated[float | None, Doc("standard error, in `unit`; null if the parameter was not fitted.")]
@@ -84,7 +84,7 @@ class BeforeAfter(TypedDict):
 
 
 class GapEntry(TypedDict):
-    """Misfit between model and tests, in units of noise."""
+    """Entry of diagnosis.json on the misfit between model and tests, in units of noise: fitted and held-out data."""
 
     calibration: Annotated[BeforeAfter, Doc("misfit of the data that were fitted.")]
     heldout: Annotated[
@@ -100,7 +100,7 @@ class GapEntry(TypedDict):
 
 
 class OddsEntry(TypedDict):
-    """One explanation of a gap, with its probability."""
+    """Entry of diagnosis.json for one explanation of the gap between model and tests, with its probability."""
 
     words: Annotated[str, Doc("description of the explanation.")]
     probability: Annotated[float, Doc("probability of the explanation if anything is missing.")]

@@ -30,7 +30,7 @@ _CORRECTED = (
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """Fit of a model to all tests of a campaign, with the tests.
+    """Fit of a model to all tests of a campaign, with the figures by which models are compared.
 
     Args:
         solution: fit with residuals in units of noise.

@@ -45,7 +45,7 @@ _OVERTONES = 3
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """One explanation of a gap.
+    """One possible explanation of a gap between model and tests, with the change of the residuals that it would cause.
 
     Args:
         kind: "effect", "place" (a faulty part of the tests), "unnamed" (a curve) or "record" (a mistake); each kind
@@ -64,7 +64,7 @@ class Explanation:
 
 @dataclass(frozen=True, eq=False)
 class FaultyPart(Explanation):
-    """Faulty part of the tests, as an explanation: a frequency, level, repeat or loop whose points deviate together.
+    """Explanation of a gap by a fault of the tests: a frequency, level, repeat or loop whose points deviate together.
 
     Args:
         direction: direction or specimen of the first test.
@@ -88,10 +88,10 @@ class FaultyPart(Explanation):
         return self.group.whole
 
     def point_by_point(self) -> FaultyPart:
-        """Convert the place to one with an independent error of every point, for faults other than a shift or slope.
+        """Give every point of the faulty part an independent error, for faults other than a common shift or slope.
 
         Returns:
-            The converted place; a loop is returned unchanged.
+            The faulty part with one column for each point and component; a loop is returned unchanged.
         """
         if self.family == "loop":
             return self
@@ -127,8 +127,10 @@ class OutlierCluster(FaultyPart):
 
 
 def is_pattern(places: Sequence[FaultyPart]) -> bool:
-    """True if faulty places may be physics: several frequencies, as at a resonance, or an extreme level, as of a
-    contact or a dependence on amplitude."""
+    """Return True if suspected faults of the tests may be physics that the model lacks.
+
+    These are faults at several frequencies, as of a resonance, or at the smallest or largest level, as of a contact.
+    """
     return sum(place.family == "frequency" for place in places) > 1 or any(place.extreme for place in places)
 
 
@@ -206,7 +208,7 @@ def compound(evidence: Evidence) -> Group | None:
 
 
 def unnamed_curves(evidence: Evidence) -> list[Explanation]:
-    """List smooth curves without a name as explanations of a gap that no effect of the library explains.
+    """List smooth curves over frequency and strain as explanations of a gap that no effect of the library explains.
 
     All sweeps of one direction and temperature share a curve.
 
@@ -243,7 +245,7 @@ def unnamed_curves(evidence: Evidence) -> list[Explanation]:
 def _process(
     evidence: Evidence, tests: Sequence[MeasuredTest], lengths: tuple[float, float], **limits: float
 ) -> tuple[Array, Array]:
-    """Gaussian process of unit variance over the operating points of some tests, as a relative change of stiffness.
+    """Build a smooth relative change of the stiffness (Gaussian process of unit variance) over the points of tests.
 
     Args:
         evidence: fitted model and all tests.
@@ -269,7 +271,7 @@ def _process(
 def _restricted(
     evidence: Evidence, tests: Sequence[MeasuredTest], chosen: Sequence[MeasuredTest], columns: Array, share: Array
 ) -> tuple[Array, Array]:
-    """Restrict the columns and relative changes of a process over `tests` to the `chosen` tests; 0 elsewhere."""
+    """Set the columns and relative changes of a Gaussian process over `tests` to 0 outside of the `chosen` tests."""
     rows = np.zeros(columns.shape[-1], dtype=bool)
     for test in chosen:
         rows[evidence.place[test]] = True
@@ -286,6 +288,6 @@ def _harmonics(evidence: Evidence, loops: Sequence[MeasuredLoop]) -> Array:
 
 
 def _temperature_step(sweep: MeasuredSweep) -> int | None:
-    """Mean temperature of a sweep, rounded to a whole number of `SAME_TEMPERATURE` steps; None if not known."""
+    """Mean temperature of a sweep in whole steps of `SAME_TEMPERATURE`, to group sweeps; None if unknown."""
     kelvin = sweep.sweep.temperature
     return None if kelvin is None else round(float(np.mean(kelvin)) / SAME_TEMPERATURE)

@@ -39,7 +39,7 @@ _BEYOND_LINEAR = 1.75
 
 @dataclass(frozen=True, eq=False)
 class FittedFamily:
-    """A model family fitted to a campaign, compared with the first family.
+    """Model family (a choice of effects) fitted to a campaign and compared with the first family, the campaign's model.
 
     Args:
         name: effects that the family adds or puts in place of branches, joined by +; for the first family, "paper" and
@@ -99,7 +99,7 @@ def known_families(model: Model, data_sets: Sequence[MeasuredTest]) -> tuple[str
 
 
 def _fits(model: Model, name: str) -> bool:
-    """True if a model lacks an effect and has the branch that the effect replaces, if any."""
+    """Return True if the named effect can be added to a model, which must have the branch that the effect replaces."""
     return name not in model.effects and get_effect(name).replaces in (None, *model.effects)
 
 
@@ -152,7 +152,7 @@ def fit_families(
 def _chain(
     chains: Mapping[str, list[Evidence]], first: Evidence, name: str, fixed: Sequence[str], bounds: Bounds
 ) -> list[Evidence]:
-    """Fit a family's effects one after the other; the first effects may be fitted already, in `chains` by name.
+    """Fit a model family effect by effect, starting from a shorter family in `chains`, whose fits are listed by name.
 
     Returns:
         Fits with no effect added, one effect, two effects, and so on.
@@ -170,7 +170,7 @@ def _chain(
 
 
 def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bounds) -> float:
-    """Natural log of the evidence for the last of a chain of fits, each with one more effect; up to a constant."""
+    """Natural log of the marginal likelihood of the tests under the last of several fits, each with one more effect."""
     *before, last = chain
     found = with_model_error(last.estimate, bounds)[0]
     priors = [laplace(name, replace(last, solution=found), one) for name, one in zip(names, before, strict=True)]

@@ -46,7 +46,7 @@ def faulty_places(evidence: Evidence) -> list[FaultyPart]:
 
 
 def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
-    """Suspects: each level of a direction with several levels, and each repeat of a level with over two repeats."""
+    """Suspected faults: each level of a direction with several levels, each repeat of a level with over two repeats."""
     for sweep in sweeps:
         levels_of_direction = [np.unique(member.held_value) for member in sweeps if member.direction == sweep.direction]
         levels = np.concatenate(levels_of_direction)
@@ -63,7 +63,7 @@ def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fau
 
 
 def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
-    """Suspects: all points of one repeat, in one sweep, in all sweeps of a direction, or in all sweeps."""
+    """Suspected faults: all points of one repeat, in one sweep, in all sweeps of a direction, or in all sweeps."""
     for _, label, members in _scopes(sweeps):
         if not all(np.unique(sweep.repeat).size > 1 for sweep in members):
             continue
@@ -74,7 +74,7 @@ def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fa
 
 
 def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
-    """Suspects: a disturbance at one frequency or a few neighbours, in one sweep, one direction or all sweeps."""
+    """Suspected faults: a disturbance at one or a few frequencies, in one sweep, one direction or all sweeps."""
     steps = np.unique(np.concatenate([sweep.frequency for sweep in sweeps])) if sweeps else np.empty(0)
     if steps.size < _FEWEST_FREQUENCIES:
         return
@@ -125,7 +125,7 @@ def _shifted(
     *,
     sloping: bool = False,
 ) -> FaultyPart:
-    """Suspect of a common error of gain and phase, and of their slopes if `sloping`; `chosen`: a mask per sweep."""
+    """Suspected fault: an error of gain and phase (and slopes if `sloping`) of the points in one mask per sweep."""
     ends = np.array([[1.0, 1.0], [1.0, -1.0]])[: 1 + sloping]
     unit = np.kron(ends, np.array([[1.0], [1.0j]]))
     return _place(evidence, family, name, sweeps, chosen, _shift_columns(evidence, sweeps, chosen, sloping), unit)
@@ -140,7 +140,7 @@ def _place(
     columns: Array,
     unit: Array,
 ) -> FaultyPart:
-    """Suspect made of the sweep points in `chosen` (one mask per sweep), with its residual columns and their units."""
+    """Build a suspected fault of sweep points (one mask per sweep) from its residual columns and changes of |K|."""
     frequency, amplitude = (
         np.concatenate([getattr(sweep, axis)[mask] for sweep, mask in zip(sweeps, chosen, strict=True)])
         for axis in ("frequency", "amplitude")
@@ -153,7 +153,7 @@ def _place(
 def _shift_columns(
     evidence: Evidence, sweeps: Sequence[MeasuredSweep], chosen: Sequence[Array], sloping: bool = False
 ) -> Array:
-    """Change of the residuals by a common error of points in gain, phase and, if sloping, slopes, (2 or 4, rows)."""
+    """Change of the residuals by a unit error of gain and phase, and of their slopes if `sloping`, (2 or 4, rows)."""
     rows = _rows(evidence, sweeps)
     columns = np.zeros((2 + 2 * sloping, rows.stop - rows.start))
     for sweep, mask in zip(sweeps, chosen, strict=True):

@@ -12,7 +12,7 @@ _UNSEEN = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Residual columns of one possible explanation of a gap, with a zero-mean Gaussian prior on their amounts.
+    """Changes of the residuals by one explanation of a gap, as columns with Gaussian amounts of zero mean.
 
     Args:
         columns: change of the whitened residuals per unit amount of each column, (c, n).
@@ -50,7 +50,7 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class GroupEvidence:
-    """Evidence of the tests for a group of columns.
+    """Evidence of the tests for one explanation of a gap, a group of residual columns.
 
     Args:
         log_evidence: natural log of the marginal likelihood of the tests with the group, averaged over the sizes of the
@@ -68,7 +68,7 @@ class GroupEvidence:
 
     @property
     def total(self) -> float:
-        """Natural log of the evidence, summed over the cases with and without a deviation of the compound."""
+        """Natural log of the evidence with and without a deviation of the compound from the model, added up."""
         if self.with_compound is None:
             return self.log_evidence
         return float(np.logaddexp(self.log_evidence, self.with_compound.log_evidence))

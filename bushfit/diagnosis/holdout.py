@@ -80,7 +80,7 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class Skipped:
-    """A part that was not held out.
+    """Part of the tests that could not be predicted from the other parts, with the reason.
 
     Args:
         part: description of the part.
@@ -95,7 +95,7 @@ class Skipped:
 
 @dataclass(frozen=True)
 class HoldOut:
-    """All parts held out in turn.
+    """Errors of two models on parts of the tests, each predicted by a fit to the other parts.
 
     Args:
         parts: results of the parts that were held out.
@@ -113,7 +113,7 @@ class HoldOut:
 
     @classmethod
     def from_residuals(cls, residuals: Mapping[str, Array], skipped: Sequence[Skipped] = ()) -> HoldOut:
-        """Compute root mean squares from predicted residuals by part, (2 models, 2: plain and whitened, n)."""
+        """Compute the errors from predicted residuals by part, (2 models, 2: in noise and whitened, n)."""
         residuals = {name: pair for name, pair in residuals.items() if pair.size}  # one frequency has no top third
         if not residuals:
             return cls((), tuple(skipped))
@@ -123,7 +123,7 @@ class HoldOut:
 
 
 def hold_out(before: Evidence, after: Evidence, bounds: Bounds) -> HoldOut:
-    """Compare two models of the same tests on every part that both can predict from the rest.
+    """Compare the errors of two models on each part of the tests, predicted by fits to the other parts.
 
     Args:
         before: fit without the added effects.
@@ -162,7 +162,7 @@ def predicted_parts(before: Evidence, after: Evidence, bounds: Bounds) -> tuple[
 
 
 def _figures(pair: Array) -> tuple[float, float, tuple[float, float]]:
-    """Root mean squares before, after, and (before, after) whitened, of residuals (2 models, 2: plain, whitened, n)."""
+    """Root mean square of residuals (model before or after, in noise or whitened, n): both in noise, then whitened."""
     (before, before_whitened), (after, after_whitened) = np.sqrt(np.mean(np.square(pair), axis=-1)).tolist()
     return before, after, (before_whitened, after_whitened)
 

@@ -59,7 +59,7 @@ class DiagnosisRequest:
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """Set of explanations of the gap, with its posterior probability.
+    """One set of explanations of the gap between model and tests, with its posterior probability.
 
     Args:
         effects: names of the effects, in the order in which they were added.
@@ -87,7 +87,7 @@ class Hypothesis:
 
     @property
     def key(self) -> frozenset[Hashable]:
-        """Names that identify the set of explanations; empty if nothing is missing."""
+        """Names that identify this set of explanations; empty for the hypothesis that nothing is missing."""
         marks = [self.unnamed, "levels" if self.levels else "", self.claim and self.claim.key]
         return frozenset((*self.effects, *(place.name for place in self.places), *filter(None, marks)))
 
@@ -98,7 +98,7 @@ class Hypothesis:
 
     @property
     def p_value(self) -> float:
-        """Probability that tests would have a larger misfit than these if the hypothesis were true."""
+        """Posterior predictive p-value: probability of a larger misfit than measured if the hypothesis is true."""
         return self.state.linear.p_value(compound_deviates=self.compound_deviates)
 
 
@@ -127,17 +127,17 @@ class Tests:
 
     @cached_property
     def errors(self) -> RigErrors:
-        """Errors of the rig as columns of the residuals of `bare`."""
+        """Errors of the rig that points share, as changes of the residuals of `bare`."""
         return rig_errors(self.bare, self.rig)
 
     @cached_property
     def compound(self) -> Group | None:
-        """Compound deviation from the model's laws, as columns of the residuals of `bare`; None without tests."""
+        """Smooth deviation of the rubber from the model's laws, as changes of the residuals of `bare`."""
         return compound(self.bare)
 
     @cached_property
     def compound_in_fits(self) -> Group | None:
-        """Deviation of the compound from the model's laws, as columns of the residuals of `base`, used in refits."""
+        """Smooth deviation of the rubber from the model's laws, as changes of the residuals of `base`, for refits."""
         return compound(self.base)
 
     @cached_property
@@ -145,7 +145,7 @@ class Tests:
         return {place.name: place for place in faulty_places(self.base)}
 
     def in_fits(self, place: FaultyPart) -> FaultyPart:
-        """Convert a faulty place from columns of the residuals of `bare` to those of `base`, used in refits."""
+        """Convert a faulty part of the tests from residuals of `bare` to residuals of `base`, for refits."""
         fitted = self._places_in_fits[place.name]
         return fitted if len(fitted.columns) == len(place.columns) else fitted.point_by_point()
 
@@ -157,7 +157,7 @@ class Tests:
 
 @dataclass(frozen=True, eq=False)
 class SearchState:
-    """Node of the search: a fitted model with added effects and faulty places, the base of a linear model.
+    """Step of the search: a model fitted with some effects and faulty parts of the tests, open to further explanations.
 
     The evidence for each further explanation is computed by linearising the residuals around this fit.
 
@@ -214,7 +214,7 @@ class SearchState:
 
     @cached_property
     def log_posterior(self) -> float:
-        """Natural log of prior times evidence, summed over the cases with and without a deviation of the compound."""
+        """Natural log of prior times evidence, with and without a deviation of the compound, added up."""
         total = float(np.logaddexp(self.linear.log_evidence, self.linear.log_evidence_with_compound))
         return self.log_prior + self.log_density + total
 
@@ -225,7 +225,7 @@ class SearchState:
         return linear.deviation[1] if linear.log_evidence_with_compound > linear.log_evidence else 0.0
 
     def free_columns(self, deviation: float) -> Array | None:
-        """Residuals that faulty places and the compound may cause, left free while further effects are refitted.
+        """Changes of the residuals by faulty parts of the tests and the compound, left free in refits of effects.
 
         Without these columns an effect would be fitted to the faults.
 
@@ -247,18 +247,18 @@ class SearchState:
 
     @cached_property
     def explanation_evidence(self) -> list[tuple[Explanation, GroupEvidence]]:
-        """Every explanation that has residual columns, with its evidence in the linear model."""
+        """Further explanations, each with the evidence of the tests for it in the linearised model."""
         explanations = [e for e in (*self.proposals, *self.tests.explanations) if e.group is not None]
         return list(zip(explanations, self.weigh(explanations), strict=True))
 
     def weigh(self, explanations: Sequence[Explanation]) -> list[GroupEvidence]:
-        """Compute the evidence for explanations that have residual columns, averaged over the likely rig errors."""
+        """Compute the evidence of the tests for given explanations, averaged over likely sizes of the rig's errors."""
         at_nodes = replace(self.linear, chosen_nodes=self._likely_nodes)
         return at_nodes.group_evidence_of([e.group for e in explanations if e.group is not None])
 
     @cached_property
     def _likely_nodes(self) -> Array:
-        """Indices of the rig-error nodes that are likely without further explanation, or with a smooth deviation."""
+        """Indices of the likely combinations of rig errors (nodes), with or without a smooth curve as explanation."""
         smooth = [e.group for e in self.tests.explanations if e.group and e.kind == "unnamed"]
         curves = replace(self.linear, groups=smooth, compound=None)
         return np.union1d(self.linear.likely(_NEAR), curves.likely(_NEAR))
@@ -304,8 +304,11 @@ class SearchState:
 
     @cached_property
     def hypotheses(self) -> list[Hypothesis]:
-        """Hypotheses without a further explanation: plain, with level errors beyond the class of the rig, and with a
-        deviation of the compound."""
+        """Hypotheses that have the explanations of this state and no further effect or fault.
+
+        They are three: as the state is, with level errors beyond the class of the rig, and with a deviation of the
+        compound.
+        """
         linear, tests = self.linear, self.tests
         log_prior = self.log_prior + self.log_density
         plain = Hypothesis(

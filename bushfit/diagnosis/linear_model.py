@@ -33,7 +33,7 @@ _AT_ONCE = 4_000_000
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """Linearised residuals of one fitted model, from which the evidence for missing explanations follows.
+    """Linearised residuals of a fitted model, from which the evidence for each further explanation is computed.
 
     A node is one combination of sizes of the rig's errors and of the compound's deviation from the model's laws. All
     log evidences are natural logs of the marginal likelihood, averaged over nodes and up to a common constant.
@@ -64,12 +64,12 @@ class LinearModel:
 
     @cached_property
     def _deviation(self) -> Array:
-        """Size of the compound's deviation at each node, relative to |K|, (nodes,)."""
+        """Standard deviation of the compound's deviation from the model at each node, relative to |K|, (nodes,)."""
         return np.array([self.rig.nodes[n].compound for n in self.nodes])
 
     @cached_property
     def _plain(self) -> Array:
-        """Mask of the nodes without level errors beyond the rig's class and without a deviation of the compound."""
+        """Mask of the nodes with rig errors within the class and without a deviation of the compound, (nodes,)."""
         return np.array([not self.rig.nodes[n].wide for n in self.nodes]) & (self._deviation == 0.0)
 
     @cached_property
@@ -90,7 +90,10 @@ class LinearModel:
 
     @cached_property
     def _at_nodes(self) -> "_AtNodes":
-        """Evidence without any group, and inner products of the groups, at each node; in parts to limit memory."""
+        """Evidence without a further explanation, and inner products of all groups of columns, at each node.
+
+        Nodes are computed in parts to limit memory.
+        """
         rig = self.rig
         deviation = self.compound.whole if self.compound else np.zeros((0, self.residual.size))
         rows = np.concatenate([self.residual[None], self.jacobian, deviation, *(group.scaled for group in self.groups)])
@@ -137,7 +140,7 @@ class LinearModel:
     def _projected(
         self, chosen: Array, index: Array, gram: Array, grams: Sequence[Array], log_det: Array, by_noise: Array
     ) -> "_AtNodes":
-        """Inner products with the parameters and the compound's deviation projected out, at some of the nodes.
+        """Project parameters and the compound's deviation out of the inner products, at some of the nodes.
 
         Args:
             chosen: positions of the m nodes in `nodes`, (m,).
@@ -192,7 +195,7 @@ class LinearModel:
 
     @cached_property
     def group_evidence(self) -> list[GroupEvidence]:
-        """Evidence for each group in `groups`, with level errors of the rig within its class."""
+        """Evidence of the tests for each group of columns in `groups`, with rig errors within the stated class."""
         bent = self._deviation > 0.0
         return [
             self._over_nodes(gains, self._plain, self._over_nodes(gains, bent) if bent.any() else None)
@@ -213,7 +216,7 @@ class LinearModel:
         return GroupEvidence(total - float(np.log(log_evidence[0].size)), size, likeliest, beside)
 
     def group_evidence_of(self, groups: Sequence[Group]) -> list[GroupEvidence]:
-        """Compute the evidence for groups other than `self.groups`, in parts to limit memory.
+        """Compute the evidence of the tests for further groups of columns, in parts to limit memory.
 
         Returns:
             One evidence per group, in the same order.
@@ -227,7 +230,7 @@ class LinearModel:
         ]
 
     def _log_evidence_over(self, chosen: Array) -> float:
-        """Natural log of the evidence without a group, summed over the nodes in a mask; -inf for an empty mask."""
+        """Natural log of the evidence without a further explanation, summed over the nodes in a mask, (nodes,)."""
         return float(logsumexp(self._at_nodes.base[chosen])) if chosen.any() else -np.inf
 
     @property

@@ -41,7 +41,7 @@ def find_regions(evidence: Evidence) -> tuple[MisfitRegion, ...]:
 
 
 def _sweep_regions(evidence: Evidence) -> Iterator[MisfitRegion]:
-    """Regions of smooth misfit of storage and of loss stiffness, one each for the sweeps of a direction."""
+    """Yield a region of smooth misfit of storage and one of loss stiffness for the sweeps of each direction."""
     _, sweeps = split_by_kind(evidence.data_sets)
     lines = [line for sweep in sweeps for line in sweep.lines(evidence.model)]
     for direction, stepped in dict.fromkeys((line.direction, line.stepped) for line in lines):
@@ -133,7 +133,7 @@ def _trend_word(first: float, last: float) -> str:
 
 
 def _loop_regions(evidence: Evidence) -> Iterator[MisfitRegion]:
-    """Regions for loops: each with the harmonic in which its force deviates most from the model."""
+    """Yield a region for each loop, with the harmonic in which its force deviates most from the model."""
     loops, _ = split_by_kind(evidence.data_sets)
     for data_set in loops:
         columns, amplitude = data_set.smooth_changes(), data_set.drive.amplitude

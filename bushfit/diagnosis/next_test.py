@@ -107,7 +107,7 @@ def deciding_test(
 
 
 def _candidates(data_sets: Sequence[MeasuredTest]) -> Iterator[NextTest]:
-    """Candidate tests: each fixture of the tests so far, and the bushing in directions that were not swept."""
+    """List the candidate tests: dummies in place of the bushing, and the bushing in directions that were not swept."""
     places = dict.fromkeys(data_set.direction for data_set in data_sets)
     for place, test in product(places, FIXTURE_TESTS):
         yield replace(test, place=place, sentence=test.sentence.format(place=place))

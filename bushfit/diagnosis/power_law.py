@@ -147,7 +147,7 @@ class PowerLaw:
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """Complex stiffness added to a model's, at the p operating points of all tests except those of coupons.
+    """Complex stiffness that is added to a model, at the p operating points of all tests except those of coupons.
 
     Its values and shapes are complex numbers in the unit `measure`.
 
@@ -201,7 +201,7 @@ class Term:
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
     def residual(self, value: Array, model: Model) -> Array:
-        """Exact whitened residuals, (n,), of a model plus the term with complex values at the points, (p,)."""
+        """Whitened residuals, (n,), of a model with the term added, whose complex values at the points are (p,)."""
         residuals, added = residual(model, self.evidence.data_sets), value * self.unit(model)
         for test, points in self.tests:
             residuals[self.evidence.place[test]] = test.residual_with(added[points], model)

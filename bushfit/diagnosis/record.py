@@ -103,7 +103,7 @@ class NamedCause:
 
 @dataclass(frozen=True)
 class Odds:
-    """Explanations of a gap with their probabilities.
+    """Reported explanations of a gap between model and tests, with their probabilities and fitted models.
 
     Args:
         nothing: probability that nothing is missing beyond noise and tolerance.
@@ -337,7 +337,7 @@ def level_of(name: str) -> str:
 
 
 def _rms(evidence: Evidence) -> float:
-    """Root mean square residual of a fit, in units of noise."""
+    """Root mean square of the residuals of a fit, in units of noise."""
     return float((evidence.chi_square / max(sum(data_set.residual_count for data_set in evidence.data_sets), 1)) ** 0.5)
 
 

@@ -39,7 +39,7 @@ _ONE_DIRECTION = (
 
 @dataclass(frozen=True, eq=False)
 class DiagnosisWriter:
-    """Builder of the reported diagnosis (texts, regions, models) from a verdict.
+    """Builder of the reported diagnosis (texts, misfit regions, models) from the verdict of a search.
 
     Args:
         search: completed search, with the tests.
@@ -60,7 +60,7 @@ class DiagnosisWriter:
 
     @property
     def first(self) -> Composition | None:
-        """First of the reported explanations; None if nothing is missing."""
+        """Most probable reported explanation of the gap; None if nothing is missing."""
         return self.finding.reported[0] if self.finding.reported else None
 
     def diagnosis(self) -> Diagnosis:
@@ -143,7 +143,7 @@ class DiagnosisWriter:
         )
 
     def _claim_entries(self, composition: Composition, alternatives: tuple[str, ...] = ()) -> list[NamedCause]:
-        """Entries for the mistake of a composition, one for each affected test."""
+        """Make the reported entries for the mistake in an explanation, one for each affected test."""
         data, claim = self.request.data, composition.best.claim
         gain = self.request.base.chi_square - composition.best.state.evidence.chi_square
         why = f"lowers chi-square by {gain:.0f} without a new parameter; {self._probability(composition)}"
@@ -199,7 +199,7 @@ class DiagnosisWriter:
         return self._finished("unexplained", summary, self.request.base, places=best, next_test=advice)
 
     def label(self, composition: Composition) -> str:
-        """Name of a composition: its mistakes, effects, faulty places and other parts, joined by " + "."""
+        """Name of an explanation: its mistakes, effects, faulty parts of the tests and other parts, joined by " + "."""
         claim = composition.best.claim
         names = [*(claim.labels(self.request.data) if claim else ()), *composition.names]
         return " + ".join((*names, *(f"fault: {place.name}" for place in composition.places), *_nameless(composition)))
@@ -223,7 +223,7 @@ class DiagnosisWriter:
         return Odds(self.finding.nothing, pairs, tuple(models), labels, exclusive)
 
     def _probability(self, composition: Composition) -> str:
-        """Text with the probability of a composition and of its strongest rival."""
+        """Text with the probability of an explanation and of its most probable rival."""
         rivals = [rival for rival in self.finding.reported if rival is not composition][:1]
         following = [f"next {self.label(rival)} {format_probability(rival.probability)}" for rival in rivals]
         return ", ".join([f"probability {format_probability(composition.probability)}", *following])
@@ -290,7 +290,7 @@ class DiagnosisWriter:
         )
 
     def _with_free_gains(self, evidence: Evidence) -> Evidence:
-        """Refit a model with free gains of the loops, unless the class of the rig's gain is stated; cached."""
+        """Refit a model without an assumed gain error in the weights of loops; unchanged if the campaign states it."""
         loops = split_by_kind(evidence.data_sets)[0]
         gain_is_stated = self.request.data.campaign.rig.stiffness_errors[0] is not None
         if gain_is_stated or not any(loop.gain_weighs for loop in loops):
@@ -305,8 +305,10 @@ class DiagnosisWriter:
         return {}
 
     def _candidates(self) -> list[CandidateResult]:
-        """All effects that the starting model lacks, and all mistakes that were fitted, with score, refit and
-        probability; the highest score first."""
+        """List all effects that the starting model lacks, and all mistakes that were fitted, the highest score first.
+
+        Each has its score, the result of its refit, and its probability.
+        """
         base, data, first = self.request.base, self.request.data, self.first
         log_posteriors = np.array([hypothesis.log_posterior for hypothesis in self.hypotheses])
         weights = np.exp(log_posteriors - log_posteriors[0])
@@ -380,5 +382,5 @@ def _format_amount(name: str, result: Result) -> str:
 
 
 def _nameless(composition: Composition) -> list[str]:
-    """Texts for the parts of a composition without a name: level errors, and unknown curves or deviations."""
+    """Texts for the parts of an explanation that are no known effect: level errors, and unknown smooth curves."""
     return [_LEVELS] * composition.best.levels + [_NAMELESS] * composition.unnamed

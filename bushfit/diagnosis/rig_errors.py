@@ -24,7 +24,7 @@ _FEWEST = 4
 
 @dataclass(frozen=True)
 class Node:
-    """Combination of sizes of all random errors, with its prior weight; the evidence is averaged over nodes.
+    """One combination of sizes of the rig's random errors, with its prior weight, over which the evidence is averaged.
 
     Args:
         scatter: standard deviation of a sweep's point, relative to the estimated point-to-point noise.
@@ -127,7 +127,7 @@ def in_scatter_units(evidence: Evidence) -> Evidence:
 
 
 def rig_errors(evidence: Evidence, rig: RigSettings) -> RigErrors:
-    """Build the errors of a rig of a stated class, for the tests that a model was fitted to."""
+    """Build the errors of a rig for the fitted tests, with sizes of the class that the campaign states in [rig]."""
     return RigErrors(list(blocks(evidence, rig)), nodes(evidence))
 
 
@@ -185,7 +185,7 @@ def blocks(evidence: Evidence, rig: RigSettings) -> Iterator[Block]:
 
 
 def _shared_errors(count: int, runs: Sequence[Array]) -> tuple[Array, Array]:
-    """Unit errors shared by the n points of a line: columns of its level, runs and drift, (w, n), and kinds, (w,)."""
+    """Unit errors that n points at one level of a sweep share (level, runs, drift), (w, n), and their kinds, (w,)."""
     columns, kinds = [np.ones(count)], [_LEVEL]
     for run in runs:
         orders = np.arange(1, WAVES + 1)[:, None] if run.size >= _FEWEST else np.empty((0, 1))

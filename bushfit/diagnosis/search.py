@@ -80,7 +80,7 @@ class Search:
         return self._ordered()
 
     def _ordered(self) -> list[Hypothesis]:
-        """All hypotheses noted so far, the most probable first."""
+        """All hypotheses recorded so far, the most probable first."""
         return sorted(self._known.values(), key=lambda hypothesis: -hypothesis.log_posterior)
 
     def _is_sure(self) -> bool:
@@ -104,21 +104,21 @@ class Search:
                 del self._known[linear.key]  # no response with it, or far behind
 
     def _log_prior(self, explanation: Explanation) -> float:
-        """Natural log of the prior odds; the lowest of its kind for an explanation that another one made possible."""
+        """Natural log of the prior odds of an explanation; the lowest of its kind if `prior_odds` does not list it."""
         key = explanation.kind, explanation.name
         if key not in self._log_priors:
             self._log_priors[key] = min(odds for (kind, _), odds in self._log_priors.items() if kind == key[0])
         return self._log_priors[key]
 
     def _register(self, state: SearchState) -> SearchState:
-        """Mark a state as visited, note its hypotheses, and return the state."""
+        """Record a state and its hypotheses, so that the search does not visit it again; return the state."""
         self._visited.add(state.key)
         for hypothesis in state.hypotheses:
             self._note(hypothesis)
         return state
 
     def _note(self, hypothesis: Hypothesis) -> None:
-        """Record a hypothesis, alone and with each frequency at which outliers meet.
+        """Record a hypothesis, alone and with a disturbance at each frequency with several outliers.
 
         Of two fits of the same set of explanations, a refitted one replaces a linear one; else the more probable stays.
         """
@@ -237,7 +237,7 @@ class Search:
             yield self._register(grown)
 
     def _without_earlier(self, state: SearchState) -> Iterator[SearchState]:
-        """Remove each effect before the last from a state and refit: the last effect may make it unnecessary."""
+        """Yield the refitted state without each earlier effect, which the last effect may make unnecessary."""
         if state.places:
             return
         data_sets, request = state.evidence.data_sets, self.request

@@ -21,7 +21,7 @@ from bushfit.effects.contract import Level
 
 @dataclass(frozen=True, eq=False)
 class Composition:
-    """Explanation of a gap: a set of effects, faults and mistakes, merged over all hypotheses with these parts.
+    """Explanation of a gap by a set of effects, faults and mistakes, merged from all hypotheses with these parts.
 
     Args:
         probability: probability of these parts if anything is missing.
@@ -43,7 +43,7 @@ class Composition:
 
     @property
     def parts(self) -> frozenset[str]:
-        """Names of the effects, kinds of faulty places and other parts."""
+        """Names of the effects, kinds of faulty test parts and other parts of the explanation."""
         best = self.best
         marks = [f"place: {place.family}" for place in self.places] + ["levels"] * best.levels
         marks += ["unnamed"] * self.unnamed + ([str(best.claim.mistake.name)] if best.claim else [])
@@ -123,7 +123,7 @@ def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float) -> Findin
 
 
 def _single(first: Composition, nothing: float, leads: Sequence[str]) -> Finding:
-    """Decide the verdict if one composition, `first`, is nearly certain."""
+    """Decide the verdict if one explanation, `first`, is nearly certain; `leads` are effects that only help."""
     best, names = first.best, first.names
     leads = tuple(dict.fromkeys((*names, *leads)))
     if first.may_mislead or not (names or best.claim or first.unnamed):
@@ -136,7 +136,7 @@ def _single(first: Composition, nothing: float, leads: Sequence[str]) -> Finding
 
 
 def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
-    """Effects of the most probable hypothesis that nearly all other hypotheses, by probability, have as well."""
+    """Effects of the most probable hypothesis that hypotheses of nearly all the probability have in common."""
     share: dict[str, float] = defaultdict(float)
     for hypothesis, weight in pairs:
         for name in hypothesis.effects:
@@ -146,7 +146,7 @@ def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
 
 
 class _Parts(NamedTuple):
-    """Parts of a hypothesis, the key by which hypotheses are merged to compositions.
+    """Effects, faults and mistake of a hypothesis, by which hypotheses are merged into compositions.
 
     Args:
         effects: names of the effects.

@@ -47,8 +47,10 @@ def _circle(length: int) -> tuple[Array, Array]:
 
 
 def _kernel(alpha: Array, scaled: Array, count: int, step: Array) -> Array:
-    """Weights of the past strains, (..., count), as in Eq. (3): coefficients of the power series in z of
-    -k v^2/(1 + k v)/step^alpha, with v = (1 - z)^alpha and k = tau^alpha/step^alpha.
+    """Weights of the past strains, (..., count), as in Eq. (3), for steps [s] and `scaled` relaxation times tau^alpha.
+
+    They are the coefficients of the power series in z of -k v^2/(1 + k v)/step^alpha, with v = (1 - z)^alpha and k =
+    tau^alpha/step^alpha.
 
     Notes: from the values of the series on a circle |z| < 1 (C. Lubich, Numer. Math. 52 (1988) 129).
     """

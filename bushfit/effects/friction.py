@@ -171,8 +171,10 @@ def _stroke_slopes(sign: Any, distance: Any, room: Any, reach: Any) -> tuple[Any
 
 
 def _strokes(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tuple[Any, Any, Any]]:
-    """Relative stress u at the k + 1 turning points of k strokes, from a start value; each with du/d(ln eps_half) for a
-    fixed start value, and the derivative by the start value."""
+    """Compute the relative stress u at the k + 1 turning points of k strokes, from a start value.
+
+    Each u comes with du/d(ln eps_half) for a fixed start value, and with the derivative by the start value.
+    """
     path = [(u, 0.0 * u, 1.0 + 0.0 * u)]
     for sense, distance in zip(senses, distances, strict=True):
         start, slope, memory = path[-1]
@@ -221,8 +223,11 @@ def _stress_at_turning_points(strides: Array, periodic: bool, eps_half: Array) -
 
 
 def _at_samples(eps_half: Array, history: History) -> tuple[Array, Array, Array, Array]:
-    """Relative stress u and du/d(ln eps_half) at the start of each stroke, (..., k), and the sign and the relative
-    distance d of the travel from that start to each sample, (..., n)."""
+    """Relative stress u and du/d(ln eps_half) at the start of each stroke, and sign and length of the travel from it.
+
+    The stress and its derivative are (..., k); the sign and the relative distance d from the start of the stroke to
+    each sample are (..., n).
+    """
     turning, eps_half = history.turning, np.atleast_1d(np.asarray(eps_half, dtype=float))
     sense, distance = np.sign(turning.travel), np.abs(turning.travel) / eps_half
     return *_stress_at_turning_points(turning.strides, history.periodic, eps_half), sense, distance

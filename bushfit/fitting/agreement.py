@@ -30,7 +30,7 @@ _ENOUGH = 0.5
 
 
 class _Run(NamedTuple):
-    """Run of a test: the quantity held constant (or None), its value and unit, and its points: mask (n,) or slice."""
+    """Run of a test: quantity that is constant (or None), its value and unit, and its points as a mask or slice."""
 
     held: Literal["amplitude", "frequency"] | None
     value: float | None
@@ -66,7 +66,7 @@ class LeaveOut:
         return cls(basis, directions[determined].T / size[determined], basis.T @ residual, residual)
 
     def undetermined(self, rows: Array) -> Array:
-        """Mask of the parameters that are not determined once `rows` (indices or mask) are left out, (k,)."""
+        """Mask of the parameters, (k,), that a fit without some rows (indices or mask) would not determine."""
         size, vectors = np.linalg.eigh(self._rest(rows))
         without = np.square(self.coordinate_steps @ vectors) @ (1.0 / np.maximum(size, _LEAST_SEEN**2))
         return without > _MOST_GROWTH * np.sum(np.square(self.coordinate_steps), axis=1)
@@ -128,11 +128,11 @@ class LeaveOut:
         return pull
 
     def _rest(self, rows: Array) -> Array:
-        """Fisher information of all rows but `rows`, along the basis, (m, m)."""
+        """Fisher information of all rows but the given ones, along the basis, (m, m)."""
         return np.eye(self.components.size) - self.basis[rows].T @ self.basis[rows]
 
     def _basis_step(self, rows: Array) -> Array:
-        """Gauss-Newton step of the fit without `rows`, along the basis, (m,)."""
+        """Gauss-Newton step of a fit without the given rows, along the basis, (m,)."""
         return -np.linalg.solve(self._rest(rows), self.components - self.basis[rows].T @ self.residual[rows])
 
 

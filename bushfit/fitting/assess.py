@@ -47,7 +47,7 @@ _CHECK = "check the units of displacement and force, and the dimensions of what 
 
 @dataclass(frozen=True, eq=False)
 class FitStage:
-    """One of the fits that a procedure makes in turn, such as the static one.
+    """One of several fits of a procedure, such as the static fit of the paper's two-step procedure.
 
     Args:
         names: names of the parameters that the fit estimated.
@@ -191,7 +191,7 @@ def lack_of_fit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int
 
 
 def excess_chi_square(chi_square: float, freedom: int) -> float | None:
-    """The given reduced chi-square if it exceeds 1 by more than noise explains (5 standard deviations); else None."""
+    """Return a reduced chi-square that exceeds 1 by more than noise explains (5 standard deviations); else None."""
     return chi_square if chi_square > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else None
 
 

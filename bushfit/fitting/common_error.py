@@ -51,7 +51,7 @@ class CommonError:
 
 
 class ErrorProducts(NamedTuple):
-    """Inner products of m rows, such as residuals and derivatives, from which any size of a shared error is projected.
+    """Inner products of m rows (residuals and derivatives), from which the size of an error of the model is estimated.
 
     Args:
         products: inner products of the rows in units of noise, (m, m).

@@ -78,7 +78,7 @@ def residual(model: Model, data_sets: Sequence[MeasuredTest]) -> Array:
 
 
 def jacobian(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> Array:
-    """Derivatives of `residual` by parameter coordinate, (len(names), n).
+    """Derivatives of the whitened residuals of all tests by parameter coordinate, (len(names), n).
 
     Args:
         model: model at whose values the derivatives are taken.

@@ -195,7 +195,7 @@ class Descent:
 
     @cached_property
     def _reach(self) -> tuple[Array, Array]:
-        """Smallest and largest coordinates that the next step may reach, (k,) each."""
+        """Smallest and largest coordinate of each parameter that the next step may reach, (k,) each."""
         parameters, (low, high) = self.problem.coordinates.parameters, self.problem.limits
         longest = np.array([_LONGEST_STEP if parameter.log else np.inf for parameter in parameters])
         return np.maximum(low, self.point - longest), np.minimum(high, self.point + longest)
@@ -224,7 +224,7 @@ class Descent:
         return step, float(-(2.0 * slope + curvature @ step) @ step)
 
     def _bend(self, step: Array, damping: float) -> Array:
-        """Correction that bends a damped step along the valley, (k,); 0 if the last step led in another direction."""
+        """Second-order correction of a damped step, along a curved valley, (k,); 0 if the last step went elsewhere."""
         if self.last is None:
             return np.zeros_like(step)
         before, second = self.last

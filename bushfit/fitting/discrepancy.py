@@ -82,7 +82,7 @@ class FittedTests:
 
     @property
     def moving(self) -> Array:
-        """Derivatives of the whitened residuals by coordinate of the k parameters that are not at a bound, (k, n)."""
+        """Derivatives of the whitened residuals by coordinate of the k parameters not at a bound, (k, n)."""
         return self.solution.jacobian[self.solution.moving]
 
     @cached_property

@@ -146,7 +146,7 @@ class Drive:
         return replace(motion, accuracy=_ACCURACY)
 
     def interpolate_at_rows(self, response: Array) -> Array:
-        """Interpolate a response of the model over `history`, (..., samples), linearly at the measured rows.
+        """Interpolate a model response over the samples of `history`, (..., samples), at the measured rows.
 
         The mean is subtracted if the fit uses the loop about its mean (`datum`).
 
@@ -288,7 +288,7 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
 
 
 def _at_reversal(drive: Drive) -> Array:
-    """Mask of the rows within 1.5 grid steps of a turning point, where dry friction jumps, (n,)."""
+    """Mask of the rows near a turning point of the motion, where the force of dry friction jumps, (n,)."""
     motion, position = drive.history(is_transient=False).value, drive.phase * GRID
     if drive.from_rest:
         turns = np.flatnonzero(reversals(motion))

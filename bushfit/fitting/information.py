@@ -79,7 +79,7 @@ class FisherInformation:
 
 
 def relative_sizes(model: Model, names: Sequence[str]) -> Array:
-    """Change of each fit coordinate per relative change of its parameter, (k,): 1 for logarithmic coordinates."""
+    """Change of the fit coordinate of each parameter per relative change of its value, (k,): 1 for logarithms."""
     pairs = [(model.parameters[name], abs(model.values[name])) for name in names]
     return np.array(
         [1.0 if parameter.log else max(value / parameter.typical, _LEAST_SIZE) for parameter, value in pairs]

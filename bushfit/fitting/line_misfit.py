@@ -44,7 +44,7 @@ class LineMisfit:
 
     @property
     def words(self) -> str:
-        """Constant value of the line as text, "0.1 mm" or "10 Hz"; for other lines the name of the test."""
+        """Text of the constant amplitude or frequency of the line, "0.1 mm" or "10 Hz"; else the name of the test."""
         if self.stepped == "frequency":
             return shown_amplitude(self.direction, float(self.amplitude[0]))
         return f"{self.frequency[0]:.4g} Hz" if self.stepped else self.name

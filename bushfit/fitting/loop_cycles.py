@@ -108,7 +108,7 @@ def _crossings(motion: Array) -> tuple[Array, Array, Array]:
 
 
 def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | None]:
-    """Loop without the rows before and after its steady cycles, and a note on the rows left out or None."""
+    """Return a loop without the rows before and after its steady cycles, and a note on these rows or None."""
     period = _period(time, motion)
     if period is None or time[-1] - time[0] <= period:
         return loop, None
@@ -145,7 +145,7 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
 
 
 def _cut(loop: Loop, first: float, last: float) -> Loop:
-    """Rows of a loop between two times [s], both included."""
+    """Return a loop with only its rows from one time to another [s]."""
     return loop.select(slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right")))
 
 
@@ -260,7 +260,7 @@ def _refined(clock: Array, x: Array, frequency: float, rows_per_cycle: float) ->
 
 
 def _repeats(clock: Array, x: Array, period: float) -> bool:
-    """True if the motion after one period repeats its beginning."""
+    """Return True if the rows after one period [s] repeat the beginning of the motion x, (n,)."""
     begin = int(np.searchsorted(clock, period))
     if x.size - begin < 2:
         return True

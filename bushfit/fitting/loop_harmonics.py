@@ -36,7 +36,7 @@ _CORNER = 0.5
 
 
 class OutlierRows(NamedTuple):
-    """Outliers of one column: row indices, (k,), and distances from the harmonics in units of noise, (k,)."""
+    """Outliers of displacement or force: row indices and distances from the harmonics [noise], (k,) each."""
 
     rows: Array
     off: Array
@@ -108,7 +108,7 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
 
 
 def _cleared(coefficients: Array, noise: float, phase: Array, displacement: Array, inliers: Array) -> Array:
-    """Complex harmonics of a motion that exceed its noise; all harmonics of a triangle if the rows agree with one."""
+    """Keep the harmonics of a motion that exceed its noise, or those of a triangle if the rows agree with one."""
     order, fundamental = np.arange(1, GRID // 2, 2), coefficients[1]
     turn, triangle = 1j * fundamental / abs(fundamental), np.zeros(GRID // 2, dtype=complex)
     triangle[0] = coefficients[0]
@@ -189,18 +189,18 @@ def _column_outliers(loop: Loop, frequency: float, column: Array, solution: Arra
 
 
 def _inliers(columns: Array, values: Array, solution: Array, stuck: Array) -> Array:
-    """Mask of the rows that are neither stuck nor far from the harmonics, (n,)."""
+    """Mask of the rows of a column that are neither stuck nor far from the harmonics in `solution`, (n,)."""
     residual = values - columns @ solution
     return ~(stuck | are_outliers(residual, values, residual_limit(solution, residual, values.size)))
 
 
 def _noise(solution: Array, residual: Array) -> float:
-    """Noise of one row: the spread of the residuals, but at least that of the best rigs."""
+    """Standard deviation of one row: robust scatter of the residuals, (n,), but at least that of the best rigs."""
     return max(_spread(residual), FLOOR * abs(as_complex(solution)[1]))
 
 
 def _spread(residual: Array) -> float:
-    """Robust standard deviation of residuals about zero."""
+    """Robust standard deviation of residuals, (n,), about zero."""
     return MEDIAN_TO_SIGMA * float(np.median(np.abs(residual)))
 
 

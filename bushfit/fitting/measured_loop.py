@@ -96,7 +96,7 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def residual_count(self) -> int:
-        """Number of residuals with weight; for correlated rows the effective number."""
+        """Number of residuals with weight; if the noise of rows is correlated, the effective number."""
         return 2 if self.fundamental_only else round(self.drive.row_noise.share * np.count_nonzero(self._counting))
 
     @property
@@ -114,33 +114,33 @@ class MeasuredLoop(MeasuredBase):
         return self.drive.noise / self.drive.half_range
 
     def weighted(self, weight: Array) -> Self:
-        """Test with the weight of each point multiplied by a factor, (n,)."""
+        """Return the test with the weight of each point multiplied by a factor, (n,)."""
         return replace(self, drive=replace(self.drive, weight=self.drive.weight * weight))
 
     def without(self, points: Array) -> Self:
-        """Test with weight 0 at the given point indices; a loop is unchanged, because its outliers have no weight."""
+        """Return the test with weight 0 at the given point indices (a loop has no weight at outliers anyway)."""
         return self
 
     def with_weight(self) -> Self:
-        """Test reduced to its points with weight; a loop is unchanged."""
+        """Return the test with only those points that have weight; a loop is unchanged."""
         return self
 
     def fundamental(self) -> Self:
-        """Test reduced to its first harmonic, for an added stiffness that is known at the test's frequency only."""
+        """Return the test reduced to its first harmonic, for an added stiffness that is known at one frequency only."""
         return replace(self, fundamental_only=True)
 
     def with_noise(self, relative: float) -> Self:
-        """Loop with another standard deviation of one row, relative to half the force range."""
+        """Return the loop with another standard deviation of the noise of a row, relative to half the force range."""
         return replace(self, drive=replace(self.drive, noise=relative * self.drive.half_range))
 
     def with_model_error(self, size: float) -> Self:
-        """Test with a model error of the given relative standard deviation added to its noise."""
+        """Return the test with an error of the model added to its noise, by its standard deviation relative to |K|."""
         test = replace(self, model_error=size)
         test.__dict__["_error_directions"] = self._error_directions
         return test
 
     def noise_free(self, model: Model) -> Self:
-        """Test with the response of a model in place of the measured response."""
+        """Return the test with the response of a model in place of the measured response."""
         force = self.force(model)
         return replace(self, drive=replace(self.drive, force=force, half_range=float(np.ptp(force)) / 2.0))
 
@@ -185,7 +185,7 @@ class MeasuredLoop(MeasuredBase):
         return self.drive.interpolate_at_rows(slopes)
 
     def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
-        """Derivatives of `residual_with` by parameter value, (k, size).
+        """Derivatives by parameters of the residuals with an added stiffness (`residual_with`), (k, size).
 
         Args:
             added: stiffness added to the model's, complex (n,) [N/m or N m/rad].
@@ -233,7 +233,7 @@ class MeasuredLoop(MeasuredBase):
         return self.drive.outliers["force"].rows
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
-        """Records of outliers with their file and row, from the indices of the points (a loop: all its outliers)."""
+        """Yield the outliers with file and row, from the indices of the points (of a loop: all outliers)."""
         file = str(self.source.file) if self.source else None
         before = self.drive.first_row + (self.test.part.first_row if self.test.part else 0)
         for column, (rows, distance) in self.drive.outliers.items():
@@ -241,15 +241,18 @@ class MeasuredLoop(MeasuredBase):
                 yield Outlier(self.name, file, row + before + 1, column, noise_units)
 
     def smooth_changes(self) -> Array:
-        """Change of the whitened residuals by a force of half the force range, (11, size), in turn constant and as
-        cosine and sine of each of five harmonics; with `fundamental_only` all but the first harmonic are 0."""
+        """Change of the whitened residuals by eleven smooth changes of the force of half the force range, (11, size).
+
+        These are a constant, and cosine and sine of five harmonics; with `fundamental_only` all but the first harmonic
+        are 0.
+        """
         rows = self._whitened(self._waves * (self._per_noise * self.drive.half_range))
         if self.fundamental_only:
             rows[[0, *range(3, len(rows))]] = 0.0
         return rows
 
     def smooth_misfit(self, model: Model) -> float:
-        """Largest smooth misfit (first five harmonics), relative to half the force range, or to |K| for a sweep."""
+        """Largest misfit in the first five harmonics, relative to half the force range (of a sweep: to |K|)."""
         sizes = np.linalg.lstsq(self.smooth_changes().T, self.residual(model), rcond=None)[0]
         return float(np.abs(sizes @ self._waves[:, self.weights > 0.0]).max())
 
@@ -280,7 +283,7 @@ class MeasuredLoop(MeasuredBase):
         return smooth_waves(self.drive.phase)
 
     def _in_noise(self, rows: Array) -> Array:
-        """Rows in units of noise, (..., n), with their correlation removed; 0 if a row depends on a row left out."""
+        """Convert rows [N or N m], (..., n), to units of noise and remove their correlation; 0 if a row is left out."""
         white = self.drive.row_noise.whiten(rows) * self._counting
         return white @ self._fundamental if self.fundamental_only else white
 
@@ -334,8 +337,11 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def _error_waves(self) -> Array:
-        """Change of the uncorrelated rows by one standard deviation of each part of a model error of 100 %, (c, n):
-        cosine and sine of each harmonic, and for a loop from rest an additional first cycle and a drift."""
+        """Change of the uncorrelated rows by one standard deviation of each part of a model error of 100 %, (c, n).
+
+        The parts are cosine and sine of each harmonic, and for a loop from rest also a deviation of the first cycle and
+        a drift.
+        """
         count = 1 if self.fundamental_only else _ERROR_HARMONICS
         angle = 2.0 * np.pi * self.drive.phase * np.arange(1, count + 1)[:, None]
         waves = np.stack((np.cos(angle), np.sin(angle)), axis=1) * _ERROR_SIZES[:count, None, None]
@@ -385,7 +391,7 @@ class MeasuredLoop(MeasuredBase):
         return {(self.name, index): self._less_shared(part) for index, part in enumerate(parts)}
 
     def extra_covariance(self, influence: Array) -> Array:
-        """Covariance of estimates that the weights of the residuals do not include.
+        """Covariance of parameter estimates by errors that the weights of the residuals do not include.
 
         For a loop with model error: the gain error, minus the model error of the first harmonic, which the Gaussian
         process of the model error already includes.

@@ -121,7 +121,7 @@ class MeasuredSweep(MeasuredBase):
         return self.weighted(np.isin(np.arange(self.frequency.size), points, invert=True)) if points.size else self
 
     def select(self, points: Array) -> Self:
-        """Sweep reduced to the points of a mask, (n,)."""
+        """Return the sweep with only the points of a mask, (n,)."""
         return replace(self, weight=self.weights[points], part=self.order[points])
 
     def with_weight(self) -> Self:
@@ -129,7 +129,7 @@ class MeasuredSweep(MeasuredBase):
         return self if weighed.all() else self.select(weighed)
 
     def thinned(self, maximum: int) -> Self:
-        """Sweep reduced to every k-th point, at most `maximum` points."""
+        """Return the sweep with only every k-th point, so that at most `maximum` points remain."""
         step = -(-self.order.size // maximum)
         return self if step == 1 else self.select(np.arange(self.order.size) % step == 0)
 
@@ -189,13 +189,13 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def _distinct(self) -> tuple[Array, Array, Array]:
-        """Frequency and reached amplitude of the distinct operating points, and the index of each point's, (n,)."""
+        """Frequency and reached amplitude of the distinct operating points; and their index for each point, (n,)."""
         points = self.frequency + 1j * self.sweep.amplitude_reached[self.order]
         distinct, place = np.unique(points, return_inverse=True)
         return distinct.real, distinct.imag, place
 
     def _operating_points(self, model: Model) -> tuple[Array, Array, RubberConditions, Array | slice]:
-        """Frequency, reached amplitude and test conditions at which to evaluate a model, and the index of each point's.
+        """Frequency, amplitude and conditions at which to evaluate a model, and for each point the index of its own.
 
         These are the distinct operating points, or all points if the model depends on temperature or earlier strains.
         """
@@ -277,7 +277,7 @@ class MeasuredSweep(MeasuredBase):
         return gain + 1j * loss * self._phase_per_loss
 
     def _deviation_change(self, change: Array, stiffness: Array) -> Array:
-        """Change of the deviation, complex (..., n), by a small change of a stiffness at the points, (..., n) each."""
+        """Change of the residual before whitening, (..., n), by a small change of the stiffness, complex (..., n)."""
         relative = change / stiffness
         if self.residuals == "complex":
             return relative
@@ -323,7 +323,7 @@ class MeasuredSweep(MeasuredBase):
         return np.stack((difference.real, difference.imag))
 
     def scaled_distance(self, deviation: Array, *, shared: bool = True) -> Array:
-        """Magnitude of deviations in units of random noise, (n,); `shared` subtracts the common error of each block."""
+        """Magnitude of deviations in units of point-to-point noise, (n,); `shared` subtracts the error of each run."""
         return np.hypot(*self.covariance.scaled(deviation, shared=shared))
 
     def distance(self, model: Model) -> Array:
@@ -384,7 +384,7 @@ class MeasuredSweep(MeasuredBase):
         return f"run {self.repeat[point]} of {self.name}, {self.direction}"
 
     def shared_error_columns(self, chosen: Array) -> list[Array]:
-        """Changes of the whitened residuals, (2 n,) each, by a common unit error of gain, and of phase, at a mask."""
+        """Changes of the whitened residuals, (2 n,), by a unit error of gain, and of phase, of the points of a mask."""
         return [self.whiten(unit * chosen.astype(complex)) for unit in (1.0, 1.0j)]
 
     def columns(self) -> dict[str, Any]:

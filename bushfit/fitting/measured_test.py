@@ -73,7 +73,7 @@ class MeasuredBase(ABC):
         return {}
 
     def _keep(self, key: str, model: Model, names: Any, values: Array) -> Array:
-        """Store values for the next call with the same model; they become read-only."""
+        """Cache an array, read-only, for the next call with this key, model and parameter names, and return it."""
         values.flags.writeable = False
         self._last[key] = model, names, values
         return values

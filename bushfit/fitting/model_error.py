@@ -271,10 +271,10 @@ def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
 
 
 def _in_noise(solution: FitResult, tests: Sequence[MeasuredTest]) -> FittedTests:
-    """Fitted model with the given (reweighted or thinned) tests, without errors of the rig."""
+    """Build `FittedTests` of a fit with reweighted or thinned tests, without errors of the rig."""
     return FittedTests(solution.moved_to(solution.model, tests), [np.empty((0, test.size)) for test in tests])
 
 
 def _thinned(tests: Sequence[MeasuredTest]) -> list[MeasuredTest]:
-    """Tests with dense sweeps reduced to at most 600 evenly chosen points, enough for smooth discrepancies."""
+    """Reduce dense sweeps to at most 600 evenly chosen points, enough for a smooth discrepancy."""
     return [test if isinstance(test, MeasuredLoop) else test.thinned(_ENOUGH) for test in tests]

@@ -248,7 +248,7 @@ def _shared(lines: Sequence[LineNoise], rig: RigSettings) -> Array:
 
 
 def _pair(values: Array) -> tuple[float, float]:
-    """Convert an array of gain and phase, (2,), to a tuple of floats."""
+    """Convert an array of two numbers, gain and phase, to a tuple of floats."""
     gain, phase = values.tolist()
     return gain, phase
 

@@ -199,7 +199,7 @@ def misfit_scale(distance: Array, parts: int) -> float:
 
 
 def _from_neighbours(values: Array, starts: Array, window: int) -> Array:
-    """Difference of each point from the median of the `window` points around it in its block, complex (n,)."""
+    """Difference of each value, complex (n,), from the median of the `window` values around it in its block, (n,)."""
     sizes, local = np.diff(starts, append=values.size), np.zeros_like(values)
     for width in np.unique(np.minimum(sizes, window)).tolist():  # mostly one: blocks are longer
         chosen = np.minimum(sizes, window) == width

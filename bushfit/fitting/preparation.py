@@ -60,7 +60,7 @@ def prepare_loops(
 
 
 def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[MeasuredLoop]:
-    """Loops with the gain error of the rig's class, stated or assumed.
+    """Return loops with the gain error of the rig, as stated in [rig] or assumed.
 
     Notes:
         All n repeats of a loop share the gain error. It is represented by independent errors that are larger by
@@ -74,7 +74,7 @@ def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[Me
 
 
 def with_gain_weighting(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> list[MeasuredTest]:
-    """Tests whose loops have the gain error included in the noise that weights the residuals (`weigh`), or not."""
+    """Return tests whose loops include the gain error in the noise that weights the residuals, if `weigh`, or not."""
     return [replace(test, gain_weighs=weigh) if isinstance(test, MeasuredLoop) else test for test in data_sets]
 
 
@@ -144,7 +144,7 @@ def _with_contradictions(found: Sequence[_Kind], conditions: Sequence[Array]) ->
 def with_level_errors(
     sweeps: Sequence[MeasuredSweep], error: tuple[float, float], freedom: int
 ) -> tuple[MeasuredSweep, ...]:
-    """Sweeps with gain and phase errors that all runs of a level share.
+    """Return sweeps with other gain and phase errors that all runs of a level share.
 
     Args:
         sweeps: measured sweeps.
@@ -156,7 +156,7 @@ def with_level_errors(
 
 
 def split_by_kind(data_sets: Iterable[MeasuredTest]) -> tuple[list[MeasuredLoop], list[MeasuredSweep]]:
-    """Loops and sweeps among some tests, as two lists."""
+    """Split tests into a list of loops and a list of sweeps."""
     tests = list(data_sets)
     loops = [test for test in tests if isinstance(test, MeasuredLoop)]
     return loops, [test for test in tests if isinstance(test, MeasuredSweep)]

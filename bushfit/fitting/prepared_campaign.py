@@ -128,7 +128,7 @@ class PreparedCampaign:
         return tests
 
     def without(self, outliers: Sequence[Outlier]) -> "PreparedCampaign":
-        """Campaign with weight 0 on the given outliers of sweeps; those of loops have weight 0 already if `robust`."""
+        """Return the campaign with weight 0 on given outliers of sweeps; those of loops have weight 0 already."""
         sweeps = []
         for data_set in self.sweeps:
             rows = [outlier.row - 1 for outlier in outliers if outlier.test == data_set.name]
@@ -275,7 +275,7 @@ class PreparedCampaign:
 
 
 def _chi_square(model: Model, data_sets: Sequence[MeasuredTest]) -> float:
-    """Chi-square of a model; infinite if the model has no finite response."""
+    """Chi-square of a model over tests; infinite if the model has no finite response."""
     with suppress(ModelError), np.errstate(all="ignore"):
         chi_square = float(np.sum(np.square(residual(model, data_sets))))
         return chi_square if np.isfinite(chi_square) else np.inf
@@ -283,6 +283,6 @@ def _chi_square(model: Model, data_sets: Sequence[MeasuredTest]) -> float:
 
 
 def _preferred(data_sets: Sequence[_Kind]) -> list[_Kind]:
-    """Return the axial tests, else those of the bushing, else all."""
+    """Select the axial tests; without any, those of the bushing; without any, all."""
     axial = [test for test in data_sets if test.direction is Direction.AXIAL]
     return axial or [test for test in data_sets if not isinstance(test.direction, Specimen)] or list(data_sets)

@@ -91,19 +91,19 @@ class FitProblem:
 
 @dataclass(frozen=True, eq=False)
 class SmoothError:
-    """Smooth relative error of a model (a Gaussian process), to be added to the covariance of fitted parameters.
+    """Smooth error of a model over operating points (Gaussian process), for the covariance of fitted parameters.
 
     Args:
         shapes: relative change of the stiffness by one standard deviation of each of q independent patterns, at the p
             operating points of all tests, complex (q, p).
-        freedom: degrees of freedom that determine the size of the process.
+        freedom: degrees of freedom that determine the standard deviation of the error.
     """
 
     shapes: Array
     freedom: float
 
     def covariance(self, model: Model, tests: Sequence[MeasuredTest], influence: Array) -> Array:
-        """Covariance of parameters that the process causes, (k, k).
+        """Covariance of fitted parameters that the smooth error of the model causes, (k, k).
 
         Args:
             model: fitted model.

@@ -108,7 +108,7 @@ def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed:
 
 
 def difference_freedom(steps: int) -> float:
-    """Effective degrees of freedom of the mean square of `steps` successive differences."""
+    """Effective degrees of freedom of a noise variance estimated from `steps` successive differences of repeats."""
     return 2.0 * steps**2 / (3.0 * steps - 1.0)
 
 
@@ -184,7 +184,7 @@ def _freed(basis: Array, values: Array) -> Array:
 
 
 def _parts(values: Array) -> Array:
-    """Split ln K, complex (n,), into gain and phase, (n, 2)."""
+    """Split ln K, complex (n,), into ln |K| (gain) and phase [rad], (n, 2)."""
     return np.stack([np.real(values), np.imag(values)], axis=-1)
 
 

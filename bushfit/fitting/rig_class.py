@@ -11,13 +11,13 @@ _MOST_CLASSES = 3.0
 
 
 def class_errors(rig: RigSettings, unstated: tuple[float, float] = ASSUMED) -> tuple[float, float]:
-    """Relative gain error and phase error [rad] of a rig, as stated in [rig], else those of `unstated`."""
+    """Standard deviations of the gain (relative) and phase [rad] of a rig, as stated in [rig], else `unstated`."""
     gain, phase = (default if one is None else one for one, default in zip(rig.stiffness_errors, unstated, strict=True))
     return gain, phase
 
 
 def largest_error(rig: RigSettings) -> tuple[float, float]:
-    """Largest standard deviation of shared errors, in gain and phase [rad], that the class of the rig explains."""
+    """Largest standard deviations of gain and phase [rad] errors of a test that the accuracy of the rig explains."""
     gain, phase = class_errors(rig)
     return _MOST_CLASSES * gain, _MOST_CLASSES * phase
 
@@ -28,7 +28,7 @@ def format_class_errors(error: tuple[float, float]) -> str:
 
 
 def describe_class(rig: RigSettings) -> str:
-    """Class of a rig as text: gain and phase error, and which of them is assumed."""
+    """Format the gain and phase error of a rig as text, and state which of them is assumed."""
     unstated = [name for name, error in zip(("gain", "phase"), rig.stiffness_errors, strict=True) if error is None]
     whose = f"{' and '.join(unstated)} assumed" if unstated else "as [rig] states"
     return f"{format_class_errors(class_errors(rig))}, {whose}"

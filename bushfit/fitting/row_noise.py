@@ -123,7 +123,7 @@ class RowNoise:
         return list(np.tensordot(self.error.T, np.array(moves), axes=1))
 
     def _coloured(self, rows: Array, delay: int) -> Array:
-        """Apply the inverse filter, times b_0, to rows delayed by `delay` rows, (..., n)."""
+        """Give white rows, (..., n), delayed by `delay` rows, the correlation of the noise, times b_0."""
         late = np.zeros((rows.shape[-1], rows[..., 0].size))  # a banded system: no module of filters is loaded
         late[delay:] = rows.reshape(late.shape[::-1])[:, : len(late) - delay].T
         band = np.repeat((self.filter / self.filter[0])[:, None], len(late), axis=1)

@@ -94,6 +94,6 @@ def start_values(
 
 
 def _slope(x: Array, y: Array) -> float:
-    """Slope of the straight line through points, (n,) each."""
+    """Slope of the straight line fitted to points x and y, (n,) each."""
     centred = x - x.mean()
     return float(centred @ y / (centred @ centred))

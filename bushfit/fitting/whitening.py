@@ -47,12 +47,12 @@ class SharedError:
 
     @cached_property
     def weight(self) -> Array:
-        """Squared norm of the residuals that a unit shared error causes in each group, (g,): sum of `unit` squared."""
+        """Sum of the squares of the residuals that a unit shared error causes in each group, (g,)."""
         return np.maximum(np.add.reduceat(self.unit**2, self.starts), np.finfo(float).tiny)
 
     @cached_property
     def share(self) -> Array:
-        """Share of the component along `unit` that whitening subtracts in each group, (g,)."""
+        """Share, 0 to 1, of the component along `unit` that whitening subtracts in each group, (g,)."""
         return 1.0 - 1.0 / np.sqrt(1.0 + self.variance * self.weight)
 
     def components(self, rows: Array) -> Array:
@@ -180,14 +180,14 @@ class Whitening:
 
     @cached_property
     def _block(self) -> SharedError:
-        """Error shared by the points of a block, in units of their noise."""
+        """Error shared by the points of a block (run), acting on deviations in units of their scatter."""
         unit = (np.sqrt(self.weights) / self.random).ravel()
         starts = np.concatenate((self.starts, self.starts + self.weights.size))
         return SharedError(starts, unit, np.repeat(np.square(self.noise.shared), self.starts.size))
 
     @cached_property
     def _line(self) -> SharedError:
-        """Error shared by the blocks of a line, as changed by the whitening of each block."""
+        """Error shared by the blocks of a line (level), acting on deviations whose blocks are already whitened."""
         starts = np.concatenate((self.lines, self.lines + self.weights.size))
         unit = (1.0 - self._block.share)[self._block.group] * self._block.unit
         return SharedError(starts, unit, np.repeat(np.square(self.noise.level), self.lines.size))
@@ -201,7 +201,7 @@ class Whitening:
 
     @cached_property
     def _point(self) -> SharedError:
-        """Model error shared by the points of an operating point, in the order of `_by_point`, in units of noise."""
+        """Model error shared by the repeats of an operating point, acting on deviations in the order of `_by_point`."""
         order, starts = self._by_point
         return SharedError(starts, self._block.unit[order], np.full(starts.size, self.model_error**2))
 

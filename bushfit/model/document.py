@@ -44,8 +44,7 @@ class BushingTable:
 
 @dataclass(frozen=True)
 class SpecimenTable:
-    """Entry of a model file for a specimen of the compound, such as a coupon or blocks in shear: kind and
-    dimensions."""
+    """Entry of a model file for a specimen of the compound (coupon or blocks in shear): kind and dimensions."""
 
     name: Annotated[Name, Field(description="Name of the specimen.")]
     kind: Annotated[SpecimenKind, Field(description='"modulus" for tests of the modulus, "shear" for blocks in shear.')]

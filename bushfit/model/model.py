@@ -110,13 +110,11 @@ class Model:
         return self.bushing.name if self.bushing else "compound"
 
     def unit_strain(self, place: Place) -> float:
-        """Equivalent strain of the rubber in a direction or specimen, per displacement [1/m], rotation [1/rad] or
-        strain."""
+        """Equivalent strain of the rubber at a place, per displacement [1/m], rotation [1/rad] or strain [1]."""
         return geometry.unit_strain(self.bushing, place)
 
     def stiffness_per_modulus(self, place: Place) -> float:
-        """Stiffness in a direction or of a specimen, per shear modulus: [m], [m^3/rad] for rotation, [1] for a
-        modulus."""
+        """Stiffness at a place per shear modulus: [m], [m^3/rad] for rotation, [1] if tests give a modulus."""
         return geometry.stiffness_per_modulus(self.bushing, place)
 
     def with_values(self, values: Mapping[str, float]) -> "Model":
@@ -320,8 +318,7 @@ class Model:
         return Setting(self.bushing, direction, kind, conditions, self.unnamed)
 
     def layers(self, setting: Setting) -> tuple[Layer, ...]:
-        """List the layers (effects around the rubber, such as the rig's) that act in a test, from the rubber
-        outward."""
+        """List the layers (effects around the rubber, such as the rig's) that act in a test, innermost first."""
         place, layers = setting.direction, self.structure.layers
         if place.motion is STRAINING:
             layers = tuple(layer for layer in layers if layer.corrects)

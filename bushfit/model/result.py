@@ -296,8 +296,7 @@ class Result:
         return [f"{lacking if names else open_values} the bands, low to high, include each alternative"]
 
     def place(self, name: str) -> Place:
-        """Return the direction of the bushing or the specimen with the given name; raise a ModelError for other
-        names."""
+        """Return the direction or specimen with the given name; raise a ModelError for other names."""
         return get_place(name, self.specimens)
 
     def interval(self, name: str) -> tuple[float, float] | None:

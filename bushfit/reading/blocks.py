@@ -65,7 +65,7 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
 def _side_by_side(
     source: RowSource, layout: Layout, sides: Sequence[slice], vocabulary: Vocabulary
 ) -> tuple[RowSource, Layout]:
-    """Table of blocks that are side by side, each with the same headers, below titles that may be merged cells."""
+    """Combine blocks of columns side by side, each with the same headers and maybe a title above, into one table."""
     above = [split(line.content, layout.delimiter) for line in source.head() if line.number < layout.header_line]
     titles = [next(filter(None, (cell for row in reversed(above) for cell in row[side])), "") for side in sides]
     width = len([header for header in layout.headers[sides[0]] if header])
@@ -87,7 +87,7 @@ def _side_by_side(
 
 
 def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple[RowSource, Layout]:
-    """Table of blocks one below the other, each below a repeated header or below lines that state a quantity."""
+    """Combine blocks one below the other, each with its header or lines that state a quantity, into one table."""
     header = [plain(text) for text in layout.headers]
     above = [line for line in source.head() if line.number < layout.header_line]
     between: list[Line] = []
@@ -132,7 +132,7 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
 def _one_table(
     source: RowSource, layout: Layout, parts: Iterable[_BlockRow], added: dict[str, list[str]]
 ) -> tuple[RowSource, Layout]:
-    """Table of the rows of all blocks, with added columns; `added` has one text per block, by header."""
+    """Build one table of the rows of all blocks, with columns of one text per block, given in `added` by header."""
     width = len(layout.headers)
     numbers: list[int] = []
     content: list[Sequence[str | float]] = []
@@ -183,7 +183,7 @@ def _label_columns(
 
 
 def _with_complex_parts(source: RowSource, layout: Layout) -> tuple[RowSource, Layout]:
-    """Table with two columns, real and imaginary part, instead of each column of complex numbers."""
+    """Replace each column of complex numbers by two columns, real and imaginary part."""
     first = [cells_of(line, layout) for line in islice(source.lines(layout.lines_before_data), _FIRST)]
     indices = {n for row in first for n, cell in enumerate(row) if isinstance(cell, str) and _COMPLEX.fullmatch(cell)}
     if not indices or max(indices) >= len(layout.headers):

@@ -57,7 +57,7 @@ class Cells:
 
     @property
     def headers(self) -> tuple[str, ...]:
-        """Texts of the header cells."""
+        """Texts of the header cells of the table."""
         return self.layout.headers
 
     def rows(self) -> Iterator[Row]:

@@ -170,7 +170,7 @@ def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, 
 
 
 def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | None = None) -> Column:
-    """Column for the meaning of its header, with the unit on which header, units row and user agree."""
+    """Make the column of a header, with the unit on which header, units row and user agree."""
     parsed = [parse_unit(text) for text in (heading.unit, cells.layout.units[index], stated_unit) if text]
     texts = sorted({text for text, *_ in parsed if text})
     conventions = {convention for convention in (heading.convention, *(part[1] for part in parsed)) if convention}

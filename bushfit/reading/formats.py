@@ -68,13 +68,13 @@ def _from_hdf5(node: Any) -> Any:
 
 
 def _bound(values: int) -> None:
-    """Raise a ValueError if a number of values is larger than any recording has."""
+    """Raise a ValueError if a MATLAB variable has more values than any recording."""
     if values > _MOST_VALUES:
         raise ValueError(f"it unpacks to {values} values, of which at most {_MOST_VALUES} are read")
 
 
 def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
-    """Group with the vectors and matrix columns of a struct as channels, and the groups of the structs inside it."""
+    """Yield the vectors and matrix columns of a struct as a group of channels, then the groups of structs inside it."""
     channels: list[Channel] = []
     labels: list[tuple[str, str]] = []
     inner: dict[str, Mapping[str, Any]] = {}

@@ -258,7 +258,7 @@ class Vocabulary:
         return None
 
     def _names_with_symbol(self, name: str) -> Iterator[str]:
-        """Words for the quantity in a header that also has its symbol, such as "Storage modulus G'" or "Weg s"."""
+        """Yield the words of a header without the symbol of its quantity, as in "Storage modulus G'" or "Weg s"."""
         for blank in re.finditer(r"[\s,(]+", name):
             word, symbol = plain(name[: blank.start()]), plain(name[blank.end() :])
             if word in self._roles and set(self._roles[word]) & set(self._roles.get(symbol, ())):
@@ -331,7 +331,7 @@ def split_unit(header: str) -> tuple[str, str | None, AmplitudeConvention | None
 
 
 def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
-    """Name and unit for each plausible split of a header, and True if the unit is in brackets or there is none."""
+    """Yield name, unit or None for each plausible split of a header, and True if it has brackets or no unit."""
     name, unit = units.split_header(text)
     yield name, unit, True
     if unit is None:

@@ -199,7 +199,7 @@ def _refuse_complex(channels: Sequence[Channel]) -> None:
 
 
 def _real_channels(channel: Channel, several: bool) -> Iterator[Channel]:
-    """Channel as floats or texts, dates in seconds, complex values as magnitude and phase, named if `several`."""
+    """Convert a channel to real ones: dates to seconds, complex values to magnitude and phase, named if `several`."""
     values = channel.values
     if values.dtype.kind == "c" and not np.any(values.imag):
         values = values.real

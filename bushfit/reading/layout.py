@@ -209,7 +209,7 @@ def header_cells(content: Content, delimiter: str) -> Iterator[list[str]]:
 
 
 def _below(lines: Sequence[Line], header: int, delimiter: str) -> Iterator[Line]:
-    """The first few lines below the header with this index, without comments."""
+    """Yield the first few lines below the header line with the index `header`, without comments."""
     below = lines[header + 1 : header + 1 + _LINES_BELOW_HEADER]
     return (line for line in below if not is_comment(line.content, delimiter))
 

@@ -43,7 +43,7 @@ class Source:
     notes: tuple[str, ...] = ()
 
     def with_note(self, note: str) -> Source:
-        """Return the provenance with a further note."""
+        """Return the provenance with a further sentence on how the file was read."""
         return replace(self, notes=(*self.notes, note))
 
 
@@ -144,19 +144,19 @@ class Sweep:
 
     @property
     def amplitude_reached(self) -> Floats:
-        """Amplitude for evaluating a model [m or rad, or strain], (n,): the one reached, or else the nominal one."""
+        """Amplitude at which a model is evaluated [m or rad, or strain], (n,): as reached, or else nominal."""
         return self.amplitude if self.reached is None else self.reached
 
     @property
     def held_value(self) -> Floats:
-        """Amplitude [m or rad] or frequency [Hz] that is constant in each run, (n,); else the repeat number."""
+        """Value that is constant in each point's run, (n,): amplitude [m or rad], frequency [Hz] or repeat number."""
         if self.stepped is None:
             return self.repeat.astype(float)
         return self.amplitude if self.stepped == "frequency" else self.frequency
 
     @property
     def step(self) -> Floats:
-        """Frequency [Hz] or amplitude [m or rad] that changes from point to point in each run, (n,)."""
+        """Value that changes from point to point of a run, (n,): frequency [Hz] or amplitude [m or rad]."""
         return self.amplitude if self.stepped == "amplitude" else self.frequency
 
 

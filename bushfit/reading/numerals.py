@@ -69,7 +69,7 @@ Place = tuple[int, int]
 
 @dataclass(frozen=True)
 class NumeralEvidence:
-    """Notations that are consistent with the numbers of a table, and the first problematic cell, if any.
+    """Notations (decimal mark and thousands separator) in which a table can be read, and the first problematic cell.
 
     Args:
         ways: notations in which all numbers can be read, the plainest first.

@@ -200,7 +200,7 @@ def _check_size(sheets: dict[str, bytes]) -> None:
 
 
 def _row(cells: Sequence[object]) -> list[str | float]:
-    """Cells of a row as floats, or else as texts on one line; without empty cells at the end."""
+    """Convert the cells of a worksheet row to floats, or else to texts on one line, without empty cells at the end."""
     row: list[str | float] = [
         float(cell) if isinstance(cell, int | float) and not isinstance(cell, bool) else " ".join(str(cell).split())
         for cell in cells
@@ -211,5 +211,5 @@ def _row(cells: Sequence[object]) -> list[str | float]:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Names in quotation marks, separated by commas; only the first twelve."""
+    """List at most twelve names as text, in quotation marks and separated by commas."""
     return ", ".join(f'"{name}"' for name in names[:_MOST_LISTED]) + (", ..." if len(names) > _MOST_LISTED else "")

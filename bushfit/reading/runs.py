@@ -175,5 +175,5 @@ def _group_medians(values: Floats, group: NDArray[np.intp]) -> Floats:
 
 
 def _group_numbers(*keys: Floats | NDArray[np.int64]) -> NDArray[np.intp]:
-    """Group number of each row, from 0, (n,); rows that agree in all keys are one group."""
+    """Group number of each row, from 0, (n,); rows that agree in all keys, (n,) each, are one group."""
     return np.unique(np.stack(keys), axis=1, return_inverse=True)[1].ravel()

@@ -296,7 +296,7 @@ class Table(Cells):
         return values, notes
 
     def needing(self, wanted: Mapping[str, Column]) -> "Table":
-        """Return the table with only those rows that have a number in each of these columns."""
+        """Return the table with only those rows that have a number in each wanted column."""
         return replace(self, needed=self.needed | {column.index for column in wanted.values()})
 
     def check_positive(self, roles: Sequence[str], wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> None:
@@ -364,7 +364,10 @@ class Table(Cells):
         return values if fits else None  # so are numbers that are not finite
 
     def _without_faults(self) -> tuple["Table", list[Row]]:
-        """Table without lines that are not data, and these lines; only lines with letters or empty cells are tested."""
+        """Return the table without lines that are not data, and these lines.
+
+        Only lines with letters, dashes or empty cells are tested.
+        """
         source, layout, faulty = self.source, self.layout, list[Row]()
         if not isinstance(source, Text) or layout.numbered:
             return self, faulty

@@ -168,7 +168,7 @@ def to_xlsx(tables: Mapping[str, pd.DataFrame]) -> bytes:
 
 
 def _text(text: str) -> str:
-    """Printable text of a cell, cut to the largest length that a workbook allows."""
+    """Return the text of a workbook cell without control characters, cut to the largest length that Excel allows."""
     return printable(text, lines=True)[:_LONGEST_TEXT]
 
 

@@ -85,7 +85,7 @@ def _at_nodes(steps: Iterable[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
 
 
 def _text(function: Mapping[str, Any], key: str) -> str:
-    """Text field of a function; "" if the file has NONE."""
+    """Text of a field of a universal-file function; "" if the file has NONE."""
     text = " ".join(str(function[key]).split())
     return "" if text == "NONE" else text
 

@@ -119,7 +119,7 @@ def unpivot(
 
 
 def _find_blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple[list[list[str]], list[_Row]]]:
-    """Header rows and rows of numbers of each possible block, without the columns to its left and right."""
+    """Yield header rows and rows of numbers of each possible block, without the columns to its left and right."""
 
     def first_number(cells: Sequence[str | float]) -> int | None:
         """Index of the first non-empty cell of a row of numbers; None if the row is not one."""
@@ -146,7 +146,7 @@ def _find_blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple
 
 
 def _read_block(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: Vocabulary) -> list[_WideColumn]:
-    """Columns of a block with their meanings; an empty list if it is not a block of a wide table."""
+    """Read the columns of a block with their meanings; an empty list if it is not a block of a wide table."""
     columns = [index for index in range(1, len(data[0][1])) if any(cells[index] != "" for _, cells in data)]
     meanings = dict.fromkeys(columns, _Meaning())
     down, across = _Meaning(), _Meaning()
@@ -214,7 +214,7 @@ def _read_header(text: str, vocabulary: Vocabulary) -> _Meaning:
 
 
 def _named(text: str, vocabulary: Vocabulary) -> _Meaning | None:
-    """Meaning of a header without a level, such as "K* [N/mm]"; None if the header names no known role."""
+    """Meaning of a header without a frequency or amplitude, such as "K* [N/mm]"; None if it names no known role."""
     heading = vocabulary.heading(text)
     if heading and heading.role in _STEPPED:
         return _Meaning(stepped=heading.role, level_unit=heading.unit, convention=heading.convention)
@@ -222,7 +222,7 @@ def _named(text: str, vocabulary: Vocabulary) -> _Meaning | None:
 
 
 def _role_of_unit(unit: str | None) -> str | None:
-    """Role of a level by its unit: "frequency" or "amplitude"; None for any other unit."""
+    """Role of a number by its unit: "frequency" or "amplitude"; None for any other unit."""
     roles = {"Hz": "frequency", "m": "amplitude", "rad": "amplitude", "1": "amplitude"}
     return next((role for si, role in roles.items() if unit and units.is_compatible(unit, si)), None)
 
@@ -230,7 +230,7 @@ def _role_of_unit(unit: str | None) -> str | None:
 def _long_table(
     series: Sequence[_WideColumn], source: RowSource, file: Path, vocabulary: Vocabulary
 ) -> tuple[RowSource, Layout]:
-    """Long table with the values from all blocks of a wide table, and its layout.
+    """Build a long table (a row per frequency and amplitude) from all blocks of a wide table, with its layout.
 
     Raises:
         MeasurementError: a block does not state its quantity, blocks differ in their frequencies or amplitudes, or a

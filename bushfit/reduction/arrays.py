@@ -17,7 +17,7 @@ CHUNK = 1 << 18
 
 
 def scatter(values: Floats) -> tuple[float, float]:
-    """Median of values, (n,), and their standard deviation estimated from the median absolute deviation."""
+    """Median and robust standard deviation (from the median absolute deviation) of values, (n,)."""
     middle = float(np.median(values))
     return middle, MEDIAN_TO_SIGMA * float(np.median(np.abs(values - middle)))
 

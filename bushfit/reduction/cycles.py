@@ -130,7 +130,7 @@ def stretches(changes: NDArray[np.bool_], fewest: int = 1) -> list[slice]:
 
 
 def resumes_in_phase(gap: float, *, step: float = 1.0) -> bool:
-    """Return True if a sine resumes in phase after a gap [cycles]: up to three cycles, and a multiple of `step`."""
+    """Return True if a gap is at most three cycles and a multiple of `step` cycles: a sine then resumes in phase."""
     return gap < _LONGEST_INTERRUPTION and abs(gap - step * round(gap / step)) < _SAME_PHASE
 
 
@@ -293,7 +293,7 @@ def select_steady_cycles(motion: Complex, stiffness: Complex, fewest: int) -> sl
 
 
 def _truncation(series: Complex, most_cut: int) -> int:
-    """Number of entries, at most `most_cut`, to cut at the start of k series, (k, m), for the least error of means."""
+    """Number of values, at most `most_cut`, to cut at the start of k series, (k, m), for the least error of means."""
     if most_cut < 1:
         return 0
     back = (series - series.mean(axis=1, keepdims=True))[:, ::-1]

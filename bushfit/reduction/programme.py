@@ -103,7 +103,7 @@ def programme(loop: Loop, test: LoopFile = _TIMED) -> tuple[Loop, ...]:
 
 
 def _clock(loop: Loop) -> Floats:
-    """Time of each row [s], or row numbers if the record has no time, (n,)."""
+    """Time of each row of a record [s], (n,), or row numbers if the record has no time."""
     return loop.time if loop.has_recorded_time else np.arange(loop.displacement.size, dtype=float)
 
 
@@ -266,7 +266,7 @@ def measure_softening(loop: Loop, span: SteadySpan, *, from_rest: bool) -> float
 
 
 def _stiffness(loop: Loop, begin: float, period: float) -> tuple[complex, float]:
-    """Complex stiffness [N/m or N m/rad] of the cycle that starts at `begin`, and its relative standard error."""
+    """Complex stiffness [N/m or N m/rad] of one cycle, from its beginning and period [s], and its relative error."""
     clock = _clock(loop)
     first, last = np.searchsorted(clock, [begin, begin + period])
     rows = slice(first, last, max(1, (last - first) // 10_000))

@@ -111,7 +111,7 @@ def motion_turns(time: Floats, motion: Floats) -> tuple[Integers, float]:
 
 
 def stroke_middles(height: Floats) -> Floats:
-    """Mean displacement of each stroke, (turns - 1,), between turning points at displacements `height`, (turns,).
+    """Mean displacement of each stroke, (turns - 1,), from the displacements of the turning points, (turns,).
 
     The first and the last stroke may be incomplete: their values are extrapolated from their neighbours.
     """
