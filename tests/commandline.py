@@ -18,6 +18,7 @@ import click
 import pytest
 
 from bushfit.cli import cli, main
+from bushfit.effects import LIBRARY, ORIGINS
 
 #: Width of the terminal, whatever that of the tests is.
 WIDTH = "80"
@@ -40,6 +41,8 @@ def call(folder: Path, *arguments: object, program: click.Command = cli) -> Done
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
         mock.patch.dict(os.environ, {"COLUMNS": WIDTH}),
+        mock.patch.dict(LIBRARY),  # effects of the user's own last as long as the command
+        mock.patch.dict(ORIGINS),
         mock.patch.object(sys, "argv", ["bushfit", *map(str, arguments)]),
         pytest.raises(SystemExit) as left,
     ):

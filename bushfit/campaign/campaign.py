@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from bushfit.campaign.copies import without_copied_repeats, without_copied_tests
-from bushfit.campaign.quantities import Compound, ReportSettings, embedded
+from bushfit.campaign.quantities import Compound, EffectsSettings, ReportSettings, embedded
 from bushfit.campaign.schema import CampaignFile, FitSettings, PredictSettings, RigSettings, SimulateSettings
-from bushfit.campaign.toml import read_toml
+from bushfit.campaign.toml import parse_toml
 from bushfit.effects import effect_name_of, place_suffix, with_base
 from bushfit.errors import CampaignError, error_location, quote_path
 from bushfit.geometry import Bushing, Specimen, get_place
+from bushfit.model.laws import register_file
 from bushfit.model.model import FIVE, Model
 from bushfit.progress import track
 from bushfit.reading.instruments import RECORDINGS
@@ -24,6 +25,7 @@ from bushfit.reading.stated import LoopFile, SweepFile, place_tested
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reduction.programme import programme
 from bushfit.units import CELSIUS, parse_quantity
+from bushfit.validation import validate_tables
 
 #: Endings of test files, from which `bushfit init` writes a campaign.
 TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods", *RECORDINGS)
@@ -56,6 +58,7 @@ class Campaign:
     sha256: str = ""
     report: ReportSettings = field(default_factory=ReportSettings)
     logo: str | None = None
+    effects: EffectsSettings | None = None
 
     def __repr__(self) -> str:
         kinds = {"loop": len(self.loops), "sweep": len(self.sweeps)}
@@ -80,7 +83,7 @@ def load_campaign(path: str | Path) -> Campaign:
     """
     path = Path(path)
     refuse_tests([path])
-    content = read_toml(path, CampaignFile)
+    content = _read_file(path)
     if not (content.loops or content.sweeps or content.simulate or content.compound):
         raise CampaignError(
             "the campaign has no tests",
@@ -115,6 +118,16 @@ def load_campaign(path: str | Path) -> Campaign:
     return Campaign(**{**vars(content), **found}, path=path)
 
 
+def _read_file(path: Path) -> CampaignFile:
+    """Read a campaign file; the effect of [effects] is registered first, since other tables may name its parameters."""
+    tables = parse_toml(path)
+    match tables.get("effects"):
+        case {"file": str(law)}:
+            with error_location(path, place="[effects]"):
+                register_file(Path(os.path.normpath(path.parent / law)))
+    return validate_tables(tables, path, CampaignFile)
+
+
 def load_bushing(path: Path) -> Bushing:
     """Read the bushing of a campaign file, or of a file with only a [bushing] table, without reading the tests.
 
@@ -122,7 +135,7 @@ def load_bushing(path: Path) -> Bushing:
         CampaignError: the file is missing, not TOML, or has no [bushing].
         ModelError: impossible dimensions of the bushing.
     """
-    table = read_toml(path, CampaignFile).bushing
+    table = _read_file(path).bushing
     if table is None:
         expected = "a [bushing] table with name, inner_radius, outer_radius and length"
         raise CampaignError("there is no bushing in it", file=path, expected=expected)

@@ -157,6 +157,17 @@ class Compound:
 
 
 @dataclass(frozen=True)
+class EffectsSettings:
+    """[effects]: an effect of the user's own.
+
+    Args:
+        file: Python file with the effect, relative to the campaign file; it is only run with --trust.
+    """
+
+    file: Name
+
+
+@dataclass(frozen=True)
 class ReportSettings:
     """[report]: texts and logo in the head of the report.
 

@@ -7,7 +7,14 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field, InstanceOf, WithJsonSchema
 
-from bushfit.campaign.quantities import Compound, ReportSettings, effect_values, parameter_settings, parameter_values
+from bushfit.campaign.quantities import (
+    Compound,
+    EffectsSettings,
+    ReportSettings,
+    effect_values,
+    parameter_settings,
+    parameter_values,
+)
 from bushfit.effects import is_parameter, parameter_names
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
@@ -384,6 +391,7 @@ class CampaignFile:
         fit: settings of the fit.
         predict: grid and directions of the prediction.
         report: texts and logo in the head of the report.
+        effects: an effect of the user's own.
     """
 
     __pydantic_config__ = ConfigDict(extra="forbid")
@@ -399,3 +407,4 @@ class CampaignFile:
     predict: PredictSettings = field(default_factory=PredictSettings)
     simulate: Annotated[SimulateSettings | None, _SIMULATED_PLACES] = None
     report: ReportSettings = field(default_factory=ReportSettings)
+    effects: EffectsSettings | None = None

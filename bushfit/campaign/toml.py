@@ -40,10 +40,11 @@ def read_toml(path: Path, schema: type[T], *, description: str = "a campaign fil
         CampaignError: the file is missing, too large, not TOML, or has invalid keys or values.
         UnitError: a quantity without a unit, or with an incompatible unit.
     """
-    return validate_tables(_parsed(path, description, largest), path, schema)
+    return validate_tables(parse_toml(path, description, largest), path, schema)
 
 
-def _parsed(path: Path, description: str, largest: int) -> dict[str, Any]:
+def parse_toml(path: Path, description: str = "a campaign file", largest: int = 1_000_000) -> dict[str, Any]:
+    """Read a TOML file as dictionaries and lists, with the arguments and errors of `read_toml`."""
     data = read_utf8(path, CampaignError, largest=largest, hint=f"give {description}, not a measurement")
     chain = _DEEP_KEY.search(data)
     try:

@@ -15,6 +15,7 @@ from threading import Timer
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
+import click
 from rich import box
 from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -245,10 +246,17 @@ def with_output(folder: str, *written: Written) -> Parameter:
                 flag("--json as_json", "Print the result as JSON on standard output."),
                 flag("-v --verbose"),
                 flag("-q --quiet", "Print more, or errors only."),
+                flag("--trust", hidden=True, expose_value=False, callback=_trust),
             ),
         )
 
     return decorate
+
+
+def _trust(_: click.Context, __: click.Parameter, is_given: bool) -> None:
+    """Permit to run the Python file of an effect, in this process and in those that it starts."""
+    if is_given:
+        os.environ["BUSHFIT_TRUST"] = "1"
 
 
 def _column_widths(columns: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int, width: int) -> list[int]:

@@ -1,10 +1,13 @@
-"""Library of effects: records in library.toml, laws in one file each."""
+"""Library of effects: records in library.toml, laws in one file each; and effects from other packages."""
 
 import tomllib
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
+from importlib.metadata import entry_points
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from bushfit.effects import unnamed
@@ -46,10 +49,14 @@ def _entry(name: str) -> dict[str, Any]:
     return {**_entry(entry.pop("like")), "radial": {}, **entry}
 
 
-def _record(name: str) -> Effect | Family:
-    """Build the effect, or the family of effects (one per direction or specimen), of a table in library.toml."""
-    entry = _entry(name)
-    module = import_module(f"{__name__}.{entry.pop('law')}")
+def _record(name: str, entry: dict[str, Any], module: ModuleType) -> Effect | Family:
+    """Build an effect, or a family of effects (one per direction or specimen).
+
+    Args:
+        name: name of the effect.
+        entry: table with the keys of library.toml.
+        module: module with the functions of the effect.
+    """
     law = {part: getattr(module, part) for part in _LAW if hasattr(module, part)}
     kind = next(kind for part, kind in _KINDS.items() if part in law)
     parameters = [
@@ -64,7 +71,8 @@ def _record(name: str) -> Effect | Family:
     return Family(record, places, radial) if name.endswith(".{place}") else record
 
 
-_RECORDS = [_record(name) for name in _TABLE]
+_ENTRIES = {name: _entry(name) for name in _TABLE}
+_RECORDS = [_record(name, entry, import_module(f"{__name__}.{entry.pop('law')}")) for name, entry in _ENTRIES.items()]
 #: Families of effects (one effect per direction or specimen), by name.
 FAMILIES = {each.name: each for each in _RECORDS if isinstance(each, Family)}
 #: All effects by name, from the rubber outward; a family is represented by its effect for the radial direction.
@@ -72,6 +80,60 @@ LIBRARY = {
     effect.name: effect
     for effect in (each.of_place(Direction.RADIAL) if isinstance(each, Family) else each for each in _RECORDS)
 }
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Origin of an effect from outside the package: an installed package, or a Python file.
+
+    Args:
+        package, version: name and version of the package; empty for a file.
+        file: path of the Python file; empty for a package.
+        sha256: SHA-256 of the file.
+    """
+
+    package: str = ""
+    version: str = ""
+    file: str = ""
+    sha256: str = ""
+
+    def __str__(self) -> str:
+        return self.file or f"{self.package} {self.version}"
+
+
+#: Origins of the effects from outside the package, by name of the effect.
+ORIGINS: dict[str, Origin] = {}
+
+
+def register(name: str, law: ModuleType, origin: Origin) -> None:
+    """Add an effect from outside the package to the library.
+
+    Args:
+        name: name of the effect.
+        law: module with the functions of the effect, and with its record as a dictionary EFFECT, which has the keys of
+            library.toml.
+        origin: origin of the module.
+
+    Raises:
+        ModelError: another effect has this name, or the record or a function is missing or invalid.
+    """
+    if not name.isidentifier() or (name in LIBRARY and name not in ORIGINS):
+        expected = "a name of letters, digits and _ that the library does not use"
+        raise ModelError("the effect cannot have this name", place=str(origin), found=name, expected=expected)
+    try:
+        effect = _record(name, dict(law.EFFECT), law)
+    except (AttributeError, LookupError, TypeError, ValueError, StopIteration) as error:
+        raise ModelError(
+            "the effect cannot be used",
+            place=f"{name}, from {origin}",
+            found=f"{error} ({type(error).__name__})",
+            expected="a dictionary EFFECT with the keys of library.toml, and the functions of its kind",
+        ) from error
+    assert isinstance(effect, Effect)  # the name has no place
+    LIBRARY[name] = replace(effect, sentence=f"{effect.sentence} (Law of {origin}.)")
+    ORIGINS[name] = origin
+    _parameters.cache_clear()
+
 
 #: Names of the effects in the paper's model.
 BASE = ("elastic", "springpot", "friction")
@@ -211,3 +273,17 @@ def effects_for_places(places: Iterable[str]) -> dict[str, Effect]:
         name: effect for name, effect in LIBRARY.items() if not place_suffix(name) or name in of_places
     } | of_places
     return {name: effect for name, effect in sought.items() if name == twins_of(name)[0]}
+
+
+for _point in entry_points(group="bushfit.effects"):
+    _origin = Origin(*((_point.dist.name, _point.dist.version) if _point.dist else (_point.value,)))
+    try:
+        _law = _point.load()
+    except Exception as error:  # of a package that bushfit does not know
+        raise ModelError(
+            "a package with an effect for bushfit cannot be imported",
+            place=f"{_point.name}, from {_origin}",
+            found=f"{error} ({type(error).__name__})",
+            hint=f"update or remove the package {_origin.package}",
+        ) from error
+    register(_point.name, _law, _origin)

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field
 
+from bushfit.effects import Origin
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import Shape, SpecimenKind, StatedStrain
@@ -196,6 +197,9 @@ class ModelFile:
         BushingTable | None, Field(description="Geometry of the bushing; null if only specimens were tested.")
     ]
     effects: Annotated[tuple[str, ...], Field(description="Names of the effects of the model.")]
+    laws: Annotated[
+        Mapping[str, Origin], Field(description="Package or file of each effect from outside bushfit, by its name.")
+    ] = field(default_factory=dict, kw_only=True)
     parameters: Annotated[Mapping[str, ParameterTable], Field(description="Parameters by name.")]
     specimens: Annotated[tuple[SpecimenTable, ...], Field(description="Other bodies of the compound.")] = ()
     covariance: Annotated[

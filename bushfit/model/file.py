@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from bushfit.effects import ORIGINS
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError, error_location
 from bushfit.geometry import Bushing, Specimen
@@ -26,6 +27,7 @@ from bushfit.model.document import (
     ProvenanceTable,
     SpecimenTable,
 )
+from bushfit.model.laws import require_effect
 from bushfit.model.model import Model
 from bushfit.model.result import Alternative, Result
 from bushfit.reading.files import read_utf8
@@ -79,6 +81,7 @@ def from_document(document: object, file: Path | None = None) -> Result:
     entries, fit, covariance = tables.parameters, tables.fit, Covariance()
     values = {name: entry.value for name, entry in entries.items()}
     with error_location(file):
+        law_warnings = tuple(filter(None, (require_effect(name, origin) for name, origin in tables.laws.items())))
         bushing = Bushing(*astuple(tables.bushing)) if tables.bushing else None
         model = Model(bushing, tables.effects, values, tables.unnamed)
         if table := tables.covariance:
@@ -97,7 +100,7 @@ def from_document(document: object, file: Path | None = None) -> Result:
             covariance=covariance,
             quality=fit.quality if fit else None,
             measured=fit.measured if fit else None,
-            warnings=tables.warnings,
+            warnings=tables.warnings + law_warnings,
             inputs=tuple(Source(Path(test.file), test.sha256, test.conditions) for test in tables.provenance.inputs),
             outliers=tables.outliers,
             profile={name: entry.profile95 for name, entry in entries.items() if entry.profile95},
@@ -151,6 +154,12 @@ def to_document(result: Result) -> dict[str, Any]:
         schema=SCHEMA,
         bushing=BushingTable(*astuple(model.bushing)) if model.bushing else None,
         effects=tuple(effect.name for effect in model.records),
+        laws={
+            name: ORIGINS[name]
+            for used_model in (model, *(alternative.model for alternative in result.alternatives))
+            for name in used_model.effects
+            if name in ORIGINS
+        },
         parameters=parameters,
         specimens=tuple(SpecimenTable(*astuple(specimen)) for specimen in result.specimens),
         covariance=CovarianceTable(covariance.names, matrices[0], tuple(matrices[1:])),

@@ -11,7 +11,8 @@ import pandas as pd
 from pydantic import Field
 from typing_extensions import TypedDict
 
-from bushfit.campaign.toml import body_lines, table_lines
+from bushfit.campaign.toml import body_lines, table_lines, toml_value
+from bushfit.effects import ORIGINS
 from bushfit.errors import quote_path
 from bushfit.geometry import STRAINING, Display, Place, Specimen, Unit, strain_factor_of_files
 from bushfit.model.document import ModelFile
@@ -55,6 +56,9 @@ def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
 def _campaign_toml(simulated: Simulated, form: Form) -> str:
     seed, end = simulated.plan.seed, ending(form)
     lines = [f"# Simulated by bushfit simulate with seed {seed}: no rubber was tested. The model is in truth.json."]
+    origins = (ORIGINS[name] for name in simulated.truth.effects if name in ORIGINS)
+    for law in {origin.file for origin in origins if origin.file}:
+        lines += ["[effects]", f"file = {toml_value(Path(law).resolve().as_posix())}", ""]
     lines += body_lines(simulated.truth.bushing, simulated.specimens)
     plan = simulated.plan
     if plan.level_gain_error or plan.level_phase_error:  # repeats do not show these errors: the campaign states them

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import json
 import pickle
-from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
-from random_models import ADDED, UNDER, operating_point, random_model, sized
+from random_models import ADDED, sized
 
 from bushfit.effects import (
     LIBRARY,
@@ -21,17 +20,15 @@ from bushfit.effects import (
     Parameter,
     effects_for_places,
     get_effect,
-    qualified_name,
     twins_of,
 )
-from bushfit.effects.contract import RubberConditions
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
-from bushfit.model.file import from_document, to_document
 from bushfit.model.model import Model
-from bushfit.model.result import Result
 from bushfit.model.rig import lock_in, record
 from bushfit.model.sensitivity import force_and_slopes, stiffness_and_slopes
+from bushfit.model.structure import Structure
+from bushfit.testing import CONDITIONS, AddEffect, check_effect, operating_point, random_model
 
 
 @pytest.fixture
@@ -71,41 +68,44 @@ def steady_sine(amplitude: float, frequency: float, samples: int = SAMPLES) -> H
 
 def harmonic_gap(model: Model, direction: Direction, frequency: float, amplitude: float) -> float:
     """First harmonic of the steady time face against the frequency face, relative."""
-    force = model.force(direction, steady_sine(amplitude, frequency), conditions=UNDER)
+    force = model.force(direction, steady_sine(amplitude, frequency), conditions=CONDITIONS)
     timed = 2.0 * np.fft.rfft(force)[..., 1] / (SAMPLES * amplitude)
-    return float(np.ravel(np.abs(timed / model.stiffness(direction, frequency, amplitude, conditions=UNDER) - 1.0))[0])
+    return float(
+        np.ravel(np.abs(timed / model.stiffness(direction, frequency, amplitude, conditions=CONDITIONS) - 1.0))[0]
+    )
 
 
 def harmonic_error(model: Model) -> float:
     return sum(effect.harmonic_error for effect in model.records)
 
 
-def test_neutral_value_gives_the_plain_model_back(effect: Effect, rng: np.random.Generator) -> None:
-    """Of the effect of temperature, but for the spring of a network, which goes with the absolute temperature."""
-    plain = random_model(rng)
-    neutral = plain.with_effect(effect.name, {qualified_name(effect, effect.amount): effect.amount.value_at_share(0.0)})
-    plain = beside(plain, effect.name)
-    if effect.name == "temperature":
-        plain = plain.with_values({"mu": plain.values["mu"] * (UNDER.temperature / 296.15)})
-    frequency, amplitude = np.meshgrid([0.1, 5.0, 155.0, 900.0], [0.0, 1e-6, 2e-4, 1e-3])
-    triangle = 1e-3 * np.concatenate([np.linspace(-1.0, 1.0, 300), np.linspace(1.0, -1.0, 300)[1:-1]])
-    histories = [
-        History.steady(triangle, 0.1),
-        History.steady(np.tile(triangle, 3), 0.1, cycles=3),
-        History(triangle + 1e-3, 1e-3, periodic=False, frequency=1.0),
-    ]
-    for direction, kind in itertools.product(Direction, ("sweep", "loop")):
-        expected = plain.stiffness(direction, frequency, amplitude, kind=kind)
-        assert np.array_equal(neutral.stiffness(direction, frequency, amplitude, kind=kind, conditions=UNDER), expected)
-        for history in histories:
-            expected = plain.force(direction, history, kind=kind)
-            assert np.array_equal(neutral.force(direction, history, kind=kind, conditions=UNDER), expected)
+def sized_in_another_time(model: Model, name: str, *point: Any) -> Model:
+    return sized(sized(model, name, *point), "loop_clock", *point)
 
 
-def test_first_harmonic_of_the_time_face_is_the_frequency_face(effect: Effect, rng: np.random.Generator) -> None:
-    for _ in range(12):
-        _, model, direction, frequency, amplitude = drawn(rng, effect.name)
-        assert harmonic_gap(model, direction, frequency, amplitude) <= effect.harmonic_error + 1e-6
+@pytest.mark.parametrize("add", [sized, sized_in_another_time], ids=["alone", "in another time"])
+def test_the_effect_keeps_its_contract(effect: Effect, add: AddEffect) -> None:
+    check_effect(effect.name, add=sized if effect.name == "loop_clock" else add)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("viscous", {"sentence": "no stop"}, "full stop"),
+        ("viscous", {"harmonic_error": -0.1}, "first harmonic and stiffness differ"),
+        ("viscous", {"modulus": lambda p, omega, _: 1j * np.asarray(omega) * (p["eta"] + 1.0)}, "at the neutral value"),
+        ("viscous", {"modulus": lambda p, omega, _: 1j * omega[0] * p["eta"]}, "."),
+        ("strain_stiffening", {"stress": lambda _, history: 0.0 * history.value}, "differ by 0."),
+    ],
+)
+def test_a_broken_effect_is_found(
+    name: str, change: dict[str, Any], words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(LIBRARY, name, replace(get_effect(name), **change))
+    Structure.from_names.cache_clear()
+    with pytest.raises((AssertionError, IndexError), match=words):
+        check_effect(name)
+    Structure.from_names.cache_clear()
 
 
 @pytest.mark.parametrize("name", [name for name in ADDED if name not in {"fixture_resonance", *HARMONIC_ONLY}])
@@ -118,9 +118,9 @@ def test_the_rig_from_rest_finds_the_frequency_face(name: str, rng: np.random.Ge
     errors = []
     for each in (plain, model):
         measured = record(
-            each, direction, frequency, amplitude, cycles=1, run_in=12, steps_per_cycle=2048, conditions=UNDER
+            each, direction, frequency, amplitude, cycles=1, run_in=12, steps_per_cycle=2048, conditions=CONDITIONS
         )
-        closed = np.ravel(each.stiffness(direction, frequency, amplitude, conditions=UNDER))[0]
+        closed = np.ravel(each.stiffness(direction, frequency, amplitude, conditions=CONDITIONS))[0]
         errors.append(lock_in(measured, frequency) / closed - 1.0)
     print(f"{name}: from rest {abs(errors[1]):.1e}, without it {abs(errors[0]):.1e}")
     assert abs(errors[1] - errors[0]) <= LIBRARY[name].harmonic_error + 3e-4
@@ -188,14 +188,14 @@ def test_sensitivities_match_finite_differences(effect: Effect, rng: np.random.G
     frequency = np.array([5.0, 60.0, 155.0])
     amplitudes = amplitude * np.array([0.91, 1.07, 2.1])
     loop, swept_at = steady_sine(amplitude, 0.1, 512), (direction, frequency, amplitudes)
-    _, swept = stiffness_and_slopes(model, direction, frequency, amplitudes, names, kind="loop", conditions=UNDER)
-    _, looped = force_and_slopes(model, direction, loop, names, UNDER)
+    _, swept = stiffness_and_slopes(model, direction, frequency, amplitudes, names, kind="loop", conditions=CONDITIONS)
+    _, looped = force_and_slopes(model, direction, loop, names, CONDITIONS)
     worst = 0.0
     for i, key in enumerate(names):
         size = scale(model.parameters[key], model.values[key])
-        stiffness = five_point(model, key, lambda m: m.stiffness(*swept_at, kind="loop", conditions=UNDER))
+        stiffness = five_point(model, key, lambda m: m.stiffness(*swept_at, kind="loop", conditions=CONDITIONS))
         force, wider = (
-            five_point(model, key, lambda m: m.force(direction, loop, kind="loop", conditions=UNDER), step)
+            five_point(model, key, lambda m: m.force(direction, loop, kind="loop", conditions=CONDITIONS), step)
             for step in (2e-3, 3e-3)
         )
         largest = np.max(np.abs(model.force(direction, loop)))
@@ -244,55 +244,15 @@ def test_any_two_compose(effect: Effect, rng: np.random.Generator) -> None:
         both = sized(model, other, direction, amplitude, rng)
         turned = plain.with_effect(other).with_effect(effect.name).with_values(both.values)
         at = (direction, frequency, amplitude)
-        assert np.array_equal(both.stiffness(*at, conditions=UNDER), turned.stiffness(*at, conditions=UNDER))
+        assert np.array_equal(both.stiffness(*at, conditions=CONDITIONS), turned.stiffness(*at, conditions=CONDITIONS))
         assert both.records == turned.records
         gap = harmonic_gap(both, *at)
         assert gap <= 2.0 * harmonic_error(both) + 1e-6, (other, gap)
 
 
-def test_a_model_survives_files_and_processes(effect: Effect, rng: np.random.Generator) -> None:
-    plain = random_model(rng)
-    model = sized(plain, effect.name, Direction.AXIAL, 2e-4, rng)
-    for copy in (
-        pickle.loads(pickle.dumps(model)),
-        from_document(json.loads(json.dumps(to_document(Result(model))))).model,
-    ):
-        assert copy.effects == tuple(e.name for e in model.records)
-        assert copy.values == model.values
-        assert np.array_equal(copy.stiffness("axial", 50.0, 1e-4), model.stiffness("axial", 50.0, 1e-4))
-
-
-def stacked(models: list[Model]) -> Mapping[str, np.ndarray]:
-    return {name: np.array([[model.values[name]] for model in models]) for name in models[0].parameters}
-
-
-@pytest.mark.parametrize("others", [(), ("loop_clock",)], ids=["alone", "in another time each"])
-def test_a_stack_of_values_equals_one_after_the_other(
-    effect: Effect, others: tuple[str, ...], rng: np.random.Generator
-) -> None:
-    _, model, direction, _, amplitude = drawn(rng, effect.name, *others)
-    models = [
-        model.with_values({name: value * rng.uniform(0.9, 1.1) for name, value in model.values.items()})
-        for _ in range(3)
-    ]
-    frequency, amplitudes = np.array([0.1, 40.0, 155.0, 155.0]), amplitude * np.array([1.0, 0.5, 1.5, 0.0])
-    turns = np.linspace(0.0, 1.0, 4)
-    each_point = RubberConditions(295.0 + turns, turns, 0.1 * turns, 0.1 * turns, 0.1 - 0.1 * turns)
-    both = model.stiffness(direction, frequency, amplitudes, kind="loop", values=stacked(models), conditions=each_point)
-    assert both.shape == (3, 4)
-    for row, each in zip(both, models, strict=True):
-        for i, one in enumerate(row):
-            conditions = each_point.select(i)
-            alone = each.stiffness(direction, frequency[i], amplitudes[i], kind="loop", conditions=conditions)
-            np.testing.assert_allclose(one, alone, rtol=1e-12)
-    phase = np.arange(600) / 200
-    motion = amplitude * np.sin(2.0 * np.pi * phase)
-    for history in (
-        History.steady(motion, 5.0, cycles=3),
-        History(motion, 1e-3, periodic=False, frequency=5.0),
-    ):
-        answer = model.force(direction, history, kind="loop", values=stacked(models), conditions=UNDER)
-        both = np.broadcast_to(answer, (3, 600))
-        for row, each in zip(both, models, strict=True):
-            expected = each.force(direction, history, kind="loop", conditions=UNDER)
-            np.testing.assert_allclose(row, expected, rtol=1e-10, atol=1e-10 * np.ptp(expected))
+def test_a_model_survives_processes(effect: Effect, rng: np.random.Generator) -> None:
+    model = sized(random_model(rng), effect.name, Direction.AXIAL, 2e-4, rng)
+    copy = pickle.loads(pickle.dumps(model))
+    assert copy.effects == tuple(e.name for e in model.records)
+    assert copy.values == model.values
+    assert np.array_equal(copy.stiffness("axial", 50.0, 1e-4), model.stiffness("axial", 50.0, 1e-4))
