@@ -119,13 +119,12 @@ def register(name: str, law: ModuleType, origin: Origin) -> None:
     """
     if not name.isidentifier() or (name in LIBRARY and name not in ORIGINS):
         expected = "a name of letters, digits and _ that the library does not use"
-        raise ModelError("the effect cannot have this name", place=str(origin), found=name, expected=expected)
+        raise ModelError(f"the effect of {origin} cannot have this name", found=name, expected=expected)
     try:
         effect = _record(name, dict(law.EFFECT), law)
     except (AttributeError, LookupError, TypeError, ValueError, StopIteration) as error:
         raise ModelError(
-            "the effect cannot be used",
-            place=f"{name}, from {origin}",
+            f"the effect {name} of {origin} cannot be used",
             found=f"{error} ({type(error).__name__})",
             expected="a dictionary EFFECT with the keys of library.toml, and the functions of its kind",
         ) from error
@@ -281,8 +280,7 @@ for _point in entry_points(group="bushfit.effects"):
         _law = _point.load()
     except Exception as error:  # of a package that bushfit does not know
         raise ModelError(
-            "a package with an effect for bushfit cannot be imported",
-            place=f"{_point.name}, from {_origin}",
+            f"the effect {_point.name} of {_origin} cannot be imported",
             found=f"{error} ({type(error).__name__})",
             hint=f"update or remove the package {_origin.package}",
         ) from error

@@ -67,7 +67,7 @@ def test_a_file_is_run_only_with_permission_and_only_as_it_was(bushfit: Run, roo
         ("import no_such_module\n", ["ModuleNotFoundError"]),
         ("def modulus(p, omega, strain): ...\n", ["EFFECT"]),
         ("EFFECT = {}\n", ["the functions of its kind"]),
-        ("EFFECT = {'sentense': 'x'}\nmodulus = stress = print\n", ["my_law, from"]),
+        ("EFFECT = {'sentense': 'x'}\nmodulus = stress = print\n", ["the effect my_law of"]),
         ("x = (\n", ["SyntaxError"]),
     ],
 )
