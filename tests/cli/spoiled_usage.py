@@ -73,6 +73,8 @@ USAGE = [
     ("simulate|model.json|--noise|300 %", "--noise: impossible size", "0 up to 100 %, or below 1 rad"),
     ("simulate|model.json|--effect|inertia", "--effect: not an effect with a value", 'such as "inertia.mass=0.1 kg"; parameters of inertia: mass'),
     ("simulate|model.json|--effect|inertia.mass=-1 kg", "inertia.mass: impossible value", "0 to 100 kg (moving mass)"),
+    ("manual|fiting", "no such page", 'did you mean "fitting"?'),
+    ("example|--fource", "No such option '--fource'"),
     ("schema|modle", "there is no such schema", 'did you mean "model"?'),
     ("inspect|campaign.toml", "campaign.toml: a test file is needed", "found: a campaign", "bushfit diagnose looks at all tests of a campaign"),
     ("reduce|model.json", "model.json: a test file is needed", "found: a model"),

@@ -41,6 +41,7 @@ ARGUMENTS = {
     "plan": ["model.json", "--hours", "1.5"],
     "compare": ["model.json", CASE],
     "export": ["model.json", "--format", "csv"],
+    "example": [],
     "reduce": ["data/cmp_15961_raw/stepped_sine_axial.csv"],
     "inspect": TESTS,
     "batch": shlex.split("data/practice/case_00[01]/bushing.toml --tables --plots --command fit --command predict"),

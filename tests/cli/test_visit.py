@@ -133,6 +133,8 @@ def test_a_visit_makes_a_campaign_that_fits(
     done = typed("fit", "x/campaign.toml", "-o", "fit", "--no-plots", "--json")
     assert values(done) == pytest.approx(table_1, rel=0.04)
     assert "and 1 more test has a smaller misfit" in " ".join(done.stderr.split())
+    shown = done.stderr.partition("test by test")[2].partition("and 1 more")[0]
+    assert ("MTS_radial" in shown, "A0,5mm" in shown) == (True, False), "the largest misfits"
     assert "…" not in done.stderr, "long names wrap"
 
 
