@@ -19,10 +19,11 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.errors import FitError
 from bushfit.fitting.assess import FitStage, covariance
 from bushfit.fitting.coordinates import Coordinates, jacobian
-from bushfit.fitting.model_error import with_model_error
+from bushfit.fitting.discrepancy import SIZES, FittedTests, discrepancies
+from bushfit.fitting.model_error import log_likelihood, with_model_error
 from bushfit.fitting.preparation import MeasuredSweep
 from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.problem import FitProblem
+from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.robust import estimate
 from bushfit.geometry import Direction
@@ -211,12 +212,17 @@ def test_a_ripple_of_a_dense_sweep_bends_no_parameter(rig: Rig, paper_model: Mod
     assert low < paper_model.values["mu"] < high
 
 
-def test_the_covariance_is_the_sandwich_of_noise_and_process(rig: Rig) -> None:
-    """In full, J^+ V J^+^T, V by one standard deviation of each independent source of error."""
-    campaign = replace(spoiled(rig(3, shared=True), waves(0.03, 3)), loops=())
-    data = PreparedCampaign.from_campaign(campaign)
+@pytest.fixture
+def refitted(rig: Rig) -> FitResult:
+    """The sweeps of a rubber that is not quite the model, fitted with a model error."""
+    data = PreparedCampaign.from_campaign(replace(spoiled(rig(3, shared=True), waves(0.03, 3)), loops=()))
     plain = estimate(FitProblem(data.starting_model(data.effects, data.sweeps, {}), data.sweeps, FIVE, data.bounds))
-    found, _ = with_model_error(plain, data.bounds)
+    return with_model_error(plain, data.bounds)[0]
+
+
+def test_the_covariance_is_the_sandwich_of_noise_and_process(refitted: FitResult) -> None:
+    """In full, J^+ V J^+^T, V by one standard deviation of each independent source of error."""
+    found = refitted
     (sweep,) = found.covariance_tests
     assert found.smooth_error is not None
     assert isinstance(sweep, MeasuredSweep)
@@ -234,3 +240,23 @@ def test_the_covariance_is_the_sandwich_of_noise_and_process(rig: Rig) -> None:
     moved = np.linalg.pinv(jacobian(model, [sweep], FIVE).T) @ np.concatenate(sources).T * slopes[:, None]
     known = covariance(model, [FitStage(FIVE, found.covariance_tests or found.minimised, found.smooth_error)])
     np.testing.assert_allclose(known.matrix, moved @ moved.T, rtol=1e-6)
+
+
+def test_the_likelihood_is_averaged_over_the_process(refitted: FitResult) -> None:
+    """In full: -(r^T C^-1 r + ln|C|)/2 over sizes and lengths, and Laplace's -ln|J C^-1 J^T + prior|/2 at the best."""
+    (sweep,) = (replace(test, model_error=0.0) for test in refitted.minimised)
+    solution, free = refitted.moved_to(refitted.model, [sweep]), ["mu", "m"]
+    cases, jacobian_rows = list[tuple[float, float]](), solution.jacobian
+    for process in discrepancies(FittedTests(solution, [np.empty((0, sweep.size))])):
+        units = process.tests.columns(process.complex_shapes)
+        eigenvalues, vectors = np.linalg.eigh(units.T @ units)
+        for size in SIZES:
+            variance = 1.0 + size**2 * eigenvalues
+            likelihood = -0.5 * np.sum((vectors.T @ solution.residual) ** 2 / variance + np.log(variance))
+            information = (jacobian_rows @ vectors / variance) @ (jacobian_rows @ vectors).T
+            prior = np.diag([float(name in free) for name in FIVE])
+            cases.append((float(likelihood), float(np.linalg.slogdet(information + prior)[1])))
+    likelihoods, informations = np.array(cases).T
+    expected = np.logaddexp.reduce(likelihoods) - np.log(len(cases)) - 0.5 * sweep.log_det_covariance
+    expected -= 0.5 * informations[likelihoods.argmax()]
+    assert log_likelihood(refitted, dict.fromkeys(free, 1.0)) == pytest.approx(expected, abs=0.1)
