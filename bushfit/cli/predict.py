@@ -10,10 +10,18 @@ import click
 from bushfit.cli.options import FILE, command_called, file_option, flag, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.printing import print_tests
-from bushfit.cli.shared_options import grid_values, kelvin, positive, prediction_options
+from bushfit.cli.shared_options import (
+    displacement_rates,
+    grid_values,
+    kelvin,
+    positive,
+    prediction_options,
+    static_rate_option,
+)
 
 if TYPE_CHECKING:
     from bushfit.commands.predict import PredictionOutput
+    from bushfit.prediction.static_curve import StaticCurve
 
 #: Maximum number of amplitudes per direction that the terminal shows; the CSV has all.
 _MOST_AMPLITUDES = 8
@@ -29,6 +37,8 @@ _MOST_AMPLITUDES = 8
     option(
         "--base-acceleration", "ACCELERATION", 'Resonance of a mass such as "1.2 kg" on a base shaken with "0.1 g".'
     ),
+    flag("--static", "Also write the static curve: force over displacement, and its slope."),
+    static_rate_option("Its rate"),
     flag("--wide", "Also write tables with amplitudes across, without bands."),
     option(
         "--arms",
@@ -47,6 +57,8 @@ def command(
     temperature: str | None,
     mass: str | None,
     base_acceleration: str | None,
+    static: bool,
+    static_rate: str | None,
     wide: bool,
     arms: str | None,
     output: Output,
@@ -73,6 +85,8 @@ def command(
         "mass": positive(mass, "--mass", "kg"),
         "base_acceleration": positive(base_acceleration, "--base-acceleration", "m/s^2"),
         "arms": positive(arms, "--arms", "1"),
+        "static": static,
+        "static_rates": displacement_rates(static_rate),
     }
     predicted = predict(result, loaded, wide=wide, **settings)
     _print_summary(output, predicted)
@@ -81,6 +95,8 @@ def command(
         frequency, largest = resonance.peak
         peak = f"resonance at {frequency:.4g} Hz, |T| {largest:.3g}"
         output.print(f"{resonance.place} under {mass}, base at {base_acceleration}: {peak}")
+    for curve in predicted.static:
+        _print_static(output, curve)
     for part in predicted.arms:
         output.print(part.sentence)
     print_tests(output, predicted.tests, predicted.usable)
@@ -109,6 +125,20 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
             f"{format_range(force.name, stiffness.min(), stiffness.max())}, loss factor "
             f"{format_range('', loss.min(), loss.max()).strip()}, {format_range('Hz', *prediction.frequency[[0, -1]])}"
         )
+
+
+def _print_static(output: Output, curve: StaticCurve) -> None:
+    """Print reach, rate and stiffness of a static curve, from end to end and about zero."""
+    from bushfit.units import format_range, number
+
+    (unit, length), _, (name, factor) = curve.direction.display
+    reach = format_range(unit, length * curve.displacement[-1])
+    middle = curve.displacement.size // 2
+    secant, slope = (number(factor * value, 4) for value in (curve.secant.value[0], curve.slope.value[middle]))
+    output.print(
+        f"{curve.direction}: static {curve.direction.motion.words[2]} {secant} {name} from -{reach} to {reach} at "
+        f"{curve.rate_text}, {slope} {name} about zero"
+    )
 
 
 def print_predictions(output: Output, predicted: PredictionOutput) -> None:

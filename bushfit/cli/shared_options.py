@@ -22,7 +22,7 @@ from bushfit.cli.options import (
     option_of,
 )
 from bushfit.errors import UnitError, error_location
-from bushfit.units import parse_quantity, regular_steps
+from bushfit.units import is_compatible, parse_quantity, regular_steps
 
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
@@ -114,6 +114,19 @@ def prediction_options(campaign: str) -> Parameter:
     )
 
 
+def static_rate_option(subject: str) -> Parameter:
+    """Create the option --static-rate, the rate of `subject`."""
+    return option("--static-rate", "RATE", f'{subject}, "10 mm/min" [that of the slowest loop, or 10 mm/min].')
+
+
+def displacement_rates(text: str | None) -> dict[str, float] | None:
+    """Parse --static-rate to a rate in SI by the unit of its displacement: m, rad or 1; None if it was not given."""
+    suffix = re.sub(r"^[-+.\d\s]+(e[-+]?\d+)?\s*", "", text or "", flags=re.IGNORECASE)
+    unit = next((unit for unit in ("rad", "1") if is_compatible(suffix, f"{unit}/s")), "m")
+    rate = positive(text, "--static-rate", f"{unit}/s")
+    return None if rate is None else {unit: rate}
+
+
 def grid_values(directions: Sequence[str], grids: Mapping[str, str | None]) -> dict[str, Any]:
     """Convert grid options to keyword arguments: directions, frequencies and amplitudes [SI]; None for a default."""
     axes = {key: parse_grid(grids[key], option_of(key), unit) for key, unit in _UNITS.items()}
@@ -178,10 +191,11 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
         values = tuple(
             parse_quantity(f"{number} {parts[2]}", unit) for number in parts[1].split(":" if is_range else ",")
         )
+        hint = "predict --static writes the static curve" if unit == "Hz" and values[0] == 0.0 else None
         if is_range:
             values = tuple(regular_steps(*values))
             if not values:
-                raise UnitError("start:stop:step does not count upward", found=text, expected=expected)
+                raise UnitError("start:stop:step does not count upward", found=text, expected=expected, hint=hint)
         elif min(values) <= 0.0:
-            raise UnitError("frequencies and amplitudes are above zero", found=text, expected=expected)
+            raise UnitError("frequencies and amplitudes are above zero", found=text, expected=expected, hint=hint)
     return values

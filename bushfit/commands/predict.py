@@ -24,7 +24,8 @@ from bushfit.geometry import Bushing, Direction, Place, Specimen, get_place
 from bushfit.model.arms import Arms, model_arms
 from bushfit.model.result import ExpectedError, Misfit, Result, transfer_compound
 from bushfit.prediction.caveats import warnings_of
-from bushfit.prediction.grid import default_grid, grid_settings, requested_grid
+from bushfit.prediction.grid import default_grid, grid_settings, requested_grid, static_reach
+from bushfit.prediction.static_curve import StaticCurve, static_curve, static_rate
 from bushfit.prediction.stiffness import PredictedResonance, Prediction, predict_resonance
 from bushfit.prediction.stiffness import predict as predict_stiffness
 from bushfit.reading.measurement import SAME_TEMPERATURE, Loop, Sweep
@@ -55,6 +56,7 @@ class PredictionOutput:
         notes: further warnings.
         resonances: resonance of a mass for each direction or specimen; empty without a mass.
         arms: Maxwell arms of each part of the model; empty unless requested.
+        static: static curve of each direction or specimen; empty unless requested.
         files: tables and figures.
     """
 
@@ -64,6 +66,7 @@ class PredictionOutput:
     notes: Sequence[str] = ()
     resonances: Sequence[PredictedResonance] = ()
     arms: Sequence[Arms] = ()
+    static: Sequence[StaticCurve] = ()
     files: Sequence[ResultFile] = ()
 
     def __repr__(self) -> str:
@@ -78,6 +81,8 @@ class PredictionOutput:
             document[f"{resonance.place}_resonance"] = tables.predicted_resonance_table(resonance).to_dict(
                 orient="list"
             )
+        for curve in self.static:
+            document[f"{curve.direction}_static"] = tables.static_table(curve).to_dict(orient="list")
         if self.arms:
             document["arms"] = [
                 {
@@ -93,8 +98,9 @@ class PredictionOutput:
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings of the model, of each prediction and of each resonance, without repetition."""
+        """Warnings of the model, of each prediction, static curve and resonance, without repetition."""
         predicted = [prediction.warnings for prediction in self.predictions]
+        predicted += [curve.warnings for curve in self.static]
         predicted += [resonance.warnings for resonance in self.resonances]
         return warnings_of(self.result, predicted, self.notes)
 
@@ -124,6 +130,8 @@ def predict(
     base_acceleration: float | None = None,
     wide: bool = False,
     arms: float | None = None,
+    static: bool = False,
+    static_rates: Mapping[str, float] | None = None,
     notes: Sequence[str] = (),
 ) -> PredictionOutput:
     """Predict stiffness and loss factor over a grid, with 95 % bands.
@@ -142,6 +150,9 @@ def predict(
         base_acceleration: zero-to-peak acceleration of the base under the mass [m/s^2].
         wide: True to add tables with one column per amplitude.
         arms: maximum relative error of Maxwell arms; None for no Maxwell arms.
+        static: True to add static curves.
+        static_rates: rates of the static curves by SI unit of displacement: "m" [m/s], "rad" [rad/s] or "1" [1/s];
+            default the rate of the slowest loop.
         notes: further warnings.
 
     Returns:
@@ -190,6 +201,16 @@ def predict(
         for place in places
         if mass and base_acceleration
     ]
+    curves = [
+        static_curve(
+            result,
+            prediction.direction,
+            static_reach(result, prediction.direction, prediction.amplitude, settings),
+            static_rate(result, prediction.direction, static_rates),
+            temperature=temperature,
+        )
+        for prediction in (predictions if static or static_rates else ())
+    ]
     maxwell: tuple[Arms, ...] = ()
     if arms:
         frequency = np.concatenate([prediction.frequency for prediction in predictions])
@@ -202,7 +223,7 @@ def predict(
                 expected="a model whose stiffness depends on frequency, as by a springpot",
             )
     notes = (*notes, *(f"{sweep.name}: {note}" for sweep in measured for note in sweep.notes))
-    output = PredictionOutput(result, predictions, measured, notes, resonances, maxwell)
+    output = PredictionOutput(result, predictions, measured, notes, resonances, maxwell, curves)
     return replace(output, files=_files(output, drawn_sweeps, temperature, wide=wide))
 
 
@@ -266,6 +287,7 @@ def _files(
     files += arms_files(result, output.arms, places)
     suffixes: list[tuple[str, Callable[[Any], pd.DataFrame], Sequence[Any]]] = [
         ("wide", tables.wide_table, output.predictions if wide else ()),
+        ("static", tables.static_table, output.static),
         ("resonance", tables.predicted_resonance_table, output.resonances),
     ]
     for suffix, make, parts in suffixes:
@@ -274,6 +296,9 @@ def _files(
             while stem in names:  # of a specimen
                 stem += "_"
             files.append(table_file(stem, partial(make, part)))
+            if isinstance(part, StaticCurve):
+                title = f"{result.name}: {part.direction}, static curve"
+                files.append(figure_file(stem, partial(plots.prediction.static_figure, part, title)))
     return [*files, *([table_file("measured", measured_table)] if output.measured else [])]
 
 

@@ -50,6 +50,21 @@ def requested_grid(default: tuple[Array, Array], requested: PredictSettings, pla
     return np.array(frequencies), np.array(amplitudes)
 
 
+def static_reach(result: Result, place: Place, amplitudes: Array, requested: PredictSettings) -> float:
+    """Choose the largest displacement of a static curve [m, rad or 1]: of the grid, or of the tested loops if larger.
+
+    Args:
+        result: fitted result, whose campaign lists the loops.
+        place: direction or specimen.
+        amplitudes: zero-to-peak amplitudes of the grid [m, rad or 1], (n,).
+        requested: settings of the prediction; amplitudes that it states have priority over the loops.
+    """
+    tests = result.campaign.tests if result.campaign else ()
+    loops = [test.amplitude[-1] for test in tests if test.kind == "loop" and test.place == str(place)]
+    stated = getattr(requested, _AMPLITUDE_KEYS[place.motion])
+    return max(float(amplitudes.max()), *(() if stated else loops), 0.0)
+
+
 def grid_settings(requested: PredictSettings, campaign: Campaign | None) -> PredictSettings:
     """Complete the prediction settings of a command with the [predict] table of a campaign, if there is one."""
     overrides = {key: value for key, value in vars(requested).items() if value is not None}

@@ -20,7 +20,7 @@ from bushfit.effects.contract import Array, RubberConditions
 from bushfit.errors import ModelError
 from bushfit.fitting.preparation import MeasuredSweep
 from bushfit.geometry import TRANSLATION, Place
-from bushfit.model.covariance import Z95
+from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_and_slopes
@@ -142,17 +142,13 @@ def predict(
         axis.ravel() for axis in np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
     )
     points = direction, frequency, amplitude, temperature
-    models = [result.model] if rig else car_models(result.model, result.unresolved)
-    predictions = [predict_with_model(result, model, *points) for model in models]
-    bushings, rigs = predictions[0], predictions[-1] if len(predictions) > 1 else None
-    explained = replace(result, model_error=None)
-    predictions += [predict_with_model(explained, model, *points) for model in _alternatives(result, rig=rig)]
+    predictions = [predict_with_model(source, model, *points) for source, model in candidates(result, rig=rig)]
+    bushings = predictions[0]
+    rigs = predictions[2 ** len(result.unresolved) - 1] if result.unresolved and not rig else None
     measured = None if sweeps is None else measured_stiffness(direction, frequency, amplitude, sweeps)
-    bands: dict[str, Any] = {}
-    for name in _BANDS:
-        candidates = [getattr(prediction, name) for prediction in predictions]
-        low, high = (np.array([getattr(band, end) for band in candidates]) for end in ("low", "high"))
-        bands[name] = replace(candidates[0], low=low.min(axis=0), high=high.max(axis=0))
+    bands: dict[str, Any] = {
+        name: envelope([getattr(prediction, name) for prediction in predictions]) for name in _BANDS
+    }
     warnings = point_warnings(
         result,
         direction,
@@ -189,6 +185,80 @@ def _alternatives(result: Result, *, rig: bool) -> Iterator[Model]:
         yield from [model] if rig else car_models(model, twins)
 
 
+def candidates(result: Result, *, rig: bool = False) -> list[tuple[Result, Model]]:
+    """List the models that agree with the tests, the predicted one first; a band spans the predictions of all.
+
+    Args:
+        result: fitted result.
+        rig: True to include the effects of the rig, as in the tests.
+
+    Returns:
+        Models with the result that gives their errors: `car_models`, then the alternatives, which have no model error.
+    """
+    models = [result.model] if rig else car_models(result.model, result.unresolved)
+    explained = replace(result, model_error=None)
+    return [(result, model) for model in models] + [(explained, model) for model in _alternatives(result, rig=rig)]
+
+
+def envelope(bands: Sequence[Band]) -> Band:
+    """Band of the first of several predictions, widened to include the bands of the others."""
+    low, high = (np.array([getattr(band, end) for band in bands]) for end in ("low", "high"))
+    return replace(bands[0], low=low.min(axis=0), high=high.max(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Errors of a prediction with one model: of its parameters, and of the model itself.
+
+    Args:
+        covariance: covariance of the k uncertain parameters of the model.
+        scale: factor of the parameters' errors at each point, (n,); below 1 where the error of the model replaces them.
+        relative: complex relative errors of the stiffness by e independent errors of the model, (e, n); e is 0 or 2.
+    """
+
+    covariance: Covariance
+    scale: Array
+    relative: Array
+
+    def band(self, value: Array, slopes: Array) -> Band:
+        """95 % band of a quantity, (n,), from its changes by parameters and model errors, (k + e, n)."""
+        count = len(self.covariance.names)
+        half = np.hypot(
+            self.scale * self.covariance.half_width(slopes[:count]), Z95 * np.linalg.norm(slopes[count:], axis=0)
+        )
+        root = np.concatenate((self.scale * (self.covariance.root.T @ slopes[:count]), slopes[count:]))
+        return Band(value, value - half, value + half, root)
+
+
+def uncertainty(
+    result: Result, model: Model, place: Place, frequency: Array, amplitude: Array, conditions: RubberConditions
+) -> Uncertainty:
+    """Collect the errors of a prediction with one model at operating points.
+
+    Args:
+        result: fitted result, which provides the covariance and the model error.
+        model: the fitted model or a variant with fewer or other effects.
+        place: direction or specimen.
+        frequency: frequency of each point [Hz], (n,).
+        amplitude: zero-to-peak amplitude of each point [m, rad or 1], (n,).
+        conditions: temperature of the rubber.
+
+    Returns:
+        Errors. An unnamed correction or a model error adds an error of the real and one of the imaginary part; within
+        the measured range these replace the errors of the parameters.
+    """
+    names = [name for name in result.covariance.names if name in model.values]
+    covariance = result.covariance.restricted(names)
+    correction = model.unnamed or result.model_error
+    if not correction:
+        return Uncertainty(covariance, np.ones(frequency.size), np.empty((0, frequency.size)))
+    share, error, weight = correction.evaluate(
+        model.setting(place, conditions=conditions), 2.0 * np.pi * frequency, amplitude
+    )
+    relative = error / (1.0 + share) if model.unnamed else np.hypot(error, [share.real, share.imag])
+    return Uncertainty(covariance, np.sqrt(1.0 - np.square(weight)), np.array([[1.0], [1.0j]]) * relative)
+
+
 def predict_with_model(
     result: Result, model: Model, direction: Place, frequency: Array, amplitude: Array, temperature: float | None
 ) -> Prediction:
@@ -203,35 +273,23 @@ def predict_with_model(
         temperature: temperature of the rubber [K]; None for the reference temperature.
 
     Returns:
-        Prediction without warnings. An unnamed correction or a model error adds an error of the real and one of the
-        imaginary part; within the measured range these replace the errors of the parameters.
+        Prediction without warnings.
     """
     conditions = RubberConditions(temperature)
-    names = [name for name in result.covariance.names if name in model.values]
-    covariance = result.covariance.restricted(names)
-    stiffness, slopes = stiffness_and_slopes(model, direction, frequency, amplitude, names, conditions=conditions)
-    count, scale = len(names), np.ones(frequency.size)
-    if correction := model.unnamed or result.model_error:
-        setting = model.setting(direction, conditions=conditions)
-        share, error, weight = correction.evaluate(setting, 2.0 * np.pi * frequency, amplitude)
-        scale = np.sqrt(1.0 - np.square(weight))
-        relative_error = error / (1.0 + share) if model.unnamed else np.hypot(error, [share.real, share.imag])
-        slopes = np.concatenate((slopes, np.array([[1.0], [1.0j]]) * relative_error * stiffness))
-
-    def band(value: Array, slope: Array) -> Band:
-        half = np.hypot(scale * covariance.half_width(slope[:count]), Z95 * np.linalg.norm(slope[count:], axis=0))
-        root = np.concatenate((scale * (covariance.root.T @ slope[:count]), slope[count:]))
-        return Band(value, value - half, value + half, root)
-
+    errors = uncertainty(result, model, direction, frequency, amplitude, conditions)
+    stiffness, slopes = stiffness_and_slopes(
+        model, direction, frequency, amplitude, errors.covariance.names, conditions=conditions
+    )
+    slopes = np.concatenate((slopes, errors.relative * stiffness))
     relative, loss_factor = slopes / stiffness, stiffness.imag / stiffness.real
     return Prediction(
         direction,
         frequency,
         amplitude,
-        stiffness=band(np.abs(stiffness), np.abs(stiffness) * relative.real),
-        loss_factor=band(loss_factor, (1.0 + loss_factor**2) * relative.imag),
-        storage_stiffness=band(stiffness.real, slopes.real),
-        loss_stiffness=band(stiffness.imag, slopes.imag),
+        stiffness=errors.band(np.abs(stiffness), np.abs(stiffness) * relative.real),
+        loss_factor=errors.band(loss_factor, (1.0 + loss_factor**2) * relative.imag),
+        storage_stiffness=errors.band(stiffness.real, slopes.real),
+        loss_stiffness=errors.band(stiffness.imag, slopes.imag),
     )
 
 

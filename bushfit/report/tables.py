@@ -16,6 +16,7 @@ from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Display, Place
 from bushfit.model.arms import Arms, arm_rows
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
+from bushfit.prediction.static_curve import StaticCurve
 from bushfit.prediction.stiffness import PredictedResonance, Prediction
 from bushfit.reading.measurement import loss_factor
 from bushfit.units import CELSIUS
@@ -152,6 +153,30 @@ def predicted_resonance_table(resonance: PredictedResonance) -> pd.DataFrame:
         if_rigs = predicted_resonance_table(resonance.if_rigs).iloc[:, 1:].add_suffix(f", {IF_RIGS}")
         table = pd.concat([table, if_rigs], axis=1)
     return table
+
+
+def static_table(curve: StaticCurve) -> pd.DataFrame:
+    """Table of a static curve, with the ends of the 95 % bands; a row per displacement.
+
+    Returns:
+        Columns: displacement, rate; mean, loading and unloading force, and stiffness (slope of the mean), each with
+        its "low" and "high" ends.
+    """
+    (length, to_length), (_, to_force), (_, to_stiffness) = curve.direction.display
+    _, stiffness, force = response_headers(curve.direction)
+    columns: dict[str, Any] = {
+        displacement_header(curve.direction): curve.displacement * to_length,
+        f"rate [{length}/min]": 60.0 * curve.rate * to_length,
+    }
+    for header, band, scale in (
+        (force, curve.mean, to_force),
+        (f"loading {force}", curve.loading, to_force),
+        (f"unloading {force}", curve.unloading, to_force),
+        (stiffness, curve.slope, to_stiffness),
+    ):
+        ends = {"": band.value, ", low": band.low, ", high": band.high}
+        columns |= {f"{header}{end}": values * scale for end, values in ends.items()}
+    return pd.DataFrame(columns)
 
 
 def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> pd.DataFrame:

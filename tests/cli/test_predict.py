@@ -149,6 +149,46 @@ def test_predict_writes_maxwell_arms_where_asked(bushfit: Run, root: Path, tmp_p
     assert 0.001 < json.loads(done.stdout)["arms"][0]["largest_relative_error"] <= 0.01, "where no error is given"
 
 
+def test_predict_writes_the_static_curve_at_the_rate_of_the_slowest_loop(
+    bushfit: Run, work: Path, tmp_path: Path
+) -> None:
+    model = document(work / "model/model.json")
+    (loop,) = (test for test in model["campaign"]["tests"] if test["kind"] == "loop")
+    slow = 4.0 * loop["frequency_Hz"][0] * loop["amplitude"][1] * 60e3
+    done = bushfit("predict", "model/model.json", "--static", "-o", tmp_path / "x", "--json")
+    files = {f"{place}{end}" for place in ("axial", "radial") for end in (".csv", ".png", "_static.csv", "_static.png")}
+    assert names(tmp_path / "x") == files
+    table = pd.read_csv(tmp_path / "x/axial_static.csv")
+    assert table["rate [mm/min]"].to_numpy() == pytest.approx(slow, rel=1e-6)
+    assert table["displacement [mm]"].max() == pytest.approx(1e3 * loop["amplitude"][1])
+    assert (table["loading force [N]"] >= table["force [N]"]).all()
+    assert (table["force [N], low"] < table["force [N], high"])[table["displacement [mm]"] != 0.0].all()
+    found = json.loads(done.stdout)
+    assert found["axial_static"]["force [N]"] == pytest.approx(table["force [N]"].tolist(), rel=1e-5, abs=1e-6)
+    secant = table["force [N]"].iloc[-1] / table["displacement [mm]"].iloc[-1]
+    assert f"axial: static stiffness {secant:.4g} N/mm from -1 mm to 1 mm at {slow:.3g} mm/min" in done.stderr
+    options = ("--direction", "axial", "--amplitudes", "0.2 mm", "--static-rate", "5 mm/min", "--no-plots")
+    bushfit("predict", "model/model.json", *options, "-o", tmp_path / "y")
+    slower = pd.read_csv(tmp_path / "y/axial_static.csv")
+    assert slower["rate [mm/min]"].unique() == pytest.approx([5.0])
+    assert slower["displacement [mm]"].max() == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--frequencies", "0 Hz"), "predict --static writes the static curve"),
+        (("--frequencies", "0:10:5 Hz"), "predict --static writes the static curve"),
+        (("--static-rate", "10 mm"), "a speed, such as mm/min"),
+        (("--static-rate", "-1 mm/min"), "a value above zero"),
+    ],
+)
+def test_what_has_no_static_curve_is_told(bushfit: Run, tmp_path: Path, options: tuple[str, ...], words: str) -> None:
+    done = bushfit("predict", "model/model.json", *options, "-o", tmp_path / "x", status=2)
+    assert words in done.stderr
+    assert not (tmp_path / "x").exists()
+
+
 @pytest.fixture(scope="module")
 def planned(root: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict, str]:
     """The folder of a plan for a bushing that was not tested, its document, and what was said."""

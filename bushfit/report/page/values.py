@@ -8,6 +8,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.model.covariance import Z95
 from bushfit.prediction.caveats import agrees_within_noise
+from bushfit.prediction.static_curve import has_time_law, static_curve, static_rate
 from bushfit.prediction.stiffness import Band, Prediction, predict
 from bushfit.report.page.record import ReportRecord
 from bushfit.report.tables import spread
@@ -23,9 +24,9 @@ def headline(record: ReportRecord, prediction: Prediction) -> dict[str, str]:
     """Key values of a direction or specimen for the top of a report, as texts.
 
     The operating point is the middle one of the predicted amplitudes and the frequency nearest to the geometric mean of
-    the lowest and highest. The static stiffness is at the lowest frequency, if this is at most 1 Hz, and at the same
-    amplitude. The dynamic stiffening is the ratio of dynamic to static stiffness; its interval includes the correlation
-    of the two.
+    the lowest and highest. The static stiffness is that of the static curve to the same amplitude, if a test was made
+    at 1 Hz or below and the model has a law in time. The dynamic stiffening is the ratio of dynamic to static
+    stiffness; its interval includes the correlation of the two.
 
     Args:
         record: records of the result.
@@ -42,10 +43,9 @@ def headline(record: ReportRecord, prediction: Prediction) -> dict[str, str]:
     middle = math.sqrt(frequencies[0] * frequencies[-1])
     frequency = float(frequencies[np.argmin(np.abs(np.log(frequencies / middle)))])
     lowest = min([*(result.measured.frequency[:1] if result.measured else ()), *frequencies.tolist()])
-    points = predict(result, place, [lowest, frequency], [amplitude])
-    unit, to_unit = display_unit(name, factor, float(points.stiffness.value[-1]))
-    static, dynamic = (band_at(points.stiffness, index, to_unit) for index in (0, -1))
-    loss = band_at(points.loss_factor, -1)
+    point = predict(result, place, [frequency], [amplitude])
+    unit, to_unit = display_unit(name, factor, float(point.stiffness.value[0]))
+    dynamic, loss = band_at(point.stiffness, 0, to_unit), band_at(point.loss_factor, 0)
     row = {
         "place": str(place),
         "frequency": f"{number(frequency, 3)} Hz",
@@ -61,10 +61,12 @@ def headline(record: ReportRecord, prediction: Prediction) -> dict[str, str]:
         "accuracy": "",
         "basis": basis(record, str(place)),
     }
-    if lowest < frequency and lowest <= _STATIC:
-        relative, ratio = points.stiffness.root / points.stiffness.value, dynamic[0] / static[0]
-        half = Z95 * ratio * float(np.linalg.norm(relative[:, -1] - relative[:, 0]))
-        row["static"], row["static_point"] = f"{number(static[0], 4)} {unit}", f"at {number(lowest, 2)} Hz"
+    if lowest < frequency and lowest <= _STATIC and has_time_law(result.model):
+        curve = static_curve(result, place, amplitude, static_rate(result, place))
+        static, ratio = to_unit * float(curve.secant.value[0]), float(point.stiffness.value[0] / curve.secant.value[0])
+        relative = [band.root[:, 0] / band.value[0] for band in (point.stiffness, curve.secant)]
+        half = Z95 * ratio * float(np.linalg.norm(relative[0] - relative[1]))
+        row["static"], row["static_point"] = f"{number(static, 4)} {unit}", f"at {curve.rate_text}"
         row["stiffening"] = f"{ratio:.2f} ± {half:.2f}" if half else f"{ratio:.2f}"
     for usable in result.usable:
         if usable.place == str(place):

@@ -10,12 +10,13 @@ from matplotlib.lines import Line2D
 from bushfit.effects.contract import Array
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import rig_effects
+from bushfit.prediction.static_curve import StaticCurve
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.runs import nominal
 from bushfit.report.plots import style
 from bushfit.report.plots.fits import draw_curves, draw_points, points_note, points_to_draw, stiffness_scale
 from bushfit.report.plots.measured import Axis, header_of, sweep_groups
-from bushfit.report.tables import IF_RIGS, response_headers, spread
+from bushfit.report.tables import IF_RIGS, displacement_header, response_headers, spread, words
 from bushfit.units import display_unit, format_range
 
 #: Number of points of a line of the model.
@@ -86,6 +87,29 @@ def prediction_figure(
     if of_place is not None and (any(laid) or free):
         sentences.append(points_note(of_place))
     return figure.explain(*sentences, note=note)
+
+
+@style.in_own_style
+def static_figure(curve: StaticCurve, title: str) -> style.Chart:
+    """Figure of a static curve: force over displacement, and its slope, with 95 % bands."""
+    place = curve.direction
+    (_, length), (name, force), (stiffness_name, stiffness) = place.display
+    unit, factor = display_unit(name, force, float(np.abs(curve.mean.value).max()))
+    slope_unit, slope_factor = display_unit(stiffness_name, stiffness, float(curve.secant.value[0]))
+    figure = style.Chart(title, style.ROW)
+    panels = figure.subplots(1, 2)
+    x, (look, *_) = curve.displacement * length, style.styles(1, "loop")
+    for line in (curve.loading, curve.unloading):
+        panels[0].plot(x, factor * line.value, color=look.color, lw=_THIN)
+    for axes, band, scale in zip(panels, (curve.mean, curve.slope), (factor, slope_factor), strict=True):
+        axes.plot(x, scale * band.value, color=look.color, lw=_LINE)
+        axes.fill_between(x, scale * band.low, scale * band.high, color=look.color, alpha=0.22, lw=0)
+    style.label_axes(panels[0], displacement_header(place), f"{words(place)[1]} [{unit}]")
+    style.label_axes(panels[1], displacement_header(place), f"static {words(place)[2]} [{slope_unit}]")
+    panels[1].set_ylim(bottom=0.0)
+    return figure.explain(
+        f"Thin lines: loading and unloading at {curve.rate_text}; thick: their mean, and its slope; shaded: 95 % band."
+    )
 
 
 def refined(

@@ -1,0 +1,145 @@
+"""Static curve: force over displacement of a slow cycle at constant rate, from the law in time, with its 95 % band."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bushfit.effects import Level
+from bushfit.effects.contract import Array, RubberConditions
+from bushfit.effects.history import History
+from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.errors import ModelError
+from bushfit.geometry import Place
+from bushfit.model.model import Model
+from bushfit.model.result import Result
+from bushfit.model.sensitivity import force_and_slopes
+from bushfit.prediction.caveats import extrapolations
+from bushfit.prediction.stiffness import Band, candidates, envelope, uncertainty
+from bushfit.units import number
+
+#: Default rate of a model without loops, in display units per minute (10 mm/min): common in static tests of rubber.
+_DEFAULT_RATE = 10.0
+#: Displacements of a curve, and samples of the cycle between two of them.
+_POINTS, _SAMPLES = 101, 10
+
+
+@dataclass(frozen=True, eq=False)
+class StaticCurve:
+    """Force over displacement in the steady state of a slow triangular motion.
+
+    Args:
+        direction: direction or specimen.
+        displacement: displacements from the lowest to the highest [m, rad or 1], (n,).
+        loading, unloading: force with rising and with falling displacement [N, N m or Pa].
+        mean: mean of loading and unloading, the static curve.
+        slope: derivative of the mean by displacement, the static stiffness at each displacement [SI].
+        secant: static stiffness from end to end, (1,) [SI].
+        rate: rate of the motion [m/s, rad/s or 1/s].
+        warnings: sentences on extrapolation.
+    """
+
+    direction: Place
+    displacement: Array
+    loading: Band
+    unloading: Band
+    mean: Band
+    slope: Band
+    secant: Band
+    rate: float
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def rate_text(self) -> str:
+        """Rate with its unit, such as "10 mm/min"."""
+        unit, factor = self.direction.display.displacement
+        return f"{number(60.0 * factor * self.rate, 3)} {unit}/min"
+
+
+def static_rate(result: Result, place: Place, stated: Mapping[str, float] | None = None) -> float:
+    """Choose the rate of a static curve.
+
+    The first available of: the stated rate; that of the slowest loop in this direction; that of the slowest loop in any
+    direction, at equal strain rate; 10 mm, 10 deg or 10 % of strain per minute.
+
+    Args:
+        result: fitted result, whose campaign lists the loops.
+        place: direction or specimen.
+        stated: rates by SI unit of displacement (m, rad or 1) [unit/s]; rates of other units are ignored.
+
+    Returns:
+        Rate [m/s, rad/s or 1/s].
+    """
+    if stated and place.motion.displacement_unit in stated:
+        return stated[place.motion.displacement_unit]
+    loops = [test for test in result.campaign.tests if test.kind == "loop"] if result.campaign else []
+    loops = [test for test in loops if test.place == str(place)] or loops
+    if not loops:
+        return _DEFAULT_RATE / (60.0 * place.display.displacement.factor)
+    slowest = min(loops, key=lambda test: test.frequency_Hz[0])
+    ratio = result.model.unit_strain(result.place(slowest.place)) / result.model.unit_strain(place)
+    return 4.0 * slowest.frequency_Hz[0] * slowest.amplitude[-1] * ratio
+
+
+def static_curve(
+    result: Result, place: Place, reach: float, rate: float, *, temperature: float | None = None
+) -> StaticCurve:
+    """Compute the static curve of a fitted model, as the bushing has it in the car.
+
+    Args:
+        result: fitted result.
+        place: direction or specimen.
+        reach: largest displacement, in both senses [m, rad or 1].
+        rate: rate of the motion [m/s, rad/s or 1/s].
+        temperature: temperature of the rubber [K]; None for the reference temperature.
+
+    Returns:
+        Curve at even displacements from -reach to reach.
+
+    Raises:
+        ModelError: an effect of the model has no law in time.
+    """
+    require_time_law(result.model)
+    displacement, conditions = np.linspace(-reach, reach, _POINTS), RubberConditions(temperature)
+    parts = [_forces(source, model, place, displacement, rate, conditions) for source, model in candidates(result)]
+    loading, unloading, mean, slope, secant = (envelope(bands) for bands in zip(*parts, strict=True))
+    point = np.array([rate / (4.0 * reach)]), np.array([reach])
+    warnings = tuple(extrapolations(result, place, *point, temperature, f"{place}, static curve"))
+    return StaticCurve(place, displacement, loading, unloading, mean, slope, secant, rate, warnings)
+
+
+def _forces(
+    result: Result, model: Model, place: Place, displacement: Array, rate: float, conditions: RubberConditions
+) -> list[Band]:
+    """Loading, unloading, mean, slope and secant of one model in the steady state of a triangular motion."""
+    strokes = np.linspace(displacement[0], displacement[-1], _SAMPLES * (_POINTS - 1) + 1)
+    frequency = rate / (4.0 * displacement[-1])
+    cycle = History.steady(np.concatenate((strokes, strokes[-2:0:-1])), frequency)
+    errors = uncertainty(result, model, place, np.array([frequency]), displacement[-1:], conditions)
+    force, slopes = force_and_slopes(model, place, cycle, errors.covariance.names, conditions)
+    changes = np.concatenate((force[None], slopes, errors.relative.real * force))
+    loading = changes[:, : strokes.size : _SAMPLES]
+    unloading = np.roll(changes, -1, axis=-1)[:, ::-1][:, : strokes.size : _SAMPLES]
+    mean = 0.5 * (loading + unloading)
+    secant = (mean[:, -1:] - mean[:, :1]) / (displacement[-1] - displacement[0])
+    curves = (loading, unloading, mean, np.gradient(mean, displacement, axis=-1, edge_order=2), secant)
+    return [errors.band(curve[0], curve[1:]) for curve in curves]
+
+
+def has_time_law(model: Model) -> bool:
+    """True if all effects of the bushing have a law in time; the correction without a name acts on its harmonic."""
+    effects = model.without(Level.INSTRUMENT).records
+    return not any(effect.harmonic_only and effect.name != UNNAMED for effect in effects)
+
+
+def require_time_law(model: Model) -> None:
+    """Raise a ModelError if an effect of the bushing has no law in time."""
+    if not has_time_law(model):
+        names = [effect.name for effect in model.records if effect.harmonic_only]
+        raise ModelError(
+            "this needs a law in time, which an effect of the model does not have",
+            place=" and ".join(names),
+            found="a law of the steady first harmonic alone",
+            expected="effects with a law in time",
+            hint="fit a model without it",
+        )

@@ -1,0 +1,95 @@
+"""Static curve: against the virtual rig, its band, its rate, and what has none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bushfit.errors import ModelError
+from bushfit.geometry import Direction
+from bushfit.model import rig
+from bushfit.model.covariance import Covariance
+from bushfit.model.model import Model
+from bushfit.model.result import CampaignTable, Result, TestTable
+from bushfit.prediction.static_curve import static_curve, static_rate
+
+#: 10 mm/min.
+RATE = 10e-3 / 60.0
+LAWS = {
+    "paper": {},
+    "strain_stiffening": {"strain_stiffening.c3": 40.0},
+    "fifth_power_stiffening": {"fifth_power_stiffening.c5": 4000.0},
+    "asymmetry": {"asymmetry.c2": 3.0},
+    "bump_stop": {},
+    "sleeve_compliance": {"sleeve_compliance.compliance": 3e-7},
+}
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_curve_is_that_of_the_virtual_rig(paper_model: Model, law: str) -> None:
+    """The last of 12 triangular cycles from rest, stepped through time, at equal displacements."""
+    model = paper_model if law == "paper" else paper_model.with_effect(law, LAWS[law])
+    reach = 2e-3
+    curve = static_curve(Result(model), Direction.AXIAL, reach, RATE)
+    frequency = RATE / (4.0 * reach)
+    record = rig.record(
+        model, Direction.AXIAL, frequency, reach, cycles=1, run_in=11, steps_per_cycle=4000, waveform="triangle"
+    )
+    top, bottom = np.argmax(record.displacement), np.argmin(record.displacement)
+    falling = slice(top, bottom + 1)
+    rising = np.r_[bottom : record.force.size, 1 : top + 1]
+    unloading = np.interp(curve.displacement, record.displacement[falling][::-1], record.force[falling][::-1])
+    loading = np.interp(curve.displacement, record.displacement[rising], record.force[rising])
+    largest = np.abs(record.force).max()
+    for name, force in (("loading", loading), ("unloading", unloading), ("mean", 0.5 * (loading + unloading))):
+        error = np.abs(getattr(curve, name).value - force).max() / largest
+        print(f"{law}, {name}: {error:.2%}")
+        assert error < 1e-3
+    if law == "asymmetry":
+        assert curve.mean.value[-1] > -1.05 * curve.mean.value[0] > 0.0
+    np.testing.assert_allclose(
+        np.trapezoid(curve.slope.value, curve.displacement), np.ptp(curve.mean.value[[0, -1]]), rtol=0.002
+    )
+    assert curve.secant.value[0] == pytest.approx(np.ptp(curve.mean.value[[0, -1]]) / (2.0 * reach), rel=1e-12)
+
+
+def test_the_band_is_what_the_covariance_makes_of_the_force(paper_model: Model) -> None:
+    covariance = Covariance(("mu", "sigma_fmax"), np.array([[4e8, 1e6], [1e6, 1e6]]))
+    curve = static_curve(Result(paper_model, ("mu", "sigma_fmax"), covariance), Direction.RADIAL, 5e-4, RATE)
+    rows = []
+    for name, step in (("mu", 1e3), ("sigma_fmax", 10.0)):
+        changed = paper_model.with_values({name: paper_model.values[name] + step})
+        rows.append((static_curve(Result(changed), Direction.RADIAL, 5e-4, RATE), step))
+    for name in ("loading", "mean", "slope", "secant"):
+        band = getattr(curve, name)
+        slopes = np.array([(getattr(moved, name).value - band.value) / step for moved, step in rows])
+        half = 1.959964 * np.sqrt(np.einsum("in,ij,jn->n", slopes, covariance.matrix, slopes))
+        np.testing.assert_allclose(band.high - band.value, half, rtol=1e-4, atol=1e-6 * half.max())
+        np.testing.assert_allclose(band.value - band.low, half, rtol=1e-4, atol=1e-6 * half.max())
+
+
+def test_the_rate_is_stated_or_that_of_the_slowest_loop(paper_model: Model) -> None:
+    loops = [
+        TestTable("fast", "loop", "axial", (1.0, 1.0), (2e-3, 2e-3), "m", 100),
+        TestTable("slow", "loop", "axial", (0.1, 0.1), (1e-3, 1e-3), "m", 100),
+        TestTable("sweep", "sweep", "radial", (0.01, 155.0), (1e-4, 5e-4), "m", 100),
+    ]
+    plain = Result(paper_model)
+    tested = replace(plain, campaign=CampaignTable("a", "a.toml", "0", "bushfit fit", tuple(loops)))
+    strain = [paper_model.unit_strain(place) for place in (Direction.AXIAL, Direction.RADIAL)]
+    assert static_rate(plain, Direction.AXIAL) == pytest.approx(RATE)
+    assert static_rate(plain, Direction.TORSION) == pytest.approx(np.radians(10.0) / 60.0)
+    assert static_rate(tested, Direction.AXIAL) == pytest.approx(4e-4)
+    assert static_rate(tested, Direction.RADIAL) == pytest.approx(4e-4 * strain[0] / strain[1])
+    assert static_rate(tested, Direction.AXIAL, {"m": 1e-5}) == 1e-5
+    assert static_rate(tested, Direction.AXIAL, {"rad": 1e-5}) == pytest.approx(4e-4)
+
+
+def test_a_law_of_the_harmonic_alone_has_no_curve_unless_it_is_the_rigs(paper_model: Model) -> None:
+    with pytest.raises(ModelError, match="hysteretic_loss: this needs a law in time"):
+        static_curve(Result(paper_model.with_effect("hysteretic_loss")), Direction.AXIAL, 1e-3, RATE)
+    rigged = paper_model.with_effect("rig_compliance", {"rig_compliance.compliance": 1e-7})
+    kept, plain = (static_curve(Result(model), Direction.AXIAL, 1e-3, RATE) for model in (rigged, paper_model))
+    np.testing.assert_array_equal(kept.mean.value, plain.mean.value)
