@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 import os
 import signal
-import stat
 import sys
 import tempfile
 import threading
@@ -96,16 +94,6 @@ def _killed_at(count: int, folder: Path) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
-def test_a_figure_that_fails_loses_no_other_file(tmp_path: Path) -> None:
-    def broken() -> Figure:
-        raise RuntimeError("no font")
-
-    files = [figure_file("x", broken), json_file("y", {}), table_file("z", lambda: pd.DataFrame({"x [mm]": [1.0]}))]
-    with pytest.raises(RuntimeError):
-        write_results(tmp_path, files)
-    assert set(contents(tmp_path)) == {"y.json", "z.csv"}
-
-
 def test_a_folder_that_allows_no_writing() -> None:
     """Rights do not bind root, so that a child gives its own up first."""
     with tempfile.TemporaryDirectory() as home:
@@ -142,28 +130,6 @@ def test_commands_that_write_into_one_folder_lose_no_file(tmp_path: Path) -> Non
     write(tmp_path / "x", dict.fromkeys((*found, "shared.csv"), b"again"), force=True)
 
 
-def test_a_new_folder_is_made_and_one_that_exists_keeps_rights_subfolders_and_links(tmp_path: Path) -> None:
-    folder = tmp_path / "results" / "deep" / "x"
-    write(folder, OLD)
-    umask = os.umask(0)
-    os.umask(umask)
-    assert contents(folder) == OLD
-    assert stat.S_IMODE((folder / "a.csv").stat().st_mode) == 0o666 & ~umask
-    folder = tmp_path / "x"
-    (folder / "sub").mkdir(parents=True)
-    (folder / "sub" / "mine.txt").write_text("mine")
-    (folder / "link").symlink_to("nowhere")
-    folder.chmod(0o750)
-    (tmp_path / "way").symlink_to(folder, target_is_directory=True)
-    write(folder, OLD)
-    write(tmp_path / "way", NEW, force=True)
-    assert (tmp_path / "way").is_symlink()
-    assert (folder / "a.csv").read_bytes() == b"new a"
-    assert (folder / "sub" / "mine.txt").read_text() == "mine"
-    assert (folder / "link").readlink() == Path("nowhere")
-    assert folder.stat().st_mode & 0o777 == 0o750
-
-
 @pytest.mark.parametrize("force", [True, False])
 def test_a_file_that_bushfit_did_not_write_is_never_replaced(tmp_path: Path, force: bool) -> None:
     """One of the user's, a result that the user changed, a link, an input of the run, a folder, a file as folder."""
@@ -186,26 +152,6 @@ def test_a_file_that_bushfit_did_not_write_is_never_replaced(tmp_path: Path, for
     names = {path.name for path in (tmp_path / "results").glob("[!.]*")}
     assert names == {"a.csv", "b.json", "c.csv", "d.csv", "e.csv"}
     assert (tmp_path / "results" / "b.json").read_bytes() == b"old b"
-
-
-def test_results_are_replaced_with_force_alone_and_nothing_else_is_touched(tmp_path: Path) -> None:
-    write(tmp_path, OLD)
-    with pytest.raises(OutputError, match="there are results already") as refused:
-        write(tmp_path, {"a.csv": b"2"})
-    assert "--force" in str(refused.value)
-    write(tmp_path, {"a.csv": b"2"}, force=True)
-    assert contents(tmp_path) == {"a.csv": b"2", "b.json": b"old b"}
-    record = (tmp_path / ".bushfit.sha256").read_text().splitlines()
-    assert record[-1] == f"{hashlib.sha256(b'2').hexdigest()}  a.csv"
-
-
-@pytest.mark.parametrize("record", [b"", b"\xff\x00", b"0  a.csv\n"])
-def test_without_a_record_a_file_is_taken_for_the_user_s(record: bytes, tmp_path: Path) -> None:
-    write(tmp_path, OLD)
-    (tmp_path / ".bushfit.sha256").write_bytes(record)
-    with pytest.raises(OutputError, match="that bushfit did not write"):
-        write(tmp_path, NEW, force=True)
-    assert contents(tmp_path) == OLD
 
 
 BEGINS = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}

@@ -80,19 +80,6 @@ def test_the_first_block_is_what_a_customer_reads(results: Results) -> None:
         assert words in first
 
 
-def test_diagnose_writes_it_too_and_its_folder_gives_the_same(root: Path, tmp_path: Path) -> None:
-    """Without tables of their own, loops and sweeps are shown from that of the gap."""
-    campaign = root / "data/practice/case_001/bushing.toml"
-    done = call(tmp_path, "diagnose", campaign, "-o", "x", "--no-plots", "-q")
-    assert done.returncode == 0, done.stderr
-    page = page_of(tmp_path / "x")
-    text = parsed(page).text
-    assert parsed(made_of(tmp_path / "x")).text == text
-    titles = ("axial: prediction and measurement", "radial: prediction and measurement", "Hysteresis loops")
-    for words in (*titles, "Measured minus model", "bushfit diagnose bushing.toml"):
-        assert words in text
-
-
 @pytest.mark.parametrize("form", ["xlsx", "decimal comma"])
 def test_other_forms_of_tables_are_read_back(results: Results, tmp_path: Path, form: str) -> None:
     folder = tmp_path / "x"
@@ -175,23 +162,6 @@ def test_a_logo_that_cannot_be_shown_is_refused(root: Path, tmp_path: Path, cont
     assert not (tmp_path / "x").exists()
 
 
-def test_parts_of_one_campaign_are_told_apart_by_name(root: Path, tmp_path: Path) -> None:
-    """Two parts, one stiffer: a curve each at every level, not the mean of both under one name."""
-    text = (root / "configs/cmp_15961.toml").read_text(encoding="utf-8").replace("../data", str(root / "data"))
-    sweep = pd.read_csv(root / "data/cmp_15961/sweep_axial.csv", comment="#")
-    stiffness = next(name for name in sweep if "stiffness" in name)
-    sweep.assign(**{stiffness: 1.1 * sweep[stiffness]}).to_csv(tmp_path / "stiffer.csv", index=False)
-    first = text[text.index("[[sweeps]]") :].split("[[sweeps]]")[1]
-    text = text.replace(first, f'{first}specimen_number = "A-7"\n', 1)
-    text += '\n[[sweeps]]\nfile = "stiffer.csv"\ndirection = "axial"\nspecimen_number = "B-8"\n'
-    (tmp_path / "c.toml").write_text(text, encoding="utf-8")
-    assert call(tmp_path, "fit", "c.toml", "-o", "x", "--no-plots", "-q").returncode == 0
-    assert call(tmp_path, "report", "x", "-q").returncode == 0
-    (sweeps,) = re.findall(r"<h3>Sweeps and their residuals</h3>.*?(<svg.*?</svg>)", page_of(tmp_path / "x"), re.DOTALL)
-    names = re.findall(r">(part [^<]*)<", sweeps)
-    assert names == [f"part {part}, {level} mm" for part in ("A-7", "B-8") for level in (0.1, 0.2, 0.5)]
-
-
 def test_points_are_those_of_the_tables(results: Results) -> None:
     """Means of the repeats over frequency and over amplitude, and their storage and loss, within half a point."""
     folder = results("cmp_15961")
@@ -211,19 +181,6 @@ def test_points_are_those_of_the_tables(results: Results) -> None:
             distance = np.abs((panel[:, :, None] - expected[:, None]) / scale[:, None]).max(axis=0).min(axis=1)
             assert distance.max() < 5e-3, "each point that is drawn was measured"
             assert panel.shape[1] >= 12
-
-
-def test_values_and_levels_are_those_of_the_tables(results: Results) -> None:
-    page = page_of(results("cmp_15961"))
-    rows = re.findall(r'<td align="right" data-head="([^"]*)">([^<]*)</td>', page)
-    angles = [float(cell.removesuffix("°")) for head, cell in rows if head == "Loss angle"]
-    factors = [float(cell) for head, cell in rows if head == "Loss factor"]
-    assert len(angles) == 12
-    np.testing.assert_allclose(angles, np.degrees(np.arctan(factors)), atol=0.06)
-    ((low, high),) = re.findall(r"predicted here ([\d.]+) to ([\d.]+) dB", page)
-    tables = [pd.read_csv(results("cmp_15961") / f"{place}.csv") for place in ("axial", "radial")]
-    sizes = np.log10([1e3 * size for table in tables for size in table["stiffness [N/mm]"]])
-    assert (float(low), float(high)) == pytest.approx((20 * sizes.min(), 20 * sizes.max()), abs=0.06)
 
 
 def test_the_table_of_the_gap_is_measured_minus_model(results: Results) -> None:
@@ -249,26 +206,6 @@ def page_from(documents: dict[str, Any], tables: dict[str, Any]) -> str:
     )
 
 
-def grown(table: pd.DataFrame, column: str, times: int) -> pd.DataFrame:
-    """A table with so many times its tests."""
-    return pd.concat([table.assign(**{column: table[column] + f" {n}"}) for n in range(times)], ignore_index=True)
-
-
-@pytest.mark.slow
-def test_a_large_campaign_stays_small_and_says_what_is_left_out(results: Results) -> None:
-    documents, tables = read(results("mystery_mount"))
-    large = tables | {"loops": grown(tables["loops"], "loop", 30)}
-    levels = [
-        tables["sweeps"].assign(**{"amplitude [mm]": tables["sweeps"]["amplitude [mm]"] * 1.1**n}) for n in range(60)
-    ]
-    between = [level.assign(**{"frequency [Hz]": level["frequency [Hz]"] + n / 10}) for n, level in enumerate(levels)]
-    large["sweeps"] = pd.concat([*levels, *between], ignore_index=True)
-    page = page_from(documents, large)
-    assert len(page.encode()) < LARGEST
-    text = parsed(page).text
-    assert "Of more than 8 loops of a direction 8 are drawn" in text or "Further figures are left out" in text
-
-
 #: Keys of the documents whose texts come from a user's files.
 FOREIGN = {"name", "summary", "next_test", "command", "reading", "sentence", "evidence", "preload", "date", "warnings"}
 
@@ -280,11 +217,3 @@ def test_names_do_no_harm(root: Path, name: str) -> None:
     tables = {key: table.replace({"sweep": {"sweep_axial": name}}) for key, table in plain.items()}
     page = page_from(spoiled(documents, name, FOREIGN), tables)
     assert_harmless(page, parsed(page_from(documents, plain)), name)
-
-
-def test_the_command(root: Path, tmp_path: Path) -> None:
-    folder = root / "data/reports/mystery_mount"
-    done = call(tmp_path, "report", folder, "-o", "page", "--json")
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout) == {"pages": {"page/report.html": (tmp_path / "page/report.html").stat().st_size}}
-    assert "wrote report.html to page" in done.stderr

@@ -9,12 +9,10 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from commandline import call
 from production import COUNT, LOSSY, SOFT
 from reading_html import HARMFUL, LARGEST, assert_harmless, loads, parsed, spoiled
 
 from bushfit.report.page import comparison_page, folder_pages
-from bushfit.report.page.index import index_page, read_batch
 from bushfit.report.results import Formats, encode_all, json_file
 
 NAMES = ["two", "families"]
@@ -76,32 +74,6 @@ def test_names_do_no_harm(compared: Path, name: str) -> None:
         assert_harmless(page_of(spoiled(document, name, FOREIGN)), plain, name)
 
 
-def grown(document: dict[str, Any]) -> dict[str, Any]:
-    """Eight results at twelve places over a grid three times as fine."""
-    first, entry = document["pairs"][0], document["compared"][1]
-    columns = {name: 3 * column for name, column in first["places"]["axial"].items()}
-    labels = "BCDEFGH"
-    pairs = [first | {"other": label, "places": {f"place {n}": columns for n in range(12)}} for label in labels]
-    more = [entry | {"label": label, "name": f"bushing {label}"} for label in labels]
-    words = document["words"] * 60
-    return document | {"pairs": pairs, "compared": [document["compared"][0], *more], "words": words}
-
-
-def test_many_results_at_many_places_stay_small_and_say_what_is_left_out(documents: dict[str, Any]) -> None:
-    page = page_of(grown(documents["two"]))
-    assert len(page.encode()) < LARGEST
-    text = parsed(page).text
-    assert "Too many results and places for one figure" in text
-    assert "more, in compare.json" in text
-
-
-def test_a_folder_with_a_model_too_has_both_pages(root: Path, documents: dict[str, Any], tmp_path: Path) -> None:
-    (tmp_path / "compare.json").write_text(json.dumps(documents["two"]))
-    (tmp_path / "model.json").write_bytes((root / "data/reports/mystery_mount/model.json").read_bytes())
-    done = call(tmp_path, "report", ".")
-    assert "wrote compare.html, report.html to ." in done.stderr
-
-
 #: A batch that is diagnosed and reported takes ten seconds.
 SLOW = pytest.mark.slow
 
@@ -133,15 +105,6 @@ def test_a_batch_writes_its_page_and_the_folder_gives_the_same(batch: Path) -> N
 
 
 @SLOW
-def test_report_makes_it_again_and_elsewhere_with_whole_links(batch: Path, tmp_path: Path) -> None:
-    done = call(tmp_path, "report", batch, "-o", "x")
-    assert done.returncode == 0, done.stderr
-    links = re.findall(r'href="([^"]*)"', (tmp_path / "x/index.html").read_text(encoding="utf-8"))
-    assert sorted(set(links)) == [f"{batch.resolve().as_uri()}/bushings/c{n}/report.html" for n in range(3)]
-    assert call(tmp_path, "report", batch, "--force").returncode == 0
-
-
-@SLOW
 def test_the_page_shows_each_curve_against_the_batch_and_who_differs(made: Path) -> None:
     page = (made / "out/index.html").read_text(encoding="utf-8")
     assert encode_all(folder_pages(made / "out"), Formats())["index.html"].decode() == page
@@ -157,13 +120,3 @@ def test_the_page_shows_each_curve_against_the_batch_and_who_differs(made: Path)
     assert loads(page) == []
     for words in ("2 differ from the others", "SN 907", "part_20 fails: mu 0.", "Differs from the others: mu -3"):
         assert words in found.text
-
-
-@SLOW
-def test_many_bushings_stay_small(made: Path) -> None:
-    document = dict(read_batch(made / "out")[0].make())
-    usual = next(part for part in document["parts"] if part["result"] == "pass" and not part["differs"])
-    document |= {"rows": 20_010, "parts": [*document["parts"], *[usual] * 19_980]}
-    page = index_page([json_file("batch", document)], made / "out")
-    assert len(page.encode()) < LARGEST
-    assert "batch.csv lists all 20010" in page

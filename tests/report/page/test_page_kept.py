@@ -10,22 +10,10 @@ from pathlib import Path
 
 import pytest
 from commandline import call
-from reading_html import change, loads, made_of, page_of, parsed
+from reading_html import change, loads, page_of, parsed
 
 Results = Callable[[str], Path]
 STYLED = re.compile(r"<(style|script)>(.*?)</\1>", re.DOTALL)
-
-
-def test_a_folder_without_tables_or_campaign_has_a_page(root: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "x"
-    shutil.copytree(root / "data/reports/mystery_mount", folder)
-    change(folder / "model.json", campaign=None)
-    text = parsed(made_of(folder)).text
-    for words in ("Mystery mount", "axial: prediction", "Verdict: named", "sleeve_compliance closes the gap"):
-        assert words in text
-    for table in folder.glob("*.csv"):
-        table.unlink()
-    assert "prediction and measurement" not in parsed(made_of(folder)).text
 
 
 def bare(page: str) -> str:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from itertools import combinations
 from typing import Any
 
 import numpy as np
 import pytest
-from figures import Looped, Swept, gap, legend, note, points, titles, whole
+from figures import Looped, Swept, gap, legend, points, titles, whole
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
@@ -58,22 +56,6 @@ def headings(figure: Figure) -> list[str]:
     return [axes.get_title() for axes in figure.axes if axes.get_title()]
 
 
-def test_rows_are_directions_and_parts_columns_before_and_after(
-    paper_model: Model, heavier: Heavier, campaign: list[MeasuredTest]
-) -> None:
-    figure = whole(gap(paper_model, heavier(0.1), campaign))
-    assert names(figure) == ["axial storage", "axial loss", "radial storage", "radial loss", "axial loops [%]"]
-    assert figure.get_suptitle() == "mount, named: something closes the gap"
-    assert "Held-out data: 6.00 × noise before, 1.10 × noise after." in note(figure)
-    assert headings(figure) == ["before\ndata fitted 5.00 × noise", "after adding inertia\ndata fitted 1.00 × noise"]
-    x_labels = [axes.get_xlabel() for axes in figure.axes if axes.get_xlabel()]
-    assert x_labels == ["frequency [Hz]"] * 4 + ["phase after upper turn [deg]"] * 2
-    assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == ["0.1 mm", "0.2 mm", "0.5 mm"]
-    ((bar,),) = (axes.child_axes for axes in figure.axes if axes.child_axes)
-    assert bar.get_xlabel() == "measured minus model [% of |K|]"
-    assert {text.get_text() for text in bar.texts} == {"measured\nbelow model", "measured\nabove model"}
-
-
 def test_one_symmetric_scale_and_cells_that_are_measured_minus_model_in_percent(
     paper_model: Model, heavier: Heavier, campaign: list[MeasuredTest], swept: Swept
 ) -> None:
@@ -115,19 +97,6 @@ def test_loops_are_means_in_percent_of_half_the_force_range(paper_model: Model, 
     assert after_turn == pytest.approx(-20.0, abs=1.5), "20 % below at the upper turn"
 
 
-def test_a_corrected_test_is_drawn_where_it_was_recorded(paper_model: Model, swept: Swept) -> None:
-    """A radial sweep that was filed as axial: after, it is one of the radial direction, in the same row."""
-    radial = swept(paper_model, Direction.RADIAL)
-    filed = replace(radial, sweep=replace(radial.sweep, direction=Direction.AXIAL))
-    figure = gap(paper_model, paper_model, [filed], corrected=[radial], test="radial.csv")
-    assert names(figure) == ["axial storage", "axial loss"]
-    before, after = headings(figure)
-    assert before.startswith("tests as recorded")
-    assert after.startswith("with the record corrected")
-    storage = maps(figure)[:2]
-    assert np.abs(values(storage[0])).min() > 80.0 > 30.0 * np.sqrt(np.mean(np.square(values(storage[1]))))
-
-
 def panel(count: int) -> Panel:
     values = np.random.default_rng(3).normal(1.0, 0.02, count)
     values[[1, 4]] = 1.5, np.nan
@@ -154,13 +123,3 @@ def test_medians_limits_and_names(count: int) -> None:
     assert named == {f"$name {k}" for k in one.missed}
     assert sum(len(line.get_xdata()) for line in points(axes)) == count - 1, "each bushing that has a value, once"
     assert other.get_ylim()[0] < 0.24 < other.get_ylim()[1]
-
-
-def test_triangles_have_a_name_and_the_value_that_the_panel_does_not_show() -> None:
-    values = np.array([1.0, 1.01, 0.99, 1.02, 0.98, 4012.0, 1.0, 30.0, 0.97, 20.0])
-    figure = batch_figure([Panel("mu [MPa]", values)], "x", [f"b{n}" for n in range(10)])
-    to_image(figure)
-    axes = figure.axes[0]
-    assert {text.get_text() for text in axes.texts} == {"b5: 4010", "b7: 30", "b9: 20"}
-    boxes = [text.get_window_extent() for text in axes.texts]
-    assert not any(one.overlaps(other) for one, other in combinations(boxes, 2)), "names must not cover each other"
