@@ -39,24 +39,3 @@ def test_copies_count_once(bushfit: Run, own: Path, once: Path, command: str) ->
     single, copied = (load_result(own / folder / "model.json") for folder in ("once", "copied"))
     assert vars(copied.model)["values"] == vars(single.model)["values"]
     assert copied.covariance.stderr("m") == single.covariance.stderr("m")
-
-
-def test_sweeps_in_two_files_and_real_repeats(bushfit: Run, own: Path) -> None:
-    (own / SWEEP).with_name("copy.csv").write_bytes((own / SWEEP).read_bytes())
-    campaign = own / CAMPAIGN
-    text = campaign.read_text(encoding="utf-8")
-    text += '\n[[sweeps]]\nfile = "../data/cmp_15961/copy.csv"\ndirection = "axial"\n'
-    campaign.write_text(text, encoding="utf-8")
-    done = bushfit("fit", campaign, "-o", own / "x", "--no-plots")
-    assert "sweep_axial: the same data are in copy.csv: counted once" in done.stderr
-    assert "earlier repeat" not in done.stderr
-
-
-def test_inspect_names_files_with_the_same_data(bushfit: Run, own: Path) -> None:
-    copy = (own / LOOP).with_name("again.csv")
-    copy.write_bytes((own / LOOP).read_bytes())
-    done = bushfit("inspect", own / LOOP, copy, own / SWEEP, "--no-plots")
-    lines = [line for line in " ".join(done.stderr.split()).split("unusual: ") if "the same data" in line]
-    assert [line.split(":")[0] for line in lines] == ["loop_axial_1.csv", "again.csv"]
-    assert "again.csv: a campaign counts them once" in lines[0]
-    assert "loop_axial_1.csv: a campaign counts them once" in lines[1]

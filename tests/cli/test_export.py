@@ -17,7 +17,7 @@ import click
 import pandas as pd
 import pytest
 from commandline import Done
-from shell import BUSHING, CAMPAIGN, Run, document, names, refused, typing
+from shell import BUSHING, Run, document, names, refused, typing
 from tries import some
 
 from bushfit.cli import cli
@@ -247,22 +247,6 @@ def test_every_format_at_once_and_what_it_leaves_out(bushfit: Run, tmp_path: Pat
     assert any(line.startswith("radial: not fitted") for line in told)
 
 
-def test_the_tables_are_those_of_predict_and_arms_stand_beside_an_fmu(bushfit: Run, tmp_path: Path) -> None:
-    done = bushfit("export", "model/model.json", "--format", "fmu", "-o", tmp_path, "--json")
-    (fmu,) = json.loads(done.stdout)["formats"]["fmu"]["files"]
-    assert names(tmp_path) == {fmu, "arms.csv", "arms.png"}
-    arms = pd.read_csv(tmp_path / "arms.csv")["relaxation time [s]"]
-    assert f"{arms.notna().sum()} Maxwell arms represent the springpot" in done.stderr
-    grid = ("--direction", "axial", "--amplitudes", "0.1, 0.3 mm", "--frequencies", "10:30:10 Hz")
-    of_campaign = ("model/model.json", "--campaign", CAMPAIGN, *grid)
-    bushfit("export", *of_campaign, "--format", "csv", "-o", tmp_path / "x")
-    bushfit("predict", *of_campaign, "--no-plots", "-o", tmp_path / "y")
-    assert (tmp_path / "x/axial.csv").read_bytes() == (tmp_path / "y/axial.csv").read_bytes()
-    wide = pd.read_csv(tmp_path / "x/axial_wide.csv")
-    assert wide["frequency [Hz]"].tolist() == [10, 20, 30]
-    assert len(wide.columns) == 5
-
-
 def test_directions_share_frequencies_and_the_dialect_has_its_own_file(bushfit: Run, tmp_path: Path) -> None:
     """Tests of other frequencies axially and radially: decks have one list, of all of them."""
     text = BUSHING
@@ -277,21 +261,6 @@ def test_directions_share_frequencies_and_the_dialect_has_its_own_file(bushfit: 
     assert "KMAG" in (tmp_path / "x/bushing.fem").read_text()
     for place in ("axial", "radial"):
         assert pd.read_csv(tmp_path / f"x/{place}.csv")["frequency [Hz]"].tolist() == [5, 20, 50, 70]
-
-
-def test_an_unresolved_effect_is_a_loss_of_every_deck(bushfit: Run, root: Path, tmp_path: Path) -> None:
-    model = document(root / "data/arm_bushing/truth.json")
-    model["effects"].append("sleeve_compliance")
-    value = {"value": 1.4e-8, "unit": "m/N", "stderr": None, "ci95": None, "vary": False}
-    model["parameters"]["sleeve_compliance.compliance"] = value
-    model["unresolved"] = ["sleeve_compliance"]
-    (tmp_path / "m.json").write_text(json.dumps(model))
-    done = bushfit("export", tmp_path / "m.json", *ALL[:3], "-o", tmp_path / "x", "--json")
-    for each in json.loads(done.stdout)["formats"].values():
-        (line,) = (line for line in each["left_out"] if line.startswith("radial: the other reading"))
-        low = float(line.split("|K| is ")[1].split()[0])
-        # radially 20 to 40 kN/mm with 0.014 mm/kN in series: 1/(1 - K c) is far above 1
-        assert low > 20.0, line
 
 
 def test_without_a_grid_it_is_the_measured_one_and_files_say_where_they_hold(root: Path, tmp_path: Path) -> None:

@@ -13,12 +13,7 @@ from commandline import Done
 from shell import CAMPAIGN, Run, document, names, typing, values
 from virtual_rig import LOOP, MOUNT, SWEEPS, rig
 
-from bushfit.cli.run import two_step_line
-from bushfit.fitting.procedures import TwoStep
-from bushfit.model.covariance import Covariance
 from bushfit.model.file import load_result
-from bushfit.model.model import Model
-from bushfit.model.result import Result
 
 FILES = {
     "fit-static": {"static.json", "loops.csv", "loops.png"},
@@ -209,33 +204,6 @@ def test_run_does_the_whole_chain_and_says_what_two_steps_cost(bushfit: Run, tmp
     pd.testing.assert_frame_equal(radial, ordered)
 
 
-@pytest.mark.parametrize(
-    ("error", "off", "bound", "said"),
-    [
-        (
-            0.3,
-            0.0,
-            {},
-            "agrees with the joint fit within 1 standard error, mu 30 times less certain than in the joint fit (",
-        ),
-        (1e8, 0.0, {}, "agrees with the joint fit within 1 standard error, mu not determined ("),
-        (0.01, 0.98, {}, "does not agree with the joint fit, least in mu ("),
-        (1e8, 0.5, {"mu": "min"}, "1 pass, ended at a bound: mu ("),
-    ],
-)
-def test_the_line_on_two_steps_counts_no_meaningless_errors(
-    paper_model: Model, error: float, off: float, bound: dict[str, str], said: str
-) -> None:
-    mu = 1e6
-
-    def fitted(share: float, value: float, **more: object) -> Result:
-        covariance = Covariance(("mu",), np.array([[(share * mu) ** 2]]))
-        return Result(paper_model.with_values({"mu": value}), ("mu",), covariance, **more)  # type: ignore[arg-type]
-
-    two_step = TwoStep(({},), fitted(error, (1.0 + off) * mu, at_bound=bound))
-    assert said in two_step_line(two_step, fitted(0.01, mu))
-
-
 def test_run_with_an_effect_shows_what_diagnose_shows(root: Path, tmp_path: Path) -> None:
     done = typing(root)("run", "configs/mystery_mount.toml", "-o", tmp_path / "x", "--no-plots")
     for words in ("Mystery mount: named", "sleeve_compliance (", "  held out  ", " x noise: measured r", "next test:"):
@@ -282,15 +250,6 @@ def test_run_and_diagnose_write_the_model_that_fit_writes_where_nothing_is_missi
     fitted, diagnosed = document(work / "model/model.json"), document(tmp_path / "diagnose/model.json")
     assert {**fitted, "campaign": None} == {**diagnosed, "campaign": None}
     assert document(tmp_path / "run/diagnosis.json")["usable"]["places"] == fitted["fit"]["usable"]
-
-
-def test_an_effect_that_is_fitted_beside_held_parameters_is_diagnosed_by_both(own: Path, tmp_path: Path) -> None:
-    values = {"mu": "1.09 MPa", "m": "0.2 MPa*s^alpha", "alpha": 0.24, "sigma_fmax": "14.6 kPa", "eps_half": 0.013}
-    with (own / CAMPAIGN).open("a", encoding="utf-8") as campaign:
-        campaign.write('\n[fit]\neffects = ["inertia"]\n')
-        for key, value in values.items():
-            campaign.write(f"\n[fit.{key}]\nvalue = {json.dumps(value)}\nvary = false\n")
-    both(typing(own), CAMPAIGN, tmp_path)
 
 
 def test_one_loop_alone_is_fitted_and_what_it_leaves_open_is_said_first(own: Path, tmp_path: Path) -> None:

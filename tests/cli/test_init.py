@@ -138,14 +138,6 @@ def test_a_direction_that_is_stated_contradicts_no_file(
     typed("init", "bench/plain.csv", *GEOMETRY, "--direction", other, "-o", "y")
 
 
-def test_a_file_that_names_a_direction_is_no_block_in_shear(typed: Run, tests: list[Path], tmp_path: Path) -> None:
-    (tmp_path / "mount.csv").write_bytes(tests[1].read_bytes())
-    block = ("--area", "900 mm^2", "--thickness", "6 mm", "--elements", "2", "--specimen", "mount")
-    typed("init", tests[1], "mount.csv", *GEOMETRY, *block, "-o", "x")
-    campaign = load_campaign(tmp_path / "x/campaign.toml")
-    assert [str(sweep.direction) for sweep in campaign.sweeps] == ["axial", "mount"]
-
-
 @pytest.mark.parametrize(
     ("files", "said"),
     [
@@ -250,15 +242,3 @@ def test_programs_are_asked_nothing(
     person = answering(monkeypatch, *ANSWERS)
     refused(typed("init", *silent, option, "-o", "x", status=2), tmp_path / "x", "there is no column for the time")
     assert person.tell() == 0
-
-
-def test_a_command_that_says_all_is_asked_nothing(
-    typed: Run, tests: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    answering(monkeypatch)
-    all_said = (*tests, *GEOMETRY, "--amplitude", "zero-to-peak")
-    typed("init", *all_said, "--preload", "none", "-o", "x")
-    answering(monkeypatch, "")
-    typed("init", *all_said, "-o", "y")
-    campaigns = [(folder / "campaign.toml").read_text(encoding="utf-8") for folder in (tmp_path / "x", tmp_path / "y")]
-    assert [text.count('preload = "none"') for text in campaigns] == [len(tests), 0], "Enter leaves a preload open"

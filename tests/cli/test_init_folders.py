@@ -6,7 +6,6 @@ import os
 import tomllib
 from pathlib import Path
 
-import numpy as np
 import pytest
 from shell import CAMPAIGN, GEOMETRY, Run
 
@@ -94,14 +93,3 @@ def test_tests_of_two_specimens_or_preloads_are_not_fitted_in_silence(
     campaign.write_text("[[".join([head, loop, *stated]), encoding="utf-8")
     done = bushfit("fit", campaign, "-o", own / "x", "--no-plots")
     assert f"the tests were made {words} 0 mm (sweep_axial), 5 mm (sweep_radial)" in done.stderr
-
-
-def test_a_loop_of_four_points_a_cycle_is_fitted_or_refused(bushfit: Run, own: Path) -> None:
-    phase = np.arange(40) / 4.0
-    columns = (10.0 * phase, np.sin(2 * np.pi * phase), 450.0 * np.sin(2 * np.pi * phase + 0.1))
-    file = own / "data/cmp_15961/loop_axial_1.csv"
-    header = "time [s],displacement [mm],force [N]"
-    np.savetxt(file, np.column_stack(columns), "%.9g", ",", header=header, comments="")
-    for command in ("inspect", "fit"):
-        done = bushfit(command, file if command == "inspect" else own / CAMPAIGN, "-o", own / command, "--no-plots")
-        assert "Singular" not in done.stderr

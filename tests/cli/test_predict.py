@@ -50,15 +50,6 @@ def test_another_bushing_differs_and_the_places_and_grid_are_those_asked_for(
     assert "B against A, axial: stiffness 2" in done.stderr
 
 
-def test_where_nothing_was_tested_alike_the_compound_is_compared(bushfit: Run, root: Path, tmp_path: Path) -> None:
-    bushfit("fit", root / "configs/epdm_70.toml", "--direction", "DMA", "--no-plots", "-o", tmp_path / "dma")
-    done = bushfit("compare", "model", tmp_path / "dma", "-o", tmp_path / "x", "--no-plots")
-    table = pd.read_csv(tmp_path / "x/differences.csv")
-    assert set(table["place"]) == {"compound"}
-    assert {"strain amplitude [%]", "other modulus [MPa]"} <= set(table)
-    assert "compound: modulus " in done.stderr
-
-
 def test_families_of_one_campaign_are_fitted_and_held_out(bushfit: Run, tmp_path: Path) -> None:
     folder = tmp_path / "x"
     done = bushfit("compare", CAMPAIGN, "-o", folder, "--json", "--families", "kraus, intrinsic_time")

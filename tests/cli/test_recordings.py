@@ -169,11 +169,3 @@ def test_what_a_file_does_not_tell_is_stated_as_of_csv(typed: Run, tmp_path: Pat
         'test.mat, group "top level": the direction of this test is not stated'
         in typed("init", "test.mat", *stated, *GEOMETRY, status=2).stderr
     )
-
-
-def test_properties_say_what_the_lines_above_a_table_say(typed: Run, tmp_path: Path) -> None:
-    recordings.tdms(LOOP, tmp_path / "axial.tdms", {"Prüftemperatur": "23 °C", "Operator": "AB"})
-    typed("init", "axial.tdms", *GEOMETRY, "-o", "x")
-    campaign = (tmp_path / "x/campaign.toml").read_text(encoding="utf-8")
-    assert 'temperature = "23 °C"' in campaign
-    assert 'operator = "AB"' in campaign

@@ -139,37 +139,3 @@ def test_a_campaign_that_contradicts_a_column(
     export(tmp_path / "both.csv", ("Direction", *HEADERS), [(way, *row) for way in points for row in points[way]])
     (tmp_path / "c.toml").write_text(f'{BUSHING}[[sweeps]]\nfile = "both.csv"\n{entries}\n', encoding="utf-8")
     refused(typed("fit", "c.toml", "-o", "x", status=2), tmp_path / "x", *said)
-
-
-@pytest.mark.parametrize(("label", "values"), [("Direction", ("axial", "radial")), ("Run", ("#1", "#2"))])
-def test_loops_of_one_file(typed: Run, tmp_path: Path, label: str, values: tuple[str, str]) -> None:
-    phase = np.linspace(0.0, 6.0 * np.pi, 900)
-    forces = dict(zip(values, (600.0, 606.0), strict=True))  # equal tests would count once
-    export(
-        tmp_path / "axial.csv",
-        (label, "Time [s]", "Displacement [mm]", "Force [N]"),
-        [
-            (value, f"{p:.4f}", f"{np.sin(p):.5f}", f"{force * np.sin(p + 0.08):.3f}")
-            for value, force in forces.items()
-            for p in phase
-        ],
-    )
-    typed("init", "axial.csv", *GEOMETRY, "-o", "x")
-    loops = load_campaign(tmp_path / "x/campaign.toml").loops
-    assert [loop.time.size for loop in loops] == [900, 900]
-
-
-def test_a_column_that_is_given_twice(typed: Run, points: dict[str, Rows], tmp_path: Path) -> None:
-    head = ("Freq [Hz]", "Dyn. Disp. [mm]", "Dyn. Disp. [mm]", "K* [N/mm]", "Tan Delta")
-    export(tmp_path / "axial.csv", head, [(row[0], row[1], row[1], *row[2:]) for row in points["axial"]])
-    typed("inspect", "axial.csv", "-o", "x", "--no-plots")
-    export(tmp_path / "axial.csv", head, [(row[0], row[1], 3 * row[1], *row[2:]) for row in points["axial"]])
-    assert "give each column its own header" in typed("inspect", "axial.csv", "--no-plots", status=2).stderr
-    export(
-        tmp_path / "axial.csv",
-        ("Freq [Hz]", "Amplitude [mm]", "Dyn. Disp. p-p [mm]", *head[3:]),
-        [(row[0], row[1], 1.98 * row[1], *row[2:]) for row in points["axial"]],
-    )
-    typed("init", "axial.csv", *GEOMETRY, "-o", "z")
-    (sweep,) = load_campaign(tmp_path / "z/campaign.toml").sweeps
-    assert sweep.amplitude_reached == pytest.approx(0.99 * sweep.amplitude)

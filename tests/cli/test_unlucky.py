@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import time
 from pathlib import Path
 
 import numpy as np
@@ -42,29 +41,6 @@ def test_data_that_are_in_another_file_are_not_read(typed: Run, tmp_path: Path) 
         stream.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM")
     done = typed("inspect", "axial.mat", "--no-plots", "-o", "x", status=2)
     refused(done, tmp_path / "x", "its data are in other files")
-
-
-@pytest.mark.parametrize("points", [2, 3, 4])
-def test_few_points_a_cycle_are_fitted_or_refused(typed: Run, tmp_path: Path, points: int) -> None:
-    (tmp_path / "loop.csv").write_text(loop(points))
-    (tmp_path / "c.toml").write_text(BUSHING + LOOP.format("loop.csv"))
-    done = typed("fit-static", "c.toml", "-o", "x", "--no-plots", status=2 if points == 2 else 0)
-    assert "internal error" not in done.stderr
-
-
-@pytest.mark.parametrize(
-    ("header", "tail"),
-    [
-        ("time [s],displacement [mm],force [N]" + "," * 16_000, "," * 16_000),
-        ("time [s],x,y" + " " * 40_000 + "[N]", ""),
-    ],
-    ids=["empty columns", "blanks in a header"],
-)
-def test_much_of_nothing_is_soon_read(typed: Run, tmp_path: Path, header: str, tail: str) -> None:
-    (tmp_path / "axial.csv").write_text(loop(header=header, tail=tail))
-    start = time.process_time()
-    typed("inspect", "axial.csv", "--no-plots", status=0 if tail else 2)
-    assert time.process_time() - start < 5.0
 
 
 @pytest.mark.parametrize("width", ["80", "40", "10", "abc"])
