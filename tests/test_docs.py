@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import importlib
-import io
 import json
 import os
 import re
@@ -21,7 +20,6 @@ from typing import Any, get_args, get_type_hints
 
 import click
 import numpy as np
-import pandas as pd
 import pytest
 import yaml
 from effect_tables import PAGE, renewed
@@ -29,15 +27,12 @@ from pydantic import TypeAdapter
 
 from bushfit.batch.limits import Limits
 from bushfit.batch.manifest import ManifestFile
-from bushfit.campaign.campaign import load_campaign, model_of
 from bushfit.campaign.schema import CampaignFile
 from bushfit.cli import cli
 from bushfit.geometry import Direction
 from bushfit.reading.loops import read_loop
 from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
-from bushfit.simulation.files import to_files
-from bushfit.simulation.measured import simulate
 
 
 def blocks(page: Path, language: str) -> list[str]:
@@ -213,19 +208,6 @@ def test_files_of_other_formats_hold_their_csv(root: Path, copy: str) -> None:
     for column in columns:
         csv = getattr(kept, column)[:: 5 if kind == "loop" else 1][: getattr(own, column).size]
         np.testing.assert_allclose(getattr(own, column), csv, rtol=1e-9 if kind == "loop" else 1e-5, atol=1e-12)
-
-
-def test_the_second_bushing_can_be_made_again(root: Path) -> None:
-    campaign = load_campaign(root / "configs/simulate_arm_bushing.toml")
-    assert campaign.simulate is not None
-    files = to_files(simulate(model_of(campaign), campaign.simulate))
-    tables = {name: content for name, content in files.items() if name.endswith(".csv")}
-    assert len(tables) == 4
-    for name, content in tables.items():
-        made, kept = pd.read_csv(io.BytesIO(content)), pd.read_csv(root / "data/arm_bushing" / name)
-        assert list(made) == list(kept)
-        for column in made:
-            np.testing.assert_allclose(made[column], kept[column], rtol=1e-5, atol=1e-6 * kept[column].abs().max())
 
 
 @pytest.fixture(scope="module")

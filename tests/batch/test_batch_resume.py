@@ -108,15 +108,6 @@ def test_only_what_changed_or_is_torn_is_done_again(typed: Callable[..., Any], s
     assert (place / "b2/model.json").read_bytes() == files["bushings/b2/model.json"]
 
 
-def test_the_key_changes_with_all_that_the_answer_depends_on(shop: Path) -> None:
-    row = read_manifest(str(shop / PATTERN), RowSettings()).rows[0]
-    other, plain = replace(row, settings=replace(row.settings, effects=("inertia",))), Formats(pictures=False)
-    points = (parse_point("axial 25 Hz 0.1 mm"),)
-    asked = [(row, (), plain), (row, points, plain), (row, (), Formats()), (other, (), plain)]
-    assert len({store.row_key(*each) for each in asked}) == 4
-    assert store.row_key(row, points, plain) == store.row_key(*asked[1])
-
-
 def test_killed_in_mid_run_and_resumed_it_is_as_if_it_had_run_through(typed: Callable[..., Any], shop: Path) -> None:
     list_many(shop, 8)
     assert typed("batch", "many.csv", "-o", "whole", "--no-plots", "-q").returncode == 0
@@ -189,3 +180,12 @@ def test_a_worker_of_another_version_or_none_that_lives_ends_the_batch(tmp_path:
 
 def die() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_the_key_changes_with_all_that_the_answer_depends_on(shop: Path) -> None:
+    row = read_manifest(str(shop / PATTERN), RowSettings()).rows[0]
+    other, plain = replace(row, settings=replace(row.settings, effects=("inertia",))), Formats(pictures=False)
+    points = (parse_point("axial 25 Hz 0.1 mm"),)
+    asked = [(row, (), plain), (row, points, plain), (row, (), Formats()), (other, (), plain)]
+    assert len({store.row_key(*each) for each in asked}) == 4
+    assert store.row_key(row, points, plain) == store.row_key(*asked[1])

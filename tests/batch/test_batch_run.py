@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 from junitparser import JUnitXml
-from trees import PATTERN, command, rows, tree
+from trees import PATTERN, rows, tree
 
 from bushfit.batch import run, store
 from bushfit.batch.document import RowFile
@@ -185,16 +185,6 @@ def test_limits_on_what_a_row_does_not_have(typed: Callable[..., Any], shop: Pat
     assert (shop / "all/batch.png").exists(), "the picture shows what is known"
     again = typed("batch", "m.csv", "-o", "all", "--force", "--no-plots")
     assert (again.returncode, (shop / "all/batch.png").exists()) == (0, False), "a picture of another run"
-
-
-def test_no_process_runs_what_lies_in_the_current_folder(shop: Path) -> None:
-    (shop / "bushfit").mkdir()
-    for name in ("bushfit/__init__.py", "numpy.py", "lmfit.py", "signal.py"):
-        (shop / name).write_text(f"open({str(shop / 'ran')!r}, 'w').close()\n")
-    (shop / "many.csv").write_text("campaign\nbushings/b0/bushing.toml\nbushings/b1/bushing.toml\n")
-    done = subprocess.run(command("all", "-q"), cwd=shop, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert not (shop / "ran").exists()
 
 
 def deadly(task: RowTask, part: Row) -> tuple[RowFile, bool]:

@@ -14,11 +14,6 @@ from production import COUNT, LOSSY, SOFT
 from scipy import stats
 
 from bushfit.batch.comparison import capability, find_outliers, smallest_deviation
-from bushfit.batch.document import Estimate, RowFile
-from bushfit.batch.manifest import Row, RowSettings
-from bushfit.batch.row import RowTask
-from bushfit.batch.summary import BatchPlan, BatchResult
-from bushfit.report.results import Formats
 
 
 @pytest.fixture(scope="module")
@@ -95,25 +90,6 @@ def test_a_soft_part_of_ten_is_named() -> None:
     assert limit
     assert stats.t.sf(limit, 8) == pytest.approx(0.05 / 2 / 80)
     assert not find_outliers({"0": (values[0], np.where(np.arange(10) == 6, 9.0, 0.1))})[1]["0"].any(), "a large error"
-
-
-def test_a_part_of_a_poor_fit_counts_only_for_the_quality_of_the_fit(tmp_path: Path) -> None:
-    settings = RowSettings(commands=("fit",))
-    rows = [Row(f"P{n}", f"P{n}", "c.toml", "c.toml", settings) for n in range(7)]
-    records = [
-        RowFile(
-            status="done",
-            quantities={"mu": Estimate(1e6 + 1e3 * n), "NRMSE": Estimate(0.3 if n == 6 else 0.003)},
-        )
-        for n in range(7)
-    ]
-    plan = BatchPlan("b", rows, RowTask(tmp_path, (), Formats(), resume=False), None, None, Formats())
-    document = BatchResult(plan, records, 0, 1.0, []).document
-    mu, nrmse = document.quantities["mu [MPa]"], document.quantities["NRMSE [-]"]
-    assert (mu.parts, mu.median, nrmse.parts) == (6, pytest.approx(1.0025), 7)
-    assert document.detectable == smallest_deviation(6, 1)
-    assert [part.poor_fit != "" for part in document.parts] == [False] * 6 + [True]
-    assert document.warnings[0].startswith("the model misses the tests of P6: ")
 
 
 @pytest.mark.parametrize("count", [5, 10, 30])

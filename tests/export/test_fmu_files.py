@@ -123,33 +123,6 @@ def test_instances_do_not_see_each_other_and_a_state_is_taken_up_again(paper: Ru
     other.freeInstance()
 
 
-def test_wrong_calls_are_refused_and_output_before_the_first_step_is_that_of_the_input(
-    paper: Running, capfd: pytest.CaptureFixture[str], paper_model: Model
-) -> None:
-    with pytest.raises(Exception, match="instantiate"):
-        paper.instance(guid="{00000000-0000-0000-0000-000000000000}")
-    made = paper.begun(paper.instance())
-    for name, value in (("mu", -1.0), ("eps_half", 0.0), ("alpha", 0.3), ("force.axial", 1.0), ("mu", float("nan"))):
-        with pytest.raises(Exception, match="fmi2SetReal"):
-            made.setReal([paper.reference[name]], [value])
-    with pytest.raises(Exception, match="fmi2DoStep"):
-        made.doStep(0.0, -1e-3)
-    with pytest.raises(Exception, match="fmi2GetReal"):
-        made.getReal([10_000])
-    assert made.getReal([paper.reference["mu"]]) == [1.09e6]
-    made.freeInstance()
-    made = paper.instance()
-    made.enterInitializationMode()
-    made.setReal([paper.reference["displacement.axial"]], [1e-4])
-    (asked,) = made.getReal([paper.reference["force.axial"]])
-    made.exitInitializationMode()
-    assert made.getReal([paper.reference["force.axial"]]) == [asked]
-    assert (
-        asked > 1e-4 * paper_model.stiffness("axial", 155.0, 1e-4).real
-    )  # what moves at once is stiffer than at 155 Hz
-    made.freeInstance()
-
-
 @pytest.mark.parametrize("name", ["kraus", "hysteretic_loss"])
 def test_effects_without_a_law_in_time_are_refused(paper_model: Model, name: str) -> None:
     with pytest.raises(ModelError, match="for which this effect has no law") as refused:
@@ -186,11 +159,3 @@ def test_without_a_compiler_it_is_said_how_to_get_one(paper_model: Model, monkey
     with pytest.raises(OutputError, match="no compiler") as refused:
         export(request_of(paper_model))
     assert refused.value.hint == 'pip install "bushfit[fmu]"'
-
-
-def test_a_service_without_a_home_folder_compiles_too(
-    exported: Exported, paper_model: Model, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name in ("HOME", "XDG_CACHE_HOME", "LOCALAPPDATA", "APPDATA"):
-        monkeypatch.delenv(name, raising=False)
-    assert export(request_of(paper_model)).files == exported.files

@@ -107,21 +107,6 @@ def test_the_truth_is_as_likely_as_the_fit_of_a_clean_campaign(tmp_path: Path) -
     assert -8.0 < against_truth(tmp_path / "noisy", tmp_path / "silent", tmp_path / "fit" / "model.json") < 0.0
 
 
-@pytest.mark.parametrize(
-    ("name", "count", "of", "told"),
-    [
-        ("wrong name kept", 0, 60, "open"),
-        ("wrong name kept", 0, 300, "met"),
-        ("wrong name kept", 4, 60, "missed"),
-        ("visible, acceptable", 60, 60, "open"),
-        ("visible, acceptable", 80, 80, "met"),
-        ("visible, acceptable", 40, 60, "missed"),
-    ],
-)
-def test_a_rate_is_met_only_if_its_interval_is(name: str, count: int, of: int, told: str) -> None:
-    assert aimed(name, count, of) == told
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("chosen", "campaigns"),
