@@ -29,35 +29,38 @@ _MOST_SHOWN = 10
     option(
         "--command commands",
         "COMMAND",
-        "fit, diagnose, predict or run; may be given again [fit].",
+        "Command to run for each bushing: fit, diagnose, predict or run; may be given again [fit].",
         type=click.Choice(["run", "fit", "diagnose", "predict"]),
         multiple=True,
     ),
-    direction_option("Tests to fit, as in `bushfit fit`."),
-    effect_option("Add an effect, as in `bushfit fit`."),
+    direction_option("Fit the tests in this direction, as in `bushfit fit`."),
+    effect_option("Add this effect to each model, as in `bushfit fit`."),
     option(
         "--at operating_points",
         "POINT",
-        'Tabulate stiffness and loss factor at a point such as "axial 25 Hz 0.1 mm"; may be given again.',
+        (
+            'Add table columns with stiffness and loss factor at this point, such as "axial 25 Hz 0.1 mm"; may '
+            "be given again."
+        ),
         multiple=True,
     ),
 )
 @option_group(
     "Limits",
     file_option("--limits", "Judge each bushing by the limits in this TOML file."),
-    file_option("--junit", "Write a JUnit report for CI."),
+    file_option("--junit", "Write a JUnit report with one test case per bushing, for continuous integration (CI)."),
 )
 @option_group(
     "Execution",
-    flag("--resume", "Evaluate missing, failed or changed rows only."),
+    flag("--resume", "Evaluate only bushings without results, with an error, or with changed input."),
     option("--jobs", "N", "Number of worker processes [one per core].", type=click.IntRange(1)),
-    option("--scheduler", "ADDRESS", "Use this Dask cluster, such as tcp://10.0.0.5:8786."),
+    option("--scheduler", "ADDRESS", "Run on the Dask cluster at this address, such as tcp://10.0.0.5:8786."),
 )
 @option_group(
     "Output",
     flag("--tables"),
-    flag("--plots", "Also write these for each bushing."),
-    flag("--reports", "Also write the page of each diagnosed bushing."),
+    flag("--plots", "Also write the tables, or plots, of each bushing."),
+    flag("--reports", "Also write report.html for each bushing that is diagnosed."),
 )
 @with_output("results/<manifest>", "tables", "pictures", "pages")
 def command(
@@ -78,16 +81,15 @@ def command(
 ) -> None:
     """Evaluate many campaigns and collect the results in one table.
 
-    MANIFEST is a list (TOML, or CSV with the same keys as columns), a pattern in quotes, or one or more campaigns:
+    MANIFEST is a list (TOML, or CSV with the same keys as columns), a pattern in quotes, or campaigns:
 
     \b
         [[bushings]]
         campaign = "batch_7/*/campaign.toml"   # relative to the folder of the list
 
-    The command names parts that miss a limit, with value and limit, and parts that differ from the others by more
-    than chance. --force also removes results of parts that are no longer listed. The exit status is 1 if a row
-    failed, a limit is missed or a part was not judged. Writes batch.csv, batch.png, batch.json, index.html, and
-    bushings/<name>/model.json.
+    The command names bushings that miss a limit, with value and limit, and bushings that differ from the others by more
+    than chance. The exit status is 1 if a limit is missed, a bushing could not be evaluated, or its model fits too
+    poorly to be judged. Writes batch.csv, batch.png, batch.json, index.html, and bushings/<name>/model.json.
     """
     from bushfit.batch.executor import dask_workers, local_workers
 

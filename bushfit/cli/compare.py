@@ -29,16 +29,16 @@ _CHANCE = 0.05
 @option_group(
     "Range of the comparison",
     direction_option(
-        "axial, radial, torsion or a specimen, also for the fit of a campaign; may be given again [where all "
-        "were fitted]."
+        "Compare in this direction (axial, radial, torsion) or for this specimen; may be given again [all that "
+        "were fitted in every result]."
     ),
     grid_options("as measured"),
     option(
         "--families",
         "[NAME,...]",
         (
-            "Fit model families to campaign A: the paper's, and the named ones, effects joined by + [each law of "
-            "frequency with each law of amplitude]."
+            "Fit the paper's model and these alternatives to campaign A; join effects of one model by + [each law "
+            "of frequency with each law of amplitude]."
         ),
         is_flag=False,
         flag_value=_ALL,
@@ -52,8 +52,8 @@ def command(
     """Compare results with A, the reference: differences in parameters, stiffness and loss factor.
 
     A and B are models (JSON), folders of results, or campaigns, which are fitted first. Each difference has a 95 %
-    interval. --families instead fits several models to one campaign, and compares how well they meet the tests and
-    predict tests that were held out.
+    interval. With --families, the command instead fits several models to one campaign, and compares how well each
+    model fits the tests and how well it predicts tests that were left out of its fit.
 
     Writes compare.json, parameters.csv, differences.csv, compare.png, compare.html; with --families families.csv.
     """

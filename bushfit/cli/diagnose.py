@@ -28,12 +28,14 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 @command_called("diagnose", "configs/mystery_mount.toml")
 @option_group(
     "What may be missing",
-    option("--max-effects", "N", "Largest number of effects to add [3].", type=click.IntRange(0, 5), default=3),
+    option(
+        "--max-effects", "N", "Largest number of effects to add to the model [3].", type=click.IntRange(0, 5), default=3
+    ),
     option(
         "--adopt",
         "EFFECT",
         (
-            "Add this effect, such as inertia, or correct this mistake in the record of a test, such as "
+            "Add this effect to the model, such as inertia, or correct this mistake in a test file, such as "
             "peak_to_peak:sweep_axial; may be given again. An unknown EFFECT prints the list."
         ),
         multiple=True,
@@ -42,14 +44,19 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
     option(
         "--without",
         "EFFECT",
-        "Do not consider this effect or mistake; may be given again.",
+        "Exclude this effect or mistake from the search; may be given again.",
         multiple=True,
         shell_complete=explanations,
     ),
-    option("--tolerance", "SHARE", "Ignore gaps below this share of the stiffness [1 %].", default="1 %"),
-    file_option("--model", "Start from the effects of this model.json [the paper's three]."),
+    option(
+        "--tolerance",
+        "SHARE",
+        "Ignore differences between tests and model below this share of the stiffness [1 %].",
+        default="1 %",
+    ),
+    file_option("--model", "Start from the model in this model.json [the paper's model]."),
 )
-@campaign_options(soft_l1="without outliers")
+@campaign_options(soft_l1="outliers are left out")
 @with_output("results/<campaign name>", "tables", "pictures", "pages")
 def command(
     campaigns: tuple[Path, ...],
@@ -62,12 +69,12 @@ def command(
 ) -> None:
     """Find where the model and the tests of CAMPAIGN disagree, name the missing effect, and add it.
 
-    Uses all tests in all directions. The verdict is consistent (nothing is missing), named (one explanation, which
-    is added to the model), ambiguous (several explanations are listed, none is added), described (a smooth
-    correction without a name), partly (a remainder stays) or unexplained. A mistake in a test file is named but
-    corrected only with --adopt.
+    All tests in all directions are used. The verdict is consistent (nothing is missing), named (one explanation was
+    found), ambiguous (several explanations are possible), described (no known effect, but a smooth correction fits),
+    partly (a part of the difference stays unexplained) or unexplained. A named effect is added to the model. A mistake
+    in a test file is reported, and corrected only with --adopt.
 
-    Writes diagnosis.json, model.json with what was added, gap.csv, candidates.csv, gap.png, report.html.
+    Writes diagnosis.json, model.json with the added effects, gap.csv, candidates.csv, gap.png, report.html.
     """
     from bushfit.commands.diagnose import diagnose
     from bushfit.commands.fit import prepare_tests

@@ -13,7 +13,7 @@ from bushfit.cli.output import Output, with_output
 def command(output: Output) -> None:
     """Write a campaign of the paper's bushing with simulated tests, to try bushfit without test files.
 
-    Writes campaign.toml, the tables of a hysteresis loop and two sweeps, and truth.json, the model behind them.
+    Writes campaign.toml, the test files of a hysteresis loop and two sweeps, and truth.json (the simulated model).
     """
     from bushfit import simulation
     from bushfit.campaign.campaign import load_campaign, model_of

@@ -21,21 +21,25 @@ from bushfit.cli.shared_options import grid_values, kelvin, positive, prediction
     option(
         "--format formats",
         "FORMAT",
-        "fmu, nastran, abaqus, adams, csv or xlsx; required, may be given again.",
+        "Format to write: fmu, nastran, abaqus, adams, csv or xlsx; required, may be given again.",
         type=click.Choice(["fmu", "nastran", "abaqus", "adams", "csv", "xlsx"]),
         multiple=True,
         required=True,
     ),
-    option("--units", "UNITS", 'Length, mass, time and force, such as "m kg s N" [decks: "mm t s N"].'),
+    option(
+        "--units",
+        "UNITS",
+        'Units of length, mass, time and force in the files, such as "m kg s N" [solver files: "mm t s N"].',
+    ),
     option(
         "--dialect",
         "DIALECT",
-        "optistruct: nastran with stiffness and loss angle.",
+        "Write the nastran file for another solver: optistruct, with stiffness magnitude and loss angle.",
         type=click.Choice(["optistruct"]),
     ),
-    option("--accuracy", "ERROR", "Largest error of the modulus in an fmu [1 %].", default="1 %"),
+    option("--accuracy", "ERROR", "Largest permitted error of the complex modulus in an FMU [1 %].", default="1 %"),
 )
-@prediction_options("Use the grid of this campaign.")
+@prediction_options("Use the frequencies and amplitudes of this campaign.")
 @with_output("results/<name>", "tables", "pictures")
 def command(
     model: Path,
@@ -52,7 +56,8 @@ def command(
     """Write a fitted model for other programs: a solver, a multibody code, a spreadsheet.
 
     MODEL is the model.json of run, fit or diagnose, its folder, or dynamic.json. The command lists properties that a
-    format cannot represent, with their errors. Effects of the rig are left out. z is the axis of the bushing.
+    format cannot represent, with the error in stiffness. Effects that belong to the test rig are left out. The axis
+    of the bushing is z.
 
     Writes bushing.bdf, .fem, .inp or .xlsx; bushing_car.bus and bushing_ride.bus (adams); one CSV file for each
     table; or an .fmu, with its Maxwell arms in arms.csv and arms.png.

@@ -14,22 +14,49 @@ from bushfit.errors import BushfitError, MeasurementError
 
 #: Options for metadata that a loop or sweep file may not contain: campaign key, metavar and help text.
 _OF_TESTS = {
-    "amplitude": ("COUNTING", "zero-to-peak, peak-to-peak or rms [header]."),
-    "at_amplitude": ("SIZE", '"0.1 mm", if no column states it [file name].'),
-    "at_frequency": ("FREQUENCY", '"10 Hz", if no column states it [file name].'),
-    "temperature": ("TEMP", 'Of the test, or of rows to select: "23 degC".'),
-    "preload": ("LOAD", '"500 N axial" or "none", for the report.'),
+    "amplitude": (
+        "COUNTING",
+        "How the file counts amplitudes: zero-to-peak, peak-to-peak or rms [from the header].",
+    ),
+    "at_amplitude": (
+        "SIZE",
+        'Amplitude of the whole file, such as "0.1 mm" [from a column or the file name].',
+    ),
+    "at_frequency": (
+        "FREQUENCY",
+        'Frequency of the whole file, such as "10 Hz" [from a column or the file name].',
+    ),
+    "temperature": (
+        "TEMP",
+        'Temperature of the test, such as "23 degC"; selects its rows if a file contains several temperatures.',
+    ),
+    "preload": ("LOAD", 'Static preload of the test, such as "500 N axial" or "none"; shown in the report.'),
     "rate": ("SPEED", None),
     "frequency": ("FREQUENCY", None),
     "waveform": (
         "WAVE",
-        'For a loop file without a time column: speed ("10 mm/min"), or frequency ("0.1 Hz") and waveform (sine).',
+        (
+            'For a loop without a time column: its speed, such as "10 mm/min", or its frequency, such as "0.1 '
+            'Hz", and its waveform, sine or triangle.'
+        ),
     ),
-    "specimen": ("NAME", "Of the specimen, if no bushing [coupon; bar]."),
+    "specimen": (
+        "NAME",
+        "Name of the specimen, if no bushing was tested [coupon, or bar for tension].",
+    ),
     "area": ("AREA", None),
     "thickness": ("LENGTH", None),
-    "elements": ("N", 'Of N blocks in shear: "772 mm^2", "6 mm" [1].'),
-    "specimen_number": ("NUMBER", "Of the part, or of the rows to select."),
+    "elements": (
+        "N",
+        (
+            'For a specimen of N rubber blocks in shear [1]: sheared area ("772 mm^2") and thickness ("6 mm") of '
+            "one block."
+        ),
+    ),
+    "specimen_number": (
+        "NUMBER",
+        "Serial number of the part; selects its rows if a file contains several parts.",
+    ),
 }
 #: Options for the file format: campaign key and metavar.
 _AS_WRITTEN = {
@@ -89,15 +116,23 @@ def metadata_options(*, sweeps: bool = True) -> Parameter:
             click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_tests_alone),
             option_group(
                 "Information that is missing in the files",
-                _metadata_option("direction", "DIRECTION", "axial, radial or torsion [names, columns]."),
-                option("--unit units", "ROLE=UNIT", 'Unit of a column: "force=kN".', multiple=True),
+                _metadata_option(
+                    "direction",
+                    "DIRECTION",
+                    "Direction: axial, radial or torsion [from file names].",
+                ),
+                option("--unit units", "ROLE=UNIT", 'Unit of a column, such as "force=kN".', multiple=True),
                 option(
                     "--column columns",
                     "ROLE=HEADER",
-                    'Header of a column: "force=Fz"; an unknown ROLE prints the list of roles.',
+                    'Header of a column, such as "force=Fz"; an unknown ROLE prints the list of roles.',
                     multiple=True,
                 ),
-                _metadata_option("force_sign", "-1", "If the force has the opposite sign."),
+                _metadata_option(
+                    "force_sign",
+                    "-1",
+                    "Reverse the sign of the force: use -1 if the force falls where the displacement rises.",
+                ),
                 *(_metadata_option(key, metavar, words) for key, (metavar, words) in keys.items()),
             ),
             option_group(

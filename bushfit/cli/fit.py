@@ -19,9 +19,7 @@ if TYPE_CHECKING:
 
 
 @command_called("fit-static", "configs/cmp_15961.toml")
-@option_group(
-    "Fit", file_option("--dynamic", "Keep the parameters m and alpha fixed at their values in this dynamic.json.")
-)
+@option_group("Fit", file_option("--dynamic", "Keep m and alpha fixed at their values in this dynamic.json."))
 @campaign_options()
 @with_output("results/<campaign name>", "tables", "pictures")
 def static(
@@ -29,8 +27,8 @@ def static(
 ) -> None:
     """Fit mu, sigma_fmax and eps_half to the hysteresis loops of CAMPAIGN, at given m and alpha.
 
-    m and alpha come from --dynamic or from [fit] of the campaign. If neither gives them, the frequency-dependent part
-    of the model (the springpot) is left out, and a warning states the effect on the result.
+    m and alpha come from --dynamic or from [fit] of the campaign. Without them, the frequency-dependent part of the
+    model (the springpot) is left out, and a warning states by how much this changes the result.
 
     Writes static.json, loops.csv and loops.png.
     """
@@ -46,7 +44,8 @@ def static(
 @option_group(
     "Fit",
     file_option(
-        "--static", "Fix mu, sigma_fmax and eps_half at the values in this static.json [the loops are fitted first]."
+        "--static",
+        "Take mu, sigma_fmax and eps_half, with their errors, from this static.json [from a fit of the loops].",
     ),
 )
 @campaign_options()
@@ -56,8 +55,8 @@ def dynamic(
 ) -> None:
     """Fit m and alpha to the sweep of the smallest amplitude, at given mu, sigma_fmax and eps_half.
 
-    These come from --static, with their errors. Without --static, the loops of CAMPAIGN are fitted first. [fit]
-    dynamic_amplitudes in the campaign selects other amplitudes.
+    mu, sigma_fmax and eps_half come from --static. Without --static, the loops of CAMPAIGN are fitted first. To fit
+    sweeps of other amplitudes, set dynamic_amplitudes under [fit] in the campaign.
 
     Writes dynamic.json (a model for bushfit predict), sweeps.csv and sweeps.png.
     """
@@ -77,7 +76,7 @@ def dynamic(
         "[axial, and all specimens]."
     ),
     effect_option("Add an effect to the model, such as inertia; may be given again. An unknown NAME prints the list."),
-    flag("--profile", "Add 95 % intervals by profile likelihood (some seconds)."),
+    flag("--profile", "Compute additional 95 % intervals by profile likelihood; takes some seconds."),
 )
 @campaign_options()
 @with_output("results/<campaign name>", "tables", "pictures")
@@ -92,10 +91,10 @@ def fit(
 ) -> None:
     """Fit all five parameters to the loops and sweeps of CAMPAIGN together.
 
-    Use this fit unless you need the two steps of the paper. It fits the axial tests, or those of all directions if
-    axial loops or sweeps are missing; the other tests are predicted and shown. If [fit] of the campaign fixes all
-    parameters (vary = false), the command reports how well these values agree with the tests. Use --profile if a
-    parameter is hardly determined: its standard error is then misleading.
+    Use this fit unless you need the two steps of the paper. It fits the axial tests, or the tests of all directions if
+    axial loops or sweeps are missing. The other tests are predicted and shown. If [fit] of the campaign fixes all
+    parameters (vary = false), the command reports how well these values agree with the tests. If the tests hardly
+    determine a parameter, its standard error is misleading: use --profile.
 
     Writes model.json, and a table and a plot of loops and sweeps.
     """

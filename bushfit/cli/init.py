@@ -37,14 +37,14 @@ _WORDS = {
     "unit": "unit of the {role}",
     "rate": 'rate of the motion, such as "10 mm/min", or its frequency, such as "0.1 Hz"',
     "waveform": "waveform of the motion",
-    "amplitude": "they count",
-    "at_amplitude": 'its amplitude, such as "0.1 mm"',
-    "at_frequency": 'its frequency, such as "10 Hz"',
-    "temperature": 'its temperature, such as "23 degC"',
+    "amplitude": "convention of amplitudes",
+    "at_amplitude": 'amplitude of the test, such as "0.1 mm"',
+    "at_frequency": 'frequency of the test, such as "10 Hz"',
+    "temperature": 'temperature of the test, such as "23 degC"',
     "preload": 'preload of these tests, such as "500 N axial" or "none"; Enter leaves it open',
     "inner_diameter": 'inner diameter of the rubber, where it meets the inner sleeve, such as "20 mm"',
-    "outer_diameter": 'its outer diameter, such as "36 mm"',
-    "length": 'its length, the mean of inside and outside, such as "34 mm"',
+    "outer_diameter": 'outer diameter of the rubber, where it meets the outer sleeve, such as "36 mm"',
+    "length": 'length of the rubber (mean of inside and outside), such as "34 mm"',
 }
 #: Key of an option, and the role for columns and units ("" for other options).
 _Key = tuple[str, str]
@@ -61,14 +61,22 @@ _Read = TypeVar("_Read")
 @option_group(
     "The rubber of the bushing",
     option("--inner-radius", "LENGTH"),
-    option("--inner-diameter", "LENGTH", 'Inside; give one of the two, such as "20 mm".'),
+    option(
+        "--inner-diameter", "LENGTH", 'Radius or diameter where the rubber meets the inner sleeve, such as "20 mm".'
+    ),
     option("--outer-radius", "LENGTH"),
-    option("--outer-diameter", "LENGTH", 'Outside; give one of the two, such as "36 mm".'),
-    option("--length", "LENGTH", 'Mean of inside and outside, such as "34 mm".'),
-    option("--name", "NAME", "Name [that of the folder of the first file]."),
+    option(
+        "--outer-diameter", "LENGTH", 'Radius or diameter where the rubber meets the outer sleeve, such as "36 mm".'
+    ),
+    option(
+        "--length",
+        "LENGTH",
+        'Length of the rubber along the axis, such as "34 mm"; the mean of inside and outside.',
+    ),
+    option("--name", "NAME", "Name of the bushing [name of the folder of the first file]."),
 )
 @metadata_options()
-@option_group("Output", flag("--no-input", "Ask nothing: what is missing is an error."))
+@option_group("Output", flag("--no-input", "Ask no questions; report missing information as an error."))
 @with_output("results/<bushing name>")
 def command(
     files: tuple[Path, ...],
@@ -80,8 +88,9 @@ def command(
 ) -> None:
     """Write a campaign from test files and the geometry of the bushing.
 
-    In a terminal, init asks for missing information. FILE may be a folder, or a workbook with several tests; an option
-    applies to all files of its kind. Writes campaign.toml, or -o my_bushing.toml.
+    A campaign is a text file that lists a bushing and its tests. FILE is a test file, a workbook or a folder. In a
+    terminal, init asks for missing information. An option applies to all given files. Writes campaign.toml, or the
+    file given by -o my_bushing.toml.
     """
     from bushfit.geometry import Specimen
     from bushfit.inspection.record import campaign_text, campaigns_of_parts, with_specimens_named

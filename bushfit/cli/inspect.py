@@ -34,11 +34,11 @@ _FILES_A_PICTURE = 5
 def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Output) -> None:
     """Show how bushfit reads test files, before a campaign exists: loops, sweeps, raw histories.
 
-    FILE may be a folder, or a workbook with several tests. For each test, the command lists every column with its
-    meaning and unit; cycles, noise, frequencies, amplitudes; and anything unusual: gaps, outliers, drift, clipped
-    peaks, copied rows, repeats that disagree. Rows are numbered from 1, starting below the header. The text
-    for the campaign goes to standard output. If a file cannot be used, the others are shown, nothing is written, and
-    the exit status is 2. Writes inspect.png; for more than five files also inspect_2.png and so on.
+    FILE is a test file, a workbook or a folder. For each test, the command lists every column with its meaning and
+    unit; cycles, noise, frequencies and amplitudes; and anything unusual, such as missing rows, outliers, drift or
+    repeats that disagree. Rows are numbered from 1, starting below the header. The command prints the lines that a
+    campaign needs for these tests. If a file cannot be read, the exit status is 2, and nothing is written. Writes
+    inspect.png; for more than five files also inspect_2.png and so on.
     """
     from bushfit.inspection.gathering import gather, with_contradictions
     from bushfit.inspection.record import pasted_text, with_specimens_named

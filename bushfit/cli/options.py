@@ -229,7 +229,7 @@ def format_options(*kinds: Written) -> list[Parameter]:
         "tables": option(
             "--table-format",
             "FORM",
-            "csv, decimal-comma (German Excel) or xlsx [csv].",
+            "Format of tables: csv, decimal-comma (German Excel) or xlsx [csv].",
             type=click.Choice(get_args(Form)),
             default="csv",
             envvar="BUSHFIT_TABLE_FORMAT",
@@ -238,13 +238,13 @@ def format_options(*kinds: Written) -> list[Parameter]:
         "pictures": option(
             "--plot-format",
             "FORM",
-            "png, svg, pdf; may be given again [png].",
+            "Format of plots: png, svg or pdf; may be given again [png].",
             type=click.Choice(get_args(Picture)),
             multiple=True,
             default=["png"],
             envvar="BUSHFIT_PLOT_FORMAT",
             show_envvar=True,
         ),
-        "pages": flag("--no-report", "Do not write the HTML page."),
+        "pages": flag("--no-report", "Do not write the report as an HTML page."),
     }
     return [options[kind] for kind in kinds]

@@ -239,13 +239,15 @@ def with_output(folder: str, *written: Written) -> Parameter:
             wrapped,
             option_group(
                 "Output",
-                option("-o --output", "DIR", f"Folder of the results [{folder}].", type=Folder(path_type=Path)),
+                option(
+                    "-o --output", "DIR", f"Write the results to this folder [{folder}].", type=Folder(path_type=Path)
+                ),
                 flag("--force", "Replace earlier results in this folder."),
                 *format_options(*written),
                 flag("--no-plots", "Do not write plots.", hidden="pictures" not in written),
                 flag("--json as_json", "Print the result as JSON on standard output."),
                 flag("-v --verbose"),
-                flag("-q --quiet", "Print more, or errors only."),
+                flag("-q --quiet", "-v prints more details, -q only errors."),
                 flag("--trust", hidden=True, expose_value=False, callback=_trust),
             ),
         )

@@ -47,39 +47,50 @@ _MOST_VALUES = 6
     option(
         "--hours",
         "HOURS",
-        "Hours on the rig, at most [8].",
+        "Available time on the rig, in hours [8].",
         type=Size("time in hours such as 8", _MOST_HOURS),
         default=8.0,
     ),
     option(
         "--for aim",
         "AIM",
-        "parameters, predictions or rivals: what the tests shall determine best [predictions].",
+        (
+            "What the tests determine best: parameters, predictions, or which of several possible effects (rivals) "
+            "is right [predictions]."
+        ),
         type=click.Choice(["parameters", "predictions", "rivals"]),
     ),
     direction_option(
-        "Directions (axial, radial, torsion) or specimens that the rig can test; may be given again [axial and "
+        "Direction (axial, radial, torsion) or specimen that the rig can test; may be given again [axial and "
         "radial, or all specimens]."
     ),
     option(
         "--target targets",
         "NAME=SIZE",
-        'Half a 95 % interval to reach: "mu=2 %", "stiffness=1 %"; may be given again.',
+        'Accuracy to reach, as half the width of the 95 % interval: "mu=2 %", "stiffness=1 %"; may be given again.',
         multiple=True,
     ),
-    option("--parameters", "NAME,...", "Parameters to determine, with --for parameters [all]."),
+    option("--parameters", "NAME,...", "With --for parameters: the parameters to determine [all]."),
     option(
         "--rivals",
         "NAME,...",
-        "Effects to distinguish [those that diagnose cannot distinguish].",
+        "With --for rivals: the effects to distinguish [those that diagnose cannot distinguish].",
         shell_complete=effect_lists,
     ),
-    file_option("--campaign", "With MODEL.json: use [rig] and [predict] of this campaign."),
+    file_option(
+        "--campaign",
+        "With MODEL.json: take the limits of the rig and the frequencies and amplitudes from this campaign.",
+    ),
 )
-@option_group("Range of later predictions", grid_options("the campaign's"))
+@option_group("Range of later predictions", grid_options("from the campaign"))
 @option_group(
     "Check by simulation",
-    option("--check count", "N", "Simulate and fit the planned tests N times.", type=click.IntRange(2, 100_000)),
+    option(
+        "--check count",
+        "N",
+        "Check the predicted accuracy: simulate and fit the planned tests N times.",
+        type=click.IntRange(2, 100_000),
+    ),
     option("--seed", "N", "Seed of the random numbers [0].", type=click.IntRange(0), default=0),
 )
 @with_output("results/plan <name>", "tables", "pictures")
@@ -99,10 +110,11 @@ def command(
 ) -> None:
     """Select the most informative next tests within the limits of the rig.
 
-    The plan starts from the tests of CAMPAIGN, from its [compound] if it has no tests (hardness = "61 Shore A",
-    filler = "27 phr"), or from MODEL.json or a folder of results. A missed target is explained, with exit status 1.
+    The plan starts from the tests of CAMPAIGN, or from MODEL.json or a folder of results. If CAMPAIGN has no tests, the
+    plan starts from the hardness and filler in its [compound] table. If the plan misses a --target, the command states
+    why, and the exit status is 1.
 
-    Writes plan.csv (the sheet for the rig operator), plan.png, plan.json, and campaign.toml to simulate.
+    Writes plan.csv (the sheet for the rig operator), plan.png, plan.json, and campaign.toml for `bushfit simulate`.
     """
     from bushfit.campaign.campaign import Campaign, load_campaign
     from bushfit.commands.loading import load_source

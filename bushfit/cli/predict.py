@@ -29,21 +29,28 @@ _MOST_AMPLITUDES = 8
 
 @command_called("predict", 'data/arm_bushing/truth.json --frequencies "10:100:10 Hz" --amplitudes "0.1, 0.5 mm"')
 @click.argument("model", metavar="MODEL", type=FILE)
-@prediction_options("Use the grid of this campaign and show its sweeps.")
+@prediction_options("Use the frequencies and amplitudes of this campaign, and show its measured sweeps.")
 @option_group(
     "Further predictions",
-    file_option("--bushing", "Another bushing of the same compound, from [bushing] of this TOML file."),
+    file_option(
+        "--bushing", "Predict another bushing of the same compound; its dimensions are in [bushing] of this TOML file."
+    ),
     option("--mass", "MASS"),
     option(
-        "--base-acceleration", "ACCELERATION", 'Resonance of a mass such as "1.2 kg" on a base shaken with "0.1 g".'
+        "--base-acceleration",
+        "ACCELERATION",
+        (
+            'Also predict the resonance of a mass such as "1.2 kg" on the bushing, with a base acceleration such '
+            'as "0.1 g".'
+        ),
     ),
-    flag("--static", "Also write the static curve: force over displacement, and its slope."),
-    static_rate_option("Its rate"),
-    flag("--wide", "Also write tables with amplitudes across, without bands."),
+    flag("--static", "Also write the static curve: force over displacement in a slow motion, and its slope."),
+    static_rate_option("Rate of this motion"),
+    flag("--wide", "Also write tables with one column per amplitude, without bands."),
     option(
         "--arms",
         "[ERROR]",
-        "Also write Maxwell arms of the springpot, within this error [1 %].",
+        "Also write Maxwell arms (a Prony series) that represent the springpot within this error [1 %].",
         is_flag=False,
         flag_value="1 %",
     ),
@@ -66,9 +73,9 @@ def command(
 ) -> None:
     """Predict dynamic stiffness and loss factor over frequency and amplitude, with 95 % bands.
 
-    MODEL is the model.json of run, fit or diagnose, its folder, or dynamic.json. Effects of the rig are left out. A
-    warning reports predictions outside the tested range. Writes a table and a plot for each direction or specimen
-    (axial.csv, axial.png), and with --campaign measured.csv.
+    MODEL is the model.json of run, fit or diagnose, its folder, or dynamic.json. Effects that belong to the test rig
+    are left out. A warning reports predictions outside the tested range. Writes a table and a plot for each direction
+    or specimen (axial.csv, axial.png), and with --campaign measured.csv.
     """
     from bushfit.campaign.campaign import load_bushing, load_campaign
     from bushfit.commands.loading import load_model, model_file

@@ -39,17 +39,25 @@ _LINES_AN_OCTAVE = 3
 @metadata_options(sweeps=False)
 @option_group(
     "Raw histories",
-    option("--levels", "GRID", 'Nominal amplitudes, "0.1, 0.2 mm" [detected].'),
+    option("--levels", "GRID", 'Nominal amplitudes of the steps, zero-to-peak, such as "0.1, 0.2 mm" [detected].'),
     option(
-        "--cycles", "N", "Leave out steps with fewer than N steady cycles [3].", type=click.IntRange(3, 1000), default=3
+        "--cycles", "N", "Use only steps with at least N steady cycles [3].", type=click.IntRange(3, 1000), default=3
     ),
 )
 @option_group(
     "Resonance test",
-    option("--mass", "MASS", 'Mass on the mount, such as "0.5 kg".'),
-    option("--mass-added", "MASS", 'Mass that moves with it, such as "15 g".'),
-    option("--specimen", "NAME", "Name of the specimen, if it is no bushing."),
-    option("--base-acceleration", "ACCELERATION", 'Such as "0.1 g", if no column states it.'),
+    option("--mass", "MASS", 'Mass that the mount carries on the shaker, such as "0.5 kg".'),
+    option(
+        "--mass-added",
+        "MASS",
+        'Further mass that moves with it, such as "15 g" of accelerometer and cable; added to --mass.',
+    ),
+    option("--specimen", "NAME", "Name of the tested specimen, if the test is not of a bushing."),
+    option(
+        "--base-acceleration",
+        "ACCELERATION",
+        'Acceleration amplitude of the base, such as "0.1 g", if no column states it.',
+    ),
 )
 @with_output("results/<first file>", "tables", "pictures")
 def command(
@@ -62,11 +70,11 @@ def command(
 ) -> None:
     """Reduce raw stepped-sine histories or a resonance test to a sweep.
 
-    Raw histories (time, displacement, force): a FILE may hold many steps of at least five cycles; several files of
-    one direction make one sweep. A resonance test (--mass, one FILE): acceleration and phase of the base and of a
-    mass on the mount, or their transmissibility. Each point has its standard error.
+    A raw history contains time, displacement and force, with many steps of at least five cycles. Several files of one
+    direction make one sweep. A resonance test, given by one FILE and --mass, contains the accelerations and phases of
+    a shaken base and of a mass on the mount, or their ratio (transmissibility). Each point gets a standard error.
 
-    Writes sweep.csv, for [[sweeps]] of a campaign or `bushfit init`, and reduce.png.
+    Writes sweep.csv, which init and campaigns read as a sweep, and reduce.png.
     """
     from bushfit.reduction.steps import reduce
     from bushfit.report.reduced import reduced_table, resonance_table

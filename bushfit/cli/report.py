@@ -12,11 +12,12 @@ from bushfit.cli.output import Output, with_output
 @click.argument("folder", metavar="DIR", type=FILE)
 @with_output("DIR")
 def command(folder: Path, output: Output) -> None:
-    """Make one page from DIR, the results of run, diagnose, a fit, or a batch: to show, print or mail.
+    """Make one report page from DIR, a folder with results of run, diagnose, a fit or a batch.
 
-    The page is a single file that needs no network. It shows part and tests, verdict and expected error, prediction
-    and measurement, parameters with intervals, the gap, the next test, and the origin of the numbers. It shows what
-    the JSON and CSV files of DIR contain. run and diagnose write it, too.
+    Show, print or mail the page: it is a single file that needs no network. The page shows part and tests, verdict,
+    expected error, prediction and measurement, parameters with intervals, differences between tests and model, the
+    next test, and the origin of the numbers. All numbers come from the JSON and CSV files in DIR. run and diagnose
+    write the page by themselves.
 
     Writes report.html, or for a batch index.html.
     """

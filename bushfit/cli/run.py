@@ -34,11 +34,12 @@ _OPEN = 100.0
 def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | None, output: Output) -> None:
     """Fit, diagnose and predict in one go.
 
-    Prints the verdict of diagnose, the parameters of the model to use, the tested range, and the corners of the
-    prediction; -v prints every step. Steps without tests are skipped and listed.
+    Prints the verdict on the model, the parameters, the tested range, and the predicted stiffness at the lowest and
+    highest frequency. -v prints every step. Steps for which tests are missing are skipped and listed.
 
-    Writes static.json, dynamic.json, model.json (with what diagnose added; joint.json is then the plain fit),
-    diagnosis.json, candidates.csv, report.html; as table and plot: loops, sweeps, gap, axial, radial, each specimen.
+    Writes model.json (the model to use), report.html, diagnosis.json, candidates.csv, static.json and dynamic.json;
+    tables and plots of loops, sweeps, gap (measured minus model) and of each direction and specimen. If diagnose adds
+    an effect to model.json, joint.json is the fit without this effect.
     """
     from bushfit.commands.fit import prepare_tests
     from bushfit.commands.provenance import input_files

@@ -21,10 +21,10 @@ def _names(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
 def command(name: str | None, output: Output) -> None:
     """Print the JSON Schema (draft 2020-12) of NAME on standard output; without NAME, list all names.
 
-    A schema describes every key of a file and its unit. Schemas of JSON files are for programs that read results.
-    Those of campaign, manifest and limits are for TOML editors, which then complete and check keys while you type.
+    A schema describes every key of a file and its unit. Programs that read results use the schemas of JSON files.
+    TOML editors use the schemas of campaign, manifest and limits to complete and check keys while you type.
 
-    With -o, writes <name>.schema.json for NAME, or for all files without NAME.
+    With -o, writes <name>.schema.json; without NAME, writes the schemas of all files.
     """
     from bushfit.errors import error_location
     from bushfit.report.results import json_file

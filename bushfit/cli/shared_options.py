@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _UNITS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
 
 
-def campaign_options(soft_l1: str = "less weight on distant points, none on outliers") -> Parameter:
+def campaign_options(soft_l1: str = "outliers are left out, and distant points have less weight") -> Parameter:
     """Create the argument CAMPAIGN (`campaigns`) and the options of all commands that fit a campaign.
 
     Args:
@@ -48,13 +48,13 @@ def campaign_options(soft_l1: str = "less weight on distant points, none on outl
                 option(
                     "--loss",
                     "LOSS",
-                    f"linear: least squares [the campaign's, else this]; soft_l1: {soft_l1}.",
+                    f"linear: least squares; soft_l1: {soft_l1} [from the campaign, else linear].",
                     type=click.Choice(["linear", "soft_l1"]),
                 ),
                 option(
                     "--max-nrmse",
                     "SHARE",
-                    "Exit with status 1 if NRMSE exceeds this, such as 2 %.",
+                    "Exit with status 1 if the misfit (NRMSE) exceeds this share of the stiffness, such as 2 %.",
                     type=Size("share up to 1, such as 0.02 or 2 %", 1.0),
                 ),
             ),
@@ -94,10 +94,16 @@ def grid_options(default: str) -> Parameter:
     """Create the options for the frequencies and amplitudes of a prediction; `default` is the default in the help."""
     return lambda function: add_parameters(
         function,
-        option("--frequencies", "GRID", f'"5:155:10 Hz" or "20, 50 Hz" [{default}].'),
-        option("--amplitudes", "GRID", f'Zero-to-peak, "0.1, 0.5 mm" [{default}].'),
-        option("--torsion-amplitudes", "GRID", 'For --direction torsion ["0.5, 1, 2 deg"].'),
-        option("--strain-amplitudes", "GRID", 'For specimens that give a modulus ["1, 2, 5 %"].'),
+        option(
+            "--frequencies", "GRID", f'Frequencies: start:stop:step, "5:155:10 Hz", or a list, "20, 50 Hz" [{default}].'
+        ),
+        option("--amplitudes", "GRID", f'Displacement amplitudes, zero-to-peak, such as "0.1, 0.5 mm" [{default}].'),
+        option(
+            "--torsion-amplitudes",
+            "GRID",
+            'Rotation amplitudes for --direction torsion, zero-to-peak ["0.5, 1, 2 deg"].',
+        ),
+        option("--strain-amplitudes", "GRID", 'Strain amplitudes for specimens tested by modulus (DMA) ["1, 2, 5 %"].'),
     )
 
 
@@ -106,10 +112,15 @@ def prediction_options(campaign: str) -> Parameter:
     return option_group(
         "Range and conditions",
         direction_option(
-            "axial, radial, torsion or a specimen; may be given again [axial and radial, and all specimens]."
+            "Predict in this direction (axial, radial, torsion) or for this specimen; may be given again [axial and "
+            "radial, and all specimens]."
         ),
-        grid_options("the campaign's"),
-        option("--temperature", "TEMP", 'Such as "40 degC", if the model has an effect of temperature [23 degC].'),
+        grid_options("from the campaign"),
+        option(
+            "--temperature",
+            "TEMP",
+            'Temperature, such as "40 degC", if the model was fitted with --effect temperature [23 degC].',
+        ),
         file_option("--campaign", campaign),
     )
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     option(
         "--effect effects",
         "EFFECT",
-        'Add an effect to the tests, such as "inertia.mass=0.1 kg"; may be given again.',
+        'Add an effect to the model, such as "inertia.mass=0.1 kg"; may be given again.',
         multiple=True,
     ),
     option("--repeats", "N", "Number of repeats of each sweep [1].", type=click.IntRange(1, 1000)),
@@ -33,21 +33,29 @@ if TYPE_CHECKING:
 )
 @option_group(
     "Noise and errors of the rig [from the campaign, else none]",
-    option("--noise", "SHARE", 'Scatter of a sweep point relative to |K|, such as "0.5 %".'),
-    option("--force-noise", "SHARE", 'Noise of a loop relative to half its force range: "0.3 %".'),
-    option("--displacement-noise", "SHARE", 'Noise of a loop relative to its amplitude: "0.02 %".'),
-    option("--gain-error", "SHARE", 'Gain error of a run (a repeat of a level): "0.4 %".'),
-    option("--phase-error", "ANGLE", 'Phase error of a run: "0.2 deg".'),
+    option("--noise", "SHARE", 'Random error of each sweep point, relative to the stiffness |K|, such as "0.5 %".'),
+    option("--force-noise", "SHARE", 'Noise of the force in loops, relative to half the force range, such as "0.3 %".'),
+    option(
+        "--displacement-noise",
+        "SHARE",
+        'Noise of the displacement in loops, relative to the amplitude, such as "0.02 %".',
+    ),
+    option(
+        "--gain-error",
+        "SHARE",
+        'Gain error shared by all points of a run (one repeat of one amplitude), such as "0.4 %".',
+    ),
+    option("--phase-error", "ANGLE", 'Phase error shared by all points of a run, such as "0.2 deg".'),
 )
 @with_output("results/simulated <name>", "tables")
 def command(source: Path, effects: tuple[str, ...], output: Output, **settings: Any) -> None:
     """Simulate the tests of a model on a virtual rig and write them as a campaign.
 
-    The model is MODEL.json, tested like the paper's bushing, or CAMPAIGN with the tests in its [simulate] table. The
-    equations are stepped through time, without the closed forms that the fits use. Use it to check whether `bushfit
-    diagnose` would find an effect that --effect adds.
+    With CAMPAIGN, its [simulate] table states the model and the tests. With MODEL.json, the tests are those of the
+    paper's bushing. Use simulate to check whether `bushfit diagnose` would find an effect that you add with --effect.
+    The equations are solved step by step in time, independently of the formulas that the fits use.
 
-    Writes campaign.toml, the tables it names, and truth.json, the model behind them.
+    Writes campaign.toml, its test files, and truth.json (the model that was simulated).
     """
     from bushfit.campaign.campaign import load_campaign, model_of
     from bushfit.campaign.schema import SimulateSettings

@@ -26,7 +26,7 @@ from bushfit.cli import output as common
 
 COMMANDS = cli.list_commands(click.Context(cli))
 #: Lines of the longest help on a terminal of 80 columns.
-LONGEST = 50
+LONGEST = 70
 EXAMPLES = re.compile(r"^  Examples?:\n((?:    .*\n)+)\Z", re.MULTILINE)
 
 
