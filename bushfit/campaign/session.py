@@ -101,7 +101,7 @@ def session(bushing: Bushing | None, visits: Sequence[SessionTest]) -> list[Rubb
     return [conditions[i] for i in range(len(visits))]
 
 
-def _last_larger(strain: Array, turn: Array) -> tuple[Array, Array]:
+def _last_larger(strain: Array, session_time: Array) -> tuple[Array, Array]:
     """Last earlier strain amplitude of a larger level for each point, and the session time since then, (n,) each.
 
     If no earlier strain was larger, the values are 0 and the session time of the point.
@@ -115,7 +115,7 @@ def _last_larger(strain: Array, turn: Array) -> tuple[Array, Array]:
         while above and level[above[-1]] <= level[end]:
             above.pop()
         if above:
-            larger[run], since[run] = strain[above[-1]], turn[above[-1]]
+            larger[run], since[run] = strain[above[-1]], session_time[above[-1]]
         above.append(int(end))
     runs = np.searchsorted(ends, np.arange(strain.size))
-    return larger[runs], turn - since[runs]
+    return larger[runs], session_time - since[runs]

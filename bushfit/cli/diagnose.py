@@ -117,11 +117,11 @@ def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
 
 def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") -> None:
     """Print the verdict of a diagnosis, the next step (`action`), a summary, and probabilities of missing effects."""
-    from bushfit.diagnosis.record import odds_in_words
+    from bushfit.diagnosis.record import format_odds
 
     colour = _COLOURS.get(diagnosed.headline, "yellow")
     output.print_headline(diagnosed.name, diagnosed.headline, action, f"bold {colour}")
-    for line in (diagnosed.diagnosis.summary, *odds_in_words(diagnosed.document)):
+    for line in (diagnosed.diagnosis.summary, *format_odds(diagnosed.document)):
         output.console.print(f"  {escape(line)}")
     if diagnosed.diagnosis.adopt:
         first = " the first" if diagnosed.diagnosis.verdict == "ambiguous" else ""

@@ -162,14 +162,14 @@ def _wanted_points(
         yield Points(place, frequency.ravel(), amplitude.ravel())
 
 
-def _targets(name: str, half: float, knowledge: Knowledge, points: Sequence[Points]) -> list[Target]:
+def _targets(name: str, half_width: float, knowledge: Knowledge, points: Sequence[Points]) -> list[Target]:
     """Targets with a name such as "mu", "stiffness" (all predicted directions) or "stiffness.axial".
 
     `half_width` is the wanted half-width of the 95 % interval relative to the value.
     """
-    possible = {parameter: [Target(parameter, half)] for parameter in knowledge.names}
+    possible = {parameter: [Target(parameter, half_width)] for parameter in knowledge.names}
     for quantity in PREDICTED:
-        targets = [Target(quantity, half, part.place) for part in points]
+        targets = [Target(quantity, half_width, part.place) for part in points]
         possible |= {quantity: targets, **{str(target): [target] for target in targets}}
     if name not in possible:
         expected, hint = ", ".join(possible), did_you_mean(name, tuple(possible))

@@ -199,20 +199,21 @@ class Screen:
     _known: dict[tuple[int, str, Bushing | None], Array] = field(default_factory=dict)
     _responses: dict[tuple[Bushing | None, Place, bytes, bytes], Array] = field(default_factory=dict)
 
-    def best(self, found: Sequence[Claim], limit: int) -> list[Claim]:
+    def best(self, candidates: Sequence[Claim], limit: int) -> list[Claim]:
         """Select the claims with the smallest misfit.
 
         Args:
-            found: claims to compare.
+            candidates: claims to compare.
             limit: maximum number of claims.
 
         Returns:
             Claims that change the misfit and may lower it in a fit, the smallest misfit first.
         """
-        before, misfits = self.misfit(None), np.array([self.misfit(claim) for claim in found])
+        before, misfits = self.misfit(None), np.array([self.misfit(claim) for claim in candidates])
         changed = np.abs(misfits - before) > _LEAST_CHANGE * before
         order = np.argsort(misfits, kind="stable")
-        return [found[place] for place in order if changed[place] and misfits[place] < _WORTH_A_FIT * before][:limit]
+        better = (place for place in order if changed[place] and misfits[place] < _WORTH_A_FIT * before)
+        return [candidates[place] for place in better][:limit]
 
     def misfit(self, claim: Claim | None) -> float:
         """Compute the misfit of the paper's model to the tests: least sum of squared residuals over its parameters.

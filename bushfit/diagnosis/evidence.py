@@ -86,8 +86,8 @@ class Evidence:
         return basis[:, size > 1e-10 * size[0]]
 
     @cached_property
-    def place(self) -> Mapping[MeasuredTest, slice]:
-        """Slice of each test's rows in the residual vector."""
+    def residual_rows(self) -> Mapping[MeasuredTest, slice]:
+        """Slice of the residuals of each test in the vector of all residuals."""
         ends = np.cumsum([data_set.size for data_set in self.data_sets]).tolist()
         return {data_set: slice(end - data_set.size, end) for end, data_set in zip(ends, self.data_sets, strict=True)}
 

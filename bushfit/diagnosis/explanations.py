@@ -264,7 +264,7 @@ def _process(
     columns = np.zeros((len(share), evidence.residual.size))
     for test, change in zip(tests, np.split(share, np.cumsum([*map(len, points)])[:-1], axis=1), strict=True):
         stiffness = model.stiffness(test.direction, test.frequency, test.amplitude, kind=test.kind)
-        columns[:, evidence.place[test]] = test.residual_change(change * stiffness, model)
+        columns[:, evidence.residual_rows[test]] = test.residual_change(change * stiffness, model)
     return columns, share
 
 
@@ -274,7 +274,7 @@ def _restricted(
     """Set the columns and relative changes of a Gaussian process over `tests` to 0 outside of the `chosen` tests."""
     rows = np.zeros(columns.shape[-1], dtype=bool)
     for test in chosen:
-        rows[evidence.place[test]] = True
+        rows[evidence.residual_rows[test]] = True
     points = np.concatenate([np.full(test.frequency.size, test in chosen) for test in tests])
     return columns * rows, share * points
 
@@ -283,7 +283,7 @@ def _harmonics(evidence: Evidence, loops: Sequence[MeasuredLoop]) -> Array:
     """Change of the whitened residuals by unit amounts of c harmonics that repeated loops share, (c, n)."""
     columns = np.zeros((len(loops[0].smooth_changes()), evidence.residual.size))
     for loop in loops:
-        columns[:, evidence.place[loop]] = loop.smooth_changes()
+        columns[:, evidence.residual_rows[loop]] = loop.smooth_changes()
     return columns
 
 

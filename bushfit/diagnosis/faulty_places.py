@@ -38,7 +38,7 @@ def faulty_places(evidence: Evidence) -> list[FaultyPart]:
             np.array(loop.gain_and_offset()),
             np.eye(2),
             act_together=True,
-            covered_rows=(evidence.place[loop], evidence.residual.size),
+            covered_rows=(evidence.residual_rows[loop], evidence.residual.size),
         )
         ends = (loop.drive.frequency,) * 2, (loop.drive.amplitude,) * 2
         places.append(FaultyPart("place", "loop", f"the loop {loop.name}", group, loop.direction, *ends))
@@ -160,7 +160,7 @@ def _shift_columns(
         log_step = np.log(sweep.step)
         slope = 2.0 * (log_step - log_step.mean()) / max(float(np.ptp(log_step)), 1e-9)
         shapes = [mask.astype(float), *([mask * slope] if sloping else [])]
-        place = evidence.place[sweep]
+        place = evidence.residual_rows[sweep]
         columns[:, place.start - rows.start : place.stop - rows.start] = [
             column for shape in shapes for column in sweep.shared_error_columns(shape)
         ]
@@ -169,5 +169,5 @@ def _shift_columns(
 
 def _rows(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> slice:
     """Slice of the residual vector from the first to the last row of the given sweeps."""
-    places = [evidence.place[sweep] for sweep in sweeps]
+    places = [evidence.residual_rows[sweep] for sweep in sweeps]
     return slice(min(place.start for place in places), max(place.stop for place in places))

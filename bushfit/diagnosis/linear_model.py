@@ -203,17 +203,17 @@ class LinearModel:
         ]
 
     def _over_nodes(
-        self, gains: tuple[Array, Array], chosen: Array, beside: GroupEvidence | None = None
+        self, gains: tuple[Array, Array], chosen: Array, with_compound: GroupEvidence | None = None
     ) -> GroupEvidence:
         """Evidence for a group, averaged over the nodes in the mask `chosen`; `with_compound` is passed on."""
         log_evidence = (self._at_nodes.base[:, None, None] + gains[0])[chosen]
         if not log_evidence.size:
-            return GroupEvidence(-np.inf, 0.0, float(SIZES[0]), beside)
+            return GroupEvidence(-np.inf, 0.0, float(SIZES[0]), with_compound)
         total = float(logsumexp(log_evidence))
         share = np.exp(log_evidence - total)
         size = float(np.sqrt(np.sum(share * gains[1][chosen])))
         likeliest = float(SIZES[int(np.argmax(share.sum(axis=(0, 1))))])
-        return GroupEvidence(total - float(np.log(log_evidence[0].size)), size, likeliest, beside)
+        return GroupEvidence(total - float(np.log(log_evidence[0].size)), size, likeliest, with_compound)
 
     def group_evidence_of(self, groups: Sequence[Group]) -> list[GroupEvidence]:
         """Compute the evidence of the tests for further groups of columns, in parts to limit memory.

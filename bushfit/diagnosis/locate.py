@@ -138,7 +138,7 @@ def _loop_regions(evidence: Evidence) -> Iterator[MisfitRegion]:
     for data_set in loops:
         columns, amplitude = data_set.smooth_changes(), data_set.drive.amplitude
         norms = np.maximum(np.linalg.norm(columns, axis=1), np.finfo(float).tiny)
-        amounts = columns @ evidence.residual[evidence.place[data_set]] / norms
+        amounts = columns @ evidence.residual[evidence.residual_rows[data_set]] / norms
         by_order = [np.hypot(values[::2], [0.0, *values[1::2]]) for values in (amounts, amounts / norms)]
         order = int(np.argmax(by_order[0]))
         share = by_order[1][order]

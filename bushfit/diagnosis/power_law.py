@@ -201,10 +201,10 @@ class Term:
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
     def residual(self, value: Array, model: Model) -> Array:
-        """Whitened residuals, (n,), of a model with the term added, whose complex values at the points are (p,)."""
+        """Whitened residuals, (n,), of a model to which the term, with complex values at the points, (p,), is added."""
         residuals, added = residual(model, self.evidence.data_sets), value * self.unit(model)
         for test, points in self.tests:
-            residuals[self.evidence.place[test]] = test.residual_with(added[points], model)
+            residuals[self.evidence.residual_rows[test]] = test.residual_with(added[points], model)
         return residuals
 
     def linearised(self, model: Model, value: Array, shapes: Array) -> tuple[Array, Array, Array]:
@@ -219,7 +219,7 @@ class Term:
             Residuals extrapolated to no term, (n,); derivatives by the coordinates of the parameters, (k, n); and by
             the amounts of each shape in phase and in quadrature, (c, 2, n).
         """
-        names, place = self.evidence.solution.coordinates.names, self.evidence.place
+        names, place = self.evidence.solution.coordinates.names, self.evidence.residual_rows
         added, changes = value * self.unit(model), np.concatenate((shapes, 1j * shapes)) * self.unit(model)
         residuals, rows = self.residual(value, model), np.array(jacobian(model, self.evidence.data_sets, names))
         slopes = Coordinates.of_parameters(model, names).slopes(model.values)[:, None]

@@ -60,7 +60,7 @@ def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str
         One proposal for each effect, at its best shape parameters, the highest score first.
     """
     relative_noise = np.empty(evidence.residual.size)
-    for test, place in evidence.place.items():
+    for test, place in evidence.residual_rows.items():
         relative_noise[place] = test.relative_noise
     ranked = []
     for effect in missing_effects(evidence.model, [str(test.direction) for test in evidence.data_sets], excluded):

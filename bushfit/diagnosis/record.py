@@ -306,27 +306,27 @@ def format_probability(probability: float) -> str:
     return f"{100 * probability:.0f} %"
 
 
-def odds_in_words(found: Mapping[str, Any]) -> list[str]:
+def format_odds(document: Mapping[str, Any]) -> list[str]:
     """Format the probabilities of a diagnosis.
 
     Args:
-        found: content of diagnosis.json.
+        document: content of diagnosis.json.
 
     Returns:
         Lines of text: the explanations, the most probable first, and the probability that nothing is missing.
     """
-    if found["verdict"] == "consistent":
-        lines = [f"Probability that nothing is missing: {format_probability(found['nothing'])}."]
-        if 1.0 - found["nothing"] > _LEAST_TOLD:
-            small = format_probability(1.0 - found["nothing"])
+    if document["verdict"] == "consistent":
+        lines = [f"Probability that nothing is missing: {format_probability(document['nothing'])}."]
+        if 1.0 - document["nothing"] > _LEAST_TOLD:
+            small = format_probability(1.0 - document["nothing"])
             lines.append(f"Probability of an effect too small for these tests to show: {small}.")
         return lines
-    lines = [f"{format_probability(entry['probability'])}: {entry['words']}" for entry in found["odds"]]
-    rest = 1.0 - sum(entry["probability"] for entry in found["odds"])
+    lines = [f"{format_probability(entry['probability'])}: {entry['words']}" for entry in document["odds"]]
+    rest = 1.0 - sum(entry["probability"] for entry in document["odds"])
     if lines and rest > _LEAST_TOLD:
         lines.append(f"{format_probability(rest)}: other explanations together")
-    if lines and found["nothing"] > _LEAST_TOLD:
-        lines.append(f"Probability that nothing is missing: {format_probability(found['nothing'])}.")
+    if lines and document["nothing"] > _LEAST_TOLD:
+        lines.append(f"Probability that nothing is missing: {format_probability(document['nothing'])}.")
     return lines
 
 

@@ -169,7 +169,7 @@ def blocks(evidence: Evidence, rig: RigSettings) -> Iterator[Block]:
     loops, sweeps = split_by_kind(evidence.data_sets)
     classes = class_errors(rig, ASSUMED)
     for sweep in sweeps:
-        first, count = evidence.place[sweep].start, sweep.frequency.size
+        first, count = evidence.residual_rows[sweep].start, sweep.frequency.size
         runs = np.split(np.arange(count), sweep.block_starts[1:])
         units = sweep.whiten(np.full(count, 1.0 + 1.0j)).reshape(2, count)
         for level in np.unique(sweep.held_value):
@@ -179,7 +179,9 @@ def blocks(evidence: Evidence, rig: RigSettings) -> Iterator[Block]:
             for part, unit_class in enumerate(classes):
                 yield Block(first + part * count + line, unit_class * columns * units[part, line], kinds, scatters=True)
     for group in group_repeats(loops):
-        rows = np.concatenate([np.arange(evidence.place[loop].start, evidence.place[loop].stop) for loop in group])
+        rows = np.concatenate(
+            [np.arange(evidence.residual_rows[loop].start, evidence.residual_rows[loop].stop) for loop in group]
+        )
         gain = classes[0] * np.concatenate([loop.unit_gain for loop in group])
         yield Block(rows, gain[None], np.array([_LOOP]), scatters=False)
 

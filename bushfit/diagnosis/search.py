@@ -198,7 +198,7 @@ class Search:
         return list(grown.values())
 
     def _with_effect(self, state: SearchState, name: str, evidence: Evidence, depth: int) -> SearchState:
-        """Add an effect to a state, given the fit `evidence` of the model with the effect; `depth` lowers the prior."""
+        """Add an effect, fitted in `evidence`, to a state with `depth` explanations, of which the prior depends."""
         log_density, precision, change = laplace(name, evidence, state.evidence)
         return replace(
             state,
@@ -267,13 +267,13 @@ class Search:
                     yield self._register(SearchState.of_tests(tests, self.request))
 
 
-def _record_change(base: Evidence, mended: Evidence) -> float:
+def _record_change(base: Evidence, corrected: Evidence) -> float:
     """Largest relative change of a recorded stiffness, amplitude or frequency by a correction of the record.
 
     The value is 1 if the dimensions of the bushing or the direction of a test are corrected.
     """
-    pairs = list(zip(base.data_sets, mended.data_sets, strict=True))
-    if base.model.bushing != mended.model.bushing or any(
+    pairs = list(zip(base.data_sets, corrected.data_sets, strict=True))
+    if base.model.bushing != corrected.model.bushing or any(
         before.direction != after.direction for before, after in pairs
     ):
         return 1.0

@@ -169,9 +169,9 @@ class Turning:
     travel: Array
     piece: Array
 
-    def at_samples(self, of_pieces: Array) -> Array:
+    def at_samples(self, stroke_values: Array) -> Array:
         """Expand values per stroke, (..., k), to values per sample, (..., n)."""
-        return _take(of_pieces, self.piece)
+        return _take(stroke_values, self.piece)
 
 
 def _single_row(rows: Array) -> Array:

@@ -247,7 +247,7 @@ def _check_loses_energy(drive: Drive) -> None:
         )
 
 
-def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
+def _with_row_noise(drive: Drive, loop_harmonics: LoopHarmonics) -> Drive:
     """Estimate size and correlation of the noise of a loop's rows, or bins, from its whole cycles.
 
     If there is no whole cycle, or the noise is below that of any rig, the rows are taken to be independent.
@@ -258,7 +258,7 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
     cycles = np.unique(turn[rows]).size
     if not cycles or np.count_nonzero(rows) < 32 * cycles:  # fewer resolve no correlation
         return drive
-    phase, force, weight, harmonics = drive.phase[rows], drive.force[rows], drive.weight[rows], found.force
+    phase, force, weight, harmonics = drive.phase[rows], drive.force[rows], drive.weight[rows], loop_harmonics.force
     if drive.from_rest:
         harmonics = as_complex(least_squares(basis(phase, harmonics.size - 1), force, weight))
     if cycles == 1:
@@ -280,7 +280,7 @@ def _with_row_noise(drive: Drive, found: LoopHarmonics) -> Drive:
         model, size = row_noise(misfit * scale, remove_slow_changes(phase, misfit)[0] * scale, cycles)
     if binned:
         breaks = () if drive.from_rest else tuple((np.flatnonzero(np.diff(turn)) + 1).tolist())
-        return replace(drive, row_noise=replace(model, size=max(size / found.force_noise, 1.0), breaks=breaks))
+        return replace(drive, row_noise=replace(model, size=max(size / loop_harmonics.force_noise, 1.0), breaks=breaks))
     if not model.order:
         return drive
     noise = drive.noise if drive.loop.noise is not None else max(size, FLOOR * drive.half_range)
@@ -301,7 +301,7 @@ def _at_reversal(drive: Drive) -> Array:
 
 
 def _rests(
-    loop: Loop, found: LoopHarmonics, frequency: float, half_motion: float, half_force: float, noise: float
+    loop: Loop, harmonics: LoopHarmonics, frequency: float, half_motion: float, half_force: float, noise: float
 ) -> tuple[bool, bool]:
     """Return two flags: the record begins at rest at zero, and it begins at rest about a preload.
 
@@ -310,7 +310,7 @@ def _rests(
 
     Args:
         loop: steady cycles of the record.
-        found: harmonics of the loop.
+        harmonics: harmonics of the loop.
         frequency: frequency of the motion [Hz].
         half_motion: half of the range of the displacement [m or rad].
         half_force: half of the range of the force [N or N m].
@@ -327,7 +327,7 @@ def _rests(
         return False, False
     near, scatter, reach = _AT_REST * half_force, 3.0 * noise, _AT_REST * half_motion
     unmoved, unloaded = abs(loop.displacement[0]) <= reach, abs(loop.force[0]) <= near + scatter
-    off_mean = abs(loop.displacement[0] - found.motion[0].real), abs(loop.force[0] - found.force_mean)
+    off_mean = abs(loop.displacement[0] - harmonics.motion[0].real), abs(loop.force[0] - harmonics.force_mean)
     # the virgin curve moves the mean by up to 0.3 of the change
     in_middle = off_mean[0] <= reach and off_mean[1] <= max(near, 0.5 * change) + scatter
     is_first = loop.part is None or loop.part.first_row == 0

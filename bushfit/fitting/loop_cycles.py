@@ -186,8 +186,8 @@ def _fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, 
     return _of_one_cycle(loop, clock, x, times)
 
 
-def _of_one_cycle(loop: Loop, clock: Array, x: Array, across: Array) -> tuple[float, float]:
-    """Frequency [Hz] and number of cycles of a loop that crosses its middle once each way, at times `across` [s].
+def _of_one_cycle(loop: Loop, clock: Array, x: Array, crossings: Array) -> tuple[float, float]:
+    """Frequency [Hz] and number of cycles of a loop that crosses its middle once each way, at times `crossings` [s].
 
     The clock [s] and the motion x relative to its middle, (n,) each, are those of the thinned rows, see `_thinned`.
     """
@@ -200,7 +200,7 @@ def _of_one_cycle(loop: Loop, clock: Array, x: Array, across: Array) -> tuple[fl
     period = _period_by_ends(clock, x, duration, whole)
     if period is not None:
         return 1.0 / period, closed / period
-    stroke = float(across[1] - across[0]) if across.size == 2 else np.inf
+    stroke = float(crossings[1] - crossings[0]) if crossings.size == 2 else np.inf
     meets = gap < _CLOSED * np.ptp(x) / 2.0 + 1.5 * stride
     if closed > (_MORE_THAN_ONE_THAT_MEETS if meets else _MORE_THAN_ONE) * 2.0 * stroke:
         frequency = _refined(clock, x, 0.5 / stroke, rows)

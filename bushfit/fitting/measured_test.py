@@ -63,9 +63,10 @@ class MeasuredBase(ABC):
         """Magnitude of the relative difference at each point with weight, for the NRMSE, (n,)."""
         return np.linalg.norm(self.relative_difference(model)[:, self.weights > 0.0], axis=0)
 
-    def change(self, one: Model, reference: Model) -> float:
+    def change(self, model: Model, reference: Model) -> float:
         """Largest difference between two models over the points, relative to |K| or half the force range of a loop."""
-        return float(np.linalg.norm(self.relative_difference(one) - self.relative_difference(reference), axis=0).max())
+        difference = self.relative_difference(model) - self.relative_difference(reference)
+        return float(np.linalg.norm(difference, axis=0).max())
 
     @cached_property
     def _last(self) -> dict[str, tuple[Model, Any, Array]]:

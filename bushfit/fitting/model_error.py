@@ -69,29 +69,29 @@ _MAXIMUM_ROUNDS, _SETTLED = 12, 0.02
 
 
 def with_model_error(
-    found: FitResult, bounds: Bounds, rig: RigSettings = UNSTATED, *, smooth: bool = False
+    plain_fit: FitResult, bounds: Bounds, rig: RigSettings = UNSTATED, *, smooth: bool = False
 ) -> tuple[FitResult, Unnamed | None]:
     """Refit a model that misses its tests with a model error added to the noise; a model that fits is unchanged.
 
     Args:
-        found: least-squares fit with the noise alone.
+        plain_fit: least-squares fit with the noise alone.
         bounds: limits of parameters [SI], inside their default limits.
         rig: class of the rig, whose errors may explain a misfit.
         smooth: True to test for smooth discrepancies only.
 
     Returns:
-        The fit, and the discrepancy as a correction of the stiffness; `found` and None without lack of fit, or if the
+        The fit, and the discrepancy as a correction of the stiffness; `plain_fit` and None if the model fits, or if the
         misfit is too large to be an error of this model.
     """
-    if not found.names or not ((not smooth and _exceeds_noise(found, rig)) or _is_smooth(found, rig)):
-        return found, None
-    closest, size = closest_fit(found, bounds)
+    if not plain_fit.names or not ((not smooth and _exceeds_noise(plain_fit, rig)) or _is_smooth(plain_fit, rig)):
+        return plain_fit, None
+    closest, size = closest_fit(plain_fit, bounds)
     if size >= SIZES[-1]:  # that is no error of a model, but another thing than it
-        return found, None
+        return plain_fit, None
     # of a loop only the shape has an independent error: its first harmonic changes with the stiffness
     thinned = [
         replace(test, model_error=size, first_error=2) if isinstance(test, MeasuredLoop) else test
-        for test in _thinned(found.minimised)
+        for test in _thinned(plain_fit.minimised)
     ]
     tests = _in_noise(closest, thinned)
     sizes = np.geomspace(_SMOOTH_RATIO[0] * size, _SMOOTH_RATIO[1] * size, 9)
@@ -99,34 +99,34 @@ def with_model_error(
     likeliest = max(processes, key=lambda process: process.best[0])
     error = averaged(processes)
     if error.typical >= SIZES[-1]:
-        return found, None
-    weighed = [test.with_model_error(size) for test in found.covariance_tests or found.minimised]
+        return plain_fit, None
+    weighed = [test.with_model_error(size) for test in plain_fit.covariance_tests or plain_fit.minimised]
     whole = Discrepancy.over_tests(_in_noise(closest, weighed), likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
     process = SmoothError(likeliest.best[1] * whole.complex_shapes, likeliest.likelihood.freedom(likeliest.best[1]))
-    closest = replace(closest, noise_weighted=found.data_sets, outliers=found.outliers)
+    closest = replace(closest, noise_weighted=plain_fit.data_sets, outliers=plain_fit.outliers)
     return replace(closest, covariance_tests=weighed, smooth_error=process), error
 
 
-def closest_fit(found: FitResult, bounds: Bounds) -> tuple[FitResult, float]:
+def closest_fit(plain_fit: FitResult, bounds: Bounds) -> tuple[FitResult, float]:
     """Fit by least squares with the noise and an independent model error, whose size is estimated as well.
 
     Size (by restricted likelihood) and parameters are estimated in turn until the size converges.
 
     Args:
-        found: least-squares fit with the noise alone.
+        plain_fit: least-squares fit with the noise alone.
         bounds: limits of parameters [SI], inside their default limits.
 
     Returns:
         The fit, and the standard deviation of the model error relative to the stiffness.
     """
-    tests, names, starts = found.minimised, found.names, [found.model]
-    fixed = {name: value for name, value in found.model.values.items() if name not in names}
+    tests, names, starts = plain_fit.minimised, plain_fit.names, [plain_fit.model]
+    fixed = {name: value for name, value in plain_fit.model.values.items() if name not in names}
     with suppress(FitError):  # tests that no rubber gives
         # a second start, with the branches read off the tests: a fit bent by noise may have lost one for good
-        paper = Model.with_defaults(found.model.bushing, BASE, start_values(found.model.bushing, tests, fixed))
-        of_effects = [paper.start_values_for(effect)[0] for effect in found.model.records]
+        paper = Model.with_defaults(plain_fit.model.bushing, BASE, start_values(plain_fit.model.bushing, tests, fixed))
+        of_effects = [paper.start_values_for(effect)[0] for effect in plain_fit.model.records]
         values = {**paper.values, **{name: value for start in of_effects for name, value in start.items()}}
-        starts.append(found.model.with_values({name: values[name] for name in names if name in values}))
+        starts.append(plain_fit.model.with_values({name: values[name] for name in names if name in values}))
     sizes = [likeliest_size(start, tests, names) for start in starts]
     size = min(size for size in sizes if np.isfinite(size))
     for _ in range(_MAXIMUM_ROUNDS):
@@ -184,24 +184,24 @@ def likeliest_size(model: Model, data_sets: Sequence[MeasuredTest], names: Seque
     return float(np.exp(found.x))
 
 
-def log_likelihood(found: FitResult, prior_precision: Mapping[str, float]) -> float:
+def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) -> float:
     """Natural log of the likelihood of a fit, integrated over the parameters that are not at a bound.
 
     If the model misses the tests, a Gaussian process is added to the noise and its sizes and lengths are averaged over.
 
     Args:
-        found: result of the fit.
+        solution: result of the fit.
         prior_precision: precision (inverse variance) of the prior of each parameter's coordinate, by parameter name; 0
             for the other parameters.
 
     Returns:
         Natural log of the likelihood, up to a constant that is the same for all models.
     """
-    size = max(test.model_error for test in found.minimised)
-    bare = [replace(test, model_error=0.0) for test in _thinned(found.minimised)]
+    size = max(test.model_error for test in solution.minimised)
+    bare = [replace(test, model_error=0.0) for test in _thinned(solution.minimised)]
     if size:
         bare = [replace(t, model_error=size, first_error=2) if isinstance(t, MeasuredLoop) else t for t in bare]
-    tests = _in_noise(found, bare)
+    tests = _in_noise(solution, bare)
     rows, residual = tests.moving, tests.solution.residual
     information, gain = rows @ rows.T, 0.0
     if size:
@@ -216,7 +216,7 @@ def log_likelihood(found: FitResult, prior_precision: Mapping[str, float]) -> fl
         shares = columns[best] * SIZES[likelihoods[best].gains(SIZES).argmax()]
         across = shares @ tests.project(tests.moving).T
         information = information - across.T @ np.linalg.solve(shares @ shares.T + np.eye(len(shares)), across)
-    prior = np.diag([prior_precision.get(found.names[i], 0.0) for i in found.moving])
+    prior = np.diag([prior_precision.get(solution.names[i], 0.0) for i in solution.moving])
     log_size = sum(test.log_det_covariance for test in tests.data_sets) + float(
         np.linalg.slogdet(information + prior)[1]
     )
@@ -231,21 +231,21 @@ def model_error_warning(error: Unnamed) -> str:
     )
 
 
-def _exceeds_noise(found: FitResult, rig: RigSettings) -> bool:
+def _exceeds_noise(solution: FitResult, rig: RigSettings) -> bool:
     """True if chi-square of all tests, or of one, exceeds that of noise and errors of a rig of the given class."""
-    squares, counts = [], [test.residual_count for test in found.minimised]
-    for test, rows in zip(found.minimised, rows_of(found.minimised), strict=True):
-        whitened = CommonError(_errors_of_class(test, rig)).whiten(found.residual[rows])
+    squares, counts = [], [test.residual_count for test in solution.minimised]
+    for test, rows in zip(solution.minimised, rows_of(solution.minimised), strict=True):
+        whitened = CommonError(_errors_of_class(test, rig)).whiten(solution.residual[rows])
         squares.append(float(np.sum(np.square(whitened))))
-    freedom = max(sum(counts) - len(found.names), 1)
+    freedom = max(sum(counts) - len(solution.names), 1)
     pairs = [(sum(squares), freedom), *zip(squares, counts, strict=True)]
     return any(excess_chi_square(square / count, count) is not None for square, count in pairs if count)
 
 
-def _is_smooth(found: FitResult, rig: RigSettings) -> bool:
+def _is_smooth(solution: FitResult, rig: RigSettings) -> bool:
     """True if a smooth discrepancy is more probable than noise and errors of a rig of the given class alone."""
-    thinned = _thinned(found.minimised)
-    solution = found.moved_to(found.model, thinned)
+    thinned = _thinned(solution.minimised)
+    solution = solution.moved_to(solution.model, thinned)
     tests = FittedTests(solution, [_errors_of_class(test, rig) for test in thinned])
     names = tuple(dict.fromkeys(tests.directions.tolist()))
     quick = [Discrepancy.over_tests(tests, (names,), _MIDDLING, _FEW)]

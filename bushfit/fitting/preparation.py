@@ -119,25 +119,25 @@ def prepare_sweeps(
     return _with_contradictions(found, [np.concatenate([np.empty(0), *values]) for values in conditions])
 
 
-def _with_contradictions(found: Sequence[_Kind], conditions: Sequence[Array]) -> list[_Kind]:
+def _with_contradictions(tests: Sequence[_Kind], conditions: Sequence[Array]) -> list[_Kind]:
     """Mark each test that contradicts an earlier test with a sentence on the pair of points that differs most.
 
     Points of different tests are repeats if all conditions, (n,) each over the points of all tests, and temperatures
     are equal.
     """
-    if len(found) < 2:
-        return list(found)
-    kelvin = np.nan_to_num(np.hstack([test.temperature for test in found]))  # those that are not known are a group
+    if len(tests) < 2:
+        return list(tests)
+    kelvin = np.nan_to_num(np.hstack([test.temperature for test in tests]))  # those that are not known are a group
     order, session = np.argsort(kelvin), np.empty(kelvin.size, dtype=np.intp)
     session[order] = np.cumsum(np.diff(kelvin[order], prepend=kelvin[order[0]]) > _SAME_KELVIN)
     points = np.unique(np.stack([*conditions, session]), axis=1, return_inverse=True)[1]
-    owner = np.repeat(np.arange(len(found)), [test.measured.size for test in found])
-    marked = list(found)
-    for separation, *pair in reversed(contradictions(np.concatenate([test.measured for test in found]), points)):
+    owner = np.repeat(np.arange(len(tests)), [test.measured.size for test in tests])
+    marked = list(tests)
+    for separation, *pair in reversed(contradictions(np.concatenate([test.measured for test in tests]), points)):
         first, later = np.sort(owner[pair])
         if first != later:  # a file that contradicts itself tells so
             difference = f"their stiffness differs by {number(100.0 * separation, 2)} %"
-            marked[later] = replace(found[later], contradiction=f"it repeats {found[first].name}, and {difference}")
+            marked[later] = replace(tests[later], contradiction=f"it repeats {tests[first].name}, and {difference}")
     return marked
 
 

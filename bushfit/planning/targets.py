@@ -194,6 +194,6 @@ class TargetSensitivity:
         return f"{percent(size)}{location} is {cause}"
 
 
-def percent(half: float, digits: int = 2) -> str:
+def percent(half_width: float, digits: int = 2) -> str:
     """Format a relative half width as a percentage: 0.015 becomes "+/-1.5 %"."""
-    return f"+/-{number(100.0 * half, digits)} %"
+    return f"+/-{number(100.0 * half_width, digits)} %"

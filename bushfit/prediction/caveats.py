@@ -233,9 +233,9 @@ def point_warnings(
         yield f"{place}: stiffness {percent} if {names} belongs to the rig; the band, low to high, includes both"
 
 
-def format_deviation(ratio: Array) -> str:
+def format_deviation(ratios: Array) -> str:
     """Format the smallest and largest deviation of ratios from 1 as percentages: "+1.2 to +3.4 %"."""
-    ends = [number(100.0 * end - 100.0, 2, "+") for end in (np.nanmin(ratio), np.nanmax(ratio))]
+    ends = [number(100.0 * end - 100.0, 2, "+") for end in (np.nanmin(ratios), np.nanmax(ratios))]
     return f"{' to '.join(dict.fromkeys(ends))} %"
 
 

@@ -138,7 +138,7 @@ class Comparison:
         sentences = []
         for contrast in self.contrasts:
             stiffness, loss = self.widened(contrast.stiffness), self.widened(contrast.loss_factor)
-            percent = replace(stiffness, **{end: 100.0 * relative(getattr(stiffness, end)) for end in _ENDS})
+            percent = replace(stiffness, **{end: 100.0 * relative_difference(getattr(stiffness, end)) for end in _ENDS})
             quantity, place = contrast.place.motion.words[2], contrast.place
             differences = _describe_difference(percent, " %", contrast)
             losses = _describe_difference(loss, "", contrast)
@@ -207,7 +207,7 @@ def holm(probabilities: Sequence[float]) -> list[float]:
     return adjusted.tolist()
 
 
-def relative(logarithm: Array) -> Array:
+def relative_difference(logarithm: Array) -> Array:
     """Convert natural logarithms of ratios, limited to +-ln(1e10), to relative differences: exp(logarithm) - 1."""
     return np.expm1(np.clip(logarithm, -_FURTHEST, _FURTHEST))
 
@@ -267,7 +267,7 @@ def compare_parameters(
         row = ParameterContrast(label, unit, values[0], values[1], of_ratio, note=note)
         if not note:
             ends = difference[i] - half[i], difference[i], difference[i] + half[i]
-            low, value, high = (float(relative(end) if of_ratio else end) for end in ends)
+            low, value, high = (float(relative_difference(end) if of_ratio else end) for end in ends)
             p = 2.0 * float(stdtr(freedom[i], -abs(difference[i]) / error[i]))
             row = replace(row, difference=value, interval=(low, high), p=p)
         contrasts.append(row)

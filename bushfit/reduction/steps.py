@@ -136,21 +136,21 @@ def find_steps(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStre
     return join_broken_steps(found), skipped
 
 
-def join_broken_steps(found: Sequence[tuple[float, float, Step]]) -> list[Step]:
+def join_broken_steps(timed_steps: Sequence[tuple[float, float, Step]]) -> list[Step]:
     """Merge steps that are parts of one interrupted step: the longest part remains.
 
     An outlier or a creeping amplitude splits a step; its sine resumes in phase after a cycle or two. The frequencies of
     the parts may differ by up to 1 % if one part is much shorter, else by 0.2 %.
 
     Args:
-        found: beginning [s] and end [s] of the cycles of each step, and the step, in order of time.
+        timed_steps: beginning [s] and end [s] of the cycles of each step, and the step, in order of time.
 
     Returns:
         Steps in order of time.
     """
     joined: list[Step] = []
     last_end = -np.inf
-    for start, end, step in found:
+    for start, end, step in timed_steps:
         if resumes_in_phase((start - last_end) * step.frequency):
             counts = sorted((joined[-1].found, step.found))
             reach = _SETTLING_FREQUENCY if 2 * counts[0] < counts[1] else _SAME_FREQUENCY

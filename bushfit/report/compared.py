@@ -14,7 +14,7 @@ import pandas as pd
 
 from bushfit.errors import ModelError
 from bushfit.model.file import require_schema
-from bushfit.prediction.comparison import Comparison, Contrast, ParameterContrast, relative
+from bushfit.prediction.comparison import Comparison, Contrast, ParameterContrast, relative_difference
 from bushfit.report.compare_document import SCHEMA, ComparisonFile
 from bushfit.report.tables import require_columns, response_headers, words
 from bushfit.units import display_unit, number, split_header
@@ -53,7 +53,7 @@ def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
             columns |= {header: band.value * scale, f"{header}, low": band.low * scale}
             columns[f"{header}, high"] = band.high * scale
     differences = (
-        (f"relative difference of {words(contrast.place)[2]} [-]", contrast.stiffness, relative),
+        (f"relative difference of {words(contrast.place)[2]} [-]", contrast.stiffness, relative_difference),
         ("difference of loss factor [-]", contrast.loss_factor, np.asarray),
     )
     for header, band, convert in differences:

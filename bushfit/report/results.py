@@ -72,7 +72,7 @@ def table_file(name: str, make: Callable[[], pd.DataFrame]) -> ResultFile:
 
 
 def figure_file(name: str, make: Callable[[], Figure]) -> ResultFile:
-    """Result file for a figure."""
+    """Result file for a figure; `make` is called at most once."""
     return ResultFile(name, "figure", make)
 
 

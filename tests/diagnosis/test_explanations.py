@@ -68,7 +68,7 @@ def test_a_level_may_be_off_by_a_slope_over_the_logarithm_of_frequency(bare: Evi
     """From -1 to 1 times the shift, and nothing at other levels."""
     gain, _, slope, _ = next(place for place in faulty_places(bare) if place.family == "level").columns
     sweep = split_by_kind(bare.data_sets)[1][0]
-    rows = bare.place[sweep].start + np.arange(sweep.frequency.size)
+    rows = bare.residual_rows[sweep].start + np.arange(sweep.frequency.size)
     touched = gain[rows] != 0.0
     expected = np.interp(np.log(sweep.frequency), np.log([sweep.frequency.min(), sweep.frequency.max()]), [-1.0, 1.0])
     assert np.count_nonzero(slope) == np.count_nonzero(gain)
@@ -88,12 +88,12 @@ def test_curves_have_unit_variance_and_fall_off_with_distance(bare: Evidence) ->
     for how, length, short in (("smooth", 1.5, 0.1), ("rough", 0.5, 0.6)):
         group = made[f"{how} axial"].group
         assert group is not None
-        own = group.columns[:, bare.place[sweep]].reshape(len(group.columns), 2, -1)[:, 0] / point
+        own = group.columns[:, bare.residual_rows[sweep]].reshape(len(group.columns), 2, -1)[:, 0] / point
         correlation = matern(np.log(sweep.frequency[same, None]) / length, np.log(sweep.frequency[same, None]) / length)
         apart = correlation - (own.T @ own)[np.ix_(same, same)]
         assert np.linalg.eigvalsh(apart).min() > -0.01
         assert apart.max() < short
-        assert not group.columns[:, : bare.place[sweep].start].any()
+        assert not group.columns[:, : bare.residual_rows[sweep].start].any()
 
 
 def test_every_effect_is_proposed_but_twins_and_what_the_tests_do_not_state(bare: Evidence) -> None:

@@ -25,7 +25,7 @@ def off(evidence: Evidence, sweep: MeasuredSweep, change: Callable[[MeasuredSwee
     step = 1e-6
     changed = replace(sweep, sweep=replace(sweep.sweep, stiffness=sweep.sweep.stiffness * (1.0 - step * change(sweep))))
     row = np.zeros(evidence.residual.size)
-    row[evidence.place[sweep]] = (changed.residual(evidence.model) - sweep.residual(evidence.model)) / step
+    row[evidence.residual_rows[sweep]] = (changed.residual(evidence.model) - sweep.residual(evidence.model)) / step
     return row
 
 

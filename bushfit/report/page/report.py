@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from bushfit.diagnosis.document import DiagnosisFile, EffectEntry
-from bushfit.diagnosis.record import odds_in_words
+from bushfit.diagnosis.record import format_odds
 from bushfit.effects.temperature import REFERENCE
 from bushfit.geometry import STRAINING, TRANSLATION, Bushing, Specimen
 from bushfit.model.result import Result
@@ -97,7 +97,7 @@ def report_context(record: ReportRecord) -> dict[str, Any]:
         "tone": _TONES.get(diagnosis["verdict"], "fair") if diagnosis else "fair",
         "consequence": _CONSEQUENCES[diagnosis["verdict"]] if diagnosis else "",
         "effects": [(effect, [*effect_sizes(effect)]) for effect in diagnosis["effects"]] if diagnosis else [],
-        "odds": odds_in_words(diagnosis) if diagnosis else [],
+        "odds": format_odds(diagnosis) if diagnosis else [],
         "pictures": pictures,
         "appendix": appendix,
         "left_out": left_out,
