@@ -17,7 +17,7 @@ import click
 import pandas as pd
 import pytest
 from commandline import Done
-from shell import BUSHING, Run, document, names, refused, typing
+from shell import Run, document, names, refused, typing
 from tries import some
 
 from bushfit.cli import cli
@@ -245,22 +245,6 @@ def test_every_format_at_once_and_what_it_leaves_out(bushfit: Run, tmp_path: Pat
     told = [line.removeprefix("warning: ") for line in done.stderr.splitlines() if line.startswith("warning: ")]
     assert sorted(told) == sorted(found["warnings"])  # the terminal has the most important first
     assert any(line.startswith("radial: not fitted") for line in told)
-
-
-def test_directions_share_frequencies_and_the_dialect_has_its_own_file(bushfit: Run, tmp_path: Path) -> None:
-    """Tests of other frequencies axially and radially: decks have one list, of all of them."""
-    text = BUSHING
-    for direction, frequencies in (("axial", (5, 20, 50)), ("radial", (5, 20, 70))):
-        text += f'[[sweeps]]\nfile = "{direction}.csv"\ndirection = "{direction}"\n'
-        rows = "\n".join(f"{f},0.1,600,0.1" for f in frequencies)
-        header = "frequency [Hz],amplitude [mm],stiffness [N/mm],loss factor [-]"
-        (tmp_path / f"{direction}.csv").write_text(f"{header}\n{rows}\n")
-    (tmp_path / "two.toml").write_text(text)
-    formats = ("--format", "nastran", "--format", "csv", "--dialect", "optistruct")
-    bushfit("export", "model/model.json", *formats, "--campaign", tmp_path / "two.toml", "-o", tmp_path / "x")
-    assert "KMAG" in (tmp_path / "x/bushing.fem").read_text()
-    for place in ("axial", "radial"):
-        assert pd.read_csv(tmp_path / f"x/{place}.csv")["frequency [Hz]"].tolist() == [5, 20, 50, 70]
 
 
 def test_without_a_grid_it_is_the_measured_one_and_files_say_where_they_hold(root: Path, tmp_path: Path) -> None:

@@ -73,24 +73,6 @@ def test_repeats_that_disagree_do_not_excuse_themselves(own: Path, off: float, t
 
 
 @pytest.mark.parametrize(
-    "words",
-    [
-        ("predict", "{work}/model/model.json", "--campaign", CAMPAIGN), ("plan", CAMPAIGN),
-        ("compare", CAMPAIGN, CAMPAIGN), ("compare", CAMPAIGN, "--families", "intrinsic_time"), ("inspect", SWEEP),
-    ],
-    ids=["predict", "plan", "compare", "families", "inspect"],
-)  # fmt: skip
-def test_rows_that_lie_far_apart_are_told_wherever_tests_are_read(
-    own: Path, work: Path, words: tuple[str, ...]
-) -> None:
-    second_off(own, 0.13)
-    done = typing(own)(*(word.format(work=work) for word in words), "-o", "out", "--no-plots", "--json", "-v")
-    for told in (done.stderr, done.stdout):
-        assert ROWS_APART in " ".join(told.split())
-        assert re.search(r"sweep_axial.csv: .*, rows \d+ and \d+", " ".join(told.split()))
-
-
-@pytest.mark.parametrize(
     ("kind", "file", "column"),
     [("loops", "loop_axial_1", "force [N]"), ("sweeps", "sweep_axial", "stiffness [N/mm]")],
 )

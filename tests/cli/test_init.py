@@ -242,3 +242,11 @@ def test_programs_are_asked_nothing(
     person = answering(monkeypatch, *ANSWERS)
     refused(typed("init", *silent, option, "-o", "x", status=2), tmp_path / "x", "there is no column for the time")
     assert person.tell() == 0
+
+
+def test_a_file_that_names_a_direction_is_no_block_in_shear(typed: Run, tests: list[Path], tmp_path: Path) -> None:
+    (tmp_path / "mount.csv").write_bytes(tests[1].read_bytes())
+    block = ("--area", "900 mm^2", "--thickness", "6 mm", "--elements", "2", "--specimen", "mount")
+    typed("init", tests[1], "mount.csv", *GEOMETRY, *block, "-o", "x")
+    campaign = load_campaign(tmp_path / "x/campaign.toml")
+    assert [str(sweep.direction) for sweep in campaign.sweeps] == ["axial", "mount"]

@@ -18,19 +18,6 @@ def sweep(root: Path, file: Path, above: str = "") -> None:
     file.write_text(above + text, encoding="utf-8")
 
 
-def test_files_of_several_parts_are_campaigns_and_a_manifest(typed: Run, root: Path, tmp_path: Path) -> None:
-    parts = [f"P{number:02}" for number in range(1, 11)]
-    for number, part in enumerate(parts):
-        sweep(root, tmp_path / f"lab/axial_{number}.csv", f"Specimen: {part}\n")
-    done = typed("init", "lab", *GEOMETRY, "-o", "x")
-    assert "next: bushfit batch x/batch.toml" in done.stderr
-    rows = tomllib.loads((tmp_path / "x/batch.toml").read_text(encoding="utf-8"))["bushings"]
-    assert [row["campaign"] for row in rows] == [f"{part}.toml" for part in parts]
-    for number, part in enumerate(parts):
-        (test,) = load_campaign(tmp_path / f"x/{part}.toml").sweeps
-        assert test.name == f"axial_{number}"
-
-
 def test_folders_in_folders_are_searched_and_bad_names_are_left_out(typed: Run, root: Path, tmp_path: Path) -> None:
     sweep(root, tmp_path / "lab/monday/sweep_axial.csv")
     sweep(root, tmp_path / "lab/tuesday/deep/sweep_radial.csv")

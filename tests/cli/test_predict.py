@@ -111,18 +111,6 @@ def test_predict_says_each_warning_once_and_in_its_document(bushfit: Run, root: 
         assert any(said in line for line in warnings)
 
 
-def test_three_warnings_by_importance_each_with_its_meaning(bushfit: Run, work: Path, tmp_path: Path) -> None:
-    model = document(work / "model/model.json")
-    model["warnings"] = ["sweep_axial: levels disagree", "loop: the cycles only agree if the force is in kgf"]
-    (tmp_path / "model.json").write_text(json.dumps(model), encoding="utf-8")
-    done = bushfit("predict", tmp_path / "model.json", "-o", tmp_path / "x", "--no-plots")
-    first, meaning, *_ = lines = done.stderr[done.stderr.index("warning: ") :].splitlines()
-    assert first.startswith("warning: loop: the cycles only agree if")
-    assert meaning.startswith("  Do not use the numbers before")
-    assert sum(line.startswith("warning: ") for line in lines) == 3
-    assert "1 more warning: -v prints all; the result files contain them" in lines
-
-
 def test_predict_writes_maxwell_arms_where_asked(bushfit: Run, root: Path, tmp_path: Path) -> None:
     folder = tmp_path / "x"
     done = bushfit("predict", root / ARM, "--arms", "0.5 %", "-o", folder, "--json")
@@ -319,3 +307,12 @@ def test_no_test_is_planned_for_what_is_known(bushfit: Run, tmp_path: Path) -> N
     assert "no test is needed" in done.stderr
     assert names(tmp_path) == {"plan.json", "plan.csv", "plan.png"}
     assert pd.read_csv(tmp_path / "plan.csv").empty
+
+
+def test_where_nothing_was_tested_alike_the_compound_is_compared(bushfit: Run, root: Path, tmp_path: Path) -> None:
+    bushfit("fit", root / "configs/epdm_70.toml", "--direction", "DMA", "--no-plots", "-o", tmp_path / "dma")
+    done = bushfit("compare", "model", tmp_path / "dma", "-o", tmp_path / "x", "--no-plots")
+    table = pd.read_csv(tmp_path / "x/differences.csv")
+    assert set(table["place"]) == {"compound"}
+    assert {"strain amplitude [%]", "other modulus [MPa]"} <= set(table)
+    assert "compound: modulus " in done.stderr

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -41,18 +40,6 @@ def test_data_that_are_in_another_file_are_not_read(typed: Run, tmp_path: Path) 
         stream.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM")
     done = typed("inspect", "axial.mat", "--no-plots", "-o", "x", status=2)
     refused(done, tmp_path / "x", "its data are in other files")
-
-
-@pytest.mark.parametrize("width", ["80", "40", "10", "abc"])
-def test_no_number_is_cut_off_in_a_narrow_terminal(
-    bushfit: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, width: str
-) -> None:
-    arguments = ("compare", "model", "model/model.json", "--no-plots", "--no-report", "-o", tmp_path / "x", "--force")
-    numbers = []
-    for columns in ("200", width):
-        monkeypatch.setattr("commandline.WIDTH", columns)
-        numbers.append(sorted(re.findall(r"\d+\.\d+", bushfit(*arguments).stderr)))
-    assert numbers[0] == numbers[1]
 
 
 def test_a_name_is_printed_as_it_is(typed: Run, tmp_path: Path) -> None:
