@@ -14,7 +14,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 import openpyxl
-import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -26,17 +25,13 @@ from bushfit.commands.predict import predict
 from bushfit.errors import CONTROL, OutputError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.model import Model
-from bushfit.reading.tablefile import Form
 from bushfit.report.plots.style import to_image
 from bushfit.report.results import (
     Formats,
     Picture,
     ResultFile,
     encode_all,
-    figure_file,
-    json_file,
     raw_file,
-    table_file,
     write_results,
 )
 from bushfit.report.tables import loops_table, sweeps_table
@@ -154,7 +149,6 @@ def test_a_file_that_bushfit_did_not_write_is_never_replaced(tmp_path: Path, for
     assert (tmp_path / "results" / "b.json").read_bytes() == b"old b"
 
 
-BEGINS = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
 #: A text with markup, the end of a comment, what mathematics would be, and letters that the font lacks.
 NASTY = "<script>alert(1)</script> --> & $x_1$ 衬套"
 
@@ -169,24 +163,6 @@ def drawn() -> Figure:
     figure.subplots().fill_between([1.0, 2.0], [1.0, 2.0], [2.0, 3.0], hatch="//")
     figure.suptitle(NASTY, parse_math=False)
     return figure
-
-
-@pytest.mark.parametrize(("form", "end"), [("csv", "csv"), ("decimal-comma", "csv"), ("xlsx", "xlsx")])
-@pytest.mark.parametrize("pictures", [("png",), ("svg", "pdf"), ()])
-def test_files_in_each_format(form: Form, end: str, pictures: tuple[Picture, ...]) -> None:
-    made = list[Figure]()
-
-    def picture() -> Figure:
-        made.append(drawn())
-        return made[0]
-
-    formats = Formats(pictures=bool(pictures), table_form=form, picture_forms=pictures)
-    table = table_file("a", lambda: pd.DataFrame({"x [mm]": np.ones(2)}))
-    files = encode_all([json_file("model", {}), table, figure_file("a", picture)], formats)
-    assert list(files) == ["model.json", f"a.{end}", *(f"a.{ending}" for ending in pictures)]
-    assert len(made) == bool(pictures), "drawn once for all formats"
-    for ending in pictures:
-        assert files[f"a.{ending}"].startswith(BEGINS[ending])
 
 
 @pytest.mark.parametrize("form", get_args(Picture))

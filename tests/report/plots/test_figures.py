@@ -30,12 +30,10 @@ from figures import (
 from matplotlib.figure import Figure
 from tries import some
 
-from bushfit.fitting.preparation import prepare_loops
 from bushfit.geometry import Direction
 from bushfit.inspection.record import Inspection
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.reading.measurement import Loop
 from bushfit.report.plots.inspection import inspection_figure
 from bushfit.report.plots.style import to_image
 
@@ -142,22 +140,3 @@ def test_sweeps_of_many_amplitudes(paper_model: Model, swept: Swept, count: int)
     assert len(points(left)) == count
     assert len(right.child_axes) == (count > 8)
     assert right.child_axes or len(legend(right)) == count
-
-
-@pytest.mark.parametrize("count", some([2, 40], {40}))
-def test_many_loops(paper_model: Model, looped: Looped, count: int) -> None:
-    one = looped(paper_model, 1e-3, cycles=2).test
-    data_sets = prepare_loops(
-        [
-            Loop(f"$ loop {k} $.csv", one.direction, one.time, scale * one.displacement, scale * one.force)
-            for k, scale in enumerate(np.linspace(0.5, 2.0, count))
-        ]
-    )
-    figure = checked(loops(paper_model, *data_sets))
-    names = legend(figure.axes[1])
-    assert names[-1] == "model"
-    assert names[0].startswith("0.5 mm, 0.1 Hz")
-    assert len(names) == min(count, 8) + 1
-    assert ("Only 8 loops of a direction are drawn" in note(figure)) is (count > 8)
-    for after in (paper_model, paper_model.with_values({"mu": 1.2 * paper_model.values["mu"]})):
-        checked(gap(paper_model, after, data_sets))
