@@ -64,32 +64,6 @@ def result(described: GapDescription) -> Result:
     return Result(described.after.model, measured=measured)
 
 
-def test_it_stands_where_it_was_not_fitted(described: GapDescription) -> None:
-    """The excess over the noise floor halves in whole runs that were held out, by a band narrower than half the gap."""
-    held, correction = described.holdout, described.after.model.unnamed
-    assert correction is not None
-    print(held, correction.uncertainty, correction.size, correction.lengths)
-    assert held.before is not None
-    assert held.after is not None
-    assert held.after - 1.0 < 0.5 * (held.before - 1.0)
-    assert len(held.parts) == 3
-    assert correction.uncertainty < 0.5
-
-
-def test_the_parameters_beside_it_are_no_longer_bent(
-    measured: Measured, fitted: Fitted, evidence: Evidence, described: GapDescription
-) -> None:
-    """They lie nearer to those of the same rig without the gap than the plain fit's do."""
-    truth = fitted(replace(measured(), loops=())).model.values
-    off = [
-        float(np.linalg.norm([np.log(model.values[name] / truth[name]) for name in truth]))
-        for model in (evidence.model, described.after.model)
-    ]
-    print("off the parameters without the gap, plain and beside the correction:", off)
-    assert off[1] < off[0]
-    assert described.after.chi_square < 1.15 * evidence.residual.size
-
-
 def test_what_the_diagnosis_says(measured: Measured) -> None:
     """On a rig of which it is known that no error of a level makes it up."""
     rig = RigSettings(gain_error=5e-4, phase_error=5e-4)

@@ -14,14 +14,12 @@ from rigged import LEVELS, SHARED, Fitted, Measured, Tamper, both, loop_too_stro
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import Explanation, unnamed_curves
+from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.faulty_places import faulty_places
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.propose import proposals, scores
 from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
 from bushfit.effects import BASE, LIBRARY
-from bushfit.fitting.preparation import split_by_kind
-from bushfit.gaussian_process import matern
 
 SHARED_RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
 
@@ -62,38 +60,6 @@ def test_the_place_that_went_wrong_is_the_likeliest(
     found = best(evidence, faulty_places(evidence))
     assert (found.kind, found.family) == ("place", kind)
     assert found.name == words
-
-
-def test_a_level_may_be_off_by_a_slope_over_the_logarithm_of_frequency(bare: Evidence) -> None:
-    """From -1 to 1 times the shift, and nothing at other levels."""
-    gain, _, slope, _ = next(place for place in faulty_places(bare) if place.family == "level").columns
-    sweep = split_by_kind(bare.data_sets)[1][0]
-    rows = bare.residual_rows[sweep].start + np.arange(sweep.frequency.size)
-    touched = gain[rows] != 0.0
-    expected = np.interp(np.log(sweep.frequency), np.log([sweep.frequency.min(), sweep.frequency.max()]), [-1.0, 1.0])
-    assert np.count_nonzero(slope) == np.count_nonzero(gain)
-    ratio = slope[rows][touched] / gain[rows][touched]
-    assert np.ptp(ratio) == pytest.approx(2.0)
-    assert np.ptp(ratio - expected[touched]) < 1e-9
-
-
-def test_curves_have_unit_variance_and_fall_off_with_distance(bare: Evidence) -> None:
-    """In shares of |K|, of one direction or of all, and of the loops their harmonics; a rough one as far as it goes."""
-    made = {each.name: each for each in unnamed_curves(bare)}
-    of_one = {f"{how} {where}" for how in ("smooth", "rough") for where in ("axial", "radial")}
-    assert set(made) == of_one | {"rough all", "loops"}  # what is smooth in all is the compound's
-    sweep = split_by_kind(bare.data_sets)[1][0]
-    point = sweep.whiten(np.ones(sweep.frequency.size)).reshape(2, -1)[0]
-    same = np.flatnonzero((sweep.amplitude == LEVELS[1]) & (sweep.repeat == 1))
-    for how, length, short in (("smooth", 1.5, 0.1), ("rough", 0.5, 0.6)):
-        group = made[f"{how} axial"].group
-        assert group is not None
-        own = group.columns[:, bare.residual_rows[sweep]].reshape(len(group.columns), 2, -1)[:, 0] / point
-        correlation = matern(np.log(sweep.frequency[same, None]) / length, np.log(sweep.frequency[same, None]) / length)
-        apart = correlation - (own.T @ own)[np.ix_(same, same)]
-        assert np.linalg.eigvalsh(apart).min() > -0.01
-        assert apart.max() < short
-        assert not group.columns[:, : bare.residual_rows[sweep].start].any()
 
 
 def test_every_effect_is_proposed_but_twins_and_what_the_tests_do_not_state(bare: Evidence) -> None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigged import SHARED, Measured, asked, no_loops, no_repeats, no_sweeps, said
+from rigged import SHARED, Measured, asked, no_repeats, said
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.next_test import BUSHING_TESTS, FIXTURE_TESTS, deciding_test, remaining_entropy
@@ -17,24 +17,7 @@ from bushfit.effects import BASE
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Direction
-from bushfit.model.file import to_document
 from bushfit.model.model import Model
-
-
-def test_what_the_tests_cannot_show_is_said_and_goes_with_the_model(measured: Measured) -> None:
-    campaign = measured({}, SHARED)
-    for part, unseen in (
-        (no_loops, {"asymmetry", "force_offset", "force_gain"}),
-        (no_sweeps, {"viscous", "maxwell", "force_gain"}),
-    ):
-        diagnosis = asked(part(campaign))
-        assert said(diagnosis) == "consistent "
-        (note,) = diagnosis.notes
-        assert note.startswith("not identifiable from these tests: ")
-        assert unseen <= set(note.partition(": ")[2].split(", "))
-    assert any("cannot be determined separately" in line for line in to_document(diagnosis.result)["warnings"])
-    whole = asked(campaign)
-    assert whole.notes == whole.result.warnings == ()
 
 
 def test_the_class_of_a_rig_that_is_assumed_is_said(measured: Measured) -> None:
@@ -131,18 +114,6 @@ def test_pairs(
     assert found in SENTENCES
     assert any(word in found for word in words)
     assert deciding_test(models[::-1], EVEN, data_sets) == found
-
-
-def test_a_factor_of_one_direction_is_settled_by_a_reference_spring_in_its_fixture(
-    paper_model: Model, data_sets: list[MeasuredTest]
-) -> None:
-    """An empty fixture and a steel dummy read the same whatever the gain of a transducer is."""
-    models = [
-        paper_model.with_effect("stiffness_factor.radial", {"stiffness_factor.radial": 0.93}),
-        paper_model.with_effect("displacement_gain.radial", {"displacement_gain.radial": 1.06}),
-    ]
-    found = deciding_test(models, (0.9, 0.1), data_sets)
-    assert found == "put a reference spring of known stiffness in the radial fixture"
 
 
 def test_the_next_test_is_within_the_limits_of_the_rig(paper_model: Model, data_sets: list[MeasuredTest]) -> None:

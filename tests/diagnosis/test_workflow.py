@@ -12,7 +12,6 @@ from rigged import (
     INERTIA,
     PLAN,
     SHARED,
-    Diagnosed,
     Effects,
     Fitted,
     Measured,
@@ -28,32 +27,14 @@ from rigged import (
     one_loop,
     said,
 )
-from tries import some
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import SimulateSettings
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.effects import BASE
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.model import Model
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import undisturbed
-
-
-@pytest.mark.parametrize("plan", [PLAN, SHARED], ids=["independent", "shared"])
-@pytest.mark.parametrize("seed", some(range(4), [0]))
-def test_a_clean_campaign_is_consistent_and_its_model_stays(
-    diagnosed: Diagnosed, measured: Measured, plan: SimulateSettings, seed: int
-) -> None:
-    diagnosis = diagnosed({}, plan, seed)
-    assert diagnosis.verdict == "consistent"
-    assert diagnosis.effects == ()
-    assert diagnosis.where == ()
-    assert diagnosis.after is diagnosis.before
-    assert diagnosis.result.model.effects == BASE
-    before, after = diagnosis.calibration
-    assert before == after == pytest.approx(1.0, abs=0.08)
 
 
 @pytest.mark.slow
