@@ -13,20 +13,18 @@ import pytest
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep
-from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.assess import FitStage, covariance
 from bushfit.fitting.coordinates import jacobian
 from bushfit.fitting.preparation import MeasuredLoop, new_loop
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
-from bushfit.fitting.procedures import fit_joint, fit_two_step
+from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Misfit, Result
 from bushfit.reading.measurement import Sweep
-from bushfit.units import CELSIUS
 
 BAND = (5.0, 15.0, 45.0, 100.0, 155.0)
 
@@ -89,20 +87,6 @@ def test_kilonewtons_taken_for_newtons_are_told(small: Campaign) -> None:
         if "units" in line
     ]
     assert "kPa is that of no rubber" in told
-
-
-@pytest.mark.parametrize(("warm", "told"), [(25.9, 0), (60.0, 1)])
-def test_tests_at_other_temperatures_are_told_by_fit_and_diagnose(small: Campaign, warm: float, told: int) -> None:
-    (loop,), (sweep,) = small.loops, without(small, Direction.RADIAL)
-    at_23, hot = replace(loop, temperature=23.0 + CELSIUS), replace(sweep, temperature=warm + CELSIUS)
-    data = PreparedCampaign.from_campaign(replace(small, loops=(at_23,), sweeps=(hot,)))
-    for result in (fit_joint(data), fit_two_step(data).result, diagnose(data).result):
-        lines = [line for line in result.warnings if "degC" in line]
-        assert len(lines) == told
-        if told:
-            assert lines[0].startswith(
-                f"{sweep.name} was tested at 60 degC and {loop.name} at 23 degC, 37 degC apart: "
-            )
 
 
 def test_what_wrong_weights_cost_is_that_of_a_mean_of_two_groups(paper_model: Model) -> None:

@@ -73,20 +73,6 @@ def both(rig: Callable[..., Campaign], coupons: Campaign) -> Campaign:
     return replace(bushing, sweeps=(*bushing.sweeps, *coupons.sweeps), specimens=(DMA,))
 
 
-def test_coupons_are_fitted_beside_the_axial_tests(both: Campaign) -> None:
-    data = PreparedCampaign.from_campaign(both)
-    assert {str(data_set.direction) for data_set in data.select_tests(None)} == {"axial", "DMA"}
-    assert {str(data_set.direction) for data_set in data.select_tests(["DMA", "radial"])} == {"DMA", "radial"}
-    assert {data_set.direction for data_set in data.static_loops()} == {Direction.AXIAL}
-    assert data.smallest_sweep.direction is Direction.AXIAL
-    with pytest.raises(ModelError, match=r"no such direction or specimen[\s\S]*dma[\s\S]*torsion, DMA"):
-        data.select_tests(["dma"])
-    result = fit_joint(data)
-    assert result.measured is not None
-    assert result.measured.directions == ("axial", "DMA")
-    assert {test.place for test in result.tests if not test.fitted} == {"radial"}
-
-
 def test_effects_of_the_campaign_are_in_every_fit(coupons: Campaign, paper_model: Model) -> None:
     mount = sweep(paper_model, MOUNT, FREQUENCIES, [1e-4, 5e-4], factor=1.1)
     effects = FitSettings(effects=("stiffness_factor.mount",))
