@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.schema import SimulatedSweep, SimulateSettings
-from bushfit.fitting.preparation import prepare_sweeps
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction, Shape
@@ -53,22 +52,6 @@ def test_bands_of_an_open_model_are_narrow_where_it_was_measured_and_only_there(
     assert elsewhere > 0.2
 
 
-def test_instrument_effects_are_left_out_and_component_ones_kept(paper_model: Model) -> None:
-    rigged = paper_model.with_effect("rig_compliance", {"rig_compliance.compliance": 1e-7}).with_effect(
-        "inertia", {"inertia.mass": 0.2}
-    )
-    names = ("mu", "rig_compliance.compliance")
-    result = Result(rigged, names, Covariance(names, np.diag([1e6, 1e-18])), measured=Range((5.0, 155.0), (1e-3, 0.1)))
-    plain = predict(Result(paper_model), Direction.AXIAL, FREQUENCIES, AMPLITUDES)
-    cleaned = predict(result, Direction.AXIAL, FREQUENCIES, AMPLITUDES)
-    np.testing.assert_allclose(cleaned.stiffness.value, plain.stiffness.value)
-    (said,) = caveats(result)
-    assert said.endswith(("rig_compliance, inertia", "inertia, rig_compliance"))
-    stop = paper_model.with_effect("bump_stop", {"bump_stop.gap": 2e-4, "bump_stop.stiffness": 1e6})
-    kept = predict(Result(stop), Direction.AXIAL, FREQUENCIES, AMPLITUDES)
-    assert kept.stiffness.value[-1] > 1.1 * plain.stiffness.value[-1]
-
-
 @pytest.fixture
 def either(paper_model: Model) -> Result:
     """The paper's bushing with a sleeve that flexes, or a rig that gives way."""
@@ -107,27 +90,6 @@ def test_what_may_be_the_rigs_is_predicted_both_ways_and_the_bands_span_both(eit
     assert f"at {shaken.if_rigs.peak[0]:.4g} Hz" in shaken.warnings[-1]
     rigs_too = predicted_resonance_table(shaken)["transmissibility [-], if it is the rig's"]
     np.testing.assert_allclose(rigs_too, np.abs(shaken.if_rigs.transmissibility))
-
-
-def test_the_measured_stiffness_stands_beside_and_what_the_rig_took_is_said(paper_model: Model) -> None:
-    rigged = paper_model.with_effect("rig_compliance", {"rig_compliance.compliance": 2e-8})
-    frequency, amplitude = np.array([5.0, 5.02, 55.0, 155.0]), np.array([1e-4, 1.005e-4, 1e-4, 3e-4])
-    stiffness = rigged.stiffness("radial", frequency, amplitude) * np.array([1.01, 0.99, 1.0, 1.0])
-    sweep = Sweep("radial", Direction.RADIAL, frequency, amplitude, stiffness, repeat=np.array([1, 2, 1, 1]))
-    sweeps = prepare_sweeps([sweep])
-    found = predict(Result(rigged), Direction.RADIAL, FREQUENCIES, AMPLITUDES, sweeps=sweeps)
-    table = prediction_table(found)
-    measured = table["measured stiffness [N/mm]"].to_numpy() * 1e3
-    assert measured[0] == pytest.approx(abs(stiffness[:2].mean()))
-    assert measured[1] == pytest.approx(abs(stiffness[2]))
-    assert np.isnan(measured[2:]).all()
-    assert table["measured loss factor [-]"][1] == pytest.approx(stiffness[2].imag / stiffness[2].real)
-    off = 100.0 * (found.stiffness.value[:2] / measured[:2] - 1.0)
-    (said,) = [line for line in found.warnings if "without rig_compliance" in line]
-    assert f"is +{off.min():.2g} to +{off.max():.2g} % compared with the measured one" in said
-    elsewhere = predict(Result(rigged), Direction.AXIAL, FREQUENCIES, AMPLITUDES, sweeps=sweeps)
-    assert prediction_table(elsewhere)["measured stiffness [N/mm]"].isna().all()
-    assert not [line for line in elsewhere.warnings if "measured" in line and "without" in line]
 
 
 def swept(frequency: object, amplitude: object, **more: Any) -> Sweep:
