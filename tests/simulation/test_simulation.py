@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE, LIBRARY, get_effect, qualified_name
-from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction, Specimen
 from bushfit.model import rig
-from bushfit.model.file import load_result
-from bushfit.model.model import FIVE, Model
-from bushfit.simulation.files import to_files
-from bushfit.simulation.measured import Simulated, measure, simulate
+from bushfit.model.model import Model
+from bushfit.simulation.measured import measure, simulate
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
 LOOP = SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=2)
@@ -129,52 +123,3 @@ def test_a_resonance_test_reduces_to_the_stiffness_at_the_amplitude_reached(pape
         assert np.ptp(np.log(sweep.amplitude)) > np.log(5.0)
         closed = paper_model.stiffness(sweep.direction, sweep.frequency, sweep.amplitude)
         np.testing.assert_allclose(sweep.stiffness, closed, rtol=2e-3)
-
-
-def written(simulated: Simulated, folder: Path) -> Campaign:
-    for name, content in to_files(simulated).items():
-        (folder / name).write_bytes(content)
-    return load_campaign(folder / "campaign.toml")
-
-
-TESTS = SimulateSettings(
-    repeats=3,
-    noise=5e-3,
-    force_noise=3e-3,
-    gain_error=3e-3,
-    phase_error=2e-3,
-    seed=4,
-    sweeps=(
-        STRAIN_SWEEP,
-        SimulatedSweep(Direction.AXIAL, (1e-4, 2e-4, 5e-4), tuple(np.arange(5.0, 156.0, 15.0).tolist())),
-        replace(STRAIN_SWEEP, direction=MOUNT, amplitudes=tuple(6e-3 * strain for strain in STRAINS)),
-        replace(STRAIN_SWEEP, direction=Specimen("bar, tension", "modulus", strain="tension")),
-        replace(STRAIN_SWEEP, direction=Specimen("half strains", "modulus", strain="tensor")),
-    ),
-    loops=(SimulatedLoop(MOUNT, 5e-4, 0.1), SimulatedLoop(COUPON, 0.05, 0.1)),
-)
-
-
-def test_tests_are_read_back_and_what_is_fitted_to_them_is_the_truth(paper_model: Model, tmp_path: Path) -> None:
-    assert paper_model.bushing is not None
-    bushing = replace(paper_model.bushing, shape="calibrated")
-    simulated = simulate(Model(bushing, BASE, paper_model.values), TESTS)
-    campaign, in_memory = written(simulated, tmp_path), simulated.campaign()
-    assert (campaign.name, campaign.bushing) == (in_memory.name, bushing)
-    assert campaign.specimens == in_memory.specimens
-    for read, measured in zip(campaign.sweeps, simulated.sweeps, strict=True):
-        assert (read.direction, read.stepped) == (measured.direction, measured.stepped)
-        np.testing.assert_allclose(read.amplitude, measured.amplitude, rtol=1e-6)
-        np.testing.assert_allclose(read.amplitude_reached, measured.amplitude_reached, rtol=1e-6)
-        np.testing.assert_allclose(read.stiffness, measured.stiffness, rtol=1e-6)
-    for looped, loop in zip(campaign.loops, simulated.loops, strict=True):
-        np.testing.assert_allclose(looped.force, loop.force, atol=1e-5 * np.ptp(loop.force))
-    places = [test.direction for test in (*campaign.sweeps, *campaign.loops)]
-    fitted = fit_joint(PreparedCampaign.from_campaign(campaign), directions=places).model.values
-    largest = {"mu": 0.04, "m": 0.15, "alpha": 0.08, "sigma_fmax": 0.12, "eps_half": 0.12}
-    for name in FIVE:
-        assert fitted[name] == pytest.approx(paper_model.values[name], rel=largest[name])
-    truth = load_result(tmp_path / "truth.json")
-    assert (truth.model.bushing, truth.specimens) == (bushing, in_memory.specimens)
-    text = (tmp_path / "campaign.toml").read_text()
-    assert [name for name in FIVE if f"{name} =" in text] == []
