@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ import pytest
 from readers import abaqus_options, bulk_cards, teimorbit
 
 from bushfit.export import abaqus, adams, nastran
-from bushfit.export.contract import ExportRequest, UnitSystem
+from bushfit.export.contract import ExportRequest
 from bushfit.geometry import Direction
 from bushfit.report import spreadsheets
 
@@ -61,22 +60,6 @@ def test_long_and_wide_tables_hold_the_whole_grid(
                 np.testing.assert_array_equal(wide[f"{name} {level:.10g} {length} [{unit}]"], here[f"{name} [{unit}]"])
     print(f"{kind}: off the kept computation {worst:.1e}")
     assert worst < MODEL
-
-
-def test_parameters_provenance_and_units_asked_for(export_request: ExportRequest, table_1: dict[str, float]) -> None:
-    tables = sheets(spreadsheets.xlsx(export_request).files["bushing.xlsx"])
-    parameters = tables["parameters"]
-    assert dict(zip(parameters["parameter"], parameters["value"], strict=True)) == table_1
-    assert set(parameters["fitted"]) == {"no"}
-    provenance = dict(tables["provenance"].to_numpy().tolist())
-    assert provenance["model, sha256"] == export_request.source.sha256
-    assert provenance["bushing"] == "CMP 15 961"
-    assert provenance["length [m]"] == "0.034"
-    table = sheets(spreadsheets.xlsx(replace(export_request, units=UnitSystem.parse("m kg s N"))).files["bushing.xlsx"])
-    exact = np.abs(export_request.result.model.stiffness("torsion", 5.0, export_request.predictions[2].amplitude[0]))
-    assert table["torsion"]["stiffness [N*m/rad]"][0] == pytest.approx(exact, rel=1e-12)
-    assert table["torsion"]["amplitude [rad]"][0] == export_request.predictions[2].amplitude[0]
-    assert table["axial"]["stiffness [N/m]"][0] == pytest.approx(export_request.predictions[0].stiffness.value[0])
 
 
 #: Names that break out of what is not escaped: line ends, comment marks, cards, keywords, formulas, markup.
