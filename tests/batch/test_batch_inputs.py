@@ -16,7 +16,7 @@ from bushfit.batch.manifest import Manifest, RowSettings, read_manifest
 from bushfit.batch.quantities import list_quantities, measured_at, parse_point
 from bushfit.batch.row import estimate_quantities
 from bushfit.errors import BatchError, CampaignError, ModelError
-from bushfit.geometry import STRAINING, TRANSLATION, Direction, Specimen
+from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.reading.measurement import Sweep
@@ -189,22 +189,6 @@ def test_the_measured_point_is_the_mean_of_its_repeats_with_the_noise_of_one() -
     assert (loss.value, loss.stderr) == pytest.approx((0.1, 1.01 * 0.01 / math.sqrt(2)))
     assert measured_at([sweep], parse_point("axial 30 Hz 0.1 mm"), 0.01) == {}
     assert measured_at([sweep], parse_point("radial 25 Hz 0.1 mm"), 0.01) == {}
-
-
-@pytest.mark.parametrize(
-    ("text", "place", "amplitude", "shown"),
-    [
-        ("axial 25 Hz 0.1 mm", "axial", 1e-4, "axial 25 Hz 0.1 mm"),
-        ("DMA, 10 Hz, 1 %", "DMA", 0.01, "DMA 10 Hz 1 %"),
-        ("mount: 1/2 0.025 kHz 100 um", "mount: 1/2", 1e-4, "mount: 1/2 25 Hz 0.1 mm"),
-    ],
-)
-def test_points_in_words(text: str, place: str, amplitude: float, shown: str) -> None:
-    point = parse_point(text)
-    assert (point.place, str(point)) == (place, shown)
-    assert point.amplitude == pytest.approx(amplitude)
-    assert point.motion is (STRAINING if "%" in text else TRANSLATION)
-    assert parse_point(shown) == point
 
 
 def test_a_point_at_a_specimen_is_that_of_the_model(paper_model: Model) -> None:

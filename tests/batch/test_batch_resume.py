@@ -15,7 +15,6 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-import openpyxl
 import pytest
 from trees import PATTERN, command, kept, list_many, stamps, tree, wait_for
 
@@ -57,27 +56,6 @@ def test_results_that_stand_are_refused_resumed_or_replaced(typed: Callable[...,
     assert tree(shop / "all/bushings/b2") == {
         name.rpartition("/")[2]: content for name, content in files.items() if "/b2/" in name
     }
-
-
-def test_another_form_replaces_the_table_and_does_again_only_what_has_tables_of_it(
-    typed: Callable[..., Any], shop: Path
-) -> None:
-    few = "bushings/b[01]/bushing.toml"
-    assert typed("batch", few, "-o", "all", "-q").returncode == 0
-    refused = typed("batch", few, "-o", "all", "--table-format", "xlsx")
-    assert refused.returncode == 2
-    assert "batch.csv" in refused.stderr
-    again = typed("batch", few, "-o", "all", "--resume", "--json", "--table-format", "xlsx", "--plot-format", "svg")
-    assert json.loads(again.stdout)["kept"] == 2, "no bushing has a table or a picture"
-    assert "wrote batch.json, batch.xlsx, index.html, bushings/ to" in again.stderr
-    left = sorted(file.name for file in (shop / "all").glob("[!.]*"))
-    assert left == ["batch.json", "batch.xlsx", "bushings", "index.html"], "batch.csv is gone"
-    (sheet,) = openpyxl.load_workbook(shop / "all/batch.xlsx")
-    header, *lines = sheet.iter_rows(values_only=True)
-    mu = json.loads((shop / "all/bushings/b1/model.json").read_text())["parameters"]["mu"]["value"]
-    assert dict(zip(header, lines[1], strict=True))["mu [MPa]"] == pytest.approx(1e-6 * mu, rel=1e-15)
-    tables = ("batch", few, "-o", "all", "--resume", "--json", "--tables", "--table-format", "decimal-comma")
-    assert [json.loads(typed(*tables).stdout)["kept"] for _ in range(2)] == [0, 2]
 
 
 def test_only_what_changed_or_is_torn_is_done_again(typed: Callable[..., Any], shop: Path) -> None:
