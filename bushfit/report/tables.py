@@ -404,6 +404,11 @@ def require_columns(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:
     """
     for header in headers:
         if header not in rows:
-            hint = "write the results again, or remove the table: the page then omits it"
-            raise ModelError("a column of a table is missing", expected=header, hint=hint)
+            raise missing_column(header)
     return rows
+
+
+def missing_column(header: str) -> ModelError:
+    """Error for a table without the column `header`."""
+    hint = "write the results again, or remove the table: the page then omits it"
+    return ModelError("a column of a table is missing", expected=header, hint=hint)

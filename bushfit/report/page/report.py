@@ -22,7 +22,7 @@ from bushfit.report.page.record import ReportRecord
 from bushfit.report.page.svg import Picture, picture
 from bushfit.report.page.values import headline, value_rows
 from bushfit.report.parameters import interval_kind, parameter_rows
-from bushfit.report.tables import DISPLAYS
+from bushfit.report.tables import DISPLAYS, missing_column
 from bushfit.units import CELSIUS, display_unit, format_aligned, format_range, number
 
 if TYPE_CHECKING:
@@ -156,7 +156,10 @@ def draw_figures(record: ReportRecord) -> tuple[list[Picture], list[Picture], bo
     appendix["ellipses", title] = partial(plots.appendix.ellipses_figure, result, "")
     pictures, room = list[Picture](), _LARGEST_FIGURES
     for (name, title), make in (page | appendix).items():
-        chart = record.charts[name].content if name in record.charts else make()
+        try:
+            chart = record.charts[name].content if name in record.charts else make()
+        except KeyError as error:  # of pandas, with the header
+            raise missing_column(str(error.args[0])) from error
         if chart is not None and room > 0:
             drawing = picture(chart, f"f{len(pictures)}-", title)
             room -= len(drawing.svg)

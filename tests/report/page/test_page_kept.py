@@ -85,6 +85,17 @@ def without(pattern: str) -> Spoil:
     return lambda folder: [file.unlink() for file in folder.glob(pattern)]
 
 
+def without_column(name: str, header: str) -> Spoil:
+    """Another name for a column of a table."""
+
+    def rename(folder: Path) -> None:
+        text = (folder / name).read_text(encoding="utf-8")
+        assert text.count(f",{header},") == 1
+        (folder / name).write_text(text.replace(f",{header},", ",else,", 1), encoding="utf-8")
+
+    return rename
+
+
 OF_RESULTS = [
     (shutil.rmtree, ("a folder of results is needed", "nothing")),
     (without("*.json"), ("there is no model in this folder", "axial.csv", "bushfit run CAMPAIGN")),
@@ -98,6 +109,10 @@ OF_RESULTS = [
     ),
     (changed("diagnosis.json", gap=7), ("diagnosis.json, gap", "a table")),
     (written("sweeps.csv", "sweep,direction\na,axial\n"), ("a column of a table is missing", "stepped")),
+    *(
+        (without_column("sweeps.csv", header), ("a column of a table is missing", header))
+        for header in ("stiffness [N/mm]", "amplitude [mm]", "loss residual [noise]", "stiffness [N m/rad]")
+    ),
     (
         written("axial.csv", "frequency [Hz],amplitude [mm]\nx,1\n"),
         ("axial.csv: this table is not as bushfit writes it", "'x'"),
