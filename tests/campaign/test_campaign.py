@@ -82,6 +82,11 @@ waveform = "sine"
     assert (limits.min, limits.max) == (1e3, 1e9)
 
 
+def test_without_a_bushing_a_campaign_has_the_name_of_its_first_specimen(folder: Path) -> None:
+    specimens = 'specimens = [{ name = "DMA", kind = "modulus" }, { name = "sheet", kind = "modulus" }]\n[compound]\nhardness = "61 Shore A"\nfiller = "27 phr"\n'
+    assert campaign_from(specimens, folder).name == "DMA"
+
+
 def test_settings_arrive_in_si(folder: Path) -> None:
     settings = """
 [fit]

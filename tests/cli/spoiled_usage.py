@@ -77,6 +77,7 @@ USAGE = [
     ("example|--fource", "No such option '--fource'"),
     ("schema|modle", "there is no such schema", 'did you mean "model"?'),
     ("inspect|campaign.toml", "campaign.toml: a test file is needed", "found: a campaign", "bushfit diagnose looks at all tests of a campaign"),
+    ("reduce|loop.csv", "loop.csv: the direction of this test is not stated"),
     ("reduce|model.json", "model.json: a test file is needed", "found: a model"),
     ("inspect|loop.csv|--direction|up", "Invalid value for '--direction': 'up' is not one of 'axial', 'radial', 'torsion'"),
     ("inspect|loop.csv|--unit|force", "--unit: not a column's role with a value", 'such as "force=kN"; roles: time, displacement, force, frequency, amplitude,'),

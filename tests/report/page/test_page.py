@@ -30,9 +30,12 @@ from reading_html import (
 from bushfit.effects.history import History
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document
+from bushfit.model.model import Model
+from bushfit.model.result import Result
 from bushfit.model.rig import wave
 from bushfit.report.page import report_page
 from bushfit.report.page.record import read_results
+from bushfit.report.page.report import sweeps_beside
 from bushfit.report.results import ResultFile, contents, json_file
 
 Results = Callable[[str], Path]
@@ -217,3 +220,10 @@ def test_names_do_no_harm(root: Path, name: str) -> None:
     tables = {key: table.replace({"sweep": {"sweep_axial": name}}) for key, table in plain.items()}
     page = page_from(spoiled(documents, name, FOREIGN), tables)
     assert_harmless(page, parsed(page_from(documents, plain)), name)
+
+
+def test_beside_a_prediction_at_23_degrees_only_sweeps_of_that_temperature_are_drawn(paper_model: Model) -> None:
+    table = pd.DataFrame({"sweep": ["cold", "room", "none"], "temperature [degC]": [-10.0, 24.0, np.nan]})
+    warm = Result(paper_model.with_effect("temperature"))
+    shown = [sweeps_beside(table, result) for result in (warm, Result(paper_model))]
+    assert [list(rows["sweep"]) for rows in shown if rows is not None] == [["room", "none"], ["cold", "room", "none"]]
