@@ -83,7 +83,8 @@ waveform = "sine"
 
 
 def test_without_a_bushing_a_campaign_has_the_name_of_its_first_specimen(folder: Path) -> None:
-    specimens = 'specimens = [{ name = "DMA", kind = "modulus" }, { name = "sheet", kind = "modulus" }]\n[compound]\nhardness = "61 Shore A"\nfiller = "27 phr"\n'
+    specimens = 'specimens = [{ name = "DMA", kind = "modulus" }, { name = "sheet", kind = "modulus" }]'
+    specimens += '\n[compound]\nhardness = "61 Shore A"\nfiller = "27 phr"\n'
     assert campaign_from(specimens, folder).name == "DMA"
 
 
