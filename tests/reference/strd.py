@@ -106,7 +106,7 @@ class CurveTerm:
         return self.problem.response.size
 
     @property
-    def counted(self) -> int:
+    def residual_count(self) -> int:
         return self.size
 
     def unsure(self, slopes: Array) -> dict[Any, Array]:
