@@ -109,7 +109,7 @@ class CurveTerm:
     def residual_count(self) -> int:
         return self.size
 
-    def unsure(self, slopes: Array) -> dict[Any, Array]:
+    def noise_sensitivity(self, slopes: Array) -> dict[Any, Array]:
         """No variance of the noise was estimated beforehand."""
         return {}
 
