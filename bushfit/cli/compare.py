@@ -14,7 +14,7 @@ from bushfit.errors import error_location, quote_path
 from bushfit.progress import track
 
 if TYPE_CHECKING:
-    from bushfit.commands.compare import ComparedResult, ComparisonOutput
+    from bushfit.commands.compare import ComparisonOutput
 
 #: Value of the option --families if no names follow.
 _ALL = "all"
@@ -57,9 +57,9 @@ def command(
 
     Writes compare.json, parameters.csv, differences.csv, compare.png, compare.html; with --families families.csv.
     """
-    from bushfit.campaign.campaign import load_campaign
-    from bushfit.commands.compare import MOST, compare
-    from bushfit.commands.loading import model_file
+    from bushfit.campaign.campaign import Campaign, load_campaign
+    from bushfit.commands.compare import MOST, compare, compared_result
+    from bushfit.commands.loading import load_source, model_file, model_source
     from bushfit.commands.provenance import command_line, option_words
     from bushfit.effects import get_effect
 
@@ -80,24 +80,17 @@ def command(
         folder = output.checked_folder(name, "compare.json", form="{} families")
         compared = compare(campaign, families=names, **settings)
     else:
-        entries = [_entry(source, directions) for source in track("results fitted", sources)]
+        entries = []
+        for source in track("results fitted", sources):
+            loaded = load_source(source)
+            digest = None if isinstance(loaded, Campaign) else model_source(model_file(source)).sha256
+            entries.append(compared_result(loaded, str(source), digest, directions))
         name = " and ".join(entry.name for entry in entries)
         folder = output.checked_folder(name, "compare.json")
         compared = compare(*entries, **settings)
     _print_comparison(output, name, compared)
     inputs = [source if source.suffix == ".toml" else model_file(source) for source in sources]
     output.write(folder, compared.files, compared.document, inputs)
-
-
-def _entry(source: Path, directions: tuple[str, ...]) -> ComparedResult:
-    """Load one result to compare from a model file, a results folder, or a campaign, which is fitted first."""
-    from bushfit.campaign.campaign import Campaign
-    from bushfit.commands.compare import compared_result
-    from bushfit.commands.loading import load_source, model_file, model_source
-
-    loaded = load_source(source)
-    digest = None if isinstance(loaded, Campaign) else model_source(model_file(source)).sha256
-    return compared_result(loaded, str(source), digest, directions)
 
 
 def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> None:

@@ -19,7 +19,6 @@ from bushfit.units import display_unit, format_aligned, number, parse_quantity
 if TYPE_CHECKING:
     from bushfit.campaign.schema import Loss
     from bushfit.commands.diagnose import DiagnosisOutput
-    from bushfit.diagnosis.record import Diagnosis
 
 #: Terminal colours of the verdicts.
 _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
@@ -107,7 +106,10 @@ def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
     for effect in diagnosed.document["effects"] if diagnosis.verdict != "ambiguous" else ():
         output.console.print(f"  [bold]why {effect['name']}:[/bold] {escape(effect['evidence'])}")
     if output.verbose:
-        _print_candidates(output, diagnosis)
+        title = "candidates: reduction of chi-square (gain) and probability that the effect is missing in the model"
+        fitted = ((candidate, candidate.gain) for candidate in diagnosis.candidates if candidate.gain is not None)
+        rows = ((one.name, one.why, f"{gain:.0f}", f"{one.probability:.2f}") for one, gain in fitted)
+        output.print_table(title, ("candidate", "why", "gain", "probability"), rows, text_columns=2)
     has_more = tuple(diagnosis.result.model.effects) != BASE
     if has_more or output.verbose:
         title = "model with the added effects" if has_more else "model"
@@ -182,11 +184,3 @@ def _print_effect(output: Output, effect: Mapping[str, Any]) -> None:
         console.print(f"    correction in the campaign: {escape(effect['correction'])}")
     if effect["alternatives"]:
         console.print(f"    alternatives: {escape(', '.join(effect['alternatives']))}")
-
-
-def _print_candidates(output: Output, diagnosis: Diagnosis) -> None:
-    """Print each candidate effect that was fitted, with its probability and the reason for the decision."""
-    title = "candidates: reduction of chi-square (gain) and probability that the effect is missing in the model"
-    fitted = ((candidate, candidate.gain) for candidate in diagnosis.candidates if candidate.gain is not None)
-    rows = ((one.name, one.why, f"{gain:.0f}", f"{one.probability:.2f}") for one, gain in fitted)
-    output.print_table(title, ("candidate", "why", "gain", "probability"), rows, text_columns=2)

@@ -201,7 +201,7 @@ def _gain(
 
 
 def _disjoint_parts(data_sets: Sequence[MeasuredTest], among: Collection[str]) -> Iterator[str]:
-    """Names of the held-out parts in `covered_rows` that share no point with an earlier part."""
+    """Names of the held-out parts in `among` that share no point with an earlier part."""
     used_rows = np.zeros(sum(data_set.size for data_set in data_sets), dtype=bool)
     for part in parts(data_sets):
         rows = part.rows(data_sets)

@@ -263,8 +263,8 @@ class Diagnosis:
 
     def _effect(self, named: NamedCause) -> EffectEntry:
         effect, model = get_candidate(named.name), self.result.model
-        decide_verdict = {decide_verdict.name: decide_verdict.parameters for decide_verdict in self.candidates}
-        values = model.values if named.name in model.effects else decide_verdict.get(named.name, {})
+        fitted_values = {candidate.name: candidate.parameters for candidate in self.candidates}
+        values = model.values if named.name in model.effects else fitted_values.get(named.name, {})
         return {
             "name": named.name,
             "level": level_of(named.name),
