@@ -31,11 +31,11 @@ def _tables() -> Iterator[str]:
         ((_link(e), e.level, type(e).__name__.lower(), e.sentence, f"`{e.equation}`", _parameters(e)) for e in library),
     )
     yield _table(
-        ("named and proposed", "twins, which no test of the bushing distinguishes from it"),
+        ("reported effect", "twins, which no test of the bushing can distinguish from it"),
         ((f"`{e.name}`", ", ".join(f"`{twin}` ({get_effect(twin).level})" for twin in e.twins)) for e in twinned),
     )
     yield _table(
-        ("mistake", "what would be so", "true value", "in"),
+        ("mistake", "true statement if the mistake was made", "true value", "possible in"),
         (
             (f"`{m.name}`", m.sentence.format(files="FILE"), f"`{m.equation}`", " or ".join(m.kinds) or "[bushing]")
             for m in MISTAKES.values()
