@@ -123,3 +123,16 @@ def test_a_resonance_test_reduces_to_the_stiffness_at_the_amplitude_reached(pape
         assert np.ptp(np.log(sweep.amplitude)) > np.log(5.0)
         closed = paper_model.stiffness(sweep.direction, sweep.frequency, sweep.amplitude)
         np.testing.assert_allclose(sweep.stiffness, closed, rtol=2e-3)
+
+
+def test_level_errors_are_shared_by_all_repeats_of_a_level(clean: Undisturbed) -> None:
+    """All repeats of what a sweep holds are off by one factor, those at another amplitude by another."""
+    (test, _), *_ = clean.sweeps
+    own = replace(clean, sweeps=((replace(test, repeats=4), clean.sweeps[0][1]), *clean.sweeps[1:]))
+    ideal = measure(clean, PLAN).sweeps[0].stiffness.reshape(2, 1, 3)
+    plans = [replace(PLAN, level_gain_error=0.01, level_phase_error=0.02, seed=seed) for seed in range(300)]
+    off = np.array([np.log(measure(own, plan).sweeps[0].stiffness.reshape(2, 4, 3) / ideal) for plan in plans])
+    assert np.abs(np.ptp(off.real, axis=(-2, -1))).max() < 1e-12
+    assert np.std(off.real) == pytest.approx(0.01, rel=0.1)
+    assert np.std(off.imag) == pytest.approx(0.02, rel=0.1)
+    assert abs(np.corrcoef(off[:, :, 0, 0].real.T)[0, 1]) < 0.2
