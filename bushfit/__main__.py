@@ -5,6 +5,7 @@ Warnings of Python and its packages are hidden unless Python was started with -W
 
 import _thread
 import gc
+import signal
 import sys
 import time
 import warnings
@@ -29,11 +30,12 @@ def _interrupt_soon() -> None:
 
 
 def main() -> None:
-    """Run the command line; Ctrl-C prints one line and exits with status 2."""
+    """Run the command line; Ctrl-C, or a request to end, prints one line and exits with status 2."""
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # they are for programmers, who ask for them: python -W default -m bushfit
     gc.set_threshold(_OBJECTS)
     sys.unraisablehook = repeat_interrupt
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # temporary files are removed, as after Ctrl-C
     try:
         from bushfit.cli import main as command
 

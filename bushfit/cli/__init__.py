@@ -5,7 +5,6 @@ import importlib
 import io
 import os
 import re
-import signal
 import sys
 from collections.abc import Callable
 from typing import Any, TextIO
@@ -110,7 +109,6 @@ def main(command: click.Command = cli) -> None:
     os.environ["MPLBACKEND"] = _BACKEND
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(encoding="utf-8", newline="\n")  # whatever the code page: programs read it
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # temporary files are removed, as after Ctrl-C
     heard, read = _Stream(sys.stderr, is_needed=False), _Stream(sys.stdout, is_needed=True)
     with contextlib.redirect_stderr(heard), contextlib.redirect_stdout(read):
         sys.exit(_status(command))
