@@ -130,7 +130,7 @@ def _explained(table_schema: dict[str, Any], kind: type) -> dict[str, Any]:
 
 
 def _beside_keys(kind: type) -> dict[str, str]:
-    """Description of each key of a TypedDict."""
+    """Description of each key of a TypedDict, from the annotations of its fields."""
     hints = get_type_hints(kind, include_extras=True)
     parts = ((key, part) for key, hint in hints.items() for part in (hint, *get_args(hint)))  # as in NotRequired[...]
     metadata = ((key, item) for key, part in parts for item in getattr(part, "__metadata__", ()))

@@ -208,7 +208,7 @@ def _table_at(table: type, location: tuple[int | str, ...]) -> type:
 
 
 def _parts(hint: Any) -> Iterable[Any]:
-    """Yield a type and, recursively, its arguments."""
+    """Yield a type hint and, recursively, its arguments, such as list[int] and int."""
     yield hint
     for part in get_args(hint):
         yield from _parts(part)

@@ -101,7 +101,7 @@ class PartQuantity:
 
     @property
     def header(self) -> str:
-        """Column header: name and unit, such as "mu [MPa]"."""
+        """Column header of the quantity in the batch table: name and unit, such as "mu [MPa]"."""
         return f"{self.name} [{self.unit}]"
 
 

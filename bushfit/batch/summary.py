@@ -154,7 +154,7 @@ class BatchResult:
 
     @cached_property
     def document(self) -> BatchFile:
-        """Content of `batch.json`."""
+        """Content of `batch.json`, the JSON file of the whole batch."""
         columns = {name: quantity.tabled for name, quantity in self.quantities.items() if name in self.figures}
         parts = [self.part_table(index, columns) for index in range(len(self.records))]
         counts = {name: int(np.isfinite(values).sum()) for name, (values, _) in self.compared.items()}

@@ -96,7 +96,7 @@ class BushingSettings:
                 raise ValueError(CampaignError(problem, place=f"{side}_radius", expected=expected))
 
     def to_bushing(self) -> Bushing:
-        """Make the bushing; diameters are converted to radii."""
+        """Make the bushing that the table [bushing] describes; diameters are converted to radii."""
         radii = {
             f"{side}_radius": getattr(self, f"{side}_radius") or getattr(self, f"{side}_diameter") / 2.0
             for side in ("inner", "outer")

@@ -160,11 +160,11 @@ class _Stream:
         self._fault = None if stream else "it is closed"
 
     def write(self, text: str) -> int:
-        """Write a text; return the number of characters written."""
+        """Write a text to standard output or error; return the number of characters written."""
         return self._tried(lambda stream: stream.write(text))
 
     def flush(self) -> None:
-        """Write buffered text."""
+        """Write the buffered text to standard output or error."""
         if self._stream:
             self._tried(lambda stream: stream.flush())
 

@@ -134,7 +134,7 @@ class Output:
             self.print(f"  {action}")
 
     def warn(self, warnings: Iterable[str]) -> None:
-        """Collect warnings, which are printed below the results."""
+        """Collect warnings, to print them once below the results of a command."""
         self._warnings.update(dict.fromkeys(warnings))
 
     def print_warnings(self) -> None:

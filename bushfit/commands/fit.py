@@ -40,7 +40,7 @@ class FitOutput:
 
     @property
     def result(self) -> Result:
-        """Result of the last step."""
+        """Fitted result: that of the last step."""
         return self.steps[-1][1]
 
 

@@ -16,7 +16,7 @@ class HasResult(Protocol):
 
     @property
     def result(self) -> Result:
-        """Fitted model with its uncertainty."""
+        """Fitted model of the output, with its uncertainty."""
 
 
 def as_result(model: Result | HasResult) -> Result:
@@ -69,5 +69,5 @@ def load_source(path: Path) -> Campaign | Result:
 
 
 def model_source(path: Path) -> Source:
-    """Name and SHA-256 of a model file."""
+    """Return the name and the SHA-256 of a model file, as the source of an export or a prediction."""
     return Source(Path(path.name), sha256(view_bytes(path, ModelError)).result())

@@ -65,7 +65,7 @@ class PlanOutput:
 
     @cached_property
     def document(self) -> PlanFile:
-        """Content of plan.json."""
+        """Content of plan.json: planned tests and their expected results."""
         return plan_document(self.plan, self.check)
 
 

@@ -75,7 +75,7 @@ class PredictionOutput:
 
     @property
     def document(self) -> Mapping[str, Any]:
-        """Content of `predict --json`."""
+        """Content of `predict --json`: tables of the predictions by direction, Maxwell arms, tests and warnings."""
         document: dict[str, Any] = {str(p.direction): table_columns(prediction_table(p)) for p in self.predictions}
         for resonance in self.resonances:
             document[f"{resonance.place}_resonance"] = tables.predicted_resonance_table(resonance).to_dict(

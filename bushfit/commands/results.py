@@ -23,7 +23,7 @@ class CommandOutput(Protocol):
 
     @property
     def files(self) -> Sequence[ResultFile]:
-        """Result files of the command, not yet rendered."""
+        """Result files (tables, figures, documents) of the command, whose content is made when it is needed."""
 
 
 def table(output: CommandOutput, name: str) -> pd.DataFrame:

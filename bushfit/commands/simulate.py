@@ -37,7 +37,7 @@ class SimulationOutput:
 
     @property
     def document(self) -> Mapping[str, Any]:
-        """Content of `simulate --json`."""
+        """Content of `simulate --json`: the true model and the names of the files."""
         return {"truth": to_document(self.simulated.result), "files": sorted(file.name for file in self.files)}
 
 

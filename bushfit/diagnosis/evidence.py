@@ -44,7 +44,7 @@ class Evidence:
 
     @property
     def model(self) -> Model:
-        """Fitted model."""
+        """Fitted model, with its parameter values."""
         return self.solution.model
 
     @property
@@ -59,12 +59,12 @@ class Evidence:
 
     @property
     def chi_square(self) -> float:
-        """Sum of squared residuals, in units of noise."""
+        """Chi-square: sum of the squared residuals of all tests, in units of noise."""
         return self.solution.chi_square
 
     @property
     def parameters(self) -> int:
-        """Number of fitted parameters."""
+        """Number of parameters that the fit estimated."""
         return len(self.solution.names)
 
     @property

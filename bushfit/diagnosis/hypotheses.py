@@ -304,10 +304,10 @@ class SearchState:
 
     @cached_property
     def hypotheses(self) -> list[Hypothesis]:
-        """Hypotheses that have the explanations of this state and no further effect or fault.
+        """Hypotheses about the gap that have the explanations of this state and no further effect or fault.
 
-        They are three: as the state is, with level errors beyond the class of the rig, and with a deviation of the
-        compound.
+        They are three: as the state is, with rig errors of amplitude levels beyond the stated accuracy, and with a
+        smooth deviation of the rubber compound from the model's laws.
         """
         linear, tests = self.linear, self.tests
         log_prior = self.log_prior + self.log_density

@@ -293,12 +293,12 @@ class _Grid:
 
     @cached_property
     def log_evidences(self) -> Array:
-        """Natural log of the evidence for each pair, (g,)."""
+        """Natural log of the evidence of the tests for each pair of powers, (g,)."""
         return np.array([evidence.log_evidence for evidence in self.linear.group_evidence])
 
     @property
     def share(self) -> Array:
-        """Probability of each pair, (g,)."""
+        """Posterior probability of each pair of powers, (g,)."""
         return np.exp(self.log_evidences - logsumexp(self.log_evidences))
 
     @property

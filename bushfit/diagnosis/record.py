@@ -97,7 +97,7 @@ class NamedCause:
 
     @property
     def label(self) -> str:
-        """Name in the form that the option --adopt accepts."""
+        """Name of the effect or mistake in the form that the option --adopt accepts."""
         return labelled(self.name, self.test)
 
 

@@ -80,7 +80,7 @@ class Search:
         return self._ordered()
 
     def _ordered(self) -> list[Hypothesis]:
-        """All hypotheses recorded so far, the most probable first."""
+        """Hypotheses about the gap that the search has recorded so far, the most probable first."""
         return sorted(self._known.values(), key=lambda hypothesis: -hypothesis.log_posterior)
 
     def _is_sure(self) -> bool:

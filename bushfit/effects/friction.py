@@ -98,7 +98,7 @@ def harmonic_slope(x: Array, shape: Array) -> Array:
 
 
 def _roots(x: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Terms s, D, p, q and z of the formulas in `harmonic_shape`."""
+    """Terms s, D, p, q and z of the formulas in `harmonic_shape`, at the relative strain amplitude x."""
     twice = 2.0 * x
     s = np.sqrt(x * (x + 6.0) + 1.0)
     big = s + x + 1.0

@@ -63,12 +63,12 @@ class History:
 
     @cached_property
     def harmonics(self) -> Array:
-        """Angular frequencies of the entries of `spectrum` [rad/s]."""
+        """Angular frequencies [rad/s] of the entries of `spectrum`, the Fourier transform of the motion."""
         return 2.0 * np.pi * np.fft.rfftfreq(self.value.shape[-1], self.step)
 
     @cached_property
     def spectrum(self) -> Array:
-        """Fourier transform of the samples, as numpy.fft.rfft gives it."""
+        """Fourier transform of the samples of the motion, as numpy.fft.rfft gives it."""
         return np.fft.rfft(self.value)
 
     def response(self, transfer: Callable[[Array], Array]) -> Array:
@@ -149,7 +149,7 @@ class History:
 
     @cached_property
     def _by_factor(self) -> dict[float, History]:
-        """Cached results of `scaled` by factor."""
+        """Cache of the histories that `scaled` returns, by factor."""
         return {}
 
 

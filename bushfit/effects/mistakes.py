@@ -123,7 +123,7 @@ class Mistake(Effect):
         return (other_direction(place) if self.swaps else None) or place
 
     def corrected_bushing(self, bushing: Bushing) -> Bushing:
-        """Correct the radii of a bushing for this mistake."""
+        """Return a bushing with its radii corrected for this mistake, such as diameters given as radii."""
         inner, outer = (self.displacement * radius for radius in (bushing.inner_radius, bushing.outer_radius))
         return replace(bushing, inner_radius=inner, outer_radius=outer)
 
@@ -162,7 +162,7 @@ def _is_of_rubber(modulus: float, strain: float) -> bool:
 
 
 def _loss(stiffness: Complex) -> float:
-    """Median loss factor of complex stiffnesses, (n,)."""
+    """Median loss factor (imaginary over real part) of complex stiffnesses, (n,)."""
     return float(np.median(stiffness.imag / stiffness.real))
 
 
@@ -201,7 +201,7 @@ _LAWS: dict[str, Any] = {
 
 
 def _mistake(name: str, entry: dict[str, Any]) -> Mistake:
-    """Build the mistake of a table in mistakes.toml."""
+    """Build a mistake from its name and its table in mistakes.toml."""
     laws = {key: _LAWS[entry.pop(key)] for key in ("stiffness", "doubt", "motion") if key in entry}
     kinds, units = tuple(entry.pop("kinds", ["sweep"])), entry.pop("units", {}).items()
     lines = [f'units = {{ {key} = "{unit}" }}, and the same in the header if that states a unit' for key, unit in units]

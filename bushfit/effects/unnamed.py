@@ -74,7 +74,7 @@ class Patch:
 
     @cached_property
     def nodes(self) -> Array:
-        """Coordinates of the nodes, (m, 2), or (m, 3) with temperature."""
+        """Coordinates of the nodes in ln frequency and ln strain, (m, 2), or (m, 3) with temperature."""
         kelvin = np.array(self.temperature_K) if self.temperature_K else None
         return coordinates(np.array(self.frequency_Hz), np.array(self.strain), kelvin)
 

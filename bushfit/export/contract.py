@@ -162,7 +162,7 @@ class ExportRequest:
 
     @property
     def places(self) -> tuple[Place, ...]:
-        """Exported directions and specimens."""
+        """Directions and specimens whose predictions are exported."""
         return tuple(prediction.direction for prediction in self.predictions)
 
 

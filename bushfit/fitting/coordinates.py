@@ -46,11 +46,11 @@ class Coordinates:
         return float(np.log(value)) if parameter.log else value / parameter.typical
 
     def point(self, values: Mapping[str, float]) -> Array:
-        """Coordinates, (k,), from parameter values in SI units by name."""
+        """Dimensionless coordinates of the k parameters, (k,), from their values in SI units by name."""
         return np.array([self.forward(name, values[name]) for name in self.names])
 
     def values(self, point: Sequence[float] | Array) -> dict[str, float]:
-        """Parameter values in SI units by name, from coordinates, (k,)."""
+        """Values of the k parameters in SI units by name, from their dimensionless coordinates, (k,)."""
         return {
             name: float(np.exp(u)) if parameter.log else float(u) * parameter.typical
             for name, parameter, u in zip(self.names, self.parameters, point, strict=True)

@@ -117,7 +117,7 @@ class Descent:
 
     @property
     def solution(self) -> FitResult:
-        """Result of the fit in its present state, converged or not."""
+        """Result of the fit with the best model so far, converged or not."""
         at_bound = self.problem.at_bound(self.point)
         state = self.model, self.residual, self.jacobian, self.evaluations, at_bound, not self.converged
         return FitResult(self.problem, *state)

@@ -91,7 +91,7 @@ class Drive:
 
     @property
     def amplitude(self) -> float:
-        """Zero-to-peak displacement [m or rad]."""
+        """Zero-to-peak amplitude of the loop's displacement [m or rad]."""
         return float(self.history(is_transient=False).amplitude[0])
 
     @property
@@ -128,7 +128,7 @@ class Drive:
 
     @property
     def _rounding(self) -> float:
-        """Half a row in cycles: tolerance for a whole number of cycles."""
+        """Half the distance of two rows [cycles], the tolerance for a whole number of cycles."""
         return 0.5 * self.cycles / self.loop.time.size
 
     @cached_property

@@ -62,7 +62,7 @@ class LoopHarmonics(NamedTuple):
 
     @property
     def force_mean(self) -> float:
-        """Mean of the force [N or N m]."""
+        """Mean force of the loop [N or N m]."""
         return float(self.force[0].real)
 
 

@@ -61,12 +61,12 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def notes(self) -> Sequence[str]:
-        """Warnings about the record for the user."""
+        """Sentences for the user on left-out parts or a preload of the record, and on contradictory tests."""
         return [*self.drive.notes, *([self.contradiction] if self.contradiction else [])]
 
     @property
     def temperature(self) -> float:
-        """Temperature [K]; nan if unknown."""
+        """Temperature of the rubber in the loop [K]; nan if unknown."""
         return self.test.temperature or np.nan
 
     @property
@@ -91,7 +91,7 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def size(self) -> int:
-        """Number of residuals."""
+        """Number of residuals of the test: rows or bins of a loop, two for each point of a sweep."""
         return 2 if self.fundamental_only else int(self.drive.force.size)
 
     @cached_property

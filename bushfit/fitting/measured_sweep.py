@@ -67,7 +67,7 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def notes(self) -> list[str]:
-        """Warnings about the test for the user."""
+        """Sentences for the user on the file, repeats that differ, contradictory tests, and rounded values."""
         file = self.source.file if self.source else self.name
         found = [*self.source.notes] if self.source else []
         points = np.unique([self.frequency, self.amplitude], axis=1, return_inverse=True)[1]
@@ -90,7 +90,7 @@ class MeasuredSweep(MeasuredBase):
 
     @property
     def temperature(self) -> Array:
-        """Temperature of each point [K], (n,); nan if unknown."""
+        """Temperature of the rubber at each point of the sweep [K], (n,); nan if unknown."""
         kelvin = np.nan if self.sweep.temperature is None else self.sweep.temperature
         return np.broadcast_to(kelvin, self.sweep.frequency.size)[self.order]
 
@@ -174,7 +174,7 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def repeat(self) -> Array:
-        """Number of the repeat that each point belongs to, (n,)."""
+        """Number of the repeat that each point of the sweep belongs to, (n,)."""
         return self.sweep.repeat[self.order]
 
     @cached_property
@@ -183,7 +183,7 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def block_starts(self) -> Array:
-        """Index of the first point of each run."""
+        """Index of the first point of each run (block of points at one constant value and repeat), (blocks,)."""
         label = np.stack((self.held_value, self.repeat.astype(float)))
         return np.concatenate(([0], 1 + np.flatnonzero(np.any(np.diff(label), axis=0))))
 
@@ -206,11 +206,14 @@ class MeasuredSweep(MeasuredBase):
         return frequency, amplitude, UNKNOWN, place
 
     def stiffness(self, model: Model, values: Values | None = None) -> Array:
-        """Model stiffness at the points, complex (..., n) [N/m or N m/rad]; repeats are computed once.
+        """Stiffness of a model at the points of the sweep; repeats are computed once.
 
         Args:
             model: model to evaluate.
             values: parameter values in place of the model's own; leading axes are added to the result.
+
+        Returns:
+            Complex stiffness, (..., n) [N/m or N m/rad].
         """
         last = self._last.get("stiffness")
         if last and last[0] is model and values is None:
@@ -292,7 +295,7 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def covariance(self) -> Whitening:
-        """Covariance of the deviations (residuals before whitening)."""
+        """Covariance of the sweep's residuals in gain and phase, with which they are whitened."""
         random = self.noise.scatter(self.name, self.held_value, self.step)
         if self.sweep.relative_error is not None and self.sweep.noise is None:
             random = np.maximum(np.tile(self.sweep.relative_error[self.order], (2, 1)), FLOOR)

@@ -89,7 +89,7 @@ class SweepNoise:
         return np.array([of_lines[line] for line in held_values]).T * (step / reference) ** exponent
 
     def describe(self) -> str:
-        """Describe the noise in one line for reports."""
+        """Describe size and origin of the sweeps' noise in one line for reports."""
         shared = f"{format_class_errors(self.shared)} shared by a run"
         if any(self.level):
             shared += f", {format_class_errors(self.level)} by all repeats of a level"

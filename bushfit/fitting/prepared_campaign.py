@@ -85,7 +85,7 @@ class PreparedCampaign:
 
     @property
     def data_sets(self) -> list[MeasuredTest]:
-        """All tests, loops first."""
+        """All measured tests of the campaign with their noise, loops first."""
         return [*self.loops, *self.sweeps]
 
     @property

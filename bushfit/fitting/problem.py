@@ -55,12 +55,12 @@ class FitProblem:
 
     @cached_property
     def coordinates(self) -> Coordinates:
-        """Coordinates of the free parameters."""
+        """Map between values and dimensionless coordinates of the free parameters."""
         return Coordinates.of_parameters(self.model, self.names)
 
     @cached_property
     def limits(self) -> tuple[Array, Array]:
-        """Lower and upper bounds of the coordinates, (k,) each."""
+        """Lower and upper bounds of the free parameters' coordinates, (k,) each."""
         low, high = coordinate_bounds(self.coordinates, self.bounds)
         inside = _INSIDE * (high - low)
         return low + inside, high - inside
@@ -160,7 +160,7 @@ class FitResult:
 
     @property
     def coordinates(self) -> Coordinates:
-        """Coordinates of the fitted parameters."""
+        """Map between values and dimensionless coordinates of the fitted parameters."""
         return self.problem.coordinates
 
     @property
@@ -175,12 +175,12 @@ class FitResult:
 
     @property
     def chi_square(self) -> float:
-        """Sum of the squared whitened residuals."""
+        """Chi-square: sum of the squared whitened residuals."""
         return float(self.residual @ self.residual)
 
     @property
     def moving(self) -> list[int]:
-        """Indices of the parameters that are not at a bound."""
+        """Indices of the fitted parameters that are not at a bound."""
         return [i for i, name in enumerate(self.names) if name not in self.at_bound]
 
     @property

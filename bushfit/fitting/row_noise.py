@@ -64,7 +64,7 @@ class RowNoise:
 
     @property
     def order(self) -> int:
-        """Number of preceding rows that the noise of a row depends on."""
+        """Order p of the autoregressive model: number of preceding rows that the noise of a row depends on."""
         return self.filter.size - 1
 
     @property

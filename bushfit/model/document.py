@@ -32,7 +32,7 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class BushingTable:
-    """Name and geometry of the bushing in a model file."""
+    """Entry of a model file for the bushing: name, radii, length and shape formulas."""
 
     name: Annotated[Name, Field(description="Name of the bushing.")]
     inner_radius_m: Annotated[Number, Field(description="Inner radius of the rubber [m].")]

@@ -224,7 +224,7 @@ class Programme:
 
     @property
     def hours(self) -> float:
-        """Duration of the tests [h]."""
+        """Total duration of the tests of the programme [h]."""
         return float(np.sum(self.minutes)) / 60.0
 
 

@@ -72,7 +72,7 @@ class Cells:
 
     @cached_property
     def first_row(self) -> Sequence[str | float]:
-        """Cells of the first row of data; empty cells if there is none."""
+        """Cells of the first row of data in the table; empty cells if there is none."""
         return next((cells for _, cells in self.rows()), [""] * len(self.headers))
 
     @cached_property

@@ -47,7 +47,7 @@ class ColumnTexts(NamedTuple):
         return len(self.values) > 0
 
     def per_row(self) -> list[str]:
-        """Return the text of each row, (n,)."""
+        """Return the text of the column in each row, (n,)."""
         return [self.values[code] for code in self.codes.tolist()]
 
 

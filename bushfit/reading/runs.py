@@ -161,13 +161,13 @@ def group_rows(*keys: Floats) -> list[NDArray[np.intp]]:
 
 
 def _group_spans(values: Floats, group: NDArray[np.intp]) -> Floats:
-    """Largest minus smallest value in each group, (groups,)."""
+    """Largest minus smallest value in each group, (groups,); `group` is the group number of each value, (n,)."""
     ordered, ends = values[np.lexsort((values, group))], np.cumsum(np.bincount(group))
     return ordered[ends - 1] - ordered[np.append(0, ends[:-1])]
 
 
 def _group_medians(values: Floats, group: NDArray[np.intp]) -> Floats:
-    """Median of the group to which each value belongs, (n,)."""
+    """Replace each value by the median of its group, (n,); `group` is the group number of each value, (n,)."""
     ordered, counts = values[np.lexsort((values, group))], np.bincount(group)
     starts = np.cumsum(counts) - counts
     medians = (ordered[starts + (counts - 1) // 2] + ordered[starts + counts // 2]) / 2.0

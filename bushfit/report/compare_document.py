@@ -17,7 +17,7 @@ SCHEMA: SchemaName = "bushfit/compare/1"
 
 
 class ComparedEntry(TypedDict):
-    """One result of a comparison."""
+    """Entry of compare.json for one of the compared results: name, source, model and agreement with its tests."""
 
     label: Annotated[str, Doc("letter of the result: A for the reference, then B and so on.")]
     name: Annotated[str, Doc("name of the bushing, or of the model family.")]
@@ -48,7 +48,7 @@ class JointContrast(TypedDict):
 
 
 class ComparedPair(TypedDict):
-    """One result compared with the reference."""
+    """Entry of compare.json for one result and the reference: differences of parameters and of stiffness."""
 
     reference: Annotated[str, Doc("letter of the reference.")]
     other: Annotated[str, Doc("letter of the result that is compared with the reference.")]
@@ -70,7 +70,7 @@ class HeldOutPart(TypedDict):
 
 
 class FamilyEntry(TypedDict):
-    """Agreement of one model family with the tests of the campaign."""
+    """Entry of compare.json for one model family: agreement with the tests, held-out error and probability."""
 
     label: Annotated[str, Doc("letter of the family in `compared`.")]
     name: Annotated[str, Doc("effects that the family adds or that replace a branch, joined by +.")]

@@ -62,22 +62,22 @@ class ResultFile:
 
 
 def json_file(name: str, document: Mapping[str, Any]) -> ResultFile:
-    """Result file for a JSON document."""
+    """Make the result file for a JSON document; `name` has no extension."""
     return ResultFile(name, "json", lambda: document)
 
 
 def table_file(name: str, make: Callable[[], pd.DataFrame]) -> ResultFile:
-    """Result file for a table; `make` is called at most once."""
+    """Make the result file for a table, which `make` computes when the file is first needed."""
     return ResultFile(name, "table", cache(make))
 
 
 def figure_file(name: str, make: Callable[[], Figure]) -> ResultFile:
-    """Result file for a figure; `make` is called at most once."""
+    """Make the result file for a figure, which `make` draws when the file is first needed."""
     return ResultFile(name, "figure", make)
 
 
 def raw_file(name: str, content: bytes) -> ResultFile:
-    """Result file with given bytes; `name` has its extension."""
+    """Make the result file with given bytes; `name` has its extension."""
     return ResultFile(name, "raw", lambda: content)
 
 
@@ -296,7 +296,7 @@ def _digest(file: Path) -> str:
 
 
 def unwritable(folder: Path, error: OSError) -> OutputError:
-    """Error for a folder that cannot be written."""
+    """Make the error, to be raised, for a results folder that cannot be written."""
     return OutputError(
         "the results cannot be written",
         file=folder,

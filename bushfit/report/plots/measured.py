@@ -55,7 +55,7 @@ class SweepGroup(NamedTuple):
 
     @property
     def x_header(self) -> str:
-        """Header of the table column that is drawn along x."""
+        """Header of the table column (frequency or amplitude) that is drawn along x."""
         return header_of(self.place, self.axis)
 
     @property

@@ -169,7 +169,7 @@ class Style(NamedTuple):
     marker: str
 
     def handle(self, marked: bool) -> Line2D:
-        """Line for a legend; `marked` adds the marker."""
+        """Make the line that represents this style in a legend; `marked` adds the marker."""
         return Line2D([], [], color=self.color, ls=self.dashes, lw=1.3, marker=self.marker * marked, **POINT)
 
 
