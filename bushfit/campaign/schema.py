@@ -20,6 +20,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
 from bushfit.geometry import TRANSLATION, Bushing, Direction, Place, Shape, Specimen, SpecimenKind, StatedStrain
 from bushfit.reading.measurement import Stepped, Waveform
+from bushfit.reading.preload import Preload, parse_preload
 from bushfit.reading.resonance import FEWEST_ROWS
 from bushfit.reading.stated import PLACE_KEYS, Displacement, LoopFile, SweepFile, with_places
 from bushfit.validation import (
@@ -233,12 +234,19 @@ class SimulatedTest:
         direction: direction of the bushing that is tested; for a specimen, none or "shear".
         specimen: name in [[specimens]] of the specimen that is tested in place of the bushing.
         temperature: temperature of the test [K]; None if not stated.
+        preload: displacement or force about which the test is made, such as "500 N"; None if not stated.
     """
 
     direction: Annotated[Place, InstanceOf[Place], WithJsonSchema({"type": "string"})] = field(
         metadata=inline_keys(lambda: PLACE_KEYS)
     )
     temperature: Temperature | None = field(default=None, kw_only=True)
+    preload: Text | None = field(default=None, kw_only=True)
+
+    @property
+    def static(self) -> Preload | None:
+        """Preload of the test; None if not stated."""
+        return parse_preload(self.preload, self.direction)
 
 
 @dataclass(frozen=True)

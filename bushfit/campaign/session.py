@@ -1,6 +1,7 @@
 """Session of a campaign: order of the points, their temperature, and the strains before them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, Simulated
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.geometry import Bushing, Place, Specimen, unit_strain
 from bushfit.reading.measurement import Loop, Sweep
+from bushfit.reading.preload import Preload
 
 #: Relative difference of amplitudes below which they belong to one level; chosen: more than the error of a rig, and
 #: less than the step between levels.
@@ -23,16 +25,18 @@ class SessionTest(NamedTuple):
         amplitude: zero-to-peak amplitudes [m or rad, or strain] of the points in measured order, (n,); one for a loop.
         temperature: temperature [K], a number or (n,); None if not stated.
         order: number of the test in the session, if the campaign states it; None for its position in the list.
+        preload: preload of the test; None if not stated.
     """
 
     place: Place
     amplitude: Array
     temperature: Array | float | None = None
     order: float | None = None
+    preload: Preload | None = None
 
 
 def measured_session(bushing: Bushing | None, tests: Sequence[Loop | Sweep]) -> list[RubberConditions]:
-    """Conditions of measured tests: temperature, time in the session and earlier strains of each point.
+    """Conditions of measured tests: temperature, time in the session, earlier strains of each point, and preload.
 
     Args:
         bushing: the bushing; None if only specimens were tested.
@@ -45,13 +49,14 @@ def measured_session(bushing: Bushing | None, tests: Sequence[Loop | Sweep]) -> 
     def visit(test: Loop | Sweep) -> SessionTest:
         order = test.source.conditions.get("order") if test.source else None
         reached = test.amplitude_reached if isinstance(test, Sweep) else np.array([np.ptp(test.displacement) / 2.0])
-        return SessionTest(test.direction, reached, test.temperature, None if order is None else float(order))
+        number = None if order is None else float(order)
+        return SessionTest(test.direction, reached, test.temperature, number, test.preload)
 
     return session(bushing, [visit(test) for test in tests])
 
 
 def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], repeats: int) -> list[RubberConditions]:
-    """Conditions of planned tests: temperature, time in the session and earlier strains of each point.
+    """Conditions of planned tests: temperature, time in the session, earlier strains of each point, and preload.
 
     The strains of a resonance test depend on its result and are taken as zero.
 
@@ -72,11 +77,14 @@ def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], rep
         assert isinstance(test, SimulatedResonance)
         return np.zeros(repeats * len(test.frequencies))
 
-    return session(bushing, [SessionTest(test.direction, amplitudes(test), test.temperature) for test in tests])
+    return session(
+        bushing,
+        [SessionTest(test.direction, amplitudes(test), test.temperature, preload=test.static) for test in tests],
+    )
 
 
 def session(bushing: Bushing | None, visits: Sequence[SessionTest]) -> list[RubberConditions]:
-    """Conditions of the tests of a session: temperature, time and earlier strains. Each body has a session of its own.
+    """Conditions of the tests of a session: temperature, time, earlier strains, preload; each body has its session.
 
     Args:
         bushing: the bushing; None if only specimens were tested.
@@ -97,7 +105,7 @@ def session(bushing: Bushing | None, visits: Sequence[SessionTest]) -> list[Rubb
         largest_strain = np.maximum.accumulate(np.concatenate([[0.0], *strains]))[:-1]
         histories = (turn, largest_strain, *_last_larger(np.concatenate(strains), turn))
         for i, *columns in zip(visited, *(np.split(column, ends[:-1]) for column in histories), strict=True):
-            conditions[i] = RubberConditions(visits[i].temperature, *columns)
+            conditions[i] = replace(RubberConditions(visits[i].temperature, *columns), preload=visits[i].preload)
     return [conditions[i] for i in range(len(visits))]
 
 

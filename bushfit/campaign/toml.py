@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from bushfit.errors import CONTROL, CampaignError
 from bushfit.geometry import Bushing, Place, Specimen
 from bushfit.reading.files import line_of, read_utf8
+from bushfit.reading.preload import Preload
 from bushfit.units import CELSIUS
 from bushfit.validation import validate_tables
 
@@ -112,7 +113,9 @@ def specimen_lines(specimen: Specimen) -> list[str]:
     return lines
 
 
-def table_lines(kind: str, file: str, place: Place, temperature: Any = None) -> list[str]:
+def table_lines(
+    kind: str, file: str, place: Place, temperature: Any = None, preload: Preload | None = None
+) -> list[str]:
     """Write one [[loops]] or [[sweeps]] table of a campaign file.
 
     Args:
@@ -120,12 +123,14 @@ def table_lines(kind: str, file: str, place: Place, temperature: Any = None) -> 
         file: test file, relative to the campaign.
         place: direction or specimen that was tested.
         temperature: temperature of the test [K]; None if unknown.
+        preload: preload of the test; None if unknown.
 
     Returns:
         Lines of TOML, the first empty.
     """
     warm = [] if temperature is None else [f'temperature = "{temperature - CELSIUS:.6g} degC"']
-    return ["", f"[[{kind}]]", f"file = {toml_value(file)}", place_line(place), *warm]
+    loaded = [] if preload is None else ['preload = "{:.6g} {}"'.format(*preload.in_display_unit(place))]
+    return ["", f"[[{kind}]]", f"file = {toml_value(file)}", place_line(place), *warm, *loaded]
 
 
 def place_line(place: Place) -> str:

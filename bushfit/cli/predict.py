@@ -32,6 +32,12 @@ _MOST_AMPLITUDES = 8
 @prediction_options("Use the frequencies and amplitudes of this campaign, and show its measured sweeps.")
 @option_group(
     "Further predictions",
+    option(
+        "--preload",
+        "LOAD",
+        'Such as "500 N" or "1.5 mm", within the tests; may be given again [none].',
+        multiple=True,
+    ),
     file_option(
         "--bushing", "Predict another bushing of the same compound; its dimensions are in [bushing] of this TOML file."
     ),
@@ -62,6 +68,7 @@ def command(
     bushing: Path | None,
     directions: tuple[str, ...],
     temperature: str | None,
+    preload: tuple[str, ...],
     mass: str | None,
     base_acceleration: str | None,
     static: bool,
@@ -88,6 +95,7 @@ def command(
     settings: dict[str, Any] = {
         **grid_values(directions, grids),
         "temperature": kelvin(temperature),
+        "preloads": preload,
         "bushing": load_bushing(bushing) if bushing else None,
         "mass": positive(mass, "--mass", "kg"),
         "base_acceleration": positive(base_acceleration, "--base-acceleration", "m/s^2"),
@@ -117,7 +125,7 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
     from bushfit.prediction.caveats import by_importance, consequence_of
     from bushfit.units import format_range
 
-    places = [str(prediction.direction) for prediction in predicted.predictions]
+    places = list(dict.fromkeys(str(prediction.direction) for prediction in predicted.predictions))
     verdict, action = f"{', '.join(places)} predicted with 95 % bands", "May be used: there are no warnings."
     if warnings := by_importance(predicted.warnings):
         verdict += f", with {len(warnings)} warning{'s' * (len(warnings) > 1)}"
@@ -128,7 +136,7 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
         force, loss = prediction.direction.display.stiffness, prediction.loss_factor.value
         stiffness = force.factor * prediction.stiffness.value
         output.print(
-            f"{prediction.direction}: {prediction.direction.motion.words[2]} "
+            f"{prediction.label}: {prediction.direction.motion.words[2]} "
             f"{format_range(force.name, stiffness.min(), stiffness.max())}, loss factor "
             f"{format_range('', loss.min(), loss.max()).strip()}, {format_range('Hz', *prediction.frequency[[0, -1]])}"
         )
@@ -167,6 +175,6 @@ def print_predictions(output: Output, predicted: PredictionOutput) -> None:
                 value, *limits = format_aligned([row[name], *band], digits)
                 cells.append(f"{value} ({' to '.join(limits)})" if band[0] < band[1] else value)
             rows.append(cells)
-        title = f"{owner}{prediction.direction}, corners of the grid, with 95 % bands"
+        title = f"{owner}{prediction.label}, corners of the grid, with 95 % bands"
         output.print_table(title, list(table.columns[:4]), rows, text_columns=0)
     output.warn(predicted.warnings)

@@ -17,7 +17,7 @@ from bushfit.commands.loading import HasResult, as_result
 from bushfit.effects import Level
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.effects.temperature import REFERENCE
-from bushfit.errors import ModelError
+from bushfit.errors import ModelError, UnitError
 from bushfit.fitting.agreement import expected_errors_without_refits, misfits
 from bushfit.fitting.preparation import MeasuredSweep, prepare_sweeps
 from bushfit.geometry import Bushing, Direction, Place, Specimen, get_place
@@ -26,9 +26,10 @@ from bushfit.model.result import ExpectedError, Misfit, Result, transfer_compoun
 from bushfit.prediction.caveats import warnings_of
 from bushfit.prediction.grid import default_grid, grid_settings, requested_grid, static_reach
 from bushfit.prediction.static_curve import StaticCurve, static_curve, static_rate
-from bushfit.prediction.stiffness import PredictedResonance, Prediction, predict_resonance
+from bushfit.prediction.stiffness import PredictedResonance, Prediction, predict_resonance, tested_preload
 from bushfit.prediction.stiffness import predict as predict_stiffness
 from bushfit.reading.measurement import SAME_TEMPERATURE, Loop, Sweep
+from bushfit.reading.preload import Preload, parse_preload
 from bushfit.report import plots, tables
 from bushfit.report.results import ResultFile, figure_file, place_names, table_file
 from bushfit.report.tables import prediction_table
@@ -51,7 +52,7 @@ class PredictionOutput:
 
     Args:
         result: the model with its uncertainty.
-        predictions: stiffness over the grid, of each direction or specimen.
+        predictions: stiffness over the grid, of each direction or specimen, and of each preload.
         measured: sweeps of the campaign that the model can predict.
         notes: further warnings.
         resonances: resonance of a mass for each direction or specimen; empty without a mass.
@@ -70,13 +71,16 @@ class PredictionOutput:
     files: Sequence[ResultFile] = ()
 
     def __repr__(self) -> str:
-        places = ", ".join(str(prediction.direction) for prediction in self.predictions)
+        places = ", ".join(dict.fromkeys(str(prediction.direction) for prediction in self.predictions))
         return f"Prediction of {self.result.name}: {places}"
 
     @property
     def document(self) -> Mapping[str, Any]:
         """Content of `predict --json`: tables of the predictions by direction, Maxwell arms, tests and warnings."""
-        document: dict[str, Any] = {str(p.direction): table_columns(prediction_table(p)) for p in self.predictions}
+        document: dict[str, Any] = {
+            str(place): table_columns(joined_table([p for p in self.predictions if p.direction == place]))
+            for place in dict.fromkeys(prediction.direction for prediction in self.predictions)
+        }
         for resonance in self.resonances:
             document[f"{resonance.place}_resonance"] = tables.predicted_resonance_table(resonance).to_dict(
                 orient="list"
@@ -125,6 +129,7 @@ def predict(
     torsion_amplitudes: Numbers | None = None,
     strain_amplitudes: Numbers | None = None,
     temperature: float | None = None,
+    preloads: Sequence[str] = (),
     bushing: Bushing | None = None,
     mass: float | None = None,
     base_acceleration: float | None = None,
@@ -145,6 +150,7 @@ def predict(
         torsion_amplitudes: zero-to-peak rotations [rad].
         strain_amplitudes: zero-to-peak strains of specimens that give a modulus.
         temperature: temperature [K], if the model has the effect of temperature.
+        preloads: preloads with their unit, such as "500 N", within the tested range; default none.
         bushing: another bushing of the same compound, to predict instead of the tested one.
         mass: mass on the bushing [kg], to predict its resonance.
         base_acceleration: zero-to-peak acceleration of the base under the mass [m/s^2].
@@ -159,7 +165,8 @@ def predict(
         Predictions by direction, resonances and Maxwell arms, with the result files.
 
     Raises:
-        ModelError: a direction, frequency, amplitude or temperature for which the model cannot predict.
+        ModelError: a direction, frequency, amplitude, temperature or preload for which the model cannot predict.
+        UnitError: a preload that is no displacement or force of a direction.
     """
     result, sweeps = as_result(model), campaign.sweeps if campaign else ()
     if bushing:
@@ -173,6 +180,11 @@ def predict(
             expected="a model with the effect of temperature",
             hint="fit tests at several temperatures with --effect temperature",
         )
+    if len(preloads) > 1 and (wide or mass or static or static_rates):
+        problem = "wide tables, resonances and static curves are of one preload"
+        raise ModelError(problem, found=", ".join(preloads), expected="one")
+    if preloads and directions is None and result.measured:
+        directions = [stated.place for stated in result.measured.preloads] or None
     requested = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
     settings = grid_settings(requested, campaign)
     specimens = {specimen.name: specimen for specimen in (*result.specimens, *(campaign.specimens if campaign else ()))}
@@ -186,19 +198,23 @@ def predict(
         or (tested := sweep.conditions.temperature) is None
         or abs(np.mean(tested) - (temperature or REFERENCE)) <= SAME_TEMPERATURE
     ]
+    loads = [(place, preload) for place in places for preload in _preloads(result, place, preloads)]
     predictions = [
         predict_stiffness(
             result,
             place,
             *requested_grid(default_grid(result, place, sweeps), settings, place),
-            sweeps=drawn_sweeps if campaign else None,
+            sweeps=sweeps_at(drawn_sweeps, place, preload) if campaign else None,
             temperature=temperature,
+            preload=preload if preloads else None,
         )
-        for place in places
+        for place, preload in loads
     ]
     resonances = [
-        predict_resonance(result, place, mass, base_acceleration, settings.frequencies, temperature=temperature)
-        for place in places
+        predict_resonance(
+            result, place, mass, base_acceleration, settings.frequencies, temperature=temperature, preload=preload
+        )
+        for place, preload in loads
         if mass and base_acceleration
     ]
     curves = [
@@ -225,6 +241,23 @@ def predict(
     notes = (*notes, *(f"{sweep.name}: {note}" for sweep in measured for note in sweep.notes))
     output = PredictionOutput(result, predictions, measured, notes, resonances, maxwell, curves)
     return replace(output, files=_files(output, drawn_sweeps, temperature, wide=wide))
+
+
+def _preloads(result: Result, place: Place, preloads: Sequence[str]) -> list[Preload | None]:
+    """Preloads of a prediction in a direction: those of the texts, or else the default."""
+    if not preloads:
+        return [tested_preload(result, place, None)]
+    parsed = [parse_preload(text, place) for text in preloads]
+    if None in parsed:
+        found, expected = f'"{preloads[parsed.index(None)]}"', 'such as "500 N", "1.5 mm" or "none"'
+        raise UnitError(f"this is no preload of the {place} direction", place="preload", found=found, expected=expected)
+    return [tested_preload(result, place, preload) for preload in parsed]
+
+
+def sweeps_at(sweeps: Sequence[MeasuredSweep], place: Place, preload: Preload | None) -> list[MeasuredSweep]:
+    """Sweeps of a direction or specimen at a preload; all if the preload is None."""
+    of_place = [sweep for sweep in sweeps if sweep.direction == place]
+    return [sweep for sweep in of_place if preload is None or preload.equals(sweep.sweep.preload)]
 
 
 def grid_of(directions: Sequence[str] | None, *axes: Numbers | None) -> PredictSettings:
@@ -263,12 +296,15 @@ def _files(
     output: PredictionOutput, drawn_sweeps: Sequence[MeasuredSweep], temperature: float | None, *, wide: bool
 ) -> list[ResultFile]:
     """Tables and figures of a prediction at a temperature [K]; the figures show the sweeps in `drawn_sweeps`."""
-    result, places = output.result, [prediction.direction for prediction in output.predictions]
+    result, by_place = output.result, dict[Place, list[Prediction]]()
+    for prediction in output.predictions:
+        by_place.setdefault(prediction.direction, []).append(prediction)
+    places = list(by_place)
     names = place_names(places)
 
     def draw(prediction: Prediction) -> Figure:
         place = prediction.direction
-        measured = [sweep for sweep in drawn_sweeps if sweep.direction == place]
+        measured = sweeps_at(drawn_sweeps, place, prediction.preload)
         table = tables.sweeps_table(result.model, measured) if measured else None
         title = result.name if isinstance(place, Direction) else str(place)
         note = plots.style.warnings_note(warnings_of(result, [], (*prediction.warnings, *output.notes)))
@@ -281,9 +317,12 @@ def _files(
         return rows.assign(fitted=np.repeat(["yes", "no"], counts))
 
     files = list[ResultFile]()
-    for name, prediction in zip(names, output.predictions, strict=True):
-        files.append(table_file(name, partial(prediction_table, prediction)))
-        files.append(figure_file(name, partial(draw, prediction)))
+    for name, predictions in zip(names, by_place.values(), strict=True):
+        files.append(table_file(name, partial(joined_table, predictions)))
+        files.append(figure_file(name, partial(draw, predictions[0])))
+        if len(predictions) > 1:
+            over_preload = partial(plots.preload.preload_figure, result, predictions, result.name, temperature)
+            files.append(figure_file(f"{name}_preload", over_preload))
     files += arms_files(result, output.arms, places)
     suffixes: list[tuple[str, Callable[[Any], pd.DataFrame], Sequence[Any]]] = [
         ("wide", tables.wide_table, output.predictions if wide else ()),
@@ -319,6 +358,11 @@ def arms_files(result: Result, arms: Sequence[Arms], places: Sequence[Place]) ->
         table_file("arms", lambda: tables.arms_table(result.model, arms, places)),
         figure_file("arms", lambda: plots.master_curve.arms_figure(result.model, arms, result.name)),
     ]
+
+
+def joined_table(predictions: Sequence[Prediction]) -> pd.DataFrame:
+    """Table of the predictions of one direction at several preloads, one below the other."""
+    return pd.concat([prediction_table(prediction) for prediction in predictions], ignore_index=True)
 
 
 def table_columns(table: pd.DataFrame) -> dict[str, list[Any]]:

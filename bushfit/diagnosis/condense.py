@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -178,8 +178,8 @@ class _Groups:
         turn = np.argsort(np.bincount(place, rows) / counts, kind="stable")
         return cls(rows, np.argsort(turn)[place], rows[first[turn]], counts[turn])
 
-    def mean(self, values: Array | float | None) -> Array | float | None:
-        """Mean of values by sweep row over each group, (g,); a scalar or None is returned unchanged."""
+    def mean(self, values: Any) -> Any:
+        """Mean of values by sweep row over each group, (g,); a value that is no array is returned unchanged."""
         return self._mean(values) if isinstance(values, np.ndarray) else values
 
     def _mean(self, values: Array) -> Array:

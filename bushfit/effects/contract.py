@@ -31,6 +31,7 @@ import numpy as np
 from bushfit.effects.history import Array as Array
 from bushfit.effects.history import History as History
 from bushfit.geometry import Bushing, Direction, Place
+from bushfit.reading.preload import Preload
 
 if TYPE_CHECKING:
     from bushfit.effects.unnamed import Unnamed
@@ -113,7 +114,7 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class RubberConditions:
-    """Temperature and strain history of the rubber in a test; effects that depend on an unknown (None) do nothing.
+    """Temperature, strain history and preload in a test; effects that depend on an unknown (None) do nothing.
 
     Args:
         temperature: temperature of the rubber [K], a number or one per operating point, (n,).
@@ -121,6 +122,7 @@ class RubberConditions:
         largest_strain: largest strain amplitude that the rubber had undergone before the measurement [1], (n,).
         previous_strain: last earlier strain amplitude larger than that of the point [1], (n,); 0 without any.
         rest_time: time since that larger amplitude, as a share of the session, (n,).
+        preload: static displacement or force of the test.
     """
 
     temperature: Array | float | None = None
@@ -128,6 +130,7 @@ class RubberConditions:
     largest_strain: Array | float | None = None
     previous_strain: Array | float | None = None
     rest_time: Array | float | None = None
+    preload: Preload | None = None
 
     def select(self, points: Any) -> RubberConditions:
         """Return the conditions of some operating points, by their numpy index; single numbers apply to all points."""
@@ -221,7 +224,7 @@ class Effect:
     twins: tuple[str, ...] = ()
     replaces: str | None = None
     depends_on: tuple[
-        Literal["temperature", "session_time", "largest_strain", "previous_strain", "rest_time"], ...
+        Literal["temperature", "session_time", "largest_strain", "previous_strain", "rest_time", "preload"], ...
     ] = ()
     assumption: str = ""
     harmonic_only: bool = False

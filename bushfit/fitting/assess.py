@@ -25,7 +25,8 @@ from bushfit.fitting.problem import SmoothError
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
-from bushfit.model.result import Quality, Range
+from bushfit.model.result import PreloadRange, Quality, Range
+from bushfit.reading.preload import distinct_preloads
 from bushfit.units import CELSIUS, format_range, number
 
 #: Distance of the reduced chi-square from 1 beyond which noise alone is no explanation, in standard deviations.
@@ -247,13 +248,25 @@ def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) ->
 
 
 def measured_range(model: Model, data_sets: Sequence[MeasuredTest]) -> Range:
-    """Range of frequencies [Hz], equivalent strain amplitudes and temperatures [K] of tests, and their directions."""
+    """Ranges of frequency [Hz], equivalent strain amplitude, temperature [K] and preload of tests; their directions."""
     found = [str(data_set.direction) for data_set in data_sets]
     directions = tuple(dict.fromkeys([*(str(direction) for direction in Direction if direction in found), *found]))
     kelvin = [np.ravel(data_set.test.temperature) for data_set in data_sets if data_set.test.temperature is not None]
     axes = [*operating_conditions(model.bushing, data_sets), *([np.concatenate(kelvin)] if kelvin else [])]
     ends = [(float(axis.min()), float(axis.max())) for axis in axes]
-    return Range(ends[0], ends[1], directions, *ends[2:])
+    temperature = ends[2] if kelvin else None
+    return Range(ends[0], ends[1], directions, temperature, tuple(preload_ranges(data_sets)))
+
+
+def preload_ranges(data_sets: Sequence[MeasuredTest]) -> list[PreloadRange]:
+    """Preloads of each direction or specimen with tests at two preloads or more, all displacements or all forces."""
+    ranges = []
+    for place in dict.fromkeys(test.direction for test in data_sets):
+        stated = [test.test.preload for test in data_sets if test.direction == place and test.test.preload]
+        if len(distinct := distinct_preloads(stated)) > 1:
+            low, high = distinct[0], distinct[-1]
+            ranges.append(PreloadRange(str(place), low.unit, low.value, high.value, len(distinct)))
+    return ranges
 
 
 def implausible_modulus(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> list[str]:
@@ -321,7 +334,10 @@ def mixed_conditions(data_sets: Sequence[MeasuredTest]) -> list[str]:
         One sentence for each condition that differs.
     """
     sentences = []
-    for key, words in (("specimen_number", "of specimens"), ("preload", "under preloads of")):
+    labels = {"specimen_number": "of specimens", "preload": "under preloads of"}
+    if preload_ranges(data_sets):  # a variable of the model, or without influence
+        del labels["preload"]
+    for key, words in labels.items():
         by_value: dict[str, str] = {}
         for data_set in data_sets:
             conditions = data_set.source.conditions if data_set.source else {}

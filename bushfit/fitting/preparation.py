@@ -79,9 +79,9 @@ def with_gain_weighting(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> li
 
 
 def repeats_of(loops: Sequence[MeasuredLoop]) -> Array:
-    """Mask of the pairs of loops that are repeats (same direction, amplitude and frequency within 2 %), (n, n)."""
+    """Mask of the pairs of loops that are repeats (same direction, preload, amplitude and frequency), (n, n)."""
     conditions = np.log([(loop.drive.amplitude, loop.drive.frequency) for loop in loops]).reshape(-1, 2)
-    place = np.array([str(loop.direction) for loop in loops])
+    place = np.array([f"{loop.direction} {loop.test.preload}" for loop in loops])
     return np.all(np.abs(conditions[:, None] - conditions) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
 
 
@@ -113,7 +113,7 @@ def prepare_sweeps(
         by_rig.setdefault(sweep.direction if isinstance(sweep.direction, Specimen) else None, []).append(sweep)
     noises = {id(sweep): noise for group in by_rig.values() for noise in [sweep_noise(group, rig)] for sweep in group}
     found = [MeasuredSweep(sweep, noises[id(sweep)], residuals).weighted(np.array(sweep.weight)) for sweep in sweeps]
-    names = [str(test.direction) for test in found]
+    names = [f"{test.direction} {test.test.preload}" for test in found]
     places = [np.full(test.measured.size, names.index(name)) for test, name in zip(found, names, strict=True)]
     conditions = (places, [test.frequency for test in found], [test.amplitude for test in found])
     return _with_contradictions(found, [np.concatenate([np.empty(0), *values]) for values in conditions])

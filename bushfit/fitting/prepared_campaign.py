@@ -15,6 +15,7 @@ from bushfit.errors import FitError, ModelError, error_location
 from bushfit.fitting.assess import mixed_conditions, refuse_strain
 from bushfit.fitting.coordinates import Bounds, residual
 from bushfit.fitting.design import designed
+from bushfit.fitting.preload import with_preload
 from bushfit.fitting.preparation import (
     MeasuredLoop,
     MeasuredSweep,
@@ -45,12 +46,14 @@ class PreparedCampaign:
         loops: measured loops with their noise.
         sweeps: measured sweeps with their noise.
         bounds: limits of parameters from [fit] [SI], by name.
+        preload_notes: sentences on the influence of the preload that the tests show.
     """
 
     campaign: Campaign
     loops: tuple[MeasuredLoop, ...]
     sweeps: tuple[MeasuredSweep, ...]
     bounds: Bounds = field(default_factory=dict)
+    preload_notes: tuple[str, ...] = ()
 
     @classmethod
     def from_campaign(cls, campaign: Campaign) -> "PreparedCampaign":
@@ -73,7 +76,7 @@ class PreparedCampaign:
         )
         with error_location(campaign.path):
             refuse_strain(campaign.bushing, data.data_sets)
-        return data.in_session()
+        return with_preload(data.in_session())
 
     def in_session(self) -> "PreparedCampaign":
         """Return the campaign with the temperature of the rubber and its earlier strains at each point of each test."""
@@ -96,15 +99,16 @@ class PreparedCampaign:
 
     @property
     def assumed(self) -> list[str]:
-        """Warning if the class of the rig is assumed: nothing was repeated, and the class is not fully stated."""
+        """Warnings about preloads, and if the class of the rig is assumed: nothing was repeated, no class stated."""
         if None not in self.campaign.rig.stiffness_errors or all(
             sweep.noise.origin != "assumed" for sweep in self.sweeps
         ):
-            return []
+            return [*self.preload_notes]
         shared = describe_class(self.campaign.rig)
         return [
+            *self.preload_notes,
             "no test was repeated at three points or more: the errors shared by a run are assumed from the class "
-            f"of the rig, {shared}"
+            f"of the rig, {shared}",
         ]
 
     @property

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from bushfit.effects import BASE, get_effect
+from bushfit.effects import BASE, effect_name_of, get_effect
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.agreement import expected_errors, misfits
@@ -17,6 +17,7 @@ from bushfit.fitting.assess import (
     lack_of_fit,
     measured_range,
     misfit_warnings,
+    preload_ranges,
     quality,
     temperature_warning,
     unfitted,
@@ -25,6 +26,7 @@ from bushfit.fitting.coordinates import Bounds, Coordinates
 from bushfit.fitting.identify import undetermined_parameters
 from bushfit.fitting.levels import level_errors
 from bushfit.fitting.model_error import model_error_warning, with_model_error
+from bushfit.fitting.preload import PRELOAD
 from bushfit.fitting.preparation import MeasuredTest, sources, split_by_kind, with_level_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem, FitResult
@@ -92,8 +94,11 @@ def fit_joint(
         if effect.corrects:
             get_place(effect.corrects, data.campaign.specimens)
     tests = data.select_tests(directions)
+    effects = data.effects if effects is None else effects
+    if not preload_ranges(tests):
+        effects = [name for name in effects if name != PRELOAD]
     unused = [test for test in data.data_sets if test not in tests]
-    problem = _problem(data, tests, data.effects if effects is None else effects, {})
+    problem = _problem(data, tests, effects, {})
     found = estimate(problem, robust=data.robust)
     largest = largest_error(data.campaign.rig)
     errors = level_errors(found.minimised, found.residual, found.jacobian, largest)
@@ -307,7 +312,9 @@ def fit_warnings(model: Model, step: FitResult, bounds: Bounds, covariance: Cova
             f"nothing was fitted, because every parameter is fixed; the given values {how} the tests {extent} "
             f"(NRMSE {number(100.0 * found.nrmse, 2)} %, reduced chi-square {number(found.reduced_chi_square, 3)})",
         ]
-    unknown = covariance.restricted(names).describe_unknown(model.values)
+    # the parameters of the preload are one curve, whose bands tell more than the error of a coefficient
+    judged = [name for name in names if effect_name_of(name) != PRELOAD]
+    unknown = covariance.restricted(judged).describe_unknown(model.values)
     sentences = [*([unknown] if unknown else []), *notes]
     if step.stopped:
         sentences.append(
@@ -325,6 +332,6 @@ def fit_warnings(model: Model, step: FitResult, bounds: Bounds, covariance: Cova
             how = f"at {'most' if end == 'min' else 'least'} {number(factor * limit, 2)} {unit}".rstrip(" -")
             sentences.append(f"{name} ended at a limit of the model: the tests only show that it is {how} (95 %)")
     sentences += undetermined_parameters(
-        model, step.minimised, [name for name in names if name not in at_bound], covariance
+        model, step.minimised, [name for name in judged if name not in at_bound], covariance
     )
     return sentences if step.smooth_error else [*sentences, *misfit_warnings(model, tests, len(names), advice)]

@@ -16,7 +16,7 @@ from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import Shape, SpecimenKind, StatedStrain
 from bushfit.model.result import CampaignTable as CampaignTable
-from bushfit.model.result import End, ExpectedError, Misfit, Outlier, Quality, Range
+from bushfit.model.result import End, ExpectedError, Misfit, Outlier, PreloadRange, Quality, Range
 from bushfit.model.result import TestTable as TestTable
 from bushfit.units import SIZES
 from bushfit.validation import Flag, Name, Number, WholeNumber
@@ -122,6 +122,9 @@ class FitTable(Quality):
     temperature_K: Annotated[  # noqa: N815
         Interval | None, Field(description="Lowest and highest temperature [K]; null if no test states one.")
     ] = None
+    preloads: Annotated[
+        tuple[PreloadRange, ...], Field(description="Preloads by direction or specimen, if there are two or more.")
+    ] = ()
     tests: Annotated[
         tuple[Misfit, ...], Field(description="Misfit of every test, fitted or not, and of its runs.")
     ] = ()
@@ -147,10 +150,10 @@ class FitTable(Quality):
 
     @property
     def measured(self) -> Range | None:
-        """Ranges of frequency, strain and temperature of the fitted tests; None if the file does not state them."""
+        """Ranges of frequency, strain, temperature and preload of the fitted tests; None if not in the file."""
         if self.frequency_Hz is None or self.strain is None:
             return None
-        return Range(self.frequency_Hz, self.strain, self.directions, self.temperature_K)
+        return Range(self.frequency_Hz, self.strain, self.directions, self.temperature_K, self.preloads)
 
 
 @dataclass(frozen=True)

@@ -134,6 +134,7 @@ def to_document(result: Result) -> dict[str, Any]:
             strain=measured.strain,
             directions=measured.directions,
             temperature_K=measured.temperature,
+            preloads=measured.preloads,
             tests=result.tests,
             usable=result.usable,
         )

@@ -105,6 +105,11 @@ class Model:
         return any("temperature" in effect.depends_on for effect in self.records)
 
     @property
+    def depends_on_preload(self) -> bool:
+        """True if the response depends on the preload."""
+        return any("preload" in effect.depends_on for effect in self.records)
+
+    @property
     def name(self) -> str:
         """Name of the bushing; "compound" for a model without a bushing."""
         return self.bushing.name if self.bushing else "compound"

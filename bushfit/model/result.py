@@ -15,6 +15,7 @@ from bushfit.geometry import Bushing, Place, Specimen, get_place
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Source, Stepped
+from bushfit.reading.preload import Preload
 from bushfit.units import display_unit, format_aligned, number
 from bushfit.validation import Flag, Number, WholeNumber
 
@@ -48,6 +49,30 @@ class Quality:
 
 
 @dataclass(frozen=True)
+class PreloadRange:
+    """Preloads of the fitted tests of one direction or specimen.
+
+    Args:
+        place: name of the direction or specimen.
+        unit: SI unit of the preloads: that of a displacement, such as m, or that of a force, such as N.
+        low: smallest preload, in `unit`.
+        high: largest preload, in `unit`.
+        count: number of distinct preloads.
+    """
+
+    place: str
+    unit: str
+    low: Number
+    high: Number
+    count: WholeNumber
+
+    def text(self, place: Place) -> str:
+        """Smallest and largest preload for users, such as "0 to 1.5 mm", in the direction or specimen `place`."""
+        (low, unit), (high, _) = (Preload(end, self.unit).in_display_unit(place) for end in (self.low, self.high))
+        return f"{number(low, 4)} to {number(high, 4)} {unit}"
+
+
+@dataclass(frozen=True)
 class Range:
     """Ranges of the operating conditions of the fitted tests.
 
@@ -56,12 +81,18 @@ class Range:
         strain: smallest and largest equivalent strain amplitude [1].
         directions: names of the directions and specimens; empty if an older file does not state them.
         temperature: lowest and highest temperature [K]; None if no test states one.
+        preloads: preloads of each direction or specimen that was tested at two or more.
     """
 
     frequency: tuple[float, float]
     strain: tuple[float, float]
     directions: tuple[str, ...] = ()
     temperature: tuple[float, float] | None = None
+    preloads: tuple[PreloadRange, ...] = ()
+
+    def preloads_of(self, place: Place) -> PreloadRange | None:
+        """Preloads of the tests of a direction or specimen; None if it was not tested at two or more."""
+        return next((stated for stated in self.preloads if stated.place == str(place)), None)
 
 
 @dataclass(frozen=True)
@@ -348,7 +379,7 @@ def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, str]:
     measured = result.measured
     if measured:
         of_specimens = tuple(name for name in measured.directions if name in names)
-        measured = replace(measured, directions=of_specimens or (result.name,))
+        measured = replace(measured, directions=of_specimens or (result.name,), preloads=())
     elsewhere = Result(
         model,
         fitted=tuple(name for name in result.fitted if name in model.values),

@@ -17,6 +17,7 @@ from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.covariance import Z95
 from bushfit.model.result import Result
 from bushfit.reading.measurement import SAME_TEMPERATURE
+from bushfit.reading.preload import Preload
 from bushfit.units import CELSIUS, format_range, number
 
 #: Largest relative distance beyond the fitted range that is no extrapolation: rigs miss their set points by less.
@@ -201,6 +202,7 @@ def point_warnings(
     rig_stiffness: Array | None,
     measured: Array | None,
     temperature: float | None,
+    preload: Preload | None,
 ) -> Iterator[str]:
     """Generate the warnings for predicted operating points.
 
@@ -211,6 +213,7 @@ def point_warnings(
         rig_stiffness: |K| if the unresolved effects belong to the rig, (n,); None without such effects.
         measured: measured complex stiffness, nan at points without a measurement, (n,); None without sweeps.
         temperature: temperature of the prediction [K]; None for the reference temperature.
+        preload: requested preload; None if none is requested.
 
     Yields:
         Sentences.
@@ -219,7 +222,8 @@ def point_warnings(
     yield from result.undecided
     yield from unfitted_warnings(result, place)
     yield from extrapolations(result, place, frequency, amplitude, temperature)
-    conditions = set() if temperature is None else {"temperature"}
+    requested = {"temperature": temperature, "preload": preload}
+    conditions = {name for name, value in requested.items() if value is not None}
     effects = result.model.without(Level.INSTRUMENT).records
     yield from (effect.assumption for effect in effects if effect.assumption and not conditions & {*effect.depends_on})
     rig = rig_effects(result)

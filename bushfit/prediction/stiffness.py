@@ -25,6 +25,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.prediction.caveats import MARGIN, extrapolations, point_warnings, unfitted_warnings
+from bushfit.reading.preload import SAME_PRELOAD, Preload
 from bushfit.reading.runs import nominal
 from bushfit.reduction.resonance import response
 from bushfit.units import number
@@ -91,6 +92,7 @@ class Prediction:
             unresolved effects.
         measured: measured complex stiffness at these points, mean of the repeats [N/m or N m/rad], (n,); nan at a
             point without a measurement; None without sweeps.
+        preload: preload of all points; None if the tests of this direction did not have several.
     """
 
     direction: Place
@@ -103,6 +105,12 @@ class Prediction:
     warnings: tuple[str, ...] = ()
     if_rigs: Prediction | None = None
     measured: Array | None = None
+    preload: Preload | None = None
+
+    @property
+    def label(self) -> str:
+        """Direction or specimen for users, with the preload if it is known: "axial at a preload of 500 N"."""
+        return f"{self.direction}" + (f" at a preload of {self.preload.text(self.direction)}" if self.preload else "")
 
 
 def predict(
@@ -114,6 +122,7 @@ def predict(
     rig: bool = False,
     sweeps: Sequence[MeasuredSweep] | None = None,
     temperature: float | None = None,
+    preload: Preload | None = None,
 ) -> Prediction:
     """Predict the dynamic stiffness on a grid, with 95 % bands from the covariance of the fit (delta method).
 
@@ -128,12 +137,13 @@ def predict(
         rig: True to include the effects of the rig, as in the tests.
         sweeps: measured sweeps for comparison; None for no comparison.
         temperature: temperature of the rubber [K]; None for the reference temperature.
+        preload: preload within the tested range; None for none, or the tested preload nearest to none.
 
     Returns:
         Prediction at all combinations of frequency and amplitude.
 
     Raises:
-        ModelError: a frequency or amplitude is not positive.
+        ModelError: a frequency or amplitude is not positive, or the preload is outside the tested range.
     """
     for name, values in (("frequency", frequencies), ("amplitude", amplitudes)):
         if not (np.size(values) and np.all(np.isfinite(values)) and np.min(values) > 0):
@@ -141,7 +151,8 @@ def predict(
     amplitude, frequency = (
         axis.ravel() for axis in np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
     )
-    points = direction, frequency, amplitude, temperature
+    conditions = RubberConditions(temperature, preload=tested_preload(result, direction, preload))
+    points = direction, frequency, amplitude, conditions
     predictions = [predict_with_model(source, model, *points) for source, model in candidates(result, rig=rig)]
     bushings = predictions[0]
     rigs = predictions[2 ** len(result.unresolved) - 1] if result.unresolved and not rig else None
@@ -156,8 +167,45 @@ def predict(
         rigs.stiffness.value if rigs else None,
         None if rig else measured,
         temperature,
+        preload,
     )
-    return replace(bushings, **bands, if_rigs=rigs, measured=measured, warnings=tuple(warnings))
+    bands |= {"if_rigs": rigs, "measured": measured, "preload": conditions.preload}
+    return replace(bushings, **bands, warnings=tuple(warnings))
+
+
+def tested_preload(result: Result, place: Place, preload: Preload | None) -> Preload | None:
+    """Preload of a prediction, which must be within the preloads of the fitted tests.
+
+    Args:
+        result: fitted result.
+        place: direction or specimen.
+        preload: requested preload; None for none, or the tested preload nearest to none.
+
+    Returns:
+        The preload; None if it is not requested and the model does not depend on it in this direction.
+
+    Raises:
+        ModelError: the tests of this direction do not have several preloads, or none as small or as large.
+    """
+    tested = result.measured.preloads_of(place) if result.measured else None
+    if preload is None:
+        return Preload(float(np.clip(0.0, tested.low, tested.high)), tested.unit) if tested else None
+    if result.measured is None and result.model.depends_on_preload:  # of a simulation: exact, without a range
+        return preload
+    refuse = partial(ModelError, place=str(place), found=f"a preload of {preload.text(place)}")
+    if tested is None:
+        raise refuse(
+            "the model was not fitted to several preloads of this direction",
+            expected="tests at two preloads or more",
+            hint='state preload = "500 N" for each test of the campaign, "none" without, and fit it again',
+        )
+    margin = SAME_PRELOAD * max(abs(tested.low), abs(tested.high))
+    if preload.unit != tested.unit and preload.value:
+        raise refuse("the tests state the preload in another quantity", expected=tested.text(place))
+    if not tested.low - margin <= preload.value <= tested.high + margin:
+        hint = "test the bushing at this preload, and fit all tests together"
+        raise refuse("this preload is outside of the tests", expected=tested.text(place), hint=hint)
+    return Preload(preload.value, tested.unit)
 
 
 def car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
@@ -260,7 +308,7 @@ def uncertainty(
 
 
 def predict_with_model(
-    result: Result, model: Model, direction: Place, frequency: Array, amplitude: Array, temperature: float | None
+    result: Result, model: Model, direction: Place, frequency: Array, amplitude: Array, conditions: RubberConditions
 ) -> Prediction:
     """Predict the stiffness with one model, with the uncertainty of the fit and the error of the model.
 
@@ -270,12 +318,11 @@ def predict_with_model(
         direction: direction or specimen.
         frequency: frequency of each point [Hz], (n,).
         amplitude: zero-to-peak amplitude of each point [m, rad or 1], (n,).
-        temperature: temperature of the rubber [K]; None for the reference temperature.
+        conditions: temperature and preload of the rubber.
 
     Returns:
         Prediction without warnings.
     """
-    conditions = RubberConditions(temperature)
     errors = uncertainty(result, model, direction, frequency, amplitude, conditions)
     stiffness, slopes = stiffness_and_slopes(
         model, direction, frequency, amplitude, errors.covariance.names, conditions=conditions
@@ -359,6 +406,7 @@ def predict_resonance(
     frequencies: Sequence[float] | Array | None,
     *,
     temperature: float | None = None,
+    preload: Preload | None = None,
 ) -> PredictedResonance:
     """Predict the response of a mass on the bushing or specimen, whose stiffness depends on amplitude.
 
@@ -369,6 +417,7 @@ def predict_resonance(
         base_acceleration: zero-to-peak acceleration of the base [m/s^2].
         frequencies: frequencies [Hz]; None for a range about the resonance.
         temperature: temperature of the rubber [K]; None for the reference temperature.
+        preload: preload within the tested range; None as in `predict`.
 
     Returns:
         Transmissibility and amplitude at the frequencies.
@@ -379,7 +428,7 @@ def predict_resonance(
     if place.motion is not TRANSLATION:
         raise ModelError("this cannot carry a mass", found=str(place), expected="a direction or mount with a stiffness")
     bushings, *rig_models = car_models(result.model, result.unresolved)
-    conditions = RubberConditions(temperature)
+    conditions = RubberConditions(temperature, preload=tested_preload(result, place, preload))
     if frequencies is None:
         small = bushings.stiffness(place, 1.0, _SMALL_STRAIN / bushings.unit_strain(place), conditions=conditions)
         resonance = float(np.sqrt(np.abs(small) / mass)) / (2.0 * np.pi)

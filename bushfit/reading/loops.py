@@ -9,6 +9,7 @@ from bushfit.geometry import Place, strain_factor_of_files
 from bushfit.reading.headers import LOOP_COLUMNS, Column
 from bushfit.reading.labelled import note_not_understood
 from bushfit.reading.measurement import Floats, Loop
+from bushfit.reading.preload import parse_preload
 from bushfit.reading.source import LEAST_VALUE
 from bushfit.reading.stated import LoopFile
 from bushfit.reading.table import Table
@@ -70,6 +71,7 @@ def read_loop(file: Path, direction: Place, test: LoopFile, *, name: str | None 
         "time" in values,
         test.weight,
         temperature=test.temperature,
+        preload=parse_preload(test.preload, direction),
     )
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
+from bushfit.reading.preload import Preload
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -73,6 +74,7 @@ class Loop:
         softening: excess stiffness of the first cycle relative to the last; None if noise and the memory of rubber
             explain the difference.
         temperature: temperature of the test [K]; None if it is not known.
+        preload: static displacement or force about which the test was made; None if it is not known.
 
     Raises:
         MeasurementError: arrays of different length.
@@ -90,6 +92,7 @@ class Loop:
     part: RecordPart | None = None
     softening: float | None = None
     temperature: float | None = None
+    preload: Preload | None = None
 
     def __post_init__(self) -> None:
         _check_lengths(self.name, self.time, self.displacement, self.force)
@@ -118,6 +121,7 @@ class Sweep:
         relative_error: standard deviation of the real and of the imaginary part of each point, relative to |K|, (n,);
             None if the file does not state it.
         temperature: temperature of the test, or of each point, (n,) [K]; None if it is not known.
+        preload: as in `Loop`.
 
     Raises:
         MeasurementError: arrays of different length.
@@ -136,6 +140,7 @@ class Sweep:
     relative_error: Floats | None = None
     weight: float = 1.0
     temperature: Floats | float | None = None
+    preload: Preload | None = None
 
     def __post_init__(self) -> None:
         if self.repeat.size == 0:

@@ -14,6 +14,7 @@ from bushfit.geometry import STRAINING, Place, strain_factor_of_files
 from bushfit.reading.headers import AGREEING_PAIRS, SWEEP_COLUMNS, ZERO_TO_PEAK, AmplitudeConvention, Column
 from bushfit.reading.labelled import column_texts, note_not_understood
 from bushfit.reading.measurement import SAME_TEMPERATURE, Floats, Sweep
+from bushfit.reading.preload import parse_preload
 from bushfit.reading.runs import runs_of
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.stiffness import check_stiffness, complex_stiffness, stiffness_pair, with_positive_loss
@@ -116,6 +117,7 @@ def read_sweep(
         values["relative_error"][selected] if "relative_error" in values else None,
         weight=test.weight,
         temperature=degrees,
+        preload=parse_preload(test.preload, direction),
     )
 
 

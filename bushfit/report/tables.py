@@ -82,7 +82,7 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
     Returns:
         Columns: frequency, amplitude, stiffness, loss factor, storage and loss stiffness; "low" and "high" ends of the
         last four; the four again under the assumption that an unresolved effect belongs to the rig, if there is one;
-        and measured stiffness and loss factor, if they are known.
+        and measured stiffness and loss factor, if they are known; and preload, if the tests have several.
     """
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     motion_name, _, resisted = words(prediction.direction)
@@ -105,6 +105,9 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
         columns |= {f"{name}, {IF_RIGS}": getattr(rig, key).value * scale for name, (key, scale) in quantities.items()}
     if (measured := prediction.measured) is not None:
         columns |= {f"measured {force}": np.abs(measured) * factor, "measured loss factor [-]": loss_factor(measured)}
+    if prediction.preload is not None:
+        value, unit = prediction.preload.in_display_unit(prediction.direction)
+        columns[f"preload [{unit}]"] = np.full(prediction.frequency.shape, value)
     return pd.DataFrame(columns)
 
 
@@ -277,11 +280,14 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
 
 
 def _condition_columns(data_set: MeasuredSweep) -> dict[str, Any]:
-    """Columns of the stepped quantity of a sweep, and of temperature, part and stated error if its test has them."""
+    """Columns of the stepped quantity of a sweep, and of temperature, preload, part and error if its test has them."""
     sweep, conditions = data_set.sweep, data_set.source.conditions if data_set.source else {}
     columns: dict[str, Any] = {"stepped": sweep.stepped or "neither"}
     if sweep.temperature is not None:
         columns["temperature [degC]"] = data_set.temperature - CELSIUS
+    if sweep.preload is not None:
+        value, unit = sweep.preload.in_display_unit(sweep.direction)
+        columns[f"preload [{unit}]"] = value
     if "specimen_number" in conditions:
         columns["part"] = str(conditions["specimen_number"])
     if sweep.relative_error is not None:

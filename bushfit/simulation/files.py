@@ -66,7 +66,7 @@ def _campaign_toml(simulated: Simulated, form: Form) -> str:
         lines += ["", "[rig]", *(f'{key} = "{size:.6g} {unit}"' for key, (size, unit) in errors.items())]
     for kind, tests in (("loops", simulated.loops), ("sweeps", simulated.sweeps)):
         for test in tests:
-            lines += table_lines(kind, f"{test.name}.{end}", test.direction, test.temperature)
+            lines += table_lines(kind, f"{test.name}.{end}", test.direction, test.temperature, test.preload)
     for mass, resonance in simulated.resonances:
         file, folder = (quote_path(Path(name)) for name in (f"{resonance.name}.{end}", resonance.name))
         option = "specimen" if isinstance(resonance.direction, Specimen) else "direction"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -96,7 +96,8 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
         displacement = record.displacement + plan.displacement_noise * largest * random.standard_normal(rows)
         noise = plan.force_noise * np.ptp(record.force) / 2.0 * _filtered_noise(rows, plan, random)
         name, force = f"loop_{loop.direction}_{number}", gains[loop] * record.force + noise
-        loops.append(Loop(name, loop.direction, record.time, displacement, force, temperature=loop.temperature))
+        stated = Loop(name, loop.direction, record.time, displacement, force, temperature=loop.temperature)
+        loops.append(replace(stated, preload=loop.static))
     named = zip(_names("sweep", [test for test, _ in clean.sweeps]), clean.sweeps, conditions, strict=False)
     sweeps = [_sweep(clean.truth, test, k, name, plan, random, conditions) for name, (test, k), conditions in named]
     shaken = [resonance for resonance in clean.resonances for _ in range(plan.repeats)]
@@ -142,7 +143,7 @@ def _sweep(
         ratios = np.exp(test.reached * np.sqrt(0.5) * (of_frequency + random.standard_normal(shape)))
         reached = level * ratios.ravel()
     if test.reached or truth.depends_on_conditions:
-        planned = frequency, level, stiffness.ravel(), RubberConditions(test.temperature)
+        planned = frequency, level, stiffness.ravel(), RubberConditions(test.temperature, preload=test.static)
         nearby = near(truth, test.direction, *planned, conditions)
         stiffness = nearby(level if reached is None else reached).reshape(shape)
     if plan.level_gain_error or plan.level_phase_error:
@@ -161,6 +162,7 @@ def _sweep(
         reached=reached,
         stepped=test.stepped,
         temperature=test.temperature,
+        preload=test.static,
     )
 
 

@@ -165,7 +165,7 @@ def _clean_programme(truth: Model, test: SimulatedLoop, conditions: RubberCondit
 def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Array:
     """Simulate the complex stiffness of a sweep without noise [N/m or N m/rad], (levels, steps)."""
     points = (values.ravel() for values in test.points)
-    conditions = RubberConditions(test.temperature)
+    conditions = RubberConditions(test.temperature, preload=test.static)
     stiffness = rig.dynamic_stiffness(
         truth, test.direction, *points, steps_per_cycle=steps_per_cycle, conditions=conditions
     )

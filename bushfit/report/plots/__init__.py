@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         master_curve,
         plan,
         prediction,
+        preload,
         style,
     )
 

@@ -130,7 +130,7 @@ def refined(
         values if values.size < 2 else np.union1d(values, np.geomspace(values[0], values[-1], _FINE))
         for values in map(np.unique, (prediction.frequency, prediction.amplitude))
     ]
-    return predict(result, prediction.direction, *grid, rig=rig, temperature=temperature)
+    return predict(result, prediction.direction, *grid, rig=rig, temperature=temperature, preload=prediction.preload)
 
 
 def draw_prediction(

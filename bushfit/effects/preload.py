@@ -1,0 +1,74 @@
+"""Preload: rubber about a static deformation has the tangent of its elastic law, and another friction and springpot."""
+
+import numpy as np
+
+from bushfit.effects.contract import Array, Condition, Setting, Value, Values, scaled_values
+from bushfit.geometry import stiffness_per_modulus, unit_strain
+
+#: Names of the stresses and moduli of friction, by whatever law.
+_FRICTION = ("sigma_fmax", "sigma", "delta")
+#: Smallest tangent of the elastic law over that without preload: a law that falls has no unique static strain.
+_SMALLEST_TANGENT = 0.05
+#: Newton steps for the static strain of a force; chosen: a tangent of 0.3 to 3 needs six.
+_STEPS = 12
+
+
+def adjust(p: Values, condition: Condition) -> dict[str, Value]:
+    """Moduli and stresses [Pa] about the preload of the test.
+
+    Args:
+        p: parameter values by name, with all moduli and stresses [Pa], and the six parameters of the effect [1].
+        condition: operating condition, with the preload as a displacement or force.
+
+    Returns:
+        mu times the tangent, the stresses and moduli of friction times one factor, and those that depend on the rate
+        times another; the cubic term of `strain_stiffening`, which is relative to mu, remains as it is. Empty if the
+        preload is unknown.
+
+    Notes:
+        The elastic law s = 2 mu (e + c2 e^2 + c3 e^3) has the tangent 2 mu (1 + 2 c2 e + 3 c3 e^2) at the static
+        strain e. The factors are exp(friction e + friction_square e^2) and exp(rate e + rate_square e^2).
+    """
+    if condition.setting.conditions.preload is None:
+        return {}
+    strain = static_strain(p, condition.setting)
+    slope = tangent(p, strain)
+    friction = tuple(name for name in condition.moduli if name.rpartition(".")[2] in _FRICTION)
+    rate = tuple(name for name in condition.moduli if name not in ("mu", *friction))
+    return {
+        **scaled_values(p, ("mu",), slope),
+        **scaled_values(p, ("strain_stiffening.c3",), 1.0 / slope),
+        **scaled_values(p, friction, np.exp(p["friction"] * strain + p["friction_square"] * np.square(strain))),
+        **scaled_values(p, rate, np.exp(p["rate"] * strain + p["rate_square"] * np.square(strain))),
+    }
+
+
+def tangent(p: Values, strain: Value) -> Array:
+    """Slope of the elastic law at a static strain, relative to that without preload, of the shape of the strain.
+
+    >>> tangent({"c2": 0.0, "c3": 20.0}, 0.1).round(6)
+    np.float64(1.6)
+    """
+    return np.maximum(1.0 + 2.0 * p["c2"] * strain + 3.0 * p["c3"] * np.square(strain), _SMALLEST_TANGENT)
+
+
+def static_strain(p: Values, setting: Setting) -> Value:
+    """Static strain of the test's preload: that of a displacement, or that at which the elastic law has the force.
+
+    Args:
+        p: parameter values by name, with mu [Pa], c2, c3 [1].
+        setting: test with a known preload.
+
+    Returns:
+        Equivalent strain [1], a number, or an array of the shape of the values.
+    """
+    preload, place = setting.conditions.preload, setting.direction
+    assert preload is not None
+    per_displacement = unit_strain(setting.bushing, place)
+    if preload.unit == place.motion.displacement_unit:
+        return per_displacement * preload.value
+    strain = linear = preload.value * per_displacement / (stiffness_per_modulus(setting.bushing, place) * p["mu"])
+    for _ in range(_STEPS):
+        excess = strain + p["c2"] * np.square(strain) + p["c3"] * strain**3 - linear
+        strain = np.clip(strain - excess / tangent(p, strain), -5.0 * abs(linear), 5.0 * abs(linear))
+    return strain

@@ -1,0 +1,97 @@
+"""Preload as a variable of the model: whether the tests of a direction show that it has an influence.
+
+A direction with tests at three preloads or more determines the six parameters of the effect `preload`; two preloads
+determine a straight line. An F-test decides between the model with and without them: noise, errors of levels and gain
+errors of loops alone may not explain the difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from scipy.special import fdtrc
+
+from bushfit.campaign.schema import ParameterSetting
+from bushfit.fitting.assess import preload_ranges
+from bushfit.fitting.levels import level_errors
+from bushfit.fitting.preparation import MeasuredTest, split_by_kind, with_gain_weighting, with_level_errors
+from bushfit.fitting.problem import FitProblem, FitResult
+from bushfit.fitting.rig_class import largest_error
+from bushfit.fitting.robust import estimate
+from bushfit.geometry import get_place
+from bushfit.units import number
+
+if TYPE_CHECKING:
+    from bushfit.fitting.prepared_campaign import PreparedCampaign
+
+#: Name of the effect.
+PRELOAD = "preload"
+#: Parameters that two preloads leave open: a line is neutral in them.
+_CURVATURES = ("preload.c3", "preload.friction_square", "preload.rate_square")
+#: Probability of chance below which an influence is claimed; chosen: one campaign in a hundred without an influence.
+_CHANCE = 0.01
+
+
+def with_preload(data: PreparedCampaign) -> PreparedCampaign:
+    """Add the effect of preload to the model of a campaign if its tests show an influence of the preload.
+
+    Args:
+        data: campaign with prepared tests.
+
+    Returns:
+        The campaign, with the effect in its [fit], or with a sentence that the tests show no influence; unchanged if
+        [fit] has the effect, or if all tests of each direction have one preload.
+    """
+    ranges = preload_ranges(data.data_sets)
+    if PRELOAD in data.effects or not ranges:
+        return data
+    fit, notes, shown = data.campaign.fit, list[str](), False
+    fixed = _CURVATURES if max(stated.count for stated in ranges) == 2 else ()
+    for stated in ranges:
+        place = get_place(stated.place, data.campaign.specimens)
+        tests = [test for test in data.data_sets if test.direction == place and test.conditions.preload]
+        chance = _probability_of_chance(data, tests, fixed)
+        listed = f"{stated.place}: {stated.count} preloads, {stated.text(place)}"
+        if chance > _CHANCE / len(ranges):
+            notes.append(
+                f"{listed}: these tests show no influence of the preload on stiffness and loss: noise explains "
+                f"their differences (p = {number(chance, 2)})"
+            )
+            continue
+        shown = True
+        if stated.count == 2:
+            notes.append(
+                f"{listed}: the model follows a straight line over two preloads, and no test shows whether it is "
+                "straight; add tests at a third preload between them"
+            )
+    if not shown:
+        return replace(data, preload_notes=tuple(notes))
+    line = {name: ParameterSetting(value=0.0, vary=False) for name in fixed}
+    fit = replace(fit, effects=(*fit.effects, PRELOAD), parameters={**line, **fit.parameters})
+    return replace(data, campaign=replace(data.campaign, fit=fit), preload_notes=tuple(notes))
+
+
+def _probability_of_chance(data: PreparedCampaign, tests: Sequence[MeasuredTest], fixed: Sequence[str]) -> float:
+    """Probability that chance alone lowers chi-square as much as the effect of preload does, by an F-test."""
+    tests = with_gain_weighting(tests, weigh=True)
+    model = data.starting_model(data.effects, tests, {})
+    names = list(data.free(tuple(model.parameters)))
+    plain, full = _fits(data, FitProblem(model, tests, names, data.bounds), fixed)
+    errors = level_errors(full.minimised, full.residual, full.jacobian, largest_error(data.campaign.rig))
+    if errors.matters:
+        loops, sweeps = split_by_kind(tests)
+        tests = [*loops, *with_level_errors(sweeps, errors.error, errors.freedom)]
+        plain, full = _fits(data, replace(plain.problem, model=plain.model, tests=tests), fixed)
+    added, freedom = len(full.names) - len(names), full.residual.size - len(full.names)
+    variance = max(full.chi_square / freedom, 1.0)
+    return float(fdtrc(added, freedom, max(plain.chi_square - full.chi_square, 0.0) / (added * variance)))
+
+
+def _fits(data: PreparedCampaign, problem: FitProblem, fixed: Sequence[str]) -> tuple[FitResult, FitResult]:
+    """Fits of a problem without and with the free parameters of the effect of preload."""
+    plain = estimate(problem, robust=data.robust)
+    model = plain.model.with_effect(PRELOAD)
+    added = [name for name in model.parameters if name.startswith(f"{PRELOAD}.") and name not in fixed]
+    return plain, estimate(replace(problem, model=model, names=[*problem.names, *added]), robust=data.robust)

@@ -1,0 +1,74 @@
+"""Preload of a test: the static displacement or force about which it was made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import NamedTuple
+
+from bushfit.errors import UnitError
+from bushfit.geometry import Direction, Place
+from bushfit.units import number, parse_quantity
+
+#: Difference of two preloads, relative to the larger one, up to which they are the same preload.
+SAME_PRELOAD = 0.02
+
+
+class Preload(NamedTuple):
+    """Static displacement or force about which a test was made, in the direction of the test.
+
+    Args:
+        value: displacement [m or rad, or strain], or force [N or N m, or Pa].
+        unit: SI unit, which is that of a displacement or that of a force.
+    """
+
+    value: float
+    unit: str
+
+    def in_display_unit(self, place: Place) -> tuple[float, str]:
+        """Value and unit for users, such as (1.5, "mm"), of a preload in a direction."""
+        units = place.display.force if self.unit == place.motion.force_unit else place.display.displacement
+        return self.value * units.factor, units.name
+
+    def text(self, place: Place) -> str:
+        """Text for users, such as "1.5 mm", of a preload in a direction."""
+        value, unit = self.in_display_unit(place)
+        return f"{number(value, 4)} {unit}"
+
+    def equals(self, other: Preload | None) -> bool:
+        """True if the other preload is within 2 %; a preload of zero equals zero in every unit."""
+        if other is None or (self.unit != other.unit and (self.value or other.value)):
+            return False
+        return abs(self.value - other.value) <= SAME_PRELOAD * max(abs(self.value), abs(other.value))
+
+
+def parse_preload(text: str | None, place: Place) -> Preload | None:
+    """Preload that a text states for a direction or specimen.
+
+    Args:
+        text: text of the campaign, such as "500 N", "1.5 mm axial" or "none"; None if the campaign states none.
+        place: direction or specimen of the test.
+
+    Returns:
+        The preload; None if the text is no displacement or force in this direction.
+    """
+    words = (text or "").split()
+    if words and words[-1].lower() in [*Direction] and words.pop().lower() != str(place):
+        return None
+    if [word.lower() for word in words] in (["none"], ["0"]):
+        return Preload(0.0, place.motion.force_unit)
+    for unit in (place.motion.displacement_unit, place.motion.force_unit):
+        with suppress(UnitError):
+            return Preload(parse_quantity(" ".join(words), unit), unit)
+    return None
+
+
+def distinct_preloads(preloads: Sequence[Preload]) -> list[Preload]:
+    """Sort preloads of one direction, and keep one of those within 2 %; empty if forces and displacements are mixed."""
+    distinct = list[Preload]()
+    for preload in sorted(preloads):
+        if not distinct or not preload.equals(distinct[-1]):
+            distinct.append(preload)
+    mixed = len({preload.unit for preload in distinct if preload.value}) > 1
+    unit = next((preload.unit for preload in distinct if preload.value), distinct[0].unit if distinct else "")
+    return [] if mixed else [Preload(preload.value, unit) for preload in distinct]

@@ -1,0 +1,65 @@
+"""Figure of predictions over the preload."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bushfit.model.result import Result
+from bushfit.prediction.stiffness import Prediction, predict
+from bushfit.reading.preload import Preload
+from bushfit.report.plots import style
+from bushfit.report.plots.fits import stiffness_scale
+from bushfit.report.tables import spread
+from bushfit.units import format_range
+
+#: Number of preloads of a line of the model.
+_FINE = 25
+#: Largest number of amplitudes drawn: more bands would overlap.
+_MOST_LEVELS = 6
+
+
+@style.in_own_style
+def preload_figure(
+    result: Result, predictions: Sequence[Prediction], title: str, temperature: float | None = None
+) -> style.Chart:
+    """Figure of stiffness magnitude and loss factor over the preload, at the middle frequency of a prediction.
+
+    Args:
+        result: fitted model.
+        predictions: predictions of one direction or specimen at several preloads, on the same grid.
+        title: title of the figure.
+        temperature: temperature of the prediction [K]; None for the reference temperature.
+
+    Returns:
+        Figure with a line and a 95 % band for at most six amplitudes, and points at measured preloads.
+    """
+    place, preloads = predictions[0].direction, [prediction.preload for prediction in predictions if prediction.preload]
+    frequencies, amplitudes = np.unique(predictions[0].frequency), np.unique(predictions[0].amplitude)
+    frequency, amplitudes = frequencies[frequencies.size // 2], amplitudes[spread(amplitudes.size, _MOST_LEVELS)]
+    ends = min(preloads).value, max(preloads).value
+    loads = [Preload(value, preloads[0].unit) for value in np.linspace(*ends, _FINE).tolist()]
+    fine = [predict(result, place, [frequency], amplitudes, temperature=temperature, preload=load) for load in loads]
+    to_table = place.display.stiffness.factor
+    factor, labels = stiffness_scale(place, to_table * max(float(one.stiffness.value.max()) for one in fine))
+    figure = style.Chart(title, style.ROW)
+    pair = figure.subplots(1, 2)
+    quantities = (("stiffness", factor * to_table), ("loss_factor", 1.0))
+    for axes, label, (name, scale) in zip(pair, labels, quantities, strict=True):
+        for index, look in enumerate(style.styles(amplitudes.size, "amplitude")):
+            bands = [getattr(prediction, name) for prediction in fine]
+            x = [preload.in_display_unit(place)[0] for preload in loads]
+            axes.plot(x, [scale * band.value[index] for band in bands], color=look.color, ls=look.dashes)
+            low, high = ([scale * getattr(band, end)[index] for band in bands] for end in ("low", "high"))
+            axes.fill_between(x, low, high, color=look.color, alpha=0.22, lw=0)
+            for prediction, preload in zip(predictions, preloads, strict=True):
+                if prediction.measured is not None:  # nan, which is not drawn, without a measurement
+                    mask = (prediction.frequency == frequency) & (prediction.amplitude == amplitudes[index])
+                    stiffness = prediction.measured[mask]
+                    point = np.abs(stiffness) if name == "stiffness" else stiffness.imag / stiffness.real
+                    axes.plot(preload.in_display_unit(place)[0], scale * point, color=look.color, marker=look.marker)
+        style.label_axes(axes, f"preload [{preloads[0].in_display_unit(place)[1]}]", label)
+    unit, to_people = place.display.displacement
+    style.name_levels(pair[-1], [format_range(unit, to_people * level) for level in amplitudes], "amplitude")
+    sentence = f"Lines: model at {format_range('Hz', frequency)}; shaded: its 95 % band."
+    measured = any(prediction.measured is not None for prediction in predictions)
+    return figure.explain(sentence, *["Points: measured."] * measured)
