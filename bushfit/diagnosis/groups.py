@@ -31,7 +31,7 @@ class Group:
 
     @property
     def whole(self) -> Array:
-        """Columns over all residual rows, zero outside the covered slice, (c, n)."""
+        """Changes of all residuals per unit amount of each column, (c, n); zero outside `covered_rows`."""
         if self.covered_rows is None:
             return self.columns
         rows, count = self.covered_rows

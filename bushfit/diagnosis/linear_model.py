@@ -235,7 +235,7 @@ class LinearModel:
 
     @property
     def log_evidence(self) -> float:
-        """Log evidence of the tests if nothing is missing and level errors are within the class of the rig."""
+        """Log evidence of the tests if nothing is missing and rig errors are within the stated accuracy."""
         return self._log_evidence_over(self._plain)
 
     @property
@@ -245,7 +245,7 @@ class LinearModel:
 
     @property
     def log_evidence_with_level_errors(self) -> float:
-        """Log evidence of the tests if level errors exceed the class of the rig and nothing else is missing."""
+        """Log evidence of the tests if rig errors of levels exceed the stated accuracy and nothing else is missing."""
         return self._log_evidence_over(~self._plain & (self._deviation == 0.0))
 
     @property

@@ -303,7 +303,7 @@ class _Grid:
 
     @property
     def log_evidence(self) -> float:
-        """Log evidence of the tests averaged over all pairs, each equally probable."""
+        """Natural log of the evidence of the tests, averaged over all pairs of powers with equal prior probability."""
         filled = np.log(np.where(self.step > 0.0, self.step / (2.0 * _LARGEST_POWER), 1.0)).sum()
         return float(logsumexp(self.log_evidences) + filled)
 
@@ -321,7 +321,11 @@ class _Grid:
 
 
 def _settled_grid(fitted: Evidence, term: Term, plain: LinearModel, model: Model, bounds: Bounds) -> _Grid | None:
-    """Iterate the grid of powers and the model's parameters about the most probable pair; None if not converged."""
+    """Narrow a grid of power laws about the most probable pair of powers, and fit the model's parameters, in turn.
+
+    Returns:
+        The last grid, linearised about the fitted model and power law; None without convergence.
+    """
     changes = np.ptp(term.points, axis=0) > 0.0
     # at first around the measured stiffness, by which a term of any size is linear
     value = np.concatenate([test.measured - test.noise_free(model).measured for test, _ in term.tests])

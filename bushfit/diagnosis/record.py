@@ -220,7 +220,7 @@ class Diagnosis:
 
     @property
     def calibration(self) -> tuple[float, float]:
-        """Root mean square residuals of the fits `before` and `after`, in units of noise."""
+        """Root mean square of the fitted residuals before and after the diagnosis, in units of noise."""
         return _rms(self.before), _rms(self.after)
 
     def to_document(self) -> DiagnosisFile:
@@ -331,7 +331,7 @@ def format_odds(document: Mapping[str, Any]) -> list[str]:
 
 
 def level_of(name: str) -> str:
-    """Level of an effect or mistake: material, component, instrument or record; "unresolved" with a twin in the rig."""
+    """Level of an effect or mistake: material, component, instrument or record; "unresolved" if it has twins."""
     candidate = get_candidate(name)
     return "unresolved" if candidate.twins or name == UNNAMED else str(candidate.level)
 

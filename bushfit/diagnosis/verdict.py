@@ -180,7 +180,7 @@ class _Parts(NamedTuple):
         return cls(effects, frozenset(places), only_unnamed, claim)
 
     def simpler(self) -> set[_Parts]:
-        """All simpler sets: subsets of these parts that are not empty, and the effects replaced by their limits."""
+        """All simpler sets of parts: non-empty subsets, and the set with each effect replaced by its simpler limit."""
         reduced = product(_subsets(self.effects), _subsets(self.places), [False], {None, self.claim})
         limit = self._replace(effects=frozenset(get_effect(name).limit or name for name in self.effects))
         return {parts for parts in (*map(_Parts._make, reduced), limit) if any(parts)} - {self}

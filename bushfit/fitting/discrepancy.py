@@ -95,10 +95,10 @@ class FittedTests:
 
     @cached_property
     def _blocks(self) -> list[tuple[MeasuredTest, slice, Array | None, Array]]:
-        """Each test, its rows, its orthonormal directions, (n, 2), and the components of a change of 1 and of i N/m.
+        """For each test: its residual rows, and the directions in which a change of the stiffness moves its residuals.
 
-        The directions span the changes of a loop's residuals by a change of the stiffness; None for a sweep. The
-        components are along these directions, (2, 2).
+        A tuple of test, slice of rows, orthonormal directions, (n, 2) or None for a sweep, and components, (2, 2), of
+        the residuals' changes by stiffness changes of 1 and of i [N/m or N m/rad] along these directions.
         """
         units, blocks = np.array([[1.0], [1.0j]]), list[tuple[MeasuredTest, slice, Array | None, Array]]()
         for test, rows in zip(self.data_sets, rows_of(self.data_sets), strict=True):

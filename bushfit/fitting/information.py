@@ -67,7 +67,7 @@ class FisherInformation:
         return 1.0 / np.sqrt(np.maximum(values, np.finfo(float).eps * values.max())), vectors
 
     def errors(self) -> Array:
-        """Relative standard error of each parameter if all k are fitted, (k,)."""
+        """Relative standard error of each of the k parameters if all are fitted together, (k,)."""
         errors, vectors = self.directions()
         return np.linalg.norm(vectors * errors, axis=1)
 

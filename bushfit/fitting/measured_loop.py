@@ -220,7 +220,7 @@ class MeasuredLoop(MeasuredBase):
         return (self.force(model) - self.drive.force) * self._per_noise
 
     def distance(self, model: Model) -> Array:
-        """Distance of each point from the model, in units of noise, (n,)."""
+        """Distance of the measurement from the model at each point of the test, in units of noise, (n,)."""
         return np.abs(self.misfit(model))
 
     def displayed_residual(self, model: Model) -> Array:

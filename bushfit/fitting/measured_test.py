@@ -60,7 +60,7 @@ class MeasuredBase(ABC):
         return self.test.source
 
     def relative(self, model: Model) -> Array:
-        """Magnitude of the relative difference at each point with weight, for the NRMSE, (n,)."""
+        """Magnitude of the relative difference of model and test at each point with weight, for the NRMSE, (n,)."""
         return np.linalg.norm(self.relative_difference(model)[:, self.weights > 0.0], axis=0)
 
     def change(self, model: Model, reference: Model) -> float:

@@ -74,7 +74,7 @@ def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[Me
 
 
 def with_gain_weighting(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> list[MeasuredTest]:
-    """Return tests whose loops include the gain error in the noise that weights the residuals, if `weigh`, or not."""
+    """Set for all loops among tests if the noise that weights the residuals includes the rig's gain error (`weigh`)."""
     return [replace(test, gain_weighs=weigh) if isinstance(test, MeasuredLoop) else test for test in data_sets]
 
 

@@ -165,12 +165,12 @@ class FitResult:
 
     @property
     def minimised(self) -> Sequence[MeasuredTest]:
-        """Tests with the weights at which the fit minimises the sum of squares."""
+        """Tests, weighted as in the sum of squares that the fit minimises."""
         return self.problem.tests
 
     @property
     def data_sets(self) -> Sequence[MeasuredTest]:
-        """Tests with the weights of their noise alone; excluded outliers have weight 0."""
+        """Tests, weighted by their noise alone; excluded outliers have weight 0."""
         return self.noise_weighted or self.problem.tests
 
     @property

@@ -47,7 +47,7 @@ class SharedError:
 
     @cached_property
     def weight(self) -> Array:
-        """Sum of the squares of the residuals that a unit shared error causes in each group, (g,)."""
+        """Sum over each group of the squared changes of its deviations [noise] by a shared error of 1, (g,)."""
         return np.maximum(np.add.reduceat(self.unit**2, self.starts), np.finfo(float).tiny)
 
     @cached_property
@@ -56,7 +56,7 @@ class SharedError:
         return 1.0 - 1.0 / np.sqrt(1.0 + self.variance * self.weight)
 
     def components(self, rows: Array) -> Array:
-        """Sum of the products of deviations with `unit` over each group, (..., m) -> (..., g)."""
+        """Sum over each group of the products of its deviations with `unit`, (..., m) -> (..., g)."""
         return np.add.reduceat(rows * self.unit, self.starts, axis=-1)
 
     def whiten(self, rows: Array) -> Array:

@@ -247,7 +247,7 @@ def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 
     unit = np.abs(target).mean()
 
     def parts(x: Array) -> tuple[Array, Array]:
-        """Modulus of each arm relative to the target, and its derivative by the logarithm of the time, (n, k) each."""
+        """Modulus of each arm relative to the target, and its derivative by the log of its time, (n, k) each."""
         basis = _basis(omega, np.exp(x[count:]))
         # a step that goes too far is held, as `exp` would overflow
         arm = basis * unit * np.exp(np.minimum(x[:count], 100.0)) / target[:, None]

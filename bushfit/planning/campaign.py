@@ -153,7 +153,7 @@ class Check:
 
     @property
     def observed(self) -> Array:
-        """Root mean square relative deviation of the fitted from the true parameters, (k,)."""
+        """Observed standard errors: root mean square relative deviation of fitted from true parameters, (k,)."""
         return np.sqrt(np.mean(np.square(self.deviations), axis=0))
 
     @property

@@ -117,7 +117,7 @@ class PlanningProblem:
 
     @cached_property
     def separable_rivals(self) -> Array:
-        """Mask of the pairs of rival models that all candidate tests together separate, (rivals, rivals).
+        """Mask of the pairs of rival models that all candidate tests together can distinguish, (rivals, rivals).
 
         If no pair is separable, the mask contains all pairs. Only the upper triangle is used.
         """

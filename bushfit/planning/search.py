@@ -247,7 +247,7 @@ class PlanSearch:
         return sorted(min(n, _SCATTER_FREEDOM) for n in freedom.values())
 
     def determines_scatter(self, counts: Array) -> bool:
-        """True if repeats determine the scatter of sweeps well enough, for the bushing and for each specimen."""
+        """True if repeats among `counts` runs, (tests,), determine the scatter of sweeps of each body well enough."""
         return self.scatter_freedom(counts) >= [_SCATTER_FREEDOM]
 
     def drift_effect(self, counts: Array) -> DriftEffect:

@@ -281,7 +281,7 @@ def exponent_of(name: str, parameter: Parameter) -> str | None:
 
 
 def quantities_of(result: Result, rows: Sequence[tuple[str, str | None]], omega: float) -> tuple[Array, Array]:
-    """Compute the quantities of a result that are compared, and their derivatives by the parameters.
+    """Compute the quantities of a result to compare (parameters, or moduli at a frequency) and their derivatives.
 
     Args:
         result: fitted result.

@@ -136,7 +136,11 @@ def common_grid(
 
 
 def _limit(values: Array, ranges: Sequence[Any], count: int) -> Array:
-    """Select the values within all ranges; if fewer than two are, `count` even values over the common range, if any."""
+    """Select the values, (n,), within all `ranges` (low, high).
+
+    If fewer than two are, the result is `count` even values over the range that all ranges share; without a shared
+    range, all values.
+    """
     inside, low, high = _inside(values, ranges), max(low for low, _ in ranges), min(high for _, high in ranges)
     if low > high * (1 + MARGIN):
         return values
