@@ -126,7 +126,7 @@ class BatchResult:
 
     @cached_property
     def curve_deviation(self) -> Array:
-        """Relative deviation of each part's measured |K| from the median of the batch, geometric mean, (n,)."""
+        """Relative deviation of the measured |K| of each part from the median part, mean over the curve, (n,)."""
         if not self.curves:
             return np.full(len(self.records), np.nan)
         logarithms = np.log([*self.curves.values()])

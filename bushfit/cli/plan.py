@@ -228,7 +228,7 @@ def _listed(values: Sequence[float], factor: float) -> str:
 
 
 def _percents(rows: Mapping[str, Mapping[str, Any]], keys: Sequence[str]) -> list[tuple[str, ...]]:
-    """Table rows: each name with the values of the given keys in percent."""
+    """Format rows of numbers by name as table rows: the name, then the values of the given keys in percent."""
     return [(name, *(number(100.0 * row[key], 2) for key in keys)) for name, row in rows.items()]
 
 

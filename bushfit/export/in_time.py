@@ -76,7 +76,7 @@ class TimeModel:
 
 
 def time_model(request: ExportRequest) -> TimeModel:
-    """Convert the fitted model of an export order to a time-domain model for an FMU, without effects of the rig.
+    """Convert the fitted model of an export to a time-domain model for an FMU, without effects of the rig.
 
     Returns:
         Values, fields and lever arm of each direction, Maxwell arms, and the losses.

@@ -163,7 +163,7 @@ def find_layout(
 def _candidates(
     lines: Sequence[Line], before: Sequence[int], delimiters: Sequence[str], vocabulary: Vocabulary, commented: bool
 ) -> Iterator[tuple[tuple[int, ...], int, str, list[str]]]:
-    """Rank, index, delimiter and cells of each possible header: a line in `before` that names two columns or more."""
+    """Yield rank, line index, delimiter and cells of each possible header: a line that names two columns or more."""
     for index in before:
         for order, delimiter in enumerate(delimiters):
             content = lines[index].content

@@ -47,7 +47,7 @@ class Text:
         return list(islice(_lines(io.BytesIO(self.data[:HEAD_BYTES]), 0), MOST_HEAD_LINES))
 
     def lines(self, after: int) -> Iterator[Line]:
-        """Yield the non-empty lines after line number `after`."""
+        """Yield the non-empty lines of the text below the line with number `after`."""
         stream = io.BytesIO(self.data)
         stream.seek(self.offset(after))
         return _lines(stream, after)
@@ -206,7 +206,7 @@ class Sheet:
         return list(islice(self.lines(0), MOST_HEAD_LINES))
 
     def lines(self, after: int) -> Iterator[Line]:
-        """Yield the non-empty rows after row number `after`."""
+        """Yield the non-empty rows of the sheet below the row with number `after`."""
         for number, cells in enumerate(islice(self.content, after, None), start=after + 1):
             if any(cell != "" for cell in cells):
                 yield Line(number, cells)

@@ -17,13 +17,13 @@ _OF_ALL = ("parameters", "provenance")
 
 
 def csv(request: ExportRequest) -> Exported:
-    """Export the model of an order as CSV files, one for each table (predictions, parameters, provenance)."""
+    """Export a model as CSV files, one for each table (predictions, parameters, provenance)."""
     written = {name: to_csv(table, decimal_comma=request.decimal_comma) for name, table in _tables(request).items()}
     return Exported({f"{name.replace(' ', '_')}.csv": file for name, file in written.items()}, (NO_LOOPS,))
 
 
 def xlsx(request: ExportRequest) -> Exported:
-    """Export the model of an order as an Excel workbook, `bushing.xlsx`, with a sheet for each table."""
+    """Export a model as an Excel workbook, `bushing.xlsx`, with a sheet for each table."""
     return Exported({"bushing.xlsx": to_xlsx(_tables(request))}, (NO_LOOPS,))
 
 
