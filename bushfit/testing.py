@@ -44,7 +44,13 @@ def operating_point(model: Model, rng: np.random.Generator) -> tuple[Direction, 
 
 
 def with_typical_values(model: Model, name: str, rng: np.random.Generator) -> Model:
-    """Add an effect with random values of 0.5 to 1.5 times the typical distance from its neutral values."""
+    """Add an effect with random values of 0.5 to 1.5 times the typical distance from its neutral values.
+
+    Args:
+        model: model without the effect.
+        name: name of the effect.
+        rng: random number generator.
+    """
     effect = get_effect(name)
     values = {
         qualified_name(effect, parameter): parameter.value_at_share(rng.uniform(0.5, 1.5))

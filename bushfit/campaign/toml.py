@@ -45,7 +45,19 @@ def read_toml(path: Path, schema: type[T], *, description: str = "a campaign fil
 
 
 def parse_toml(path: Path, description: str = "a campaign file", largest: int = 1_000_000) -> dict[str, Any]:
-    """Read a TOML file as dictionaries and lists, with the arguments and errors of `read_toml`."""
+    """Read a TOML file as dictionaries and lists, without checking it against a schema.
+
+    Args:
+        path: TOML file.
+        description: kind of file, for error messages.
+        largest: maximum size of the file [bytes].
+
+    Returns:
+        Content of the file: tables, values and texts as TOML gives them.
+
+    Raises:
+        CampaignError: the file is missing, too large or not TOML.
+    """
     data = read_utf8(path, CampaignError, largest=largest, hint=f"give {description}, not a measurement")
     chain = _DEEP_KEY.search(data)
     try:

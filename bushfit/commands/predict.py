@@ -255,7 +255,13 @@ def _preloads(result: Result, place: Place, preloads: Sequence[str]) -> list[Pre
 
 
 def sweeps_at(sweeps: Sequence[MeasuredSweep], place: Place, preload: Preload | None) -> list[MeasuredSweep]:
-    """Sweeps of a direction or specimen at a preload; all if the preload is None."""
+    """Select the sweeps of a direction or specimen at a preload.
+
+    Args:
+        sweeps: measured sweeps.
+        place: direction or specimen.
+        preload: preload of the tests; None for tests at any preload.
+    """
     of_place = [sweep for sweep in sweeps if sweep.direction == place]
     return [sweep for sweep in of_place if preload is None or preload.equals(sweep.sweep.preload)]
 

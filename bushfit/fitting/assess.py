@@ -248,7 +248,11 @@ def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) ->
 
 
 def measured_range(model: Model, data_sets: Sequence[MeasuredTest]) -> Range:
-    """Ranges of frequency [Hz], equivalent strain amplitude, temperature [K] and preload of tests; their directions."""
+    """Determine the ranges of the operating conditions of tests.
+
+    Returns:
+        Ranges of frequency [Hz], equivalent strain amplitude [1], temperature [K] and preload, and tested directions.
+    """
     found = [str(data_set.direction) for data_set in data_sets]
     directions = tuple(dict.fromkeys([*(str(direction) for direction in Direction if direction in found), *found]))
     kelvin = [np.ravel(data_set.test.temperature) for data_set in data_sets if data_set.test.temperature is not None]
@@ -259,7 +263,11 @@ def measured_range(model: Model, data_sets: Sequence[MeasuredTest]) -> Range:
 
 
 def preload_ranges(data_sets: Sequence[MeasuredTest]) -> list[PreloadRange]:
-    """Preloads of each direction or specimen with tests at two preloads or more, all displacements or all forces."""
+    """List the directions and specimens with tests at two preloads or more, all displacements or all forces.
+
+    Returns:
+        For each of them the smallest and largest preload [m, rad, N or N m], and the number of preloads.
+    """
     ranges = []
     for place in dict.fromkeys(test.direction for test in data_sets):
         stated = [test.test.preload for test in data_sets if test.direction == place and test.test.preload]

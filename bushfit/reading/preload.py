@@ -64,7 +64,11 @@ def parse_preload(text: str | None, place: Place) -> Preload | None:
 
 
 def distinct_preloads(preloads: Sequence[Preload]) -> list[Preload]:
-    """Sort preloads of one direction, and keep one of those within 2 %; empty if forces and displacements are mixed."""
+    """Sort the preloads of one direction, and keep one of those that are equal within 2 %.
+
+    Returns:
+        Different preloads in ascending order; empty if forces and displacements are mixed.
+    """
     distinct = list[Preload]()
     for preload in sorted(preloads):
         if not distinct or not preload.equals(distinct[-1]):

@@ -32,6 +32,9 @@ def manual_page() -> str:
     Headings get the identifiers `<page>--<anchor>`, with the anchors that code hosts give them. Links between the pages
     become links within the page; links to other files of the source tree, which an installation does not have, become
     plain text.
+
+    Returns:
+        The page as HTML.
     """
     from markdown_it import MarkdownIt
     from markupsafe import Markup

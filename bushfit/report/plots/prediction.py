@@ -91,7 +91,15 @@ def prediction_figure(
 
 @style.in_own_style
 def static_figure(curve: StaticCurve, title: str) -> style.Chart:
-    """Figure of a static curve: force over displacement, and its slope, with 95 % bands."""
+    """Figure of a static curve: force over displacement, and its slope, with 95 % bands.
+
+    Args:
+        curve: predicted static curve of one direction or specimen.
+        title: title of the figure.
+
+    Returns:
+        Figure with two panels.
+    """
     place = curve.direction
     (_, length), (name, force), (stiffness_name, stiffness) = place.display
     unit, factor = display_unit(name, force, float(np.abs(curve.mean.value).max()))
