@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, replace
 
-from bushfit.diagnosis.claims import adopted
+from bushfit.diagnosis.claims import Screen, adopted, claims
 from bushfit.diagnosis.condense import condensed
 from bushfit.diagnosis.evidence import EVALUATIONS, Evidence
 from bushfit.diagnosis.explanations import outlier_clusters
@@ -16,6 +16,7 @@ from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import decide_verdict
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.mistakes import get_candidate, get_mistake
+from bushfit.errors import FitError
 from bushfit.fitting.design import fit_from
 from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -52,7 +53,14 @@ def diagnose(
     data, messages = adopted(data, [name for name in settings.adopt if get_mistake(name)])
     excluded: tuple[Outlier, ...] = ()
     for _ in range(_MAXIMUM_ROUNDS):  # single outliers of sweeps, which repeats and neighbours contradict
-        initial = _initial_fit(data, model, settings)
+        try:
+            initial = _initial_fit(data, model, settings)
+        except FitError as error:
+            thousands = [claim for claim in claims(data, settings.without) if claim.mistake.scales]
+            for claim in Screen(data).best(thousands, 1):
+                options = " ".join(f"--adopt {label}" for label in claim.labels(data))
+                error.hint = f"these tests agree if {claim.words(data)}: {options} corrects it"
+            raise
         known_rows = {(outlier.test, outlier.row) for outlier in excluded}  # a robust fit finds them anew
         sweeps = split_by_kind(initial.evidence.data_sets)[1]
         candidates = (*initial.outliers, *outliers_at(initial.evidence.model, sweeps))

@@ -63,7 +63,7 @@ class PreparedCampaign:
             The campaign with its measured tests.
 
         Raises:
-            FitError: a loop has no whole cycle, lacks rows or releases energy, or a test strains rubber impossibly.
+            FitError: a loop has no whole cycle, lacks rows or releases energy.
             ModelError: [fit] effects contains an unknown effect, or the same effect twice.
         """
         with error_location(campaign.path, place="[fit] effects"):
@@ -74,8 +74,6 @@ class PreparedCampaign:
             tuple(prepare_sweeps(campaign.sweeps, campaign.fit.residuals, campaign.rig)),
             {name: (setting.min, setting.max) for name, setting in campaign.fit.parameters.items()},
         )
-        with error_location(campaign.path):
-            refuse_strain(campaign.bushing, data.data_sets)
         return with_preload(data.in_session())
 
     def in_session(self) -> "PreparedCampaign":
@@ -119,16 +117,21 @@ class PreparedCampaign:
     def require_tests(
         self, tests: Sequence[_Kind], message: str, hint: str, found: str = "no [[loops]] and no [[sweeps]]"
     ) -> Sequence[_Kind]:
-        """Return the tests, or raise a FitError if the sequence is empty.
+        """Return the tests that a fit requires.
 
         Args:
             tests: loops or sweeps.
             message: message of the error.
             hint: next step for the user.
             found: text on the tests that the campaign has instead.
+
+        Raises:
+            FitError: there are no tests, or one strains rubber beyond its limits.
         """
         if not tests:
             raise FitError(message, file=self.campaign.path, found=found, hint=hint)
+        with error_location(self.campaign.path):
+            refuse_strain(self.campaign.bushing, tests)
         return tests
 
     def without(self, outliers: Sequence[Outlier]) -> "PreparedCampaign":

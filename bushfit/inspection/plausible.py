@@ -13,7 +13,7 @@ FREQUENCIES = (4e-7, 1e5)
 #: Smallest and largest amplitude [m, rad or -] and stiffness [N/m, N m/rad or Pa] by kind of motion; chosen: far beyond
 #: those of rubber parts and their laboratories.
 _AMPLITUDES = {TRANSLATION: (1e-8, 0.2), ROTATION: (1e-7, 4.0), STRAINING: (1e-8, 5.0)}
-_STIFFNESSES = {TRANSLATION: (1e3, 1e11), ROTATION: (1e-3, 1e9), STRAINING: (1e4, 1e10)}
+_STIFFNESSES = {TRANSLATION: (1e4, 1e11), ROTATION: (1e-3, 1e9), STRAINING: (1e4, 1e10)}
 
 
 def implausible_sizes(place: Place, frequency: Array, amplitude: Array, stiffness: Array) -> Iterator[str]:

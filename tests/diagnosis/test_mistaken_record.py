@@ -19,6 +19,7 @@ from tries import some
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.commands.diagnose import diagnose
 from bushfit.diagnosis.record import Diagnosis
+from bushfit.errors import FitError
 from bushfit.geometry import Direction
 from bushfit.reading.measurement import Loop, Sweep
 
@@ -78,6 +79,33 @@ def test_a_mistake_is_named_with_the_line_that_puts_it_right(truth: str, measure
     assert mended.calibration[0] == pytest.approx(after, rel=1e-6)
     assert [line for line in mended.notes if line.startswith("corrected by --adopt ")]
     assert [line for line in mended.result.warnings if line.startswith("corrected by --adopt ")]
+
+
+def scaled(test: Loop | Sweep, displacement: float, force: float) -> Loop | Sweep:
+    if isinstance(test, Loop):
+        return replace(test, displacement=displacement * test.displacement, force=force * test.force)
+    return replace(test, amplitude=displacement * test.amplitude, stiffness=force * test.stiffness)
+
+
+#: Factors of the stated displacement and of the stated force or stiffness, by the mistake in the first loop or sweep.
+THOUSANDS = {
+    f"{prefix}{quantity}:{test}": (factor, 1.0) if quantity == "displacement" else (1.0, factor)
+    for prefix, factor in (("thousandfold_", 1e-3), ("thousandth_of_", 1e3), ("millionth_of_", 1e6))
+    for quantity in ("displacement", "force")
+    for test in ("loop_axial_1", "sweep_axial")
+}
+
+
+@pytest.mark.parametrize("truth", some(THOUSANDS, {"thousandth_of_displacement:loop_axial_1"}))
+def test_a_power_of_1000_is_named_or_its_option_is_offered(truth: str, measured: Measured) -> None:
+    change = lambda test: scaled(test, *THOUSANDS[truth])  # noqa: E731
+    campaign = (on_loops if "loop" in truth else on_sweeps)(change, 0)(measured(None, SHARED))
+    try:
+        labels = [effect.label for effect in asked(campaign).effects]
+    except FitError as error:  # no fit can begin: the strain or the modulus is that of no rubber
+        labels = re.findall(r"--adopt (\S+)", error.hint or "")
+    assert labels == [truth]
+    assert asked(campaign, adopt=(truth,)).verdict == "consistent"
 
 
 @pytest.mark.slow
