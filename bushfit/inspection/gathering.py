@@ -25,7 +25,7 @@ from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import same_text
 from bushfit.reading.measurement import Loop, Sweep
-from bushfit.reading.names import NO_LABELS, Labels, labels_above
+from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names
 from bushfit.reading.parts import parts_of
 
 
@@ -98,7 +98,7 @@ def gather(paths: Sequence[Path], test_options: Mapping[str, Any]) -> tuple[list
 
 
 def list_folder(folder: Path) -> tuple[list[TestSource], list[str]]:
-    """List the files of a folder and its subfolders by name.
+    """List the files of a folder and its subfolders by name; a subfolder such as "P01" names the specimen of its files.
 
     Returns:
         Files that may contain tests, and a sentence on each of the other files.
@@ -116,6 +116,8 @@ def list_folder(folder: Path) -> tuple[list[TestSource], list[str]]:
             left_out.append(f"{path_text}: no permission to read this folder")
         elif path.is_dir() and not path.is_symlink():
             inner_files, inner_left_out = list_folder(path)
+            if number := labels_in_names(path.name).specimen_number:
+                inner_files = [replace(file, test_options={"specimen_number": number}) for file in inner_files]
             files += inner_files
             left_out += inner_left_out
         elif path.is_file() and path.suffix.lower() in TEST_FILES:
@@ -205,7 +207,10 @@ def distribute_options(sources: Sequence[TestSource], test_options: Mapping[str,
         The tests with their options.
     """
     tables: Mapping[str, Mapping[str, str]] = {key: test_options.get(key, {}) for key in ("columns", "units")}
-    by_source = [{**test_options, **tables, **({"sheet": source.sheet} if source.sheet else {})} for source in sources]
+    by_source = [
+        {**source.test_options, **test_options, **tables, **({"sheet": source.sheet} if source.sheet else {})}
+        for source in sources
+    ]
     for key, role in ((key, role) for key, stated_by_role in tables.items() for role in stated_by_role):
         needs = [needs_option(source.file, key, role, keys) for source, keys in zip(sources, by_source, strict=True)]
         for keys in (keys for keys, one in zip(by_source, needs, strict=True) if one is False and True in needs):

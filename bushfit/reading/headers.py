@@ -87,7 +87,12 @@ _UNITS_OF = {
 }
 #: Names of an amplitude that imply peak-to-peak.
 _PEAK_TO_PEAK_NAMES = frozenset(WORDS["counting"]["peak_to_peak"])
+#: One peak, in texts without accents; CJK characters need no blank before and after a word.
 _PEAK = r"(?:peak|pk|spitze|sp\.?|crete|cresta|picco|pico|pic)"
+_ONE_PEAK = (
+    rf"(?:(?:val(?:eur|or|ore)[\s_])?(?:d[ei][\s_])?{_PEAK}(?:[\s_]value)?|(?:scheitel|spitzen)(?:werte?)?(?:[\s_]der)?"
+    r"|szczyt|szczytowa|пик|пиковая|tepe|topp|vrchol|spicka)"
+)
 _START, _END = r"(?<![^\W_])", r"(?![^\W_])"
 #: End of a unit to which a convention may be joined without a blank: "mmpp".
 _AFTER_UNIT = r"(?:(?<=mm)|(?<=[u\u03bc]m)|(?<=deg)|(?<=rad))"
@@ -103,8 +108,9 @@ _CONVENTIONS: tuple[tuple[re.Pattern[str], AmplitudeConvention], ...] = (
     (
         re.compile(
             rf"{_START}(?:{_PEAK}[\s_/-]*(?:(?:to|zu|a|2)[\s_-]*)?{_PEAK}|p[\s_./-]?(?:t[\s_./-]?|2[\s_./-]?)?p"
-            rf"|v[\s_-]?pp|c[\s-]a[\s-]c|s[.-]?s|max\.?[\s_./-]*(?:min|to[\s_-]*min)|\(?2\s?[ax](?:_?0)?\)?)\.?{_END}"
+            rf"|v[\s_-]?pp|c[\s-](?:a[\s-])?c|s[.-]?s|max\.?[\s_./-]*(?:min|to[\s_-]*min)|\(?2\s?[ax](?:_?0)?\)?)\.?{_END}"
             rf"|{_AFTER_UNIT}(?:pk?-?pk?|s-?s){_END}|\((?:total|double|full)\)|(?<=amplitude)[\s,_-]+total{_END}"
+            rf"|{_START}{_PEAK}[\s_/-]*(?:to[\s_-]*)?valley{_END}|[両全](?=振幅)|峰-?峰值?"
         ),
         "peak-to-peak",
     ),
@@ -112,7 +118,12 @@ _CONVENTIONS: tuple[tuple[re.Pattern[str], AmplitudeConvention], ...] = (
         re.compile(rf"{_START}(?:r\.?m\.?s\.?|eff(?:ektiv|icace|ective)?\.?){_END}|{_AFTER_UNIT}(?:rms|eff){_END}"),
         "rms",
     ),
-    (re.compile(rf"\u00b1|\+/?-|(?:{_AFTER_UNIT}[\s_]*|(?<=%)\s*|(?<=[\[(])){_PEAK}{_END}"), "zero-to-peak"),
+    (
+        re.compile(
+            rf"\u00b1|\+/?-|(?:{_START}|{_AFTER_UNIT}){_ONE_PEAK}\.?{_END}|[片半](?=振幅)|(?<=振幅)(?:峰值|\(?ヒーク値?\)?)"
+        ),
+        "zero-to-peak",
+    ),
 )
 #: Boundary of words in "AmpPkPk".
 _CAMEL = re.compile(r"(?<=[a-z]{2})(?=[A-Z])")

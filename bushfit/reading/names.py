@@ -19,12 +19,13 @@ _UNITS = {
     **{"%": "%", "pct": "%", "mhz": "mHz", "hz": "Hz", "n": "N", "kn": "kN"},
     **{"degc": "degC", "gradc": "degC", "grdc": "degC", "°c": "degC", "c": "degC"},
 }
+_UNIT_WORDS = "|".join(sorted(_UNITS, key=len, reverse=True))
 #: Quantity in a name, with its sign and the word before it: "0.5mm", "A0,5 mm", "0p5mm", "10Hz", "2deg"; but neither
 #: "20Hz" in "5-20Hz" nor "10mm_min".
 _QUANTITY = re.compile(
     r"(?<![^\W_])(?<!\d[.,-])(?:(?P<word>[^\W\d_]+)(?P<gap>[\s_=:]*))?(?P<sign>\+/?-|±|-|\+)?\s*"
     r"(?P<number>\d+(?:[.,p]\d+)?)[ _-]?"
-    rf"(?P<unit>{'|'.join(sorted(_UNITS, key=len, reverse=True))})(?=[^A-Za-z]|pp|pkpk|ss|spsp|$)"
+    rf"(?P<unit>{_UNIT_WORDS})(?=[^A-Za-z]|pp|pkpk|ss|spsp|$)"
     r"(?![\s/_-]*(?:(?:per|pro|p)[\s_-]*)?(?:min|s|sec)(?![A-Za-z]|-s))",
     re.IGNORECASE,
 )
@@ -35,10 +36,12 @@ _DATE = re.compile(
     r"(?<!\d)(?:20\d\d([-_.]?)(?:0[1-9]|1[0-2])\1(?:0[1-9]|[12]\d|3[01])"
     r"|(?:0?[1-9]|[12]\d|3[01])\.(?:0?[1-9]|1[0-2])\.20\d\d)(?!\d)"
 )
-#: Number of a specimen: "SN12", "Nr. 7", "Probe_3", "#4".
+#: Number of a specimen, after a word or as "P01": "SN12", "Nr. 7", "Probe_3", "#4"; but not the size in "Probe 3mm".
 _SPECIMEN_NUMBER = re.compile(
-    r"(?:(?<![^\W_])(?:s[/_]?n|serial|nr|no|probe|specimen|sample|muster|prüfling|pruefling|éprouvette|probeta)|#)"
-    r"[\s_.:#-]*(\d[A-Za-z0-9]*)(?![^\W_]|[.,]\d)",
+    r"(?:(?:(?<![^\W_])(?:s[/_]?n|serial|nr|no|probe|specimen|sample|muster|prüfling|pruefling|éprouvette|probeta|part|teil"
+    r"|bauteil|bushing|buchse|lager|pièce|piece|palier|silentbloc|pieza|pezzo|casquillo|boccola|部品|试样|样品)|#)"
+    rf"[\s_.:#-]*(?!\d+[.,]?\d*[\s_]?(?:{_UNIT_WORDS})(?![A-Za-z]))|(?<![^\W_])(?=P\d{2, 4}(?![^\W_])))"
+    r"(P?\d[A-Za-z0-9]*)(?![^\W_]|[.,]\d)",
     re.IGNORECASE,
 )
 #: Range of test temperatures [degC]; chosen: a number with a C outside this range is part of a part number.

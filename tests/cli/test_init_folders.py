@@ -18,6 +18,24 @@ def sweep(root: Path, file: Path, above: str = "") -> None:
     file.write_text(above + text, encoding="utf-8")
 
 
+@pytest.mark.parametrize("name", ["axial_{number}", "{part}_axial", "part {part} axial", "{part}/axial"])
+def test_files_of_several_parts_are_campaigns_and_a_manifest(name: str, typed: Run, root: Path, tmp_path: Path) -> None:
+    """The number is above the table, in the name of the file, or in that of a folder."""
+    parts = [f"P{number:02}" for number in range(1, 11)]
+    for number, part in enumerate(parts):
+        above = "" if "part" in name else f"Specimen: {part}\n"
+        sweep(root, tmp_path / "lab" / f"{name.format(number=number, part=part)}.csv", above)
+    done = typed("init", "lab", *GEOMETRY, "-o", "x")
+    assert "next: bushfit batch x/batch.toml" in done.stderr
+    rows = tomllib.loads((tmp_path / "x/batch.toml").read_text(encoding="utf-8"))["bushings"]
+    assert [row["campaign"] for row in rows] == [f"{part}.toml" for part in parts]
+    for number, part in enumerate(parts):
+        (test,) = load_campaign(tmp_path / f"x/{part}.toml").sweeps
+        assert test.source.file.as_posix() == f"../lab/{name.format(number=number, part=part)}.csv"
+    typed("init", "lab", *GEOMETRY, "-o", "y", "--specimen-number", "P00")
+    assert (tmp_path / "y/campaign.toml").read_text(encoding="utf-8").count("[[sweeps]]") == 10
+
+
 def test_folders_in_folders_are_searched_and_bad_names_are_left_out(typed: Run, root: Path, tmp_path: Path) -> None:
     sweep(root, tmp_path / "lab/monday/sweep_axial.csv")
     sweep(root, tmp_path / "lab/tuesday/deep/sweep_radial.csv")

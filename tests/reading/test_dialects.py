@@ -30,9 +30,16 @@ PEAK_TO_PEAK = [
     "Amplitud pico a pico [mm]", "Amplitude [mm p-p]", "Amplitude SS [mm]", "Amplitude s-s (mm)",
     "Amplitude Spitze zu Spitze / mm", "Amplitude [mm SS]", "Amplitude [mmpp]", "Weg [mmp-p]", "Weg SS in mm",
     "Schwingweite [mm]", "2A [mm]", "total amplitude [mm]", "displacement range [mm]", "amplitude totale [mm]",
-    "Amplitude c-à-c [mm]", "Amplitud pico-pico (mm)",
+    "Amplitude c-à-c [mm]", "Amplitud pico-pico (mm)", "両振幅 [mm]", "振幅峰峰值 (mm)",
+    "Peak-to-valley amplitude [mm]",
 ]  # fmt: skip
-ZERO_TO_PEAK = ["Amplitude 0-p [mm]", "Amplitude zero-to-peak (mm)"]
+ZERO_TO_PEAK = [
+    "Amplitude 0-p [mm]", "Amplitude zero-to-peak (mm)", "Amplitude crête [mm]", "Amplitude (valeur de crête) [mm]",
+    "Amplitude Spitze [mm]", "Amplitude Scheitelwert / mm", "Scheitelwert der Amplitude [mm]", "peak amplitude [mm]",
+    "Displacement peak (mm)", "Amp_pk_mm", "Ampiezza di picco [mm]", "Amplitud de pico [mm]",
+    "Amplituda szczytowa [mm]",
+    "Амплитуда пиковая [мм]", "片振幅[mm]", "振幅(ピーク)[mm]", "振幅峰值 (mm)",
+]  # fmt: skip
 
 
 def amplitudes(folder: Path, header: str, columns: Mapping[str, str] | None = None, **stated: str) -> np.ndarray:
