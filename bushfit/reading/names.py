@@ -40,8 +40,8 @@ _DATE = re.compile(
 _SPECIMEN_NUMBER = re.compile(
     r"(?:(?:(?<![^\W_])(?:s[/_]?n|serial|nr|no|probe|specimen|sample|muster|prüfling|pruefling|éprouvette|probeta|part|teil"
     r"|bauteil|bushing|buchse|lager|pièce|piece|palier|silentbloc|pieza|pezzo|casquillo|boccola|部品|试样|样品)|#)"
-    rf"[\s_.:#-]*(?!\d+[.,]?\d*[\s_]?(?:{_UNIT_WORDS})(?![A-Za-z]))|(?<![^\W_])(?=P\d{2, 4}(?![^\W_])))"
-    r"(P?\d[A-Za-z0-9]*)(?![^\W_]|[.,]\d)",
+    rf"[\s_.:#-]*(?!\d+[.,]?\d*[\s_]?(?:{_UNIT_WORDS})(?![A-Za-z]))|(?<![^\W_])"
+    r"(?=P\d{2,4}(?![^\W_])))(P?\d[A-Za-z0-9]*)(?![^\W_]|[.,]\d)",
     re.IGNORECASE,
 )
 #: Range of test temperatures [degC]; chosen: a number with a C outside this range is part of a part number.
