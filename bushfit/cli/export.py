@@ -7,7 +7,14 @@ import click
 
 from bushfit.cli.options import FILE, command_called, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.shared_options import grid_values, kelvin, positive, prediction_options
+from bushfit.cli.shared_options import (
+    displacement_rates,
+    grid_values,
+    kelvin,
+    positive,
+    prediction_options,
+    static_rate_option,
+)
 
 
 @command_called(
@@ -37,6 +44,7 @@ from bushfit.cli.shared_options import grid_values, kelvin, positive, prediction
         "Write the nastran file for another solver: optistruct, with stiffness magnitude and loss angle.",
         type=click.Choice(["optistruct"]),
     ),
+    static_rate_option("Rate of the curves of adams"),
     option("--accuracy", "ERROR", "Largest permitted error of the complex modulus in an FMU [1 %].", default="1 %"),
 )
 @prediction_options("Use the frequencies and amplitudes of this campaign.")
@@ -49,6 +57,7 @@ def command(
     temperature: str | None,
     units: str | None,
     dialect: Literal["optistruct"] | None,
+    static_rate: str | None,
     accuracy: str,
     output: Output,
     **grids: str | None,
@@ -76,6 +85,7 @@ def command(
     with error_location(place="--units"):
         settings["units"] = UnitSystem.parse(units) if units is not None else None
     settings["temperature"] = kelvin(temperature)
+    settings["static_rates"] = displacement_rates(static_rate)
     settings["accuracy"] = positive(accuracy, "--accuracy", "1")
     comma = output.formats.table_form == "decimal-comma"
     names, file = tuple(dict.fromkeys(formats)), model_file(model)

@@ -83,6 +83,7 @@ def export(
     units: UnitSystem | None = None,
     dialect: Dialect = "nastran",
     decimal_comma: bool = False,
+    static_rates: Mapping[str, float] | None = None,
     **grid: Any,
 ) -> ExportOutput:
     """Convert a fitted model to files for other programs.
@@ -95,6 +96,8 @@ def export(
         units: units of length, mass, time and force; default those usual for each format.
         dialect: dialect of the format nastran.
         decimal_comma: True to write CSV files with decimal commas.
+        static_rates: rates of the static curves of adams by SI unit of displacement: "m" [m/s] or "rad" [rad/s];
+            default the rate of the slowest loop.
         grid: directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes and temperature, as of
             `predict`; all directions share one list of frequencies.
 
@@ -109,7 +112,7 @@ def export(
     frequencies = [np.unique(prediction.frequency) for prediction in predicted.predictions]
     if not all(np.array_equal(axis, frequencies[0]) for axis in frequencies):
         predicted = predict(result, campaign, **{**grid, "frequencies": np.unique(np.concatenate(frequencies))})
-    settings = (accuracy, units, dialect, decimal_comma, grid.get("temperature"))
+    settings = (accuracy, units, dialect, decimal_comma, grid.get("temperature"), static_rates)
     today = datetime.now(UTC).date().isoformat()
     request = ExportRequest(result, model_source(model), tuple(predicted.predictions), *settings, today)
     exported: dict[str, Exported] = {}

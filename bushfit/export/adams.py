@@ -1,9 +1,9 @@
 """Adams Car: bushing property files (.bus) with a curve of force over displacement and a damping per degree of freedom.
 
-The curve is the storage stiffness at the lowest frequency times each amplitude, so that it softens as the rubber does.
-The damping is one number at the middle frequency and amplitude of the grid: a viscous damper in `bushing_car.bus`, the
-loss angle for the frequency bushing of Adams Car Ride in `bushing_ride.bus`. A file states its units, which Adams
-converts: mm, newton, degrees and second.
+The curve is the static curve of the law in time, up to the largest amplitude of the grid. The damping is one number at
+the middle frequency and amplitude of the grid: a viscous damper in `bushing_car.bus`, the loss angle for the frequency
+bushing of Adams Car Ride in `bushing_ride.bus`. A file states its units, which Adams converts: mm, newton, degrees and
+second.
 
 Source: Adams Car Ride help, "Frequency Bushing" (damping coefficients are interpreted as loss angles); blocks,
 attributes and units as in the public fixture `fixture.bus` of the package suspension_multibody, which reads them;
@@ -15,7 +15,6 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from bushfit.effects.contract import Array
 from bushfit.export.contract import Exported, ExportRequest
 from bushfit.export.deck import (
     DOFS,
@@ -33,6 +32,8 @@ from bushfit.export.deck import (
 )
 from bushfit.geometry import ROTATION, TRANSLATION
 from bushfit.prediction.caveats import format_deviation
+from bushfit.prediction.static_curve import StaticCurve, static_curve, static_rate
+from bushfit.prediction.stiffness import Prediction
 from bushfit.reading.measurement import loss_factor
 from bushfit.units import number
 
@@ -42,6 +43,8 @@ _AXES = (("x", "fx"), ("y", "fy"), ("z", "fz"), ("ax", "tx"), ("ay", "ty"), ("az
 _SCALES = {TRANSLATION: (1e3, 1.0), ROTATION: (float(np.degrees(1.0)), 1e3)}
 #: Units of the files.
 _UNITS = {"LENGTH": "mm", "ANGLE": "degrees", "FORCE": "newton", "MASS": "kg", "TIME": "second"}
+#: Cosine at even phases of a cycle, for the first harmonic of a curve.
+_COSINE = np.cos(2.0 * np.pi * np.arange(64) / 64.0)
 #: File for Adams Car or for Adams Car Ride.
 Kind = Literal["car", "ride"]
 #: Comment on the damping in each kind of file.
@@ -56,15 +59,14 @@ class _Element(NamedTuple):
 
     Args:
         tables: exact stiffness over frequency, one table for each amplitude.
-        displacement, force: points of the static curve [m and N, or rad and N m], (n,) each.
+        curve: static curve.
         reference: table of the middle amplitude.
         frequency: middle frequency [Hz], at which the damping is exact.
         exact: complex stiffness at the middle frequency and amplitude [N/m or N m/rad].
     """
 
     tables: Sequence[StiffnessTable]
-    displacement: Array
-    force: Array
+    curve: StaticCurve
     reference: StiffnessTable
     frequency: float
     exact: complex
@@ -77,7 +79,8 @@ class _Element(NamedTuple):
         """Sentence on the errors of |K| and loss factor over the grid due to a single curve and a single damping."""
         damping, written, exact = self.damping(kind), [], []
         for table in self.tables:
-            storage = np.interp(table.amplitude, self.displacement, self.force) / table.amplitude
+            force = np.interp(table.amplitude * _COSINE, self.curve.displacement, self.curve.mean.value)
+            storage = 2.0 * np.mean(force * _COSINE) / table.amplitude
             viscous = storage + 2j * np.pi * table.frequency * damping
             by_angle = np.full(table.frequency.size, storage * (1.0 + 1j * np.tan(damping)))
             written.append(by_angle if kind == "ride" else viscous)
@@ -100,7 +103,7 @@ def export(request: ExportRequest) -> Exported:
         Files bushing_car.bus and bushing_ride.bus, and sentences on properties that the format cannot represent.
     """
     predictions = exported_directions(request)
-    elements = [_element(stiffness_tables(prediction)) for prediction in predictions]
+    elements = [_element(request, prediction) for prediction in predictions]
     shared = [line for prediction in predictions for line in band_losses(prediction)] + list(common_losses(request))
     if request.units:
         shared.append(f"the requested units, {request.units}: the file states its own units, which Adams converts")
@@ -112,20 +115,16 @@ def export(request: ExportRequest) -> Exported:
     return Exported(files, (*losses["car"], *losses["ride"], *shared))
 
 
-def _element(tables: Sequence[StiffnessTable]) -> _Element:
-    """Make the Adams element of one direction, with a curve through the force of its tables at each amplitude.
-
-    A single amplitude is extrapolated linearly, because splines need five points.
-    """
-    amplitude = np.array([table.amplitude for table in tables])
-    force = amplitude * np.array([table.stiffness[0].real for table in tables])
-    if amplitude.size == 1:
-        amplitude, force = (values[0] * np.array([1.0, 2.0]) for values in (amplitude, force))
-    displacement, force = (np.concatenate([-values[::-1], [0.0], values]) for values in (amplitude, force))
-    reference = middle(tables)
-    row = (reference.frequency.size - 1) // 2  # of two middle frequencies, the lower
-    frequency, exact = float(reference.frequency[row]), complex(reference.stiffness[row])
-    return _Element(tables, displacement, force, reference, frequency, exact)
+def _element(request: ExportRequest, prediction: Prediction) -> _Element:
+    """Make the element of one direction; with a single frequency, its curve has the rate of this frequency."""
+    tables, place = stiffness_tables(prediction), prediction.direction
+    reach, frequencies = tables[-1].amplitude, tables[-1].frequency
+    rate = static_rate(request.result, place, request.static_rates)
+    if frequencies.size == 1:
+        rate = 4.0 * reach * float(frequencies[0])
+    curve = static_curve(request.result, place, reach, rate, temperature=request.temperature)
+    reference, row = middle(tables), (frequencies.size - 1) // 2  # of two middle frequencies, the lower
+    return _Element(tables, curve, reference, float(frequencies[row]), complex(reference.stiffness[row]))
 
 
 def _property_file(
@@ -133,8 +132,9 @@ def _property_file(
 ) -> Iterator[str]:
     """Yield the lines of a property file for Adams Car or Adams Car Ride."""
     amplitudes = describe_amplitudes([element.reference for element in elements])
-    about = f"damping at {number(elements[0].frequency, 4)} Hz, {amplitudes}; curves at the lowest frequency"
-    yield from comment_lines("$", [*heading(request, ", ".join(_UNITS.values()), losses), _KINDS[kind], about])
+    rates = ", ".join(f"{element.curve.direction} {element.curve.rate_text}" for element in elements)
+    about = [f"damping at {number(elements[0].frequency, 4)} Hz, {amplitudes}", f"static curves at {rates}"]
+    yield from comment_lines("$", [*heading(request, ", ".join(_UNITS.values()), losses), _KINDS[kind], *about])
     yield from _block("MDI_HEADER", {"FILE_TYPE": "'bus'", "FILE_VERSION": "4.0", "FILE_FORMAT": "'ASCII'"})
     yield from _block("UNITS", {name: f"'{unit}'" for name, unit in _UNITS.items()})
     damping, curves = [0.0] * len(_AXES), [(np.arange(-2.0, 3.0), np.zeros(5))] * len(_AXES)
@@ -143,7 +143,7 @@ def _property_file(
         scale = force / displacement if kind == "car" else float(np.degrees(1.0))
         for dof in DOFS[element.reference.direction]:
             damping[dof - 1] = scale * element.damping(kind)
-            curves[dof - 1] = element.displacement * displacement, element.force * force
+            curves[dof - 1] = element.curve.displacement * displacement, element.curve.mean.value * force
     values = zip(_AXES, damping, strict=True)
     yield from _block("DAMPING", {f"{force.upper()}_DAMPING": format_real(value) for (_, force), value in values})
     for (motion_axis, resisting), curve in zip(_AXES, curves, strict=True):

@@ -112,6 +112,7 @@ class ExportRequest:
         dialect: solver of the format `nastran`.
         decimal_comma: True for semicolons and decimal commas in the format `csv`.
         temperature: temperature of the rubber [K]; None for the reference temperature of the model.
+        static_rates: rates of static curves by SI unit of displacement; None for those of the slowest loop.
         day: date to write into decks; None for no date.
     """
 
@@ -123,6 +124,7 @@ class ExportRequest:
     dialect: Dialect = "nastran"
     decimal_comma: bool = False
     temperature: float | None = None
+    static_rates: Mapping[str, float] | None = None
     day: str | None = None
 
     def remarks(self, losses: Iterable[str]) -> Iterator[tuple[str, str]]:
