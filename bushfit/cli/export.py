@@ -5,7 +5,7 @@ from typing import Any, Literal
 
 import click
 
-from bushfit.cli.options import FILE, command_called, option, option_group
+from bushfit.cli.options import FILE, command_called, flag, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import (
     displacement_rates,
@@ -28,8 +28,8 @@ from bushfit.cli.shared_options import (
     option(
         "--format formats",
         "FORMAT",
-        "Format to write: fmu, nastran, abaqus, adams, csv or xlsx; required, may be given again.",
-        type=click.Choice(["fmu", "nastran", "abaqus", "adams", "csv", "xlsx"]),
+        "Format to write: fmu, nastran, abaqus, adams, prony, csv or xlsx; required, may be given again.",
+        type=click.Choice(["fmu", "nastran", "abaqus", "adams", "prony", "csv", "xlsx"]),
         multiple=True,
         required=True,
     ),
@@ -44,8 +44,14 @@ from bushfit.cli.shared_options import (
         "Write the nastran file for another solver: optistruct, with stiffness magnitude and loss angle.",
         type=click.Choice(["optistruct"]),
     ),
+    flag("--time-domain", "Write the materials of abaqus as Prony series, for analyses in time."),
+    option(
+        "--cardanic",
+        "CONSTANTS",
+        'Stiffness and loss factor of the rotations about x and y in decks: "60 N m/rad, 0.1".',
+    ),
     static_rate_option("Rate of the curves of adams"),
-    option("--accuracy", "ERROR", "Largest permitted error of the complex modulus in an FMU [1 %].", default="1 %"),
+    option("--accuracy", "ERROR", "Largest permitted error of the modulus in an FMU or prony [1 %].", default="1 %"),
 )
 @prediction_options("Use the frequencies and amplitudes of this campaign.")
 @with_output("results/<name>", "tables", "pictures")
@@ -57,6 +63,8 @@ def command(
     temperature: str | None,
     units: str | None,
     dialect: Literal["optistruct"] | None,
+    time_domain: bool,
+    cardanic: str | None,
     static_rate: str | None,
     accuracy: str,
     output: Output,
@@ -69,7 +77,7 @@ def command(
     of the bushing is z.
 
     Writes bushing.bdf, .fem, .inp or .xlsx; bushing_car.bus and bushing_ride.bus (adams); one CSV file for each
-    table; or an .fmu, with its Maxwell arms in arms.csv and arms.png.
+    table; prony.csv, a row per term; or an .fmu, with its Maxwell arms in arms.csv and arms.png.
     """
     from bushfit.campaign.campaign import load_campaign
     from bushfit.commands.export import export
@@ -85,6 +93,9 @@ def command(
     with error_location(place="--units"):
         settings["units"] = UnitSystem.parse(units) if units is not None else None
     settings["temperature"] = kelvin(temperature)
+    if time_domain and "abaqus" not in formats:
+        raise click.UsageError("'--time-domain' is of '--format abaqus'.")
+    settings["time_domain"], settings["cardanic"] = time_domain, _cardanic(cardanic)
     settings["static_rates"] = displacement_rates(static_rate)
     settings["accuracy"] = positive(accuracy, "--accuracy", "1")
     comma = output.formats.table_form == "decimal-comma"
@@ -96,3 +107,12 @@ def command(
     output.warn(exported.predicted.warnings)
     inputs = [file, *(input_files(loaded) if loaded else [])]
     output.write(output.folder((loaded or result).name), exported.files, exported.document, inputs)
+
+
+def _cardanic(text: str | None) -> complex | None:
+    """Parse --cardanic, a stiffness and an optional loss factor, to a complex stiffness [N m/rad]."""
+    if text is None:
+        return None
+    stiffness, comma, loss = text.partition(",")
+    real = positive(stiffness, "--cardanic", "N*m/rad")
+    return complex(real or 0.0, (positive(f"{loss} -", "--cardanic", "1") or 0.0) * (real or 0.0) if comma else 0.0)

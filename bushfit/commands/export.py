@@ -26,6 +26,7 @@ FORMATS = {
     "nastran": "export.nastran:export",
     "abaqus": "export.abaqus:export",
     "adams": "export.adams:export",
+    "prony": "export.prony:export",
     "csv": "report.spreadsheets:csv",
     "xlsx": "report.spreadsheets:xlsx",
 }
@@ -84,20 +85,24 @@ def export(
     dialect: Dialect = "nastran",
     decimal_comma: bool = False,
     static_rates: Mapping[str, float] | None = None,
+    time_domain: bool = False,
+    cardanic: complex | None = None,
     **grid: Any,
 ) -> ExportOutput:
     """Convert a fitted model to files for other programs.
 
     Args:
         model: model file.
-        formats: names of formats: "fmu", "nastran", "abaqus", "adams", "csv", "xlsx".
+        formats: names of formats: "fmu", "nastran", "abaqus", "adams", "prony", "csv", "xlsx".
         campaign: campaign whose grid is the default.
-        accuracy: largest relative error of the modulus in an FMU.
+        accuracy: largest relative error of the modulus in an FMU, and the aim for a Prony series.
         units: units of length, mass, time and force; default those usual for each format.
         dialect: dialect of the format nastran.
         decimal_comma: True to write CSV files with decimal commas.
         static_rates: rates of the static curves of adams by SI unit of displacement: "m" [m/s] or "rad" [rad/s];
             default the rate of the slowest loop.
+        time_domain: True to write the materials of abaqus as Prony series.
+        cardanic: complex stiffness of the rotations about x and y in decks [N m/rad]; None for no stiffness.
         grid: directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes and temperature, as of
             `predict`; all directions share one list of frequencies.
 
@@ -112,7 +117,7 @@ def export(
     frequencies = [np.unique(prediction.frequency) for prediction in predicted.predictions]
     if not all(np.array_equal(axis, frequencies[0]) for axis in frequencies):
         predicted = predict(result, campaign, **{**grid, "frequencies": np.unique(np.concatenate(frequencies))})
-    settings = (accuracy, units, dialect, decimal_comma, grid.get("temperature"), static_rates)
+    settings = (accuracy, units, dialect, decimal_comma, grid.get("temperature"), static_rates, time_domain, cardanic)
     today = datetime.now(UTC).date().isoformat()
     request = ExportRequest(result, model_source(model), tuple(predicted.predictions), *settings, today)
     exported: dict[str, Exported] = {}

@@ -4,14 +4,14 @@ Connector: with FREQUENCY DEPENDENCE=ON the 21 constants of the symmetric 6 x 6 
 the upper triangle column by column. Forces are D u + C du/dt, so C is the loss stiffness over 2 pi f.
 
 Material: neo-Hooke with C10 = G/2 for the long-term modulus G (of the elastic branch) and D1 = 0 for an incompressible
-rubber. The table has omega Re(g*) = G''/G and omega Im(g*) = 1 - G'/G, two columns of bulk, which are zero, and the
-frequency.
+rubber. For the frequency domain, the table has omega Re(g*) = G''/G and omega Im(g*) = 1 - G'/G, two columns of bulk,
+which are zero, and the frequency. For the time domain, each line has g_i, k_i = 0 and tau_i of a Prony series.
 
 Source: Abaqus Keywords Reference Guide, *CONNECTOR ELASTICITY, *CONNECTOR DAMPING, *HYPERELASTIC and *VISCOELASTIC;
-Abaqus Analysis User's Guide, "Frequency domain viscoelasticity".
+Abaqus Analysis User's Guide, "Frequency domain viscoelasticity" and "Time domain viscoelasticity".
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -31,15 +31,11 @@ from bushfit.export.deck import (
     stiffness_tables,
     table_losses,
 )
-from bushfit.geometry import Specimen
+from bushfit.export.prony import COMPOUND, LONG_TERM, PronySeries, prony_losses, prony_series, shear_strain
 from bushfit.units import number
 
 #: Number of constants of a symmetric 6 x 6 matrix, and of values per data line.
 _CONSTANTS, _A_LINE = 21, 8
-#: Name of the parameter for the long-term shear modulus [Pa].
-_LONG_TERM = "mu"
-#: Specimen whose stiffness is the shear modulus of the material, over engineering shear strain.
-_COMPOUND = Specimen("compound", "modulus")
 
 _FORM = Form(lambda f, k: (k.real, k.imag / (2.0 * np.pi * f)), lambda f, a, b: a + 2j * np.pi * f * b)
 
@@ -55,14 +51,16 @@ def export(request: ExportRequest) -> Exported:
     """
     units = request.units or MM_T_S_N
     losses = tuple(table_losses(request, _FORM))
-    if has_material := _LONG_TERM in request.result.model.values:
+    series = prony_series(request) if request.time_domain else []
+    if has_material := LONG_TERM in request.result.model.values:
         losses += ("compound: strain is uniform in a material, so the amplitude of each element is that of the table",)
     else:
         losses += ("compound: no elastic branch, so no long-term modulus, and no material",)
     usage = "behaviors are for CONN3D2 of type BUSHING; they act in *STEADY STATE DYNAMICS, DIRECT"
+    losses += tuple(prony_losses(series)) if series else ()
     lines = deck_lines(request, "**", units, losses, usage, "BUSHING_", partial(_behavior, units))
     return Exported(
-        {"bushing.inp": encode_deck([*lines, *(_materials(request, units) if has_material else ())])}, losses
+        {"bushing.inp": encode_deck([*lines, *(_materials(request, units, series) if has_material else ())])}, losses
     )
 
 
@@ -82,18 +80,24 @@ def _behavior(units: UnitSystem, rank: int, level: AmplitudeLevel) -> Iterator[s
                 yield ", ".join(texts[start : start + _A_LINE])
 
 
-def _materials(request: ExportRequest, units: UnitSystem) -> Iterator[str]:
-    """Yield the lines of a material for the strain at each amplitude of the first direction."""
+def _materials(request: ExportRequest, units: UnitSystem, series: Sequence[PronySeries]) -> Iterator[str]:
+    """Yield the lines of a material for the strain at each amplitude of the first direction; `series` may be empty."""
     model, first = request.result.model.without(EffectLevel.INSTRUMENT), exported_directions(request)[0]
-    long_term = model.values[_LONG_TERM]
+    long_term = series[0].long_term if series else model.values[LONG_TERM]
     for rank, table in enumerate(stiffness_tables(first), start=1):
-        strain = 2.0 * table.amplitude * model.unit_strain(table.direction)
-        ratio = model.stiffness(_COMPOUND, table.frequency, strain, conditions=request.conditions) / long_term
+        strain = shear_strain(request, table.amplitude)
         about = f"shear strain amplitude {number(100.0 * strain, 6)} %, that of {describe_amplitudes((table,))}"
         yield from comment_lines("**", [f"COMPOUND_{rank}: {about}"])
         yield f"*MATERIAL, NAME=COMPOUND_{rank}"
         yield "*HYPERELASTIC, NEO HOOKE, MODULI=LONG TERM"
         yield f"{format_real(0.5 * long_term * units.stress.factor)}, 0."
+        if series:
+            terms = series[rank - 1]
+            yield "*VISCOELASTIC, TIME=PRONY"
+            for relative, time in zip(terms.relative_moduli, terms.arms.time * units.time.factor, strict=True):
+                yield f"{format_real(relative, 7)}, 0., {format_real(time, 7)}"
+            continue
+        ratio = model.stiffness(COMPOUND, table.frequency, strain, conditions=request.conditions) / long_term
         yield "*VISCOELASTIC, FREQUENCY=TABULAR"
         for f, loss, gain in zip(table.frequency * units.frequency.factor, ratio.imag, 1.0 - ratio.real, strict=True):
             yield f"{format_real(loss)}, {format_real(gain)}, 0., 0., {format_real(f, 10)}"

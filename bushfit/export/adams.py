@@ -17,6 +17,7 @@ import numpy as np
 
 from bushfit.export.contract import Exported, ExportRequest
 from bushfit.export.deck import (
+    CARDANIC,
     DOFS,
     StiffnessTable,
     band_losses,
@@ -144,6 +145,12 @@ def _property_file(
         for dof in DOFS[element.reference.direction]:
             damping[dof - 1] = scale * element.damping(kind)
             curves[dof - 1] = element.curve.displacement * displacement, element.curve.mean.value * force
+    if (stated := request.cardanic) is not None:
+        rate = stated.imag / (2.0 * np.pi * elements[0].frequency)
+        turn, moment = _SCALES[ROTATION]
+        for dof in CARDANIC:
+            damping[dof - 1] = moment / turn * rate if kind == "car" else float(np.degrees(np.angle(stated)))
+            curves[dof - 1] = curves[dof - 1][0], curves[dof - 1][0] * stated.real * moment / turn
     values = zip(_AXES, damping, strict=True)
     yield from _block("DAMPING", {f"{force.upper()}_DAMPING": format_real(value) for (_, force), value in values})
     for (motion_axis, resisting), curve in zip(_AXES, curves, strict=True):

@@ -113,6 +113,8 @@ class ExportRequest:
         decimal_comma: True for semicolons and decimal commas in the format `csv`.
         temperature: temperature of the rubber [K]; None for the reference temperature of the model.
         static_rates: rates of static curves by SI unit of displacement; None for those of the slowest loop.
+        time_domain: True for materials in the time domain in the format `abaqus`.
+        cardanic: complex stiffness of the rotations about x and y in decks [N m/rad]; None to leave them free.
         day: date to write into decks; None for no date.
     """
 
@@ -125,6 +127,8 @@ class ExportRequest:
     decimal_comma: bool = False
     temperature: float | None = None
     static_rates: Mapping[str, float] | None = None
+    time_domain: bool = False
+    cardanic: complex | None = None
     day: str | None = None
 
     def remarks(self, losses: Iterable[str]) -> Iterator[tuple[str, str]]:

@@ -23,6 +23,8 @@ _WIDTH = 80
 _UNPRINTABLE = re.compile(r"[^\x20-\x7e]")
 #: Degrees of freedom of a direction, with the axis of the bushing along z: 1 to 3 are x, y, z; 6 is rotation about z.
 DOFS = {Direction.AXIAL: (3,), Direction.RADIAL: (1, 2), Direction.TORSION: (6,)}
+#: Degrees of freedom without a law: the rotations about x and y.
+CARDANIC = (4, 5)
 #: Sentence on the loss of every format with stiffness over frequency.
 NO_LOOPS = "no law in time: loops, overtones and transients need another format (fmu)"
 
@@ -32,7 +34,7 @@ class StiffnessTable(NamedTuple):
 
     Args:
         direction: direction of the bushing.
-        amplitude: zero-to-peak amplitude [m or rad].
+        amplitude: zero-to-peak amplitude [m or rad]; 0 for the constant of the rotations about x and y.
         frequency: frequencies [Hz], (n,).
         stiffness: complex stiffness at each frequency [N/m or N m/rad], (n,).
     """
@@ -41,6 +43,11 @@ class StiffnessTable(NamedTuple):
     amplitude: float
     frequency: Array
     stiffness: Array
+
+    @property
+    def dofs(self) -> tuple[int, ...]:
+        """Numbers of the degrees of freedom, 1 to 6."""
+        return DOFS[self.direction] if self.amplitude else CARDANIC
 
 
 #: Tables of all directions at one amplitude each, for one property of a solver.
@@ -88,12 +95,15 @@ def amplitude_levels(request: ExportRequest) -> list[AmplitudeLevel]:
     """
     by_direction = [stiffness_tables(prediction) for prediction in exported_directions(request)]
     count = max(map(len, by_direction))
-    return [tuple(tables[min(rank, len(tables) - 1)] for tables in by_direction) for rank in range(count)]
+    frequency = by_direction[0][0].frequency
+    constant = StiffnessTable(Direction.TORSION, 0.0, frequency, np.full(frequency.size, request.cardanic or 0.0))
+    stated = () if request.cardanic is None else (constant,)
+    return [(*(tables[min(rank, len(tables) - 1)] for tables in by_direction), *stated) for rank in range(count)]
 
 
 def by_dof(level: AmplitudeLevel) -> Iterator[tuple[int, StiffnessTable]]:
     """Yield the number of each degree of freedom (1 to 6) of an amplitude level with its stiffness table."""
-    yield from sorted(((dof, table) for table in level for dof in DOFS[table.direction]), key=lambda pair: pair[0])
+    yield from sorted(((dof, table) for table in level for dof in table.dofs), key=lambda pair: pair[0])
 
 
 class Form(NamedTuple):
@@ -190,7 +200,8 @@ def deck_lines(
 
 def describe_amplitudes(level: Iterable[StiffnessTable]) -> str:
     """Format the amplitudes of a level: "axial at 0.2 mm, torsion at 1 deg"."""
-    rows = [(table.direction, table.amplitude, *table.direction.display.displacement) for table in level]
+    tables = [table for table in level if table.amplitude]
+    rows = [(table.direction, table.amplitude, *table.direction.display.displacement) for table in tables]
     return ", ".join(f"{place} at {number(amplitude * factor, 6)} {unit}" for place, amplitude, unit, factor in rows)
 
 
@@ -250,7 +261,14 @@ def common_losses(request: ExportRequest) -> Iterator[str]:
     yield "each direction acts by itself: coupling between directions is not included"
     present = {prediction.direction for prediction in exported_directions(request)}
     missing = [str(direction) for direction in DOFS if direction not in present]
-    yield f"no stiffness in {', '.join([*missing, 'rotations about x and y'])}"
+    if request.cardanic is None:
+        missing.append("rotations about x and y")
+    else:
+        stiffness, loss = request.cardanic.real, request.cardanic.imag / request.cardanic.real
+        constant = f"{number(stiffness, 5)} N m/rad, loss factor {number(loss, 3)}"
+        yield f"rotations about x and y: the stated constant, {constant}, which no test supports"
+    if missing:
+        yield f"no stiffness in {', '.join(missing)}"
     if specimens := [str(place) for place in request.places if place not in DOFS]:
         yield f"specimens: {', '.join(specimens)}"
 

@@ -85,6 +85,9 @@ def fitted_arms(
     *,
     stands_for: str = "",
     size: str = "",
+    spring: float = 0.0,
+    beyond: float = _BEYOND,
+    closest: bool = False,
 ) -> Arms:
     """Fit the smallest number of Maxwell arms (spring and dashpot in series) that approximate a complex modulus.
 
@@ -94,6 +97,9 @@ def fitted_arms(
         accuracy: largest relative error of the modulus.
         stands_for: names of the effects that the arms replace.
         size: qualified name of the parameter that scales the modulus.
+        spring: modulus of a spring in parallel [Pa]; errors are relative to the sum of spring and modulus.
+        beyond: factor by which relaxation times may lie outside the band.
+        closest: True to return the closest arms if no number of arms reaches the accuracy.
 
     Returns:
         Arms by ascending relaxation time, with their largest relative error.
@@ -110,21 +116,26 @@ def fitted_arms(
     low, high = band
     count = max(40, int(_PER_DECADE * np.log10(high / low)))
     omega = 2.0 * np.pi * np.geomspace(low, high, count)
-    target, best, stalled, arms = modulus(omega), np.inf, 0, 0
+    target, best, stalled, arms = modulus(omega), (np.inf, np.empty(0), np.empty(0)), 0, 0
+    total = target + spring
     while arms < _MOST_ARMS and stalled < _PATIENCE:
         arms += 1
-        fits = [_fit(omega, target, *start) for start in _starts(omega, target, arms)]
+        fits = [_fit(omega, target, total, beyond, *start) for start in _starts(omega, target, arms)]
         error, moduli, times = min(fits, key=itemgetter(0))
         if error <= _WORTHWHILE * accuracy:
-            error, moduli, times = _fit(omega, target, moduli, times, _ROUNDS)
+            error, moduli, times = _fit(omega, target, total, beyond, moduli, times, _ROUNDS)
+        stalled = 0 if error < _BETTER * best[0] else stalled + 1
+        best = best if stalled else (error, moduli, times)
         if error <= accuracy:
-            order = np.argsort(times)
-            return Arms(stands_for, size, moduli[order], times[order], band, error)
-        stalled = 0 if error < _BETTER * best else stalled + 1
-        best = min(best, error)
+            best = error, moduli, times
+            break
+    error, moduli, times = best
+    if closest or error <= accuracy:
+        order = np.argsort(times)
+        return Arms(stands_for, size, moduli[order], times[order], band, error)
     raise ModelError(
         "no set of springs and dashpots represents the frequency dependence closely enough",
-        found=f"an error of {100.0 * best:.3g} % with up to {arms} arms",
+        found=f"an error of {100.0 * error:.3g} % with up to {arms} arms",
         expected=f"{100.0 * accuracy:.3g} % from {low:g} to {high:g} Hz",
         hint="allow a larger error",
     )
@@ -234,8 +245,10 @@ def _starts(omega: Array, target: Array, arms: int) -> Iterator[tuple[Array, Arr
         yield np.maximum(2.0 / np.pi * loss * spacing, 1e-3 * np.abs(target).mean()), time
 
 
-def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 1) -> tuple[float, Array, Array]:
-    """Fit Maxwell arms to complex moduli [Pa] from start values; return largest relative error, moduli and times [s].
+def _fit(
+    omega: Array, target: Array, total: Array, beyond: float, moduli: Array, time: Array, rounds: int = 1
+) -> tuple[float, Array, Array]:
+    """Fit Maxwell arms to complex moduli [Pa] from start values; return largest error over total, moduli and times [s].
 
     Notes: repeated least squares in the logarithms, with weights multiplied by the error (Lawson's method for the
     smallest maximum error); the logarithms keep all moduli and times positive.
@@ -247,27 +260,27 @@ def _fit(omega: Array, target: Array, moduli: Array, time: Array, rounds: int = 
     unit = np.abs(target).mean()
 
     def parts(x: Array) -> tuple[Array, Array]:
-        """Modulus of each arm relative to the target, and its derivative by the log of its time, (n, k) each."""
+        """Modulus of each arm relative to the total, and its derivative by the log of its time, (n, k) each."""
         basis = _basis(omega, np.exp(x[count:]))
         # a step that goes too far is held, as `exp` would overflow
-        arm = basis * unit * np.exp(np.minimum(x[:count], 100.0)) / target[:, None]
+        arm = basis * unit * np.exp(np.minimum(x[:count], 100.0)) / total[:, None]
         return arm, arm * (1.0 - basis)
 
     def residual(x: Array) -> Array:
-        error = root * (parts(x)[0].sum(axis=1) - 1.0)
+        error = root * (parts(x)[0].sum(axis=1) - target / total)
         return np.concatenate((error.real, error.imag))
 
     def slopes(x: Array) -> Array:
         both = root[:, None] * np.concatenate(parts(x), axis=1)
         return np.concatenate((both.real, both.imag))
 
-    ends = np.log([1.0 / (_BEYOND * omega[-1]), _BEYOND / omega[0]])
+    ends = np.log([1.0 / (beyond * omega[-1]), beyond / omega[0]])
     low, high = (np.repeat([reach, end], count) for reach, end in zip((-np.inf, np.inf), ends, strict=True))
     x, best = np.concatenate((np.log(moduli / unit), np.log(time))), (np.inf, moduli, time)
     for _ in range(rounds):
         start = np.clip(x, low + 1e-9, high - 1e-9)  # a fit has to start inside
         x = least_squares(residual, start, slopes, bounds=(low, high), max_nfev=200).x  # ten times what it takes
-        error = np.abs(parts(x)[0].sum(axis=1) - 1.0)
+        error = np.abs(parts(x)[0].sum(axis=1) - target / total)
         if error.max() < best[0]:
             best = error.max(), unit * np.exp(x[:count]), np.exp(x[count:])
         if error.max() < LEAST_ACCURACY:

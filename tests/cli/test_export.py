@@ -225,7 +225,7 @@ def test_every_export_says_what_predict_says(ran: Ran, model: Path, bushfit: Run
 
 
 #: Options of every format that is written without a compiler.
-ALL = [f"--format={name}" for name in ("nastran", "abaqus", "adams", "csv", "xlsx")]
+ALL = [f"--format={name}" for name in ("nastran", "abaqus", "adams", "csv", "xlsx", "prony")]
 
 
 def test_every_format_at_once_and_what_it_leaves_out(bushfit: Run, tmp_path: Path) -> None:
@@ -245,6 +245,38 @@ def test_every_format_at_once_and_what_it_leaves_out(bushfit: Run, tmp_path: Pat
     told = [line.removeprefix("warning: ") for line in done.stderr.splitlines() if line.startswith("warning: ")]
     assert sorted(told) == sorted(found["warnings"])  # the terminal has the most important first
     assert any(line.startswith("radial: not fitted") for line in told)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--format", "prony", "--time-domain"), "'--time-domain' is of '--format abaqus'"),
+        (("--format", "nastran", "--cardanic", "60 N/m"), "--cardanic: the unit does not fit"),
+        (("--format", "nastran", "--cardanic", "60 N m/rad, -1"), "a value above zero"),
+    ],
+)
+def test_constants_and_time_domain_are_checked(
+    bushfit: Run, tmp_path: Path, options: tuple[str, ...], words: str
+) -> None:
+    done = bushfit("export", "model/model.json", *options, "-o", tmp_path / "x", status=2)
+    assert words in done.stderr
+    assert not (tmp_path / "x").exists()
+
+
+def test_a_prony_series_and_stated_constants(bushfit: Run, tmp_path: Path) -> None:
+    grid = ("--direction", "axial", "--amplitudes", "0.2 mm", "--frequencies", "5:155:50 Hz")
+    options = ("--format=prony", "--format=abaqus", "--time-domain", "--cardanic", "1.2 N m/deg, 0.1")
+    done = bushfit("export", "model/model.json", *options, *grid, "-o", tmp_path / "x")
+    assert names(tmp_path / "x") == {"prony.csv", "bushing.inp"}
+    table = pd.read_csv(tmp_path / "x/prony.csv")
+    assert table["axial amplitude [mm]"].unique() == pytest.approx([0.2])
+    assert table["term"].tolist() == [*range(1, len(table) + 1)]
+    text = (tmp_path / "x/bushing.inp").read_text()
+    assert text.count("TIME=PRONY") == 1
+    assert f"{table['g_i [-]'][0]:.6E}, 0., " in text
+    assert "6.8755E+04" in text  # 1.2 N m/deg in N mm/rad
+    assert "the Prony series has an error up to" in done.stderr
+    assert "the stated constant, 68.755 N m/rad, loss factor 0.1" in done.stderr
 
 
 def test_without_a_grid_it_is_the_measured_one_and_files_say_where_they_hold(root: Path, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from scipy.interpolate import Akima1DInterpolator
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
 from bushfit.errors import ModelError
-from bushfit.export import abaqus, adams, nastran
+from bushfit.export import abaqus, adams, nastran, prony
 from bushfit.export.contract import MM_T_S_N, Exported, ExportRequest, UnitSystem
 from bushfit.export.deck import DOFS, amplitude_levels
 from bushfit.geometry import Direction, Specimen
@@ -104,6 +105,91 @@ def test_the_compound_of_abaqus_is_the_model_at_that_strain(export_request: Expo
         # of the axial stiffness, Eq. 10: K = 2 pi L G/ln(b/a)
         axial = paper_model.stiffness("axial", frequency, amplitude)
         np.testing.assert_allclose(modulus, axial * np.log(1.8) / (2.0 * np.pi * 0.034), rtol=DIGITS)
+
+
+@pytest.mark.parametrize("units", ["N, s, t, mm", "mm kg ms kN"])
+def test_the_prony_series_of_abaqus_and_of_the_table_is_the_model_within_the_stated_error(
+    export_request: ExportRequest, paper_model: Model, units: str
+) -> None:
+    """G* = G_0 (1 - sum g_i) + G_0 sum g_i i omega tau_i/(1 + i omega tau_i), read back at its strain amplitude.
+
+    Source: Abaqus Keywords Reference Guide, *VISCOELASTIC, TIME=PRONY: g_i, k_i, tau_i, a line per term.
+    """
+    system = UnitSystem.parse(units)
+    request = replace(export_request, units=system, time_domain=True)
+    options = abaqus_options(abaqus.export(request).files["bushing.inp"].decode("ascii"))
+    table = pd.read_csv(io.BytesIO(prony.export(request).files["prony.csv"]))
+    starts = [place for place, (keyword, _, _) in enumerate(options) if keyword == "MATERIAL"]
+    frequency = np.geomspace(5.0, 155.0, 500)
+    turn = 2j * np.pi * frequency
+    by_amplitude = table.groupby("axial amplitude [mm]")
+    assert len(starts) == by_amplitude.ngroups == 5
+    for start, (amplitude, rows) in zip(starts, by_amplitude, strict=True):
+        (_, hyper, ((c10, d1),)), (_, visco, terms) = options[start + 1 : start + 3]
+        assert (hyper, visco, d1) == ({"NEO HOOKE": "", "MODULI": "LONG TERM"}, {"TIME": "PRONY"}, 0.0)
+        relative, bulk, time = np.array(terms).T
+        assert not bulk.any()
+        assert (relative > 0.0).all()
+        assert relative.sum() < 1.0
+        seconds = time / system.time.factor
+        assert (seconds >= 0.99e-1 / (2.0 * np.pi * 155.0)).all()
+        assert (seconds <= 10.1 / (2.0 * np.pi * 5.0)).all()
+        rest = 2.0 * c10 / system.stress.factor
+        assert rest == pytest.approx(1.09e6, rel=DIGITS)
+        instantaneous = rest / (1.0 - relative.sum())
+        spread = turn[:, None] * seconds
+        written = rest + instantaneous * (relative * spread / (1.0 + spread)).sum(axis=1)
+        axial = paper_model.stiffness("axial", frequency, amplitude / 1e3)  # Eq. 10: K = 2 pi L G/ln(b/a)
+        error = np.abs(written / (axial * np.log(1.8) / (2.0 * np.pi * 0.034)) - 1.0).max()
+        stated = rows["largest error of the modulus [%]"].iloc[0] / 100.0
+        print(f"{amplitude} mm: {relative.size} terms, error {error:.2%}, stated {stated:.2%}")
+        assert error == pytest.approx(stated, rel=0.03)
+        assert stated < 0.025
+        np.testing.assert_allclose(rows["g_i [-]"], relative, rtol=DIGITS)
+        np.testing.assert_allclose(rows["relaxation time [s]"], seconds, rtol=DIGITS)
+        assert rows.filter(like="instantaneous").iloc[0, 0] == pytest.approx(instantaneous * system.stress.factor)
+        strain = 2.0 * amplitude / 1e3 * paper_model.unit_strain(Direction.AXIAL)
+        assert rows["shear strain amplitude [%]"].iloc[0] == pytest.approx(100.0 * strain, rel=1e-6)
+
+
+def test_without_friction_a_prony_series_reaches_the_accuracy_and_has_no_amplitude(
+    export_request: ExportRequest, paper_model: Model
+) -> None:
+    model = paper_model.without("friction")
+    grid = predict(Result(model), Direction.AXIAL, [5.0, 155.0], [1e-4, 5e-4])
+    request = replace(export_request, result=Result(model), predictions=(grid,), accuracy=0.002)
+    small, large = prony.prony_series(request)
+    assert small.arms.error == large.arms.error < 0.002
+    np.testing.assert_array_equal(small.relative_moduli, large.relative_moduli)
+    with pytest.raises(ModelError, match="a long-term modulus"):
+        prony.export(replace(request, result=Result(model.without("elastic"))))
+
+
+@pytest.mark.parametrize("name", ["nastran", "optistruct", "abaqus"])
+def test_stated_constants_are_the_rotations_without_a_law(
+    name: str, export_request: ExportRequest, tmp_path: Path
+) -> None:
+    stated = replace(export_request, cardanic=60.0 + 6.0j)
+    exported, found = read(name, stated, tmp_path)
+    assert {dof for dof, _ in found} == {1, 2, 3, 4, 5, 6}
+    for dof in (4, 5):
+        for rank in range(1, len(amplitude_levels(stated)) + 1):
+            np.testing.assert_allclose(found[dof, rank][1], 1e3 * (60.0 + 6.0j), rtol=DIGITS)
+    assert "rotations about x and y: the stated constant, 60 N m/rad, loss factor 0.1" in " ".join(exported.losses)
+    assert "no stiffness in" not in " ".join(exported.losses)
+
+
+def test_stated_constants_in_adams(export_request: ExportRequest) -> None:
+    files = adams.export(replace(export_request, cardanic=60.0 + 6.0j)).files
+    for kind, damping in (
+        ("car", 6.0 * 1e3 * np.radians(1.0) / (2.0 * np.pi * 75.0)),
+        ("ride", np.degrees(np.arctan(0.1))),
+    ):
+        blocks = teimorbit(files[f"bushing_{kind}.bus"].decode("ascii"))
+        for end in ("TX", "TY"):
+            turned, moment = blocks[f"{end}_CURVE"][2].T
+            np.testing.assert_allclose(moment, 60e3 * np.radians(turned), rtol=DIGITS)
+            assert float(blocks["DAMPING"][0][f"{end}_DAMPING"]) == pytest.approx(damping, rel=DIGITS)
 
 
 def test_adams_holds_curve_and_damping(export_request: ExportRequest, known: pd.DataFrame) -> None:

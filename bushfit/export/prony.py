@@ -1,0 +1,149 @@
+"""Prony series of the compound: relative moduli and relaxation times at one strain amplitude, also as a table.
+
+The relaxation modulus is G(t) = G_inf + sum_i G_i exp(-t/tau_i), with g_i = G_i/G_0 and the instantaneous modulus
+G_0 = G_inf + sum_i G_i. All terms are positive, and the g_i sum to less than 1.
+
+Source: Abaqus Analysis User's Guide, "Time domain viscoelasticity": g_R(t) = 1 - sum_i g_i (1 - exp(-t/tau_i)).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import pandas as pd
+
+from bushfit.effects import Level
+from bushfit.effects.contract import Array
+from bushfit.errors import ModelError
+from bushfit.export.contract import Exported, ExportRequest
+from bushfit.geometry import Specimen
+from bushfit.model.arms import Arms, fitted_arms, values_under
+from bushfit.prediction.caveats import format_deviation
+from bushfit.reading.tablefile import to_csv
+from bushfit.units import number
+
+#: Name of the parameter for the long-term shear modulus [Pa].
+LONG_TERM = "mu"
+#: Specimen whose stiffness is the shear modulus of the material, over engineering shear strain.
+COMPOUND = Specimen("compound", "modulus")
+#: Factor by which relaxation times may lie outside the band: further away, a term would be a spring or a dashpot, and
+#: the instantaneous modulus without meaning.
+_BEYOND = 10.0
+#: Number of frequencies at which series of several amplitudes are compared.
+_FINE = 200
+
+
+@dataclass(frozen=True, eq=False)
+class PronySeries:
+    """Prony series of the shear modulus at one strain amplitude.
+
+    Args:
+        amplitude: zero-to-peak amplitude of the first exported direction or specimen [m, rad or 1].
+        strain: engineering shear strain amplitude at which the series holds.
+        long_term: modulus at rest G_inf [Pa].
+        arms: the terms, as Maxwell arms in parallel with G_inf.
+        exact: complex modulus of the model at frequencies over the band [Pa].
+    """
+
+    amplitude: float
+    strain: float
+    long_term: float
+    arms: Arms
+    exact: Array
+
+    @property
+    def instantaneous(self) -> float:
+        """Instantaneous modulus G_0 [Pa]."""
+        return self.long_term + float(self.arms.modulus.sum())
+
+    @property
+    def relative_moduli(self) -> Array:
+        """Relative moduli g_i, (k,)."""
+        return self.arms.modulus / self.instantaneous
+
+
+def shear_strain(request: ExportRequest, amplitude: float) -> float:
+    """Engineering shear strain amplitude of the rubber at an amplitude [m, rad or 1] of the first direction."""
+    return 2.0 * amplitude * request.result.model.unit_strain(request.places[0])
+
+
+@lru_cache(maxsize=1)
+def prony_series(request: ExportRequest) -> list[PronySeries]:
+    """Fit a Prony series at each amplitude of the first direction or specimen, over the frequencies of the grid.
+
+    Args:
+        request: model, predictions and settings.
+
+    Returns:
+        Series by ascending amplitude, as short as the accuracy permits, or the closest: positive terms cannot follow
+        friction, whose loss and storage modulus are both independent of frequency.
+
+    Raises:
+        ModelError: the model has no long-term modulus.
+    """
+    model, prediction = request.result.model.without(Level.INSTRUMENT), request.predictions[0]
+    if LONG_TERM not in (values := values_under(model, request.conditions)):
+        raise ModelError("a Prony series needs a long-term modulus", expected="a model with an elastic branch")
+    long_term = values[LONG_TERM]
+    band = float(prediction.frequency.min()), float(prediction.frequency.max())
+    frequency, series = np.geomspace(*band, _FINE), list[PronySeries]()
+    for amplitude in np.unique(prediction.amplitude):
+        strain = shear_strain(request, amplitude)
+
+        def beyond_rest(omega: Array, strain: float = strain) -> Array:
+            total = model.stiffness(COMPOUND, omega / (2.0 * np.pi), strain, conditions=request.conditions)
+            return total - long_term
+
+        arms = fitted_arms(beyond_rest, band, request.accuracy, spring=long_term, beyond=_BEYOND, closest=True)
+        exact = long_term + beyond_rest(2.0 * np.pi * frequency)
+        series.append(PronySeries(float(amplitude), strain, long_term, arms, exact))
+    return series
+
+
+def prony_losses(series: Sequence[PronySeries]) -> list[str]:
+    """Sentences on the error of Prony series, their band, and the strain amplitude at which each holds."""
+    low, high = (number(end, 3) for end in series[0].arms.band)
+    worst = number(100.0 * max(one.arms.error for one in series), 2)
+    sentences = [f"compound: the Prony series has an error up to {worst} % of the modulus from {low} to {high} Hz only"]
+    if len(series) > 1:
+        middle = series[(len(series) - 1) // 2]
+        ratios = np.concatenate([np.abs(middle.exact / one.exact) for one in series])
+        strain, *ends = (number(100.0 * one.strain, 3) for one in (middle, series[0], series[-1]))
+        sentences.append(
+            f"compound: one strain amplitude per series: with {strain} %, the error of |G| is "
+            f"{format_deviation(ratios)} at {' to '.join(ends)} %"
+        )
+    return [*sentences, "compound: friction is a viscous loss at that amplitude: its force at rest is left out"]
+
+
+def export(request: ExportRequest) -> Exported:
+    """Write the Prony series of the compound as a table, a row per term.
+
+    Args:
+        request: model, predictions and settings.
+
+    Returns:
+        File prony.csv, and sentences on properties that the format cannot represent.
+    """
+    series, place = prony_series(request), request.places[0]
+    stress, to_stress = request.units.stress if request.units else ("MPa", 1e-6)
+    length, to_length = place.display.displacement
+    rows = [
+        {
+            f"{place} amplitude [{length}]": to_length * one.amplitude,
+            "shear strain amplitude [%]": 100.0 * one.strain,
+            "term": term,
+            "g_i [-]": relative,
+            "relaxation time [s]": time,
+            f"long-term modulus [{stress}]": to_stress * one.long_term,
+            f"instantaneous modulus [{stress}]": to_stress * one.instantaneous,
+            "lowest frequency [Hz]": one.arms.band[0],
+            "highest frequency [Hz]": one.arms.band[1],
+            "largest error of the modulus [%]": 100.0 * one.arms.error,
+        }
+        for one in series
+        for term, (relative, time) in enumerate(zip(one.relative_moduli, one.arms.time, strict=True), start=1)
+    ]
+    table = to_csv(pd.DataFrame(rows), decimal_comma=request.decimal_comma)
+    return Exported({"prony.csv": table}, tuple(prony_losses(series)))
