@@ -146,21 +146,6 @@ def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed: int) -> Non
         assert found == pytest.approx(over_sizes, abs=1e-6)
 
 
-def test_the_size_is_that_of_what_was_put_there() -> None:
-    of = ledger(6)
-    group = of.groups[3]
-    there = replace(
-        of,
-        residual=-0.03 / group.unit[0] * group.columns[0] * 10.0,
-        groups=(replace(group, columns=10.0 * group.columns),),
-    )
-    (found,) = there.group_evidence
-    assert found.size == pytest.approx(0.03, rel=0.1)
-    assert found.likeliest == min(SIZES, key=lambda size: abs(size - 0.03))
-    (wrong,) = replace(there, residual=-there.residual).group_evidence
-    assert wrong.log_evidence < there.log_evidence < found.log_evidence - 5.0
-
-
 @pytest.mark.parametrize("number", [0, 1])
 def test_amounts_are_those_of_a_dense_posterior(number: int) -> None:
     """By Gaussian conditioning at each node within the class and each size, mixed by their evidence."""

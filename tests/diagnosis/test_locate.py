@@ -87,23 +87,6 @@ def test_loops_alone(where_of: Callable[[Effects], tuple[MisfitRegion, ...]], ef
 HEAVY = {"inertia": {"mass": 0.2}}
 
 
-def test_parts_and_gaps(measured: Measured, fitted: Fitted) -> None:
-    campaign = measured(INERTIA, SHARED)
-    found = hold_out(fitted(campaign), fitted(campaign, "inertia"), {})
-    for part in found.parts:
-        print(f"{part.part:32} {part.before:5.2f} {part.after:5.2f}")
-    assert [part.part for part in found.parts] == [
-        *(f"amplitude level {n}" for n in (1, 2, 3)),
-        "top third of the frequencies",
-        "radial direction",
-        *(f"loop loop_axial_{n}" for n in (1, 2)),
-    ]
-    assert [skipped.part for skipped in found.skipped] == ["axial direction"]
-    assert found.before is not None
-    assert found.after is not None
-    assert found.after < 1.1 < 1.5 < found.before
-
-
 @pytest.mark.parametrize(
     ("hidden", "effects", "which"),
     [
