@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import FitSettings, SimulatedLoop, SimulatedSweep
-from bushfit.fitting.loop_harmonics import MOST_ROWS
+from bushfit.campaign.schema import FitSettings, SimulatedSweep
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
@@ -89,18 +88,6 @@ def test_three_percent_outliers_move_no_parameter_by_a_standard_error(
     print(f"{kind}, block errors {shared}: moved by at most {dict(zip(FIVE, worst.round(2), strict=True))} errors")
     # an error of the levels, told by three a direction, comes out 0 or 0.08 % by one point: this moves weights
     assert np.max(worst) < 1.25
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_outliers_do_not_spoil_the_bins_of_a_long_loop(rig: Rig, kind: str) -> None:
-    loops = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=12),)
-    sweep = SimulatedSweep(Direction.AXIAL, (1e-4, 5e-4), tuple(np.arange(5.0, 156.0, 25.0)))
-    clean = rig(3, loops=loops, sweeps=(sweep,))
-    assert clean.loops[0].force.size > MOST_ROWS
-    assert (
-        np.max(np.abs(moved(robust(spoilt_campaign(clean, kind, 3)), fit_joint(PreparedCampaign.from_campaign(clean)))))
-        < 1.0
-    )
 
 
 @pytest.mark.parametrize("seeds", [1, pytest.param(6, marks=pytest.mark.slow)])
