@@ -1,7 +1,6 @@
 """A plan against what is worked out another way: full covariances, every choice there is, and fits."""
 
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +18,9 @@ from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.solve import solve
 from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.model import Model
-from bushfit.planning.candidates import candidates, run_minutes
+from bushfit.planning.candidates import candidates
 from bushfit.planning.compound import guess_parameters
 from bushfit.planning.contract import Aim, Knowledge, Noise, Plan, PlanRequest, Points, Programme, Target, Test, motions
-from bushfit.planning.criterion import Budget, Criterion, best_runs
 from bushfit.planning.information import CandidateGrid, ModelInformation, relative_slopes, rival_chi_squares
 from bushfit.planning.plan import plan
 from bushfit.planning.problem import PlanningProblem
@@ -160,23 +158,6 @@ def test_rivals_are_as_far_apart_as_the_best_refit_of_either_leaves_them(known: 
     ]
     print("linear", linear, "fits", fits)
     assert linear == pytest.approx(min(fits), rel=0.1)
-
-
-def test_no_choice_is_much_better_than_the_one_found(known: Knowledge) -> None:
-    """Every choice of runs of five tests in as many minutes."""
-    view = view_of(known, SWEEPS)
-    weight = np.diag([1.0, 0.0, 0.0, 1.0, 1.0])
-    criterion = Criterion([view], weight, np.empty((2, 0), dtype=int), np.zeros(view.squares.shape[1]), 3.0)
-    spent = np.array([run_minutes(test, RigSettings()) for test in SWEEPS])
-    budget = Budget(spent, np.array([0, 1, 0, 0, 1]), np.arange(5), np.full(5, 9), 5.0, 32.0)
-    found = best_runs(criterion, budget, *np.zeros((2, 5), dtype=int))
-    every = (
-        np.array(counts) for counts in product(range(9), repeat=5) if np.dot(counts, spent) <= budget.maximum_minutes
-    )
-    values = [criterion.value(counts) for counts in every if budget.spent(counts) <= budget.maximum_minutes]
-    print("found", criterion.value(found), "best", min(values), "of", len(values), found)
-    assert budget.spent(found) <= budget.maximum_minutes
-    assert min(values) - 1e-9 <= criterion.value(found) <= min(values) + 0.02
 
 
 def test_a_plan_is_better_than_the_standard_programme_and_errors_before_are_those_known(
