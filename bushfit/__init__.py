@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from bushfit.commands.fit import fit, fit_dynamic, fit_static
     from bushfit.commands.loading import load_model
     from bushfit.commands.predict import predict
+    from bushfit.commands.respond import respond
     from bushfit.commands.results import parameters, picture, save, table
     from bushfit.commands.run import run
     from bushfit.commands.simulate import simulate
@@ -32,6 +33,7 @@ __all__ = [
     "parameters",
     "picture",
     "predict",
+    "respond",
     "run",
     "save",
     "simulate",

@@ -25,7 +25,7 @@ from bushfit.reading.files import read_utf8
 from bushfit.reading.tablefile import folder_name
 from bushfit.validation import Share, Text, converter, unknown_key, validate_tables
 
-Command = Literal["run", "fit", "diagnose", "predict"]
+Command = Literal["run", "fit", "diagnose", "predict", "respond"]
 
 #: Largest TOML manifest [bytes]: some million rows.
 _LARGEST_MANIFEST = 200_000_000
@@ -35,7 +35,8 @@ _DEFAULT_COMMANDS: tuple[Command, ...] = ("fit",)
 _COMMANDS_USING: dict[str, tuple[Command, ...]] = {
     **dict.fromkeys(("directions", "effects"), ("fit",)),
     **dict.fromkeys(("adopt", "without", "max_effects", "tolerance"), ("diagnose",)),
-    "model": ("diagnose", "predict"),
+    "model": ("diagnose", "predict", "respond"),
+    "history": ("respond",),
 }
 #: Characters that make a path a pattern.
 _PATTERN = re.compile(r"[*?\[]")
@@ -62,10 +63,11 @@ class RowSettings:
     """Settings of a row or of a whole manifest; None if not stated: the manifest or the default then applies.
 
     Args:
-        commands: run alone, or any of fit, diagnose and predict; default fit.
+        commands: run alone, or any of fit, diagnose, predict and respond; default fit.
         directions, effects: settings of fit, as `bushfit fit --direction --effect`.
         adopt, without, max_effects, tolerance: settings of diagnose, as its options.
-        model: model file from which predict predicts, or from which diagnose starts.
+        model: model file from which predict and respond predict, or from which diagnose starts.
+        history: displacement history for respond, as `bushfit respond`.
     """
 
     commands: Annotated[tuple[Command, ...], Words, Field(min_length=1)] | None = None
@@ -76,6 +78,7 @@ class RowSettings:
     max_effects: Annotated[int, Field(ge=0, le=5)] | None = None
     tolerance: Share | None = None
     model: Text | None = None
+    history: Text | None = None
 
     def with_defaults(self, defaults: RowSettings) -> RowSettings:
         """Copy of these settings in which None is replaced by the value in `defaults`; other keys are dropped."""
@@ -322,8 +325,10 @@ def check_used(settings: RowSettings, rows: Collection[tuple[Command, ...]], sou
         CampaignError: a setting that no command of these rows uses.
     """
     for name, users in _COMMANDS_USING.items():
-        # after a fit, predict uses the fitted model
-        unused = [{*users} - ({"predict"} if name == "model" and "fit" in commands else set()) for commands in rows]
+        # after a fit, predict and respond use the fitted model
+        unused = [
+            {*users} - ({"predict", "respond"} if name == "model" and "fit" in commands else set()) for commands in rows
+        ]
         is_used = any(not names.isdisjoint(commands) for names, commands in zip(unused, rows, strict=True))
         if getattr(settings, name) is not None and not is_used:
             another = "" if ("run",) in rows else f"--command {users[0]} too, or "
@@ -360,12 +365,20 @@ def complete_settings(row_settings: RowSettings, defaults: RowSettings, base: Pa
             file=source,
             place="commands",
             found=", ".join(commands),
-            expected='commands = ["run"], or any of fit, diagnose, predict without it',
+            expected='commands = ["run"], or any of fit, diagnose, predict, respond without it',
             hint="--command run alone" if row_settings.commands is None else None,
         )
     check_used(row_settings, [commands], source)
-    if commands == ("predict",) and not settings.model:
-        expected = 'commands = ["fit", "predict"], or model = "model.json"'
-        raise CampaignError("predict has no model to predict from", file=source, place="commands", expected=expected)
-    model = os.path.abspath(base / settings.model) if settings.model else None  # noqa: PTH100
-    return replace(settings, commands=commands, model=model)
+    if {*commands} <= {"predict", "respond"} and not settings.model:
+        expected = f'commands = ["fit", "{commands[0]}"], or model = "model.json"'
+        raise CampaignError(
+            f"{commands[0]} has no model to predict from", file=source, place="commands", expected=expected
+        )
+    if "respond" in commands and not settings.history:
+        expected = 'history = "road.csv"'
+        raise CampaignError("respond has no displacement history", file=source, place="history", expected=expected)
+    model, history = (
+        os.path.abspath(base / path) if path else None  # noqa: PTH100
+        for path in (settings.model, settings.history)
+    )
+    return replace(settings, commands=commands, model=model, history=history)

@@ -15,6 +15,7 @@ from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.commands.diagnose import diagnose
 from bushfit.commands.fit import fit
 from bushfit.commands.predict import predict
+from bushfit.commands.respond import respond
 from bushfit.commands.run import run
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import get_effect
@@ -106,12 +107,13 @@ def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFi
     Raises:
         BushfitError: inputs that cannot be used.
     """
-    campaign, model = load_campaign(Path(row.campaign)), row.settings.model
+    campaign = load_campaign(Path(row.campaign))
     result, diagnosis, files = run_commands(campaign, row.settings, formats)
     tests: tuple[Loop | Sweep, ...] = (*campaign.loops, *campaign.sweeps)
     sources = [test.source for test in tests if test.source]
     inputs = {Path(row.campaign).name: campaign.sha256} | {str(source.file): source.sha256 for source in sources}
-    inputs |= {model: store.digest(view_bytes(Path(model), ModelError))} if model else {}
+    further = filter(None, (row.settings.model, row.settings.history))
+    inputs |= {path: store.digest(view_bytes(Path(path), ModelError)) for path in further}
     quantities, warnings = estimate_quantities(result, points)
     measured, at_bound = dict[str, Estimate](), dict(result.at_bound)
     for point in points:
@@ -142,7 +144,7 @@ def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFi
 def run_commands(
     campaign: Campaign, settings: RowSettings, formats: Formats
 ) -> tuple[Result, Diagnosis | None, dict[str, bytes]]:
-    """Run the commands of a row: run alone, or fit, diagnose and predict, each from the result of the one before.
+    """Run the commands of a row: run alone, or any of fit, diagnose, predict and respond, each from the last result.
 
     Args:
         campaign: campaign of the row.
@@ -160,7 +162,7 @@ def run_commands(
         return ran.result, ran.diagnosed.diagnosis if ran.diagnosed else None, files
     start = result = load_result(Path(settings.model)) if settings.model else None
     diagnosis, joint, files = None, None, {}
-    data = PreparedCampaign.from_campaign(campaign) if set(commands) - {"predict"} else None
+    data = PreparedCampaign.from_campaign(campaign) if set(commands) - {"predict", "respond"} else None
     if "fit" in commands and data:
         fitted = fit(data, directions=settings.directions or (), effects=settings.effects or ())
         result, files = fitted.result, encode_all(fitted.files, formats)
@@ -176,6 +178,8 @@ def run_commands(
     assert result is not None  # the manifest refuses rows without fit, diagnose or model
     if "predict" in commands:
         files |= encode_all(predict(result, campaign).files, with_tables)
+    if "respond" in commands and settings.history:
+        files |= encode_all(respond(result, settings.history).files, with_tables)
     return result, diagnosis, files
 
 

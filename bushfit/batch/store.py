@@ -43,7 +43,9 @@ def row_key(row: Row, points: Collection[Point], formats: Formats) -> str:
     Returns:
         SHA-256 of settings, points, formats and the version of bushfit.
     """
-    predicts = not {"run", "predict"}.isdisjoint(row.settings.commands or ())  # whose tables are always written
+    predicts = not {"run", "predict", "respond"}.isdisjoint(
+        row.settings.commands or ()
+    )  # whose tables are always written
     settings = {
         "settings": asdict(row.settings),
         "points": [str(point) for point in points],

@@ -21,6 +21,7 @@ _GROUPS = {
         "run": ("run", "The main job: fits, diagnosis and prediction in one go."),
         "diagnose": ("diagnose", "Where model and tests disagree, and which effect is missing."),
         "predict": ("predict", "Stiffness and loss factor of a model, as tables and plots."),
+        "respond": ("respond", "Force over time for a displacement history, such as a road load."),
         "compare": ("compare", "Differences between results that exceed chance."),
         "report": ("report", "One page from a folder of results, to show, print and mail."),
         "batch": ("batch", "Many campaigns at once: one table, limits, a report for CI."),

@@ -29,8 +29,8 @@ _MOST_SHOWN = 10
     option(
         "--command commands",
         "COMMAND",
-        "Command to run for each bushing: fit, diagnose, predict or run; may be given again [fit].",
-        type=click.Choice(["run", "fit", "diagnose", "predict"]),
+        "Command to run for each bushing: fit, diagnose, predict, respond or run; may be given again [fit].",
+        type=click.Choice(["run", "fit", "diagnose", "predict", "respond"]),
         multiple=True,
     ),
     direction_option("Fit the tests in this direction, as in `bushfit fit`."),

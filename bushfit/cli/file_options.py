@@ -103,13 +103,8 @@ def metadata_options(*, sweeps: bool = True) -> Parameter:
 
     def decorate(function: Function) -> Function:
         @wraps(function)
-        def wrapped(columns: Sequence[str], units: Sequence[str], **arguments: Any) -> Any:
-            test_options = {key: arguments.pop(key) for key in option_keys}
-            test_options["columns"] = _pairs(columns, "--column", "force=Kraft", column_roles())
-            test_options["units"] = _pairs(units, "--unit", "force=kN", column_roles())
-            return function(
-                test_options={key: value for key, value in test_options.items() if value not in (None, {})}, **arguments
-            )
+        def wrapped(**arguments: Any) -> Any:
+            return function(**_with_test_options(arguments, option_keys, column_roles()))
 
         return add_parameters(
             wrapped,
@@ -142,6 +137,40 @@ def metadata_options(*, sweeps: bool = True) -> Parameter:
         )
 
     return decorate
+
+
+def history_options() -> Parameter:
+    """Decorator that adds the options on columns and format of a displacement history, received as `test_options`."""
+
+    def decorate(function: Function) -> Function:
+        @wraps(function)
+        def wrapped(**arguments: Any) -> Any:
+            from bushfit.reading.displacements import DISPLACEMENT_COLUMNS
+
+            return function(**_with_test_options(arguments, (*_AS_WRITTEN,), (*DISPLACEMENT_COLUMNS,)))
+
+        return add_parameters(
+            wrapped,
+            option_group(
+                "Information that is missing in the file",
+                option("--unit units", "ROLE=UNIT", 'Unit of a column: "axial=mm".', multiple=True),
+                option("--column columns", "ROLE=HEADER", 'Header of a column: "radial=Sy".', multiple=True),
+            ),
+            option_group(
+                "File format, if it is not detected",
+                *(_metadata_option(key, metavar) for key, metavar in _AS_WRITTEN.items()),
+            ),
+        )
+
+    return decorate
+
+
+def _with_test_options(arguments: dict[str, Any], keys: Sequence[str], roles: Sequence[str]) -> dict[str, Any]:
+    """Gather the given arguments among `keys`, --column and --unit in one argument `test_options`."""
+    test_options = {key: arguments.pop(key) for key in keys}
+    test_options["columns"] = _pairs(arguments.pop("columns"), "--column", "force=Kraft", roles)
+    test_options["units"] = _pairs(arguments.pop("units"), "--unit", "force=kN", roles)
+    return {"test_options": {key: value for key, value in test_options.items() if value not in (None, {})}, **arguments}
 
 
 def _metadata_option(key: str, metavar: str, words: str | None = None) -> Parameter:

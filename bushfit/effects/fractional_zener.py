@@ -46,17 +46,19 @@ def _circle(length: int) -> tuple[Array, Array]:
     return np.log(1.0 - radius * turn), radius ** np.arange(length)
 
 
-def _kernel(alpha: Array, scaled: Array, count: int, step: Array) -> Array:
+def _kernel(alpha: Array, scaled: Array, count: int, step: Array, *, second_order: bool) -> Array:
     """Weights of the past strains, (..., count), as in Eq. (3), for steps [s] and `scaled` relaxation times tau^alpha.
 
     They are the coefficients of the power series in z of -k v^2/(1 + k v)/step^alpha, with v = (1 - z)^alpha and k =
-    tau^alpha/step^alpha.
+    tau^alpha/step^alpha; v (1 + alpha/2 (1 - z)) replaces v in the second order of `springpot.fractional_derivative`.
 
     Notes: from the values of the series on a circle |z| < 1 (C. Lubich, Numer. Math. 52 (1988) 129).
     """
     length = next_fast_len(2 * count, real=True)
     logarithm, powers = _circle(length)
     value = np.exp(alpha * logarithm)
+    if second_order:
+        value *= 1.0 + 0.5 * alpha * np.exp(logarithm)
     unit = step**alpha
     turn = scaled / unit * value
     series = np.fft.irfft(-turn * value / (1.0 + turn), length) / unit
@@ -81,5 +83,5 @@ def stress(p: Values, history: History) -> Array:
     count = history.value.shape[-1]
     alpha, scaled, step = (np.atleast_1d(value) for value in (p["alpha"], _scaled(p), history.step))
     length = next_fast_len(2 * count, real=True)
-    kernel = np.fft.rfft(_kernel(alpha, scaled, count, step), length)
+    kernel = np.fft.rfft(_kernel(alpha, scaled, count, step, second_order=history.second_order), length)
     return p["m"] * np.fft.irfft(np.fft.rfft(history.value, length) * kernel, length)[..., :count]

@@ -26,6 +26,8 @@ class History:
         driver: motion imposed by the rig, if a compliance lies between it and this motion; None if they are equal.
         solved: previous solutions of implicit equations for this motion, by name; start values for the next solution.
         accuracy: tolerance of implicit equations for this motion, relative to its maximum.
+        second_order: True for fractional derivatives of second order in the step, False for the paper's sum (Eq. 3),
+            which is of first order. A steady state has neither error.
 
     >>> cycle = History.steady(np.array([0.0, 1.0, 0.0, -1.0]), 5.0)
     >>> cycle.step, cycle.amplitude, cycle.turning.strides
@@ -39,6 +41,7 @@ class History:
     driver: Array | None = None
     solved: dict[str, Any] = field(default_factory=dict)
     accuracy: float = 1e-10
+    second_order: bool = False
 
     @classmethod
     def steady(cls, value: Array, frequency: float, cycles: int = 1) -> History:
@@ -50,6 +53,30 @@ class History:
             cycles: number of cycles in the samples.
         """
         return cls(value, cycles / (frequency * value.shape[-1]), periodic=True, frequency=frequency)
+
+    @classmethod
+    def sampled(cls, value: Array, step: float, *, periodic: bool = False) -> History:
+        """Create the history of any motion, with fractional derivatives of second order in the step.
+
+        Args:
+            value: samples [m, rad or 1], (n,).
+            step: time between samples [s].
+            periodic: True if the samples are repeated endlessly, False for a motion from rest.
+
+        Returns:
+            History whose frequency is the mean frequency of the motion, for effects that depend on a frequency.
+
+        Notes:
+            The mean frequency is the rms rate over the rms displacement from the mean, over 2 pi (S. O. Rice, Bell
+            Syst. Tech. J. 24 (1945) 46), that of a sine for a sine; but at least one cycle in the history.
+
+        >>> History.sampled(np.sin(np.linspace(0.0, 20.0 * np.pi, 1000)), 1e-3).frequency.round(2)
+        10.01
+        """
+        moving, resting = float(np.std(np.diff(value))) / step, float(np.std(value))
+        lowest = 1.0 / (step * value.size)
+        frequency = max(moving / (2.0 * np.pi * resting), lowest) if resting else lowest
+        return cls(value, step, periodic, frequency, second_order=True)
 
     @property
     def omega(self) -> float:

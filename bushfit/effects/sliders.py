@@ -13,6 +13,8 @@ from bushfit.effects.contract import Array, History, Value, Values
 #: Number of sliders in motions other than a steady cycle with two turning points; chosen: over a decade of slip strains
 #: the error is 1e-4 of the modulus.
 _COUNT = 100
+#: Largest number of strokes times elements whose stresses are computed at a time; chosen: they take some 50 MB.
+_BLOCK = 1 << 19
 #: Logarithm of the slip strain of each slider relative to e_s, in units of the spread (-1 to 1).
 _PLACES = (2.0 * np.arange(_COUNT) + 1.0) / _COUNT - 1.0
 
@@ -106,37 +108,41 @@ def parallel_elements(history: History, yield_strain: Array, weights: Array) -> 
     turning = history.turning
     strides, travel = turning.strides[..., None], np.abs(turning.travel)
     longest = max(float(travel.max()), np.finfo(float).tiny)
-    top = np.minimum(history.amplitude[..., None] / yield_strain, 1.0) if history.periodic else np.zeros((1, 1))
-    start = np.empty(np.broadcast_shapes(strides.shape, yield_strain.shape))
-    start[..., 0, :] = top[..., 0, :]
-    for piece in range(1, strides.shape[-2]):
-        extension = strides[..., piece - 1, :] / yield_strain[..., 0, :]
-        start[..., piece, :] = np.clip(start[..., piece - 1, :] + extension, -1.0, 1.0)
-    sense = np.sign(strides)
-    yields_at = np.minimum(yield_strain * (1.0 - sense * start), longest)
-    order = np.argsort(yields_at, axis=-1)
-    yields_at = np.take_along_axis(yields_at, order, axis=-1)
-    stiffness = np.take_along_axis(np.broadcast_to(weights / yield_strain, order.shape), order, axis=-1)
-    elastic = stiffness[..., ::-1].cumsum(axis=-1)[..., ::-1]
-    rise = np.cumsum(elastic * np.diff(yields_at, axis=-1, prepend=0.0), axis=-1)
-    first, last = np.zeros((*order.shape[:-1], 1)), np.full((*order.shape[:-1], 1), longest)
-    knots = np.concatenate((first, yields_at, last), axis=-1)
-    stresses = np.sum(weights * start, axis=-1, keepdims=True) + sense * np.concatenate(
-        (first, rise, rise[..., -1:]), axis=-1
-    )
-    # pieces one behind the other, so that one search finds the piece and the knot
-    knots += 2.0 * longest * np.arange(order.shape[-2])[:, None]
-    shape = np.broadcast_shapes(order.shape[:-2], travel.shape[:-1])
-    position = np.broadcast_to(travel + 2.0 * longest * turning.piece, (*shape, travel.shape[-1]))
-    rows = zip(
-        position.reshape(-1, travel.shape[-1]),
-        *(
-            np.broadcast_to(array, (*shape, *array.shape[-2:])).reshape(position[..., 0].size, -1)
+    leading = np.broadcast_shapes(strides.shape[:-2], yield_strain.shape[:-2])
+    shape = np.broadcast_shapes((*leading, 1), travel.shape)
+    travels, pieces = (np.broadcast_to(row, shape).reshape(-1, shape[-1]) for row in (travel, turning.piece))
+    stress = np.empty(travels.shape)
+    state = np.minimum(history.amplitude / yield_strain[..., 0, :], 1.0) if history.periodic else 0.0
+    count = max(1, _BLOCK // (int(np.prod(leading)) * yield_strain.shape[-1]))
+    for first in range(0, strides.shape[-2], count):
+        block = strides[..., first : first + count, :]
+        start = np.empty((*leading, block.shape[-2], yield_strain.shape[-1]))
+        for piece in range(block.shape[-2]):
+            start[..., piece, :] = state
+            state = np.clip(state + block[..., piece, :] / yield_strain[..., 0, :], -1.0, 1.0)
+        sense = np.sign(block)
+        yields_at = np.minimum(yield_strain * (1.0 - sense * start), longest)
+        order = np.argsort(yields_at, axis=-1)
+        yields_at = np.take_along_axis(yields_at, order, axis=-1)
+        stiffness = np.take_along_axis(np.broadcast_to(weights / yield_strain, order.shape), order, axis=-1)
+        elastic = stiffness[..., ::-1].cumsum(axis=-1)[..., ::-1]
+        rise = np.cumsum(elastic * np.diff(yields_at, axis=-1, prepend=0.0), axis=-1)
+        nothing, whole = np.zeros((*order.shape[:-1], 1)), np.full((*order.shape[:-1], 1), longest)
+        knots = np.concatenate((nothing, yields_at, whole), axis=-1)
+        stresses = np.sum(weights * start, axis=-1, keepdims=True) + sense * np.concatenate(
+            (nothing, rise, rise[..., -1:]), axis=-1
+        )
+        # pieces one behind the other, so that one search finds the piece and the knot
+        knots += 2.0 * longest * np.arange(order.shape[-2])[:, None]
+        tables = (
+            np.broadcast_to(array, (*shape[:-1], *array.shape[-2:])).reshape(len(travels), -1)
             for array in (knots, stresses)
-        ),
-        strict=True,
-    )
-    return np.array([np.interp(*row) for row in rows]).reshape(position.shape)
+        )
+        for row, xp, fp in zip(range(len(travels)), *tables, strict=True):
+            mask = (pieces[row] >= first) & (pieces[row] < first + count)
+            position = travels[row, mask] + 2.0 * longest * (pieces[row, mask] - first)
+            stress[row, mask] = np.interp(position, xp, fp)
+    return stress.reshape(shape)
 
 
 def in_place_of(p: Values) -> list[dict[str, float]]:

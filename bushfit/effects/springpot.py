@@ -65,27 +65,32 @@ def grunwald_letnikov_weights(alpha: Value, count: int) -> Array:
     return np.insert(np.cumprod((j - 1.0 - alpha) / j, axis=-1), 0, 1.0, axis=-1)
 
 
-def fractional_derivative(alpha: Value, values: Array, step: float) -> Array:
+def fractional_derivative(alpha: Value, history: History) -> Array:
     """Fractional derivative by the Gruenwald-Letnikov sum with full memory, from rest before the first sample.
 
     Args:
         alpha: order of the derivative.
-        values: samples, (..., n).
-        step: time between samples [s].
+        history: motion over time, (..., n).
 
     Returns:
         D^alpha of the values, (..., n) [unit of the values per s^alpha].
 
     Notes:
-        Eq. 3. First order in the step: (1 - exp(-i omega step))^alpha replaces (i omega step)^alpha.
+        Eq. 3. First order in the step: (1 - z)^alpha, z = exp(-i omega step), replaces (i omega step)^alpha, which
+        delays by alpha/2 steps. The history's second order multiplies by 1 + alpha/2 (1 - z) against the delay
+        (W. Tian, H. Zhou, W. Deng, Math. Comp. 84 (2015) 1703).
 
-    >>> fractional_derivative(1.0, np.array([0.5, 2.0, 3.0]), 0.5).round(6)
+    >>> fractional_derivative(1.0, History(np.array([0.5, 2.0, 3.0]), 0.5, False, 1.0)).round(6)
     array([1., 3., 2.])
     """
-    count = values.shape[-1]
+    values, count = history.value, history.value.shape[-1]
     length = next_fast_len(2 * count, real=True)
     spectrum = np.fft.rfft(values, length) * np.fft.rfft(grunwald_letnikov_weights(alpha, count), length)
-    return step**-alpha * np.fft.irfft(spectrum, length)[..., :count]
+    derivative = history.step**-alpha * np.fft.irfft(spectrum, length)[..., :count]
+    if history.second_order:
+        derivative[..., 1:] += 0.5 * alpha * np.diff(derivative, axis=-1)
+        derivative[..., :1] *= 1.0 + 0.5 * alpha
+    return derivative
 
 
 def stress(p: Values, history: History) -> Array:
@@ -103,7 +108,7 @@ def stress(p: Values, history: History) -> Array:
     """
     if history.periodic:
         return linear_stress(modulus, p, history)
-    return p["m"] * fractional_derivative(p["alpha"], history.value, history.step)
+    return p["m"] * fractional_derivative(p["alpha"], history)
 
 
 def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
@@ -120,10 +125,10 @@ def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
         For a steady cycle harmonic by harmonic; from rest, the derivative by alpha is a finite difference.
     """
     if not history.periodic:
-        alpha, step = p["alpha"], history.step
-        ahead, behind = (fractional_derivative(alpha + h, history.value, step) for h in (_ORDER_STEP, -_ORDER_STEP))
+        alpha = p["alpha"]
+        ahead, behind = (fractional_derivative(alpha + h, history) for h in (_ORDER_STEP, -_ORDER_STEP))
         by_alpha = p["m"] * (ahead - behind) / (2.0 * _ORDER_STEP)
-        return {"m": fractional_derivative(alpha, history.value, step), "alpha": by_alpha}
+        return {"m": fractional_derivative(alpha, history), "alpha": by_alpha}
     slopes = modulus_sensitivities(p, history.harmonics, history.amplitude)
     both = history.response(lambda _: 2.0 * np.stack(list(slopes.values())))
     return dict(zip(slopes, both, strict=True))

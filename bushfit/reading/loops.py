@@ -105,13 +105,18 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
     column = table.column("force", resistance)
     wanted["force"] = replace(column, scale=test.force_sign * column.scale)
     if "time" in table.roles:
-        time = table.roles["time"]
-        in_days = time.unit is None and time.index not in table.clocks and _has_day_numbers(table, time)
-        wanted["time"] = replace(time, scale=DAY) if in_days else table.column("time", "s")
+        wanted["time"] = time_column(table)
     elif test.rate is None and test.frequency is None:
         hint = 'or state rate = "10 mm/min", or frequency = "0.1 Hz" and waveform = "sine", in the campaign'
         table.column("time", "s", hint)
     return wanted
+
+
+def time_column(table: Table) -> Column:
+    """Return the time column with its factor to seconds; without a unit, it may contain day numbers."""
+    time = table.roles.get("time")
+    in_days = time and time.unit is None and time.index not in table.clocks and _has_day_numbers(table, time)
+    return replace(time, scale=DAY) if time and in_days else table.column("time", "s")
 
 
 def _has_day_numbers(table: Table, time: Column) -> bool:

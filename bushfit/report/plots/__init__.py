@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         plan,
         prediction,
         preload,
+        response,
         style,
     )
 

@@ -1,0 +1,94 @@
+"""`bushfit respond`: force over time for a displacement history."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from bushfit.cli.file_options import history_options, options_named
+from bushfit.cli.options import FILE, command_called, direction_option, flag, option, option_group
+from bushfit.cli.output import Output, with_output
+from bushfit.cli.shared_options import kelvin
+
+if TYPE_CHECKING:
+    from bushfit.commands.respond import ResponseOutput
+
+
+@command_called("respond", "data/arm_bushing/truth.json data/road/axial_radial.csv")
+@click.argument("model", metavar="MODEL", type=FILE)
+@click.argument("history", metavar="HISTORY", type=FILE)
+@option_group(
+    "Motion and conditions",
+    direction_option("axial, radial, torsion or a specimen [headers, file name]."),
+    flag("--steady", "The history is whole cycles of a steady state [it starts from rest]."),
+    option("--temperature", "TEMP", 'Such as "40 degC", if the model has an effect of temperature [23 degC].'),
+)
+@history_options()
+@with_output("results/<name> response", "tables", "pictures")
+def command(
+    model: Path,
+    history: Path,
+    directions: tuple[str, ...],
+    steady: bool,
+    temperature: str | None,
+    test_options: Mapping[str, Any],
+    output: Output,
+) -> None:
+    """Predict the force over time for a displacement history, with its 95 % band.
+
+    MODEL is the model.json of run, fit or diagnose, or its folder. HISTORY is a table or recording with a time and a
+    displacement in one or more directions: road load, steps, ramps, any waveform. Effects of the rig are left out. A
+    warning reports strains and rates outside the tested range.
+
+    Writes response.csv (time, displacement, force, band) and response.png.
+    """
+    from bushfit.commands.loading import load_model, model_file
+    from bushfit.commands.respond import respond
+    from bushfit.reading.layout import FileFormat
+
+    if len(directions) > 1:
+        raise click.UsageError(
+            "'--direction' names one direction here; a file with several states them in its headers."
+        )
+    result = load_model(model)
+    folder = output.checked_folder(result.name, output.formats.table("response"), form="{} response")
+    file_format = FileFormat(**{key.name: test_options.get(key.name) for key in fields(FileFormat)})
+    with options_named():
+        response = respond(
+            result,
+            history,
+            direction=directions[0] if directions else None,
+            columns=test_options.get("columns"),
+            units=test_options.get("units"),
+            file_format=file_format,
+            steady=steady,
+            temperature=kelvin(temperature),
+        )
+    print_response(output, response)
+    output.write(folder, response.files, response.document, [model_file(model), history])
+
+
+def print_response(output: Output, response: ResponseOutput) -> None:
+    """Print peak and rms force, power, largest strain and rate of each direction, and collect the warnings."""
+    from bushfit.units import number
+
+    step = response.responses[0].history.step
+    output.print_headline(
+        response.result.name,
+        f"force over {number(step * response.time.size, 3)} s, {response.time.size} rows, with 95 % bands",
+    )
+    rows = []
+    for part in response.responses:
+        unit, factor = part.direction.display.force
+        strain, rate = (abs(values).max() for values in (part.strain, part.strain_rate))
+        beyond = [f"{number(100.0 * share, 2)} %" for share in part.shares_beyond] if part.tested else ["", ""]
+        forces = [f"{number(factor * size, 4)} {unit}" for size in (part.peak, part.rms)]
+        strains = number(100.0 * strain, 3), beyond[0], number(rate, 3), beyond[1]
+        rows.append((str(part.direction), *forces, number(part.power, 3), *strains))
+    heads = ("peak", "rms", "energy [J/s]", "strain [%]", "beyond tests", "rate [1/s]", "beyond tests")
+    output.print_table("force, energy, and largest strain and rate", ("direction", *heads), rows)
+    output.warn(response.warnings)

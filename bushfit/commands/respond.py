@@ -1,0 +1,182 @@
+"""respond: force of a fitted model over time for a displacement history."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from bushfit.commands.loading import HasResult, as_result
+from bushfit.effects.contract import Array
+from bushfit.effects.history import History
+from bushfit.errors import MeasurementError
+from bushfit.geometry import get_place
+from bushfit.model.result import Result
+from bushfit.prediction.caveats import warnings_of
+from bushfit.prediction.response import TimeResponse, time_response
+from bushfit.reading.displacements import DisplacementHistory, read_displacements
+from bushfit.reading.layout import FileFormat
+from bushfit.report import plots
+from bushfit.report.response import response_figures, response_table
+from bushfit.report.results import ResultFile, figure_file, table_file
+from bushfit.units import number
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Ratio of mean to range of a displacement above which the mean is the zero of a transducer; chosen: no rubber follows.
+_OFFSET = 10.0
+#: Largest distance between the ends of a cycle, relative to its range.
+_CLOSED = 0.01
+
+
+class ResponseDocument(TypedDict):
+    """Figures of a response for each direction, as `bushfit respond --json` prints them."""
+
+    directions: Annotated[
+        dict[str, dict[str, float | None]],
+        Field(description="Figures of each direction in SI units; null without fitted tests."),
+    ]
+    warnings: Annotated[list[str], Field(description="Limits of the response, and corrections of the history.")]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ResponseOutput:
+    """Force over time of a fitted model, with its table and figure.
+
+    Args:
+        result: the model with its uncertainty.
+        time: time of each sample [s], (n,).
+        responses: force of each direction or specimen at these times.
+        notes: sentences on corrections of the history.
+    """
+
+    result: Result
+    time: Array
+    responses: Sequence[TimeResponse]
+    notes: Sequence[str] = ()
+
+    def __repr__(self) -> str:
+        return f"Response of {self.result.name}: {', '.join(str(response.direction) for response in self.responses)}"
+
+    @property
+    def warnings(self) -> list[str]:
+        """Corrections of the history, and warnings of the model and of each response."""
+        return warnings_of(self.result, [response.warnings for response in self.responses], self.notes)
+
+    @property
+    def document(self) -> Mapping[str, Any]:
+        """Content of `respond --json`."""
+        figures = {str(response.direction): response_figures(response) for response in self.responses}
+        return {"directions": figures, "warnings": self.warnings}
+
+    @property
+    def files(self) -> list[ResultFile]:
+        """Table response.csv and figure response.png."""
+
+        def draw() -> Figure:
+            note = plots.style.warnings_note(self.warnings)
+            return plots.response.response_figure(
+                f"{self.result.name}: force over time", self.time, self.responses, note
+            )
+
+        table = table_file("response", lambda: response_table(self.time, self.responses))
+        return [table, figure_file("response", draw)]
+
+
+def respond(
+    model: Result | HasResult,
+    history: str | Path | Mapping[str, Sequence[float] | Array],
+    *,
+    step: float | None = None,
+    direction: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    file_format: FileFormat | None = None,
+    steady: bool = False,
+    temperature: float | None = None,
+) -> ResponseOutput:
+    """Compute the force over time for a displacement history, with 95 % bands.
+
+    Args:
+        model: result, or output with a result.
+        history: file with time and one or more displacements; or displacements [m, rad or 1] by direction or specimen,
+            (n,) each.
+        step: time between samples [s], for displacements that are no file.
+        direction: direction or specimen, if the file does not state it.
+        columns, units: headers and units of unusual columns by role: time, displacement, axial, radial, torsion.
+        file_format: format of the file; default detected.
+        steady: True for whole cycles of a steady state, False for a motion from rest.
+        temperature: temperature of the rubber [K]; None for the reference temperature.
+
+    Returns:
+        Force with band for each direction, its figures, and the result files.
+
+    Raises:
+        MeasurementError, UnitError: a history that cannot be used.
+        ModelError: an effect of the model has no law in time.
+    """
+    result = as_result(model)
+    if isinstance(history, str | Path):
+        place = get_place(direction, result.specimens) if direction else None
+        channels = read_displacements(Path(history), place, columns=columns, units=units, file_format=file_format)
+    elif step is None or not step > 0.0:
+        raise MeasurementError("the time between samples is not stated", place="step", expected="seconds above zero")
+    else:
+        channels = tuple(
+            DisplacementHistory(get_place(name, result.specimens), np.asarray(values, dtype=float), step)
+            for name, values in history.items()
+        )
+    channels = tuple(_without_offset(channel, steady=steady) for channel in channels)
+    if steady:
+        channels = tuple(_one_cycle(channel) for channel in channels)
+    responses = [
+        time_response(
+            result,
+            channel.direction,
+            History.sampled(channel.displacement, channel.step, periodic=steady),
+            temperature=temperature,
+        )
+        for channel in channels
+    ]
+    notes = dict.fromkeys(note for channel in channels for note in channel.notes)
+    return ResponseOutput(result, channels[0].time, responses, [*notes])
+
+
+def _without_offset(channel: DisplacementHistory, *, steady: bool) -> DisplacementHistory:
+    """Remove an offset far larger than the motion: the mean of a steady state, or the first value of a motion."""
+    motion, span = channel.displacement, np.ptp(channel.displacement)
+    if not np.all(np.isfinite(motion)) or not span:
+        raise MeasurementError(
+            "this is no motion", place=str(channel.direction), expected="finite displacements that change"
+        )
+    if abs(motion.mean()) <= _OFFSET * span:
+        return channel
+    offset = float(motion.mean() if steady else motion[0])
+    unit, factor = channel.direction.display.displacement
+    which = "mean" if steady else "first value"
+    note = f"{channel.direction}: {number(factor * offset, 4)} {unit}, the {which}, is subtracted as an offset"
+    return replace(channel, displacement=motion - offset, notes=(*channel.notes, note))
+
+
+def _one_cycle(channel: DisplacementHistory) -> DisplacementHistory:
+    """Check that a history can be repeated endlessly; a last sample equal to the first is left out."""
+    motion, span = channel.displacement, np.ptp(channel.displacement)
+    jump = max(_CLOSED * span, 2.0 * np.abs(np.diff(motion)).max())
+    if abs(motion[-1] - motion[0]) > jump:
+        unit, factor = channel.direction.display.displacement
+        first, last = (f"{number(factor * end, 4)} {unit}" for end in (motion[0], motion[-1]))
+        raise MeasurementError(
+            "a steady state needs whole cycles",
+            place=str(channel.direction),
+            found=f"{first} at the start, {last} at the end",
+            expected="a history that ends where it begins",
+            hint="cut it to whole cycles, or leave --steady out",
+        )
+    is_repeated = abs(motion[-1] - motion[0]) < 0.5 * abs(motion[1] - motion[0])
+    return replace(channel, displacement=motion[:-1]) if is_repeated else channel

@@ -1,0 +1,186 @@
+"""Force over time for a displacement history, from the laws in time, with its 95 % band."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.fft import next_fast_len
+from scipy.signal import hilbert
+
+from bushfit.effects import Modifier
+from bushfit.effects.contract import Array, RubberConditions
+from bushfit.effects.history import History
+from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.geometry import Place
+from bushfit.model.covariance import Z95
+from bushfit.model.model import Model
+from bushfit.model.result import Result
+from bushfit.model.sensitivity import force_and_slopes
+from bushfit.prediction.caveats import BEYOND, MARGIN, extrapolations, unfitted_warnings
+from bushfit.prediction.static_curve import require_time_law
+from bushfit.prediction.stiffness import Band, candidates, envelope, uncertainty
+from bushfit.units import number
+
+#: Smallest number of samples per mean cycle without a warning: with 20 the springpot errs by 0.7 % of its force.
+_FEWEST_PER_CYCLE = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class TimeResponse:
+    """Force over time for a displacement history.
+
+    Args:
+        direction: direction or specimen.
+        history: displacement [m, rad or 1], (n,), evenly sampled.
+        force: force [N, N m or Pa] with its 95 % band, (n,).
+        unit_strain: equivalent strain per displacement [1/m, 1/rad or 1].
+        tested: largest strain [1] and strain rate [1/s] of the fitted tests; None if the model was not fitted.
+        warnings: sentences on extrapolation and on effects that are left out or constant.
+    """
+
+    direction: Place
+    history: History
+    force: Band
+    unit_strain: float
+    tested: tuple[float, float] | None = None
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def peak(self) -> float:
+        """Largest magnitude of the force [N, N m or Pa]."""
+        return float(np.abs(self.force.value).max())
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the force [N, N m or Pa]."""
+        return float(np.sqrt(np.mean(np.square(self.force.value))))
+
+    @property
+    def power(self) -> float:
+        """Mean power that the motion gives to the bushing [W], or to a unit volume of a specimen [W/m^3]."""
+        return work(self.history, self.force.value) / (self.history.step * self.history.value.size)
+
+    @property
+    def strain(self) -> Array:
+        """Equivalent strain, (n,)."""
+        return self.unit_strain * self.history.value
+
+    @property
+    def strain_rate(self) -> Array:
+        """Rate of the equivalent strain [1/s], (n,)."""
+        return self.unit_strain * self.history.rate
+
+    @property
+    def shares_beyond(self) -> tuple[float, float]:
+        """Shares of the samples whose strain, and whose strain rate, is larger than in the fitted tests."""
+        strain, rate = self.tested or (np.inf, np.inf)
+        return (
+            float(np.mean(np.abs(self.strain) > strain * (1.0 + MARGIN))),
+            float(np.mean(np.abs(self.strain_rate) > rate * (1.0 + MARGIN))),
+        )
+
+
+def work(history: History, force: Array) -> float:
+    """Work of a force [N, N m or Pa], (n,), over a motion [m, rad or 1] from its first to its last sample [J]."""
+    if history.periodic:
+        return float(np.sum(force * history.rate) * history.step)
+    return float(np.trapezoid(force, history.value))
+
+
+def time_response(result: Result, place: Place, history: History, *, temperature: float | None = None) -> TimeResponse:
+    """Compute the force for a displacement history, of the bushing as the car will have it.
+
+    Args:
+        result: fitted result.
+        place: direction or specimen.
+        history: displacement [m, rad or 1], (n,), from `History.sampled`.
+        temperature: temperature of the rubber [K]; None for the reference temperature.
+
+    Returns:
+        Force with a band that spans all models that agree with the tests. Effects of the rig, a correction without a
+        name and, in a steady state, effects of the first cycles are left out; the band includes the correction.
+
+    Raises:
+        ModelError: an effect of the model has no law in time.
+    """
+    conditions = RubberConditions(temperature)
+    left_out = {
+        effect.name
+        for effect in result.model.records
+        if effect.name == UNNAMED or (history.periodic and effect.is_transient)
+    }
+    timed = replace(
+        result,
+        model=result.model.without(*left_out),
+        model_error=result.model_error or result.model.unnamed,
+        alternatives=tuple(
+            replace(alternative, model=alternative.model.without(*left_out)) for alternative in result.alternatives
+        ),
+    )
+    models = candidates(timed)
+    for _, model in models:
+        require_time_law(model)
+    force = envelope([_force(source, model, place, history, conditions) for source, model in models])
+    response = TimeResponse(place, history, force, result.model.unit_strain(place), _tested(result))
+    return replace(response, warnings=tuple(_warnings(result, response, sorted(left_out), temperature)))
+
+
+def _force(result: Result, model: Model, place: Place, history: History, conditions: RubberConditions) -> Band:
+    """Force of one model with its 95 % band.
+
+    Notes: the model's relative errors of real and imaginary part multiply the force and its Hilbert transform. They are
+    the larger of those at the peak amplitude and at that of a sine of equal rms, at the mean frequency.
+    """
+    amplitude = np.array([np.abs(history.value).max(), np.sqrt(2.0) * np.std(history.value)])
+    amplitude = np.maximum(amplitude, np.finfo(float).eps)
+    errors = uncertainty(result, model, place, np.full(2, history.frequency), amplitude, conditions)
+    force, slopes = force_and_slopes(model, place, history, errors.covariance.names, conditions)
+    half = errors.scale.max() * errors.covariance.half_width(slopes)
+    if errors.relative.size:
+        real, imaginary = np.abs(errors.relative).max(axis=-1)
+        quadrature = hilbert(force, next_fast_len(force.size)).imag[: force.size]
+        half = np.sqrt(half**2 + Z95**2 * ((real * force) ** 2 + (imaginary * quadrature) ** 2))
+    return Band(force, force - half, force + half)
+
+
+def _tested(result: Result) -> tuple[float, float] | None:
+    """Largest strain [1] and strain rate [1/s] of the fitted tests; None for a model without tests."""
+    if result.measured is None:
+        return None
+    tests = [
+        (test.amplitude[-1] * result.model.unit_strain(result.place(test.place)), test.frequency_Hz[-1])
+        for test in (result.campaign.tests if result.campaign else ())
+        if test.place in result.measured.directions and (result.model.bushing or test.unit == "1")
+    ]
+    ends = tests or [(result.measured.strain[1], result.measured.frequency[1])]
+    return result.measured.strain[1], max(2.0 * np.pi * strain * frequency for strain, frequency in ends)
+
+
+def _warnings(result: Result, response: TimeResponse, left_out: list[str], temperature: float | None) -> list[str]:
+    """Sentences on a response: directions and ranges that were not fitted, effects left out, and coarse sampling."""
+    place, history = response.direction, response.history
+    warnings = [*result.undecided, *unfitted_warnings(result, place)]
+    if result.measured:
+        largest = max(np.abs(history.value).max(), result.measured.strain[0] / response.unit_strain)
+        warnings += extrapolations(result, place, np.array([history.frequency]), np.array([largest]), temperature)
+    if response.tested and (beyond := response.shares_beyond[1]):
+        rate = (
+            f"{number(np.abs(response.strain_rate).max(), 3)} 1/s, but fitted at up to {number(response.tested[1], 3)}"
+        )
+        warnings.append(
+            f"{place}: strain rates of up to {rate} 1/s only, in {number(100.0 * beyond, 2)} % of the time: {BEYOND}"
+        )
+    if left_out:
+        warnings.append(f"{place}: {' and '.join(left_out)} left out, without a law for this motion")
+    constant = [
+        effect.name for effect in result.model.records if isinstance(effect, Modifier) and not effect.shift_factor
+    ]
+    if constant:
+        unit, factor = place.display.displacement
+        sine = f"{number(history.frequency, 3)} Hz and {number(factor * history.amplitude.item(), 3)} {unit}"
+        warnings.append(f"{place}: {' and '.join(constant)} constant, as in a sine of {sine}")
+    if not history.periodic and (samples := 1.0 / (history.frequency * history.step)) < _FEWEST_PER_CYCLE:
+        warnings.append(
+            f"{place}: the history has {number(samples, 2)} samples in a mean cycle, and forces between them are "
+            "missed: sample it more finely"
+        )
+    return warnings

@@ -1,0 +1,156 @@
+"""Displacement histories read from files: evenly sampled channels of one or more directions."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from bushfit.errors import MeasurementError
+from bushfit.geometry import TRANSLATION, Direction, Place, strain_factor_of_files
+from bushfit.reading.headers import LOOP_COLUMNS
+from bushfit.reading.layout import FileFormat
+from bushfit.reading.loops import increasing_time, time_column
+from bushfit.reading.measurement import Floats
+from bushfit.reading.names import direction_of_file
+from bushfit.reading.table import Table
+
+#: Words for the directions in headers, such as "radial displacement"; `Table` ignores blanks and case.
+_WORDS = {
+    Direction.AXIAL: ("axial",),
+    Direction.RADIAL: ("radial",),
+    Direction.TORSION: ("torsion", "torsional"),
+}
+#: Names of the columns of a displacement history, by role: time, a displacement in each direction, or one in any.
+DISPLACEMENT_COLUMNS: Mapping[str, tuple[str, ...]] = {
+    "time": tuple(LOOP_COLUMNS["time"]),
+    **{
+        str(direction): (
+            *words,
+            *(text for name in LOOP_COLUMNS["displacement"] for word in words for text in (word + name, name + word)),
+        )
+        for direction, words in _WORDS.items()
+    },
+    "displacement": tuple(LOOP_COLUMNS["displacement"]),
+}
+#: Smallest number of rows of a history, and largest number of evenly sampled rows; chosen: their results take 2 GB.
+_FEWEST_ROWS, _MOST_ROWS = 10, 10_000_000
+#: Largest deviation of a time from even sampling, relative to the step, that is taken as rounding.
+_ROUNDING = 0.1
+#: Largest ratio of evenly sampled to recorded rows; chosen: more would be guessed than was recorded.
+_MOST_ADDED = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class DisplacementHistory:
+    """Evenly sampled displacement in one direction.
+
+    Args:
+        direction: direction or specimen.
+        displacement: displacement [m, rad or 1], (n,).
+        step: time between samples [s].
+        start: time of the first sample [s].
+        notes: sentences on how the file was read, and on corrections.
+    """
+
+    direction: Place
+    displacement: Floats
+    step: float
+    start: float = 0.0
+    notes: tuple[str, ...] = ()
+
+    @property
+    def time(self) -> Floats:
+        """Time of each sample [s], (n,)."""
+        return self.start + self.step * np.arange(self.displacement.size, dtype=float)
+
+
+def read_displacements(
+    file: Path,
+    place: Place | None = None,
+    *,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    file_format: FileFormat | None = None,
+) -> tuple[DisplacementHistory, ...]:
+    """Read the displacement histories of a file, one for each direction in its headers.
+
+    Args:
+        file: table or recording with a time and one or more displacements.
+        place: direction or specimen, if the file does not state it or if one of several directions is wanted.
+        columns: headers or numbers of columns with unusual names, by role (time, displacement, axial, radial, torsion).
+        units: units that the file does not state, by role.
+        file_format: format of the file; default detected.
+
+    Returns:
+        Histories with even steps. Uneven times are resampled by straight lines, which a note states.
+
+    Raises:
+        MeasurementError, UnitError: a column, its unit, the direction or the time cannot be used.
+    """
+    table = Table.open(file, DISPLACEMENT_COLUMNS, columns, units, file_format, place.motion if place else TRANSLATION)
+    roles: dict[Place, str] = {direction: str(direction) for direction in Direction if str(direction) in table.roles}
+    if place in roles:
+        roles = {place: roles[place]}
+    elif place or not roles:
+        turns = table.agrees("displacement", "rad")
+        column = table.column("displacement", place.motion.displacement_unit if place else "rad" if turns else "m")
+        place = place or direction_of_file(table.file, [column.header], turns=turns, sheet=table.source.sheet)
+        if place is None:
+            raise table.header_error(
+                "the direction of this displacement is not stated",
+                found=f'"{column.header}"',
+                expected="axial, radial or torsion in the header or in the name of the file",
+                hint="state it: --direction axial (or radial, torsion)",
+            )
+        roles = {place: "displacement"}
+    wanted = {role: table.column(role, direction.motion.displacement_unit) for direction, role in roles.items()}
+    wanted = {
+        role: replace(wanted[role], scale=strain_factor_of_files(direction) * wanted[role].scale)
+        for direction, role in roles.items()
+    }
+    wanted["time"] = time_column(table)
+    values, notes = table.read_with_notes(wanted, fewest_rows=_FEWEST_ROWS)
+    time, more = increasing_time(table.needing(wanted), wanted["time"], values["time"])
+    even, correction = _even_time(table, time)
+    notes = (*(note for note in notes if "displacement" in wanted or note not in table.notes), *more, *correction)
+    return tuple(
+        DisplacementHistory(
+            direction,
+            np.interp(even, time, values[role]) if correction else values[role],
+            float(even[1] - even[0]),
+            float(even[0]),
+            notes,
+        )
+        for direction, role in roles.items()
+    )
+
+
+def _even_time(table: Table, time: Floats) -> tuple[Floats, tuple[str, ...]]:
+    """Even times [s] over a record; and a sentence if the recorded times deviate from them by more than rounding."""
+    even = np.linspace(time[0], time[-1], time.size)
+    steps, correction = np.diff(time), tuple[str, ...]()
+    step = float(np.median(steps))
+    if np.any(np.abs(time - even) > _ROUNDING * step):
+        count = round((time[-1] - time[0]) / step) + 1
+        if count > _MOST_ADDED * time.size:
+            raise table.error(
+                "the times are too uneven",
+                column=table.roles["time"],
+                found=f"steps of {steps.min():.3g} to {steps.max():.3g} s",
+                expected=f"even steps, such as {step:.3g} s",
+                hint="export the record with a fixed rate, or without its pauses",
+            )
+        even = np.linspace(time[0], time[-1], count)
+        rows = np.round(steps / step).astype(int)
+        gaps = rows > 1
+        reason = f"the time steps are {steps.min():.3g} to {steps.max():.3g} s"
+        if gaps.any():
+            longest = f"the longest gap is {steps.max():.3g} s from {time[steps.argmax()]:.6g} s"
+            reason = f"{rows[gaps].sum() - gaps.sum()} rows are missing, {longest}"
+        correction = (f"{reason}: resampled evenly at {1.0 / step:.6g} Hz, by straight lines",)
+    if even.size > _MOST_ROWS:
+        raise MeasurementError(
+            "the history is too long", file=table.file, found=f"{even.size} rows", expected=f"up to {_MOST_ROWS}"
+        )
+    return even, correction

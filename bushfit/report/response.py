@@ -1,0 +1,45 @@
+"""Table of a force over time, and its peak, mean and energy."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import pandas as pd
+
+from bushfit.prediction.response import TimeResponse
+
+
+def response_table(time: Any, responses: Sequence[TimeResponse]) -> pd.DataFrame:
+    """Table of displacement and force over time.
+
+    Args:
+        time: time of each row [s], (n,).
+        responses: responses to histories with these times.
+
+    Returns:
+        Time; then for each direction, in display units, displacement, force and its 95 % band. With several directions
+        their names begin the headers.
+    """
+    columns = {"time [s]": time}
+    for response in responses:
+        (length, length_factor), (unit, force_factor), _ = response.direction.display
+        moves, resists, _ = response.direction.motion.words
+        before = f"{response.direction} " if len(responses) > 1 else ""
+        columns[f"{before}{moves} [{length}]"] = length_factor * response.history.value
+        force = f"{before}{resists} [{unit}]"
+        for end, values in (("", response.force.value), (", low", response.force.low), (", high", response.force.high)):
+            columns[f"{force}{end}"] = force_factor * values
+    return pd.DataFrame(columns)
+
+
+def response_figures(response: TimeResponse) -> dict[str, float | None]:
+    """Peak, energy, strain and rate of a response in SI units, by the keys of `respond --json`."""
+    beyond = response.shares_beyond if response.tested else (None, None)
+    return {
+        "peak_force": response.peak,
+        "rms_force": response.rms,
+        "energy_per_second": response.power,
+        "largest_strain": float(abs(response.strain).max()),
+        "largest_strain_rate_per_s": float(abs(response.strain_rate).max()),
+        "share_of_time_above_tested_strain": beyond[0],
+        "share_of_time_above_tested_strain_rate": beyond[1],
+    }

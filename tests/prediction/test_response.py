@@ -1,0 +1,145 @@
+"""Force over time: against the virtual rig at a tenth of the step, its band, its ranges, and long histories."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bushfit.effects.contract import Array
+from bushfit.effects.history import History
+from bushfit.geometry import Direction
+from bushfit.model import rig
+from bushfit.model.covariance import Covariance
+from bushfit.model.model import Model
+from bushfit.model.result import Range, Result
+from bushfit.prediction.response import time_response
+
+STEP, ROWS, FINER = 1e-3, 3000, 10
+TIME = np.arange(ROWS) * STEP
+_RANDOM = np.random.default_rng(54)
+_FREQUENCIES, _PHASES = _RANDOM.uniform(0.5, 25.0, 30), _RANDOM.uniform(0.0, 2.0 * np.pi, 30)
+
+
+def random(time: Array) -> Array:
+    sines = np.sin(2.0 * np.pi * _FREQUENCIES * time[:, None] + _PHASES).sum(axis=1)
+    return np.asarray(1.5e-4 * np.minimum(time / 0.2, 1.0) * sines)
+
+
+def dual_sine(time: Array) -> Array:
+    return np.asarray(8e-4 * np.sin(2.0 * np.pi * time) + 1e-4 * np.sin(2.0 * np.pi * 25.0 * time))
+
+
+def ramp_and_hold(time: Array) -> Array:
+    return np.interp(time, [0.0, 0.5, 1.5, 1.8], [0.0, 1e-3, 1e-3, -5e-4])
+
+
+def steps(time: Array) -> Array:
+    return np.interp(time, TIME, np.select([TIME < 0.5, TIME < 2.0], [0.0, 1e-3], 3e-4))
+
+
+LAWS: dict[str, dict[str, float]] = {
+    "paper": {},
+    "fractional_zener": {"fractional_zener.c": 0.2},
+    "maxwell": {"maxwell.mu1": 5e4},
+    "second_springpot": {"second_springpot.m": 2000.0},
+    "sliders": {},
+    "sleeve_compliance": {"sleeve_compliance.compliance": 3e-7},
+    "clearance": {"clearance.delta": 2e-5},
+    "strain_stiffening": {"strain_stiffening.c3": 40.0},
+}
+FURTHER = {
+    "viscous": {"viscous.eta": 100.0},
+    "second_friction": {"second_friction.sigma_fmax": 2000.0},
+    "distributed_sliders": {},
+    "bump_stop": {},
+    "interface_slip": {"interface_slip.force": 5.0},
+    "mullins_softening": {"mullins_softening.share": 0.05},
+    "asymmetry": {"asymmetry.c2": 3.0},
+    "rate_dependent_friction": {"rate_dependent_friction.n": 0.05},
+}
+
+
+@pytest.mark.parametrize("motion", [random, dual_sine, ramp_and_hold, steps])
+@pytest.mark.parametrize("law", [*LAWS, *(pytest.param(name, marks=pytest.mark.slow) for name in FURTHER)])
+def test_the_force_is_that_of_the_rig_at_a_tenth_of_the_step(
+    paper_model: Model, law: str, motion: Callable[[Array], Array]
+) -> None:
+    model = paper_model if law == "paper" else paper_model.with_effect(law, {**LAWS, **FURTHER}[law])
+    history = History.sampled(motion(TIME), STEP)
+    force = time_response(Result(model), Direction.AXIAL, history).force.value
+    fine = np.arange((ROWS - 1) * FINER + 1) * STEP / FINER
+    record = rig.imposed(model, Direction.AXIAL, motion(fine), STEP / FINER, history.frequency)
+    expected = record.force[::FINER]
+    assert np.sqrt(np.mean((force - expected) ** 2)) < 0.003 * np.sqrt(np.mean(expected**2))
+
+
+def test_a_steady_state_is_that_of_the_closed_form(paper_model: Model) -> None:
+    amplitude, cycles = 2e-4, 4
+    motion = amplitude * np.sin(2.0 * np.pi * 10.0 * np.arange(400 * cycles) / 4000.0)
+    response = time_response(Result(paper_model), Direction.RADIAL, History.sampled(motion, 1 / 4000, periodic=True))
+    ratio = np.fft.rfft(response.force.value)[cycles] / np.fft.rfft(motion)[cycles]
+    stiffness = paper_model.stiffness("radial", 10.0, amplitude)
+    assert ratio == pytest.approx(stiffness, rel=1e-3)
+    assert response.power == pytest.approx(np.pi * 10.0 * amplitude**2 * stiffness.imag, rel=1e-3)
+    assert response.history.frequency == pytest.approx(10.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("layer", [None, "sleeve_compliance"])
+def test_the_band_is_what_the_covariance_makes_of_the_force(paper_model: Model, layer: str | None) -> None:
+    model = paper_model.with_effect(layer, {"sleeve_compliance.compliance": 3e-7}) if layer else paper_model
+    covariance = Covariance(("mu", "alpha"), np.array([[4e8, 3.0], [3.0, 1e-6]]))
+    history = History.sampled(dual_sine(TIME), STEP)
+    force = time_response(Result(model, ("mu", "alpha"), covariance), Direction.AXIAL, history).force
+    slopes = []
+    for name, change in (("mu", 100.0), ("alpha", 1e-4)):
+        ends = [
+            model.with_values({name: model.values[name] + sign * change}).force("axial", history) for sign in (-1, 1)
+        ]
+        slopes.append((ends[1] - ends[0]) / (2.0 * change))
+    half = 1.96 * np.sqrt(np.einsum("in,ij,jn->n", slopes, covariance.matrix, slopes))
+    np.testing.assert_allclose(force.high - force.value, half, atol=2e-3 * half.max())
+    np.testing.assert_allclose(force.value - force.low, half, atol=2e-3 * half.max())
+
+
+def test_ranges_beyond_the_tests_are_stated(paper_model: Model) -> None:
+    unit_strain = paper_model.unit_strain(Direction.AXIAL)
+    result = Result(paper_model, measured=Range((0.1, 20.0), (1e-4 * unit_strain, 5e-4 * unit_strain), ("axial",)))
+    inside = time_response(result, Direction.AXIAL, History.sampled(4e-4 * np.sin(10.0 * TIME), STEP))
+    assert inside.shares_beyond == (0.0, 0.0)
+    assert not inside.warnings
+    small = time_response(result, Direction.AXIAL, History.sampled(4e-6 * np.sin(10.0 * TIME), STEP))
+    assert not small.warnings
+    large = time_response(result, Direction.AXIAL, History.sampled(2.5e-3 * np.sin(60.0 * TIME), STEP))
+    # |sin| > 0.2 in 87.2 % of a cycle; the rate 0.15 m/s exceeds 2 pi 20 Hz 0.5 mm = 0.0628 m/s in 72.5 %
+    assert large.shares_beyond == pytest.approx((0.872, 0.725), abs=0.005)
+    assert large.warnings[0].startswith("axial: predicted at strains of")
+    assert large.warnings[1].startswith("axial: strain rates of up to 9.24 1/s")
+    coarse = time_response(result, Direction.AXIAL, History.sampled(4e-4 * np.sin(30.0 * TIME[::20]), 20 * STEP))
+    assert coarse.warnings[0].startswith("axial: the history has 11 samples in a mean cycle")
+
+
+def test_what_has_no_law_for_the_motion_is_named(paper_model: Model) -> None:
+    model = paper_model.with_effect("mullins_softening", {"mullins_softening.share": 0.1})
+    model = model.with_effect("rate_dependent_friction", {"rate_dependent_friction.n": 0.05})
+    model = model.with_effect("inertia", {"inertia.mass": 5.0})
+    motion = 1e-4 * np.sin(2.0 * np.pi * 10.0 * TIME)
+    steady = time_response(Result(model), Direction.AXIAL, History.sampled(motion, STEP, periodic=True))
+    plain = model.without("mullins_softening", "inertia")
+    expected = plain.force("axial", History.steady(motion, 10.0, cycles=30))
+    np.testing.assert_allclose(steady.force.value, expected, atol=2e-4 * expected.max())
+    assert steady.warnings == (
+        "axial: mullins_softening left out, without a law for this motion",
+        "axial: rate_dependent_friction constant, as in a sine of 10 Hz and 0.1 mm",
+    )
+
+
+def test_sliders_in_blocks_are_sliders_at_once(paper_model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = paper_model.with_effect("distributed_sliders")
+    history = History.sampled(random(TIME), STEP)
+    expected = model.force("axial", history)
+    monkeypatch.setattr("bushfit.effects.sliders._BLOCK", 1000)
+    both = replace(history, value=np.stack([history.value, history.value[::-1]]))
+    np.testing.assert_allclose(model.force("axial", both)[0], expected, rtol=1e-12, atol=1e-9)
