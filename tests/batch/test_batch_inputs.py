@@ -54,8 +54,8 @@ def test_toml_rows_take_what_they_do_not_say_from_the_top(tmp_path: Path) -> Non
 def test_a_pattern_takes_every_match_and_names_by_folder_where_files_share_a_name(shop: Path) -> None:
     manifest = read_manifest(str(shop / "bushings/*/bushing.toml"), RowSettings())
     assert [row.name for row in manifest.rows] == ["b0", "b1", "b2", "b3", "b4"]
-    inside = read(shop, '[[bushings]]\ncampaign = "bushings/b[0-2]/*.toml"\n[[bushings]]\ncampaign = "x.toml"\n')
-    assert [row.name for row in inside.rows] == ["b0", "b1", "b2", "x"]
+    inside = read(shop, '[[bushings]]\ncampaign = "bushings/b[01]/*.toml"\n[[bushings]]\ncampaign = "x.toml"\n')
+    assert [row.name for row in inside.rows] == ["b0", "b1", "x"]
     assert inside.title == "m"
 
 
