@@ -182,7 +182,8 @@ def planned_session(campaign: Campaign, hours: float) -> tuple[Test, ...]:
         found = plan(replace(campaign, rig=rig), aim="rivals", hours=hours).plan.planned
     except ModelError:  # rivals of which the fit of either is no model: no test is planned for them
         return ()
-    return found.tests if found.apart is not None and found.apart >= RIVALS_APART else ()
+    apart = found.rival_chi_square
+    return found.tests if apart is not None and apart >= RIVALS_APART else ()
 
 
 def with_session(campaign: Campaign, hidden: Simulated, tests: Sequence[Test]) -> Campaign:
