@@ -22,7 +22,7 @@ from bushfit.campaign.schema import Residuals, RigSettings
 from bushfit.diagnosis.described import GapDescription, describe
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.power_law import Measure, PowerLaw, Term, nearest_power_law
-from bushfit.effects.contract import Array, Level
+from bushfit.effects.contract import Array, Level, Setting
 from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.starts import start_values
@@ -154,6 +154,16 @@ def test_they_are_told_of_a_resonance_and_stay_with_a_compound_that_is_carried(m
     said = caveats(other)
     assert not any("the prediction uses the plain model" in line for line in (*other.warnings, *said))
     assert any("permit other values of the parameters" in line for line in said)
+
+
+def test_at_a_node_a_correction_has_the_value_and_the_two_errors_of_the_node(paper_model: Model) -> None:
+    rows = ((20.0, 200.0), (0.01, 0.01), (0.05, 0.02), (0.01, 0.0), (0.004, 0.004), (0.02, 0.02))
+    data = Unnamed(0.1, (0.3, 0.3), (Patch(("axial",), *rows),))
+    omega, amplitude = 2.0 * np.pi * np.array(rows[0]), 0.01 / paper_model.unit_strain(Direction.AXIAL)
+    value, errors, weight = data.evaluate(Setting(paper_model.bushing, Direction.AXIAL, "sweep"), omega, amplitude)
+    assert value == pytest.approx([0.05 + 0.01j, 0.02], rel=1e-3)
+    np.testing.assert_allclose(errors, [[0.004, 0.004], [0.02, 0.02]], rtol=1e-2)
+    assert weight.tolist() == [1.0, 1.0]
 
 
 def test_what_was_corrected_counts_as_error_where_the_compound_is_carried(paper_model: Model) -> None:
