@@ -102,7 +102,11 @@ def prony_series(request: ExportRequest) -> list[PronySeries]:
 
 
 def prony_losses(series: Sequence[PronySeries]) -> list[str]:
-    """Sentences on the error of Prony series, their band, and the strain amplitude at which each holds."""
+    """Write sentences on the limits of Prony series: error, frequency band, and strain amplitude of each.
+
+    Returns:
+        Sentences with the relative errors in percent.
+    """
     low, high = (number(end, 3) for end in series[0].arms.band)
     worst = number(100.0 * max(one.arms.error for one in series), 2)
     sentences = [f"compound: the Prony series has an error up to {worst} % of the modulus from {low} to {high} Hz only"]

@@ -32,7 +32,11 @@ def response_table(time: Any, responses: Sequence[TimeResponse]) -> pd.DataFrame
 
 
 def response_figures(response: TimeResponse) -> dict[str, float | None]:
-    """Peak, energy, strain and rate of a response in SI units, by the keys of `respond --json`."""
+    """Summarise the response to a displacement history in numbers [SI].
+
+    Returns:
+        Peak and rms force, energy, strain and strain rate by the keys of `respond --json`; None if not known.
+    """
     beyond = response.shares_beyond if response.tested else (None, None)
     return {
         "peak_force": response.peak,
