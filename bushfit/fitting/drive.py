@@ -27,8 +27,9 @@ from bushfit.fitting.loop_harmonics import (
 from bushfit.fitting.repeats import FLOOR
 from bushfit.fitting.row_noise import RowNoise, noise_harmonics_of_single_cycle, row_noise
 from bushfit.reading.measurement import Loop
+from bushfit.reading.preload import Preload
 from bushfit.reduction.harmonics import as_complex, basis, least_squares, series
-from bushfit.units import display_unit, number
+from bushfit.units import number
 
 #: Share of the amplitude, or of half the force's range, above which a mean is reported as a preload; chosen: zero
 #: errors of sensors are smaller.
@@ -334,18 +335,23 @@ def _rests(
     return bool(unmoved and unloaded), bool(in_middle and is_first)
 
 
-def _preload(drive: Drive) -> Iterator[str]:
-    """Yield a note on mean displacement and force of a loop if these are too large for a zero error of a sensor."""
+def recorded_means(drive: Drive) -> list[Preload]:
+    """Mean displacement and mean force of a loop, those that are too large for a zero error of a sensor."""
     if drive.datum is None:
-        return
-    (motion, force, _), units = drive.loop.direction.motion.words, drive.loop.direction.display
-    mean_motion = float(drive.coefficients[0].real)
-    off_zero = abs(mean_motion) > TOLD_MEAN * drive.amplitude
-    means = [
-        f"a mean {motion} of {number(units.displacement.factor * mean_motion, 3)} {units.displacement.name}"
-    ] * off_zero
-    if abs(drive.datum) > (TOLD_MEAN if off_zero else _PRELOADED) * drive.half_range:
-        unit, factor = display_unit(*units.force, drive.datum)
-        means.append(f"a mean {force} of {number(factor * drive.datum, 3)} {unit}")
-    if means:
-        yield f"recorded about {' and '.join(means)}; the model has no preload: the fit uses the loop about its mean"
+        return []
+    motion, means = drive.loop.direction.motion, list[Preload]()
+    if abs(mean_motion := float(drive.coefficients[0].real)) > TOLD_MEAN * drive.amplitude:
+        means.append(Preload(mean_motion, motion.displacement_unit))
+    if abs(drive.datum) > (TOLD_MEAN if means else _PRELOADED) * drive.half_range:
+        means.append(Preload(drive.datum, motion.force_unit))
+    return means
+
+
+def _preload(drive: Drive) -> Iterator[str]:
+    """Yield a note on the mean displacement and force of a loop without a stated preload."""
+    loop = drive.loop
+    if means := recorded_means(drive) if loop.preload is None or not loop.preload.value else []:
+        motion = loop.direction.motion
+        words = {motion.displacement_unit: motion.words[0], motion.force_unit: motion.words[1]}
+        listed = " and ".join(f"a mean {words[mean.unit]} of {mean.text(loop.direction, 3)}" for mean in means)
+        yield f"recorded about {listed}, but no preload is stated: the fit uses the loop about its mean"

@@ -312,9 +312,7 @@ def fit_warnings(model: Model, step: FitResult, bounds: Bounds, covariance: Cova
             f"nothing was fitted, because every parameter is fixed; the given values {how} the tests {extent} "
             f"(NRMSE {number(100.0 * found.nrmse, 2)} %, reduced chi-square {number(found.reduced_chi_square, 3)})",
         ]
-    # the parameters of the preload are one curve, whose bands tell more than the error of a coefficient
-    judged = [name for name in names if effect_name_of(name) != PRELOAD]
-    unknown = covariance.restricted(judged).describe_unknown(model.values)
+    unknown = covariance.restricted(names).describe_unknown(model.values)
     sentences = [*([unknown] if unknown else []), *notes]
     if step.stopped:
         sentences.append(
@@ -332,6 +330,9 @@ def fit_warnings(model: Model, step: FitResult, bounds: Bounds, covariance: Cova
             how = f"at {'most' if end == 'min' else 'least'} {number(factor * limit, 2)} {unit}".rstrip(" -")
             sentences.append(f"{name} ended at a limit of the model: the tests only show that it is {how} (95 %)")
     sentences += undetermined_parameters(
-        model, step.minimised, [name for name in judged if name not in at_bound], covariance
+        model,
+        step.minimised,
+        [name for name in names if name not in at_bound and effect_name_of(name) != PRELOAD],
+        covariance,
     )
     return sentences if step.smooth_error else [*sentences, *misfit_warnings(model, tests, len(names), advice)]

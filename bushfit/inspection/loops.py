@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.effects.mistakes import MISTAKES
-from bushfit.fitting.drive import TOLD_MEAN, Drive, prepare_drive
+from bushfit.fitting.drive import TOLD_MEAN, Drive, prepare_drive, recorded_means
 from bushfit.fitting.loop_cycles import waveform
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.plausible import implausible_sizes
@@ -199,6 +199,8 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
         "noise": f"{noise} % of half the {names[1]}'s range, a row{drive.correlated}",
     }
     sizes = (np.array([size]) for size in (drive.frequency, amplitude, half_force / amplitude))
+    if means := recorded_means(drive):
+        facts["preload"] = means[0].text(loop.direction)
     odd = [
         *wrong_labels(labels, loop.direction, [amplitude, half_motion], [drive.frequency]),
         *implausible_sizes(loop.direction, *sizes),

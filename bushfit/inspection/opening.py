@@ -73,6 +73,8 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
         settings = reader_arguments(file, read_as, entry, LoopFile)["test"]
         kind, (facts, odd) = classify_recording(measured, by_name, settings)
         odd = turned + odd
+        if "preload" in facts:
+            entry.setdefault("preload", facts["preload"])
     columns = describe_columns(table, is_sweep=is_sweep)
     facts |= label_facts
     return Inspection(file, kind, place, describe_format(table), columns, facts, tuple(odd), entry, measured, counted)

@@ -30,10 +30,10 @@ class Preload(NamedTuple):
         units = place.display.force if self.unit == place.motion.force_unit else place.display.displacement
         return self.value * units.factor, units.name
 
-    def text(self, place: Place) -> str:
-        """Text for users, such as "1.5 mm", of a preload in a direction."""
+    def text(self, place: Place, digits: int = 4) -> str:
+        """Text for users with some significant digits, such as "1.5 mm", of a preload in a direction."""
         value, unit = self.in_display_unit(place)
-        return f"{number(value, 4)} {unit}"
+        return f"{number(value, digits)} {unit}"
 
     def equals(self, other: Preload | None) -> bool:
         """True if the other preload is within 2 %; a preload of zero equals zero in every unit."""

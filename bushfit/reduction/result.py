@@ -188,5 +188,5 @@ def preload_warnings(steps: Sequence[Step], direction: Place) -> list[str]:
             written, factor = display_unit(*unit, max(values, key=abs))
             ends = dict.fromkeys(number(factor * end, 3) for end in sorted((min(values), max(values)), key=abs))
             means.append(f"a mean {word} of {' to '.join(ends)} {written}")
-    about = f"recorded about {' and '.join(means)}; the model has no preload: the points refer to this mean"
+    about = f"recorded about {' and '.join(means)}; the points refer to this mean: state it as the preload of the sweep"
     return [about] if means else []

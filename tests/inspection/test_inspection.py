@@ -104,10 +104,10 @@ LOOP_FAULTS: dict[str, Callable[[Loop], Loop]] = {
         x, displacement=x.displacement * np.where(x.time < 9.9, 0.6, 1.0)
     ),
     "the mean displacement is 0.03 mm, 3 % of its amplitude": lambda x: replace(x, displacement=x.displacement + 3e-5),
-    "recorded about a mean displacement of 0.1 mm; the model has no preload": lambda x: replace(
+    "recorded about a mean displacement of 0.1 mm, but no preload is stated": lambda x: replace(
         x, displacement=x.displacement + 1e-4
     ),
-    "recorded about a mean force of 820 N; the model has no preload": lambda x: replace(x, force=x.force + 820.0),
+    "recorded about a mean force of 820 N, but no preload is stated": lambda x: replace(x, force=x.force + 820.0),
     "state force_sign = -1 in the campaign": lambda x: replace(x, force=-x.force),
 }
 
