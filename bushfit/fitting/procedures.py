@@ -329,10 +329,6 @@ def fit_warnings(model: Model, step: FitResult, bounds: Bounds, covariance: Cova
             unit, factor = display_unit(step.model.parameters[name].unit, 1.0, limit)
             how = f"at {'most' if end == 'min' else 'least'} {number(factor * limit, 2)} {unit}".rstrip(" -")
             sentences.append(f"{name} ended at a limit of the model: the tests only show that it is {how} (95 %)")
-    sentences += undetermined_parameters(
-        model,
-        step.minimised,
-        [name for name in names if name not in at_bound and effect_name_of(name) != PRELOAD],
-        covariance,
-    )
+    judged = [name for name in names if name not in at_bound and effect_name_of(name) != PRELOAD]
+    sentences += undetermined_parameters(model, step.minimised, judged, covariance)
     return sentences if step.smooth_error else [*sentences, *misfit_warnings(model, tests, len(names), advice)]
