@@ -84,8 +84,10 @@ def _probability_of_chance(data: PreparedCampaign, tests: Sequence[MeasuredTest]
         loops, sweeps = split_by_kind(tests)
         tests = [*loops, *with_level_errors(sweeps, errors.error, errors.freedom)]
         plain, full = _fits(data, replace(plain.problem, model=plain.model, tests=tests), fixed)
-    added, freedom = len(full.names) - len(names), full.residual.size - len(full.names)
-    variance = max(full.chi_square / freedom, 1.0)
+    # the errors that a run shares are as uncertain as the repeats are few
+    estimated = [sweep.noise.freedom for sweep in split_by_kind(tests)[1] if sweep.noise.freedom]
+    added, freedom = len(full.names) - len(names), min([full.residual.size - len(full.names), *estimated])
+    variance = max(full.chi_square / (full.residual.size - len(full.names)), 1.0)
     return float(fdtrc(added, freedom, max(plain.chi_square - full.chi_square, 0.0) / (added * variance)))
 
 
