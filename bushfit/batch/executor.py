@@ -204,7 +204,7 @@ def run_rows(
                         queue.appendleft(number)
                         continue
                     _check_alive(executor)
-                    outcome = give_up(f"its worker process died; out of memory, most likely ({error})")
+                    outcome = give_up(f"its worker process ended, probably for lack of memory ({error})")
                 failures.pop(number, None)
                 yield number, outcome
     finally:
@@ -223,5 +223,5 @@ def _check_alive(executor: Executor) -> None:
             "no worker process starts",
             found=str(error) or type(error).__name__,
             expected="processes that import the same packages as this one",
-            hint="see their messages above; install bushfit and its packages anew",
+            hint="read the messages of the processes above, and install bushfit and its packages again",
         ) from error

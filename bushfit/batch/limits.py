@@ -196,7 +196,9 @@ def read_limits(path: Path, rows: Sequence[Row]) -> Limits:
     """
     limits = read_toml(path, Limits, description="a limits file")
     if not (limits.bounds or limits.verdicts):
-        raise CampaignError("there is no limit in it", file=path, expected='such as [parameters.mu] with max = "2 MPa"')
+        raise CampaignError(
+            "the file contains no limit", file=path, expected='such as [parameters.mu] with max = "2 MPa"'
+        )
     silent = [row.name for row in rows if not row.settings.diagnoses] if limits.verdicts else []
     if silent:
         found = silent[0] + (f" and {len(silent) - 1} more" if len(silent) > 1 else "") + " without it"
@@ -226,7 +228,7 @@ def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[st
         if sample.size < bounds.at_least:
             notes.append(f"{name}: {sample.size} parts, and at_least = {bounds.at_least}: sigma is not judged")
         elif deviation == 0.0:
-            notes.append(f"{name}: more than half of the parts agree to the digit: sigma is not judged")
+            notes.append(f"{name}: more than half of the parts have exactly the same value: sigma is not judged")
         else:
             (low, high), reach = bounds.fixed, bounds.sigma * deviation
             allowed[name] = max(low, median - reach), min(high, median + reach)
@@ -323,5 +325,5 @@ def limit_sentence(
     if finite:
         nearest = min(finite, key=lambda limit: abs(limit - estimate.value))
         sentence += f", limit {number(nearest * displayed.factor, 4)}"
-    sentence += f", at the {bound} of its fit" if bound else ""
+    sentence += f", at the {bound} bound of the fit" if bound else ""
     return sentence + (f": {result}" if result.startswith("conditional") else "")

@@ -361,7 +361,7 @@ def complete_settings(row_settings: RowSettings, defaults: RowSettings, base: Pa
     commands = settings.commands or _DEFAULT_COMMANDS
     if "run" in commands and set(commands) != {"run"}:
         raise CampaignError(
-            "run is the whole chain and does the others too",
+            "run includes the other commands",
             file=source,
             place="commands",
             found=", ".join(commands),

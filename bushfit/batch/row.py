@@ -63,7 +63,9 @@ class RowTask:
         """
         if self.version != __version__:
             hint = "install the same version on all workers"
-            raise BatchError("a worker runs another bushfit", found=__version__, expected=self.version, hint=hint)
+            raise BatchError(
+                "a worker runs another bushfit version", found=__version__, expected=self.version, hint=hint
+            )
         limit_threads()
         key = store.row_key(row, self.points, self.formats)
         if self.resume and (earlier := store.load_row(self.output, row, key)):
@@ -203,7 +205,11 @@ def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[s
         place = result.place(point.place)
         if place.motion != point.motion:
             expected = f"an amplitude in {place.display.displacement.name}"
-            raise BatchError("this amplitude is none of the place", found=str(point), expected=expected)
+            raise BatchError(
+                "the unit of this amplitude does not suit this direction or specimen",
+                found=str(point),
+                expected=expected,
+            )
         predicted = predict_stiffness(result, place, [point.frequency], [point.amplitude])
         bands = {
             STIFFNESS: (predicted.stiffness, place.motion.stiffness_unit),

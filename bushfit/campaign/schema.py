@@ -128,7 +128,9 @@ class SpecimenSettings:
     def __post_init__(self) -> None:
         if self.name in (*Direction, "loops", "sweeps", "gap", "candidates", "measured", "shear"):
             expected = "a name of its own: its tables are named after it"
-            raise ValueError(CampaignError("this name is taken", place="name", found=self.name, expected=expected))
+            raise ValueError(
+                CampaignError("another table has this name", place="name", found=self.name, expected=expected)
+            )
 
 
 @dataclass(frozen=True)
@@ -275,7 +277,7 @@ class SimulatedLoop(SimulatedTest):
         for one, several in (("amplitude", "amplitudes"), ("frequency", "frequencies")):
             stated_keys = [key for key in (one, several) if getattr(self, key)]
             if len(stated_keys) != 1:
-                message = "one of these keys is too many" if stated_keys else "a key is missing"
+                message = "these keys exclude each other" if stated_keys else "a key is missing"
                 expected = f"{one} = ..., or {several} = [...] of a programme"
                 raise ValueError(CampaignError(message, found=" and ".join(stated_keys) or None, expected=expected))
 

@@ -151,7 +151,9 @@ def _print_gap(output: Output, document: Mapping[str, Any]) -> None:
     held_out = gap["heldout"]
     cells = [f"{held_out[when]:.2f}" for when in ("before", "after")] if held_out else ["not testable", ""]
     rows = (("held out", *cells), ("data fitted", *(f"{value:.2f}" for value in gap["calibration"].values())))
-    title = "gap, in units of noise (1: noise alone)" + "; no effect was added" * (document["verdict"] == "ambiguous")
+    title = "gap (measured minus model) in units of the noise; 1: noise alone" + "; no effect was added" * (
+        document["verdict"] == "ambiguous"
+    )
     output.print_table(title, ("", "before", "after"), rows)
     if usable:
         how = "of the points, each predicted without its own run" if usable["held_out"] else "of the fitted points"

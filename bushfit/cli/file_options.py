@@ -68,7 +68,7 @@ _AS_WRITTEN = {
     "sheet": "NAME",
 }
 #: Descriptions of files that are not test files, by extension.
-_NO_TESTS = {".toml": "a campaign, or what else TOML holds", ".json": "a model, or other JSON"}
+_NO_TESTS = {".toml": "a campaign or another TOML file", ".json": "a model or another JSON file"}
 #: click types of the options by key; other options are texts.
 TYPES: dict[str, "click.ParamType[Any]"] = {
     "direction": click.Choice(DIRECTIONS),

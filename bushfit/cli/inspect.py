@@ -97,7 +97,7 @@ def print_inspection(output: Output, inspection: Inspection) -> None:
         ends = ("" if end is None else f"{end:.6g}" for end in (column.low, column.high))
         rows.append((column.header, column.role or "(not needed)", column.unit or "", *ends))
     output.print_table(title, ("column", "taken for", "unit", "from", "to"), rows)
-    for label, value in {"written with": written, **inspection.facts}.items():
+    for label, value in {"file format": written, **inspection.facts}.items():
         output.print(f"  {label}: {value}")
     if inspection.assumed:
         output.print(f"  {inspection.assumed}")

@@ -171,17 +171,17 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
     document = outcome.document
     hours = number(document["hours_planned"], 3)
     gains = (
-        f"{place} {number(100.0 * row['before'], 2)} to {number(100.0 * row['planned'], 2)} %"
+        f"{place} from {number(100.0 * row['before'], 2)} to {number(100.0 * row['planned'], 2)} %"
         for place, row in document["stiffness"].items()
     )
-    output.print(f"{len(document['tests'])} runs in {hours} h: standard error of the stiffness {', '.join(gains)}")
+    output.print(f"{len(document['tests'])} runs in {hours} h: standard error of the stiffness: {', '.join(gains)}")
     output.print(f"starting point: {document['source']}")
     _print_tests(output, outcome)
     standard = f"standard, {number(document['hours_standard'], 3)} h"
     error_columns = ("of", "before", f"plan, {number(document['hours_planned'], 3)} h", standard)
     rows = {**document["parameters"], **{f"stiffness, {place}": row for place, row in document["stiffness"].items()}}
     rows |= {f"loss factor, {place} [0.01]": row for place, row in document["loss_factor"].items()}
-    title = "standard errors [%]: before, with the plan, and with the standard programme"
+    title = "standard errors [%]: before these tests, after the plan, and after the standard programme"
     output.print_table(title, error_columns, _percents(rows, ("before", "planned", "standard")))
     if targets := document["targets"]:
         sizes = _percents(targets, ("asked", "before", "planned", "standard"))

@@ -126,7 +126,10 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
     from bushfit.units import format_range
 
     places = list(dict.fromkeys(str(prediction.direction) for prediction in predicted.predictions))
-    verdict, action = f"{', '.join(places)} predicted with 95 % bands", "May be used: there are no warnings."
+    verdict, action = (
+        f"{', '.join(places)} predicted with 95 % bands",
+        "The prediction may be used: there are no warnings.",
+    )
     if warnings := by_importance(predicted.warnings):
         verdict += f", with {len(warnings)} warning{'s' * (len(warnings) > 1)}"
         place, colon, _ = warnings[0].partition(": ")
@@ -175,6 +178,6 @@ def print_predictions(output: Output, predicted: PredictionOutput) -> None:
                 value, *limits = format_aligned([row[name], *band], digits)
                 cells.append(f"{value} ({' to '.join(limits)})" if band[0] < band[1] else value)
             rows.append(cells)
-        title = f"{owner}{prediction.label}, corners of the grid, with 95 % bands"
+        title = f"{owner}{prediction.label}, first and last frequency, with 95 % bands"
         output.print_table(title, list(table.columns[:4]), rows, text_columns=0)
     output.warn(predicted.warnings)

@@ -34,7 +34,7 @@ def print_result(output: Output, title: str, result: Result) -> None:
         loops = f", gain of a loop within {number(100 * gain, 2)} % ([rig] gain_error)" if gain else ""
         output.print(
             f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)} "
-            f"over {quality.points} points, noise {number(100 * quality.noise, 2)} % a point{loops}"
+            f"over {quality.points} points, noise {number(100 * quality.noise, 2)} % per point{loops}"
         )
     print_tests(output, result.tests, result.usable)
     correlations = [

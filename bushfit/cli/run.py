@@ -144,7 +144,7 @@ def two_step_line(two_step: TwoStep, joint: Result) -> str:
             if count <= _AGREED
             else f"{far} is {difference[far]:.1f} standard errors from the joint fit"
             if difference[far] <= _COUNTED
-            else f"does not agree with the joint fit, least in {far}"
+            else f"does not agree with the joint fit; largest difference: {far}"
         )
         times = number(ratio[unsure], 2)
         if float(times) > _OPEN:

@@ -139,7 +139,9 @@ def _parse_claim(data: PreparedCampaign, name: str) -> Claim:
         raise ModelError(
             "this mistake is not possible in this test",
             found=name,
-            expected="one of " + ", ".join(expected) if expected else "another mistake: no test has room for this one",
+            expected="one of " + ", ".join(expected)
+            if expected
+            else "another mistake: this one is not possible in any test",
         )
     return Claim(mistake, tests)
 

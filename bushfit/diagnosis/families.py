@@ -68,7 +68,9 @@ class FittedFamily:
         """Sentence that compares the held-out error of the family with that of the first family."""
         if self.gain is None or self.p is None or self.holdout.before is None or self.holdout.after is None:
             return "no part can be held out of both"
-        figures = f"held out {number(self.holdout.after, 3)} x noise, the first {number(self.holdout.before, 3)}"
+        figures = (
+            f"held-out error {number(self.holdout.after, 3)} x noise (first family: {number(self.holdout.before, 3)})"
+        )
         if abs(self.holdout.after / self.holdout.before - 1.0) < _ALIKE:
             return f"{figures}: alike within {number(100.0 * _ALIKE, 2)} %"
         better = sum(part.after < part.before for part in self.holdout.parts)

@@ -125,7 +125,8 @@ class DiagnosisWriter:
         data, best, claim = self.request.data, first.best, first.best.claim
         assert claim is not None
         command = " ".join(["bushfit diagnose CAMPAIGN", *(f"--adopt {name}" for name in claim.labels(data))])
-        advice = f"if the records of the tests confirm it, state {'; '.join(claim.corrections(data))} (or {command})"
+        corrections = "; ".join(claim.corrections(data))
+        advice = f"if the records of the tests confirm this mistake, state {corrections} (or {command})"
         companions = " and ".join([*best.effects, *(place.name for place in best.places)])
         summary = f"these tests agree if {claim.words(data)}" + (f", and with {companions}" if companions else "")
         entries = self._claim_entries(first)
@@ -260,7 +261,7 @@ class DiagnosisWriter:
         at_fault = list[MisfitRegion]()
         for place in places.places if places else ():
             kind, component = ("loop", "force") if place.family == "loop" else ("sweep", "storage")
-            reading = f"{place.name} departs by {number(100 * places.change, 2)} % from all other tests"  # type: ignore[union-attr]
+            reading = f"{place.name} deviates by {number(100 * places.change, 2)} % from all other tests"  # type: ignore[union-attr]
             excess = place.distance(base.residual)
             at_fault.append(
                 MisfitRegion(place.direction, kind, place.frequency, place.amplitude, component, excess, reading)

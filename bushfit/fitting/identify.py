@@ -118,7 +118,7 @@ def undetermined_parameters(
         idle -= {effect_name_of(name) for name in amounts if not is_zero(name)}
         for name in zero:
             effect = effect_name_of(name)
-            lines.append(f"{name} is no different from zero" + f": these tests do not show {effect}" * (effect in idle))
+            lines.append(f"{name} does not differ from zero" + f": these tests do not show {effect}" * (effect in idle))
         rest = [name for name in names if name not in zero and effect_name_of(name) not in idle]
         if not rest:
             return lines
@@ -138,7 +138,7 @@ def undetermined_parameters(
         lines.append(f"{reasons}: {meaning} (standard errors: {listed})")
         combinations |= dict.fromkeys(_known_combinations(model, data_sets, information, group))
     if combinations:
-        lines.append("what is known nevertheless: " + "; ".join(combinations))
+        lines.append("combinations that the tests determine: " + "; ".join(combinations))
     # what another test would tell beside an error of the model depends on what that error is
     missed = any(data_set.model_error for data_set in data_sets)
     return lines if missed else [*lines, *further_test(model, data_sets, information)]

@@ -46,7 +46,7 @@ def solve(
     if found.stopped and strict and not found.flat:
         raise FitError(
             "the fit did not converge",
-            found=f"no end after {found.evaluations} evaluations of the model",
+            found=f"no convergence after {found.evaluations} evaluations of the model",
             hint="fix a parameter with vary = false, or give bounds, in [fit] of the campaign",
         )
     return found

@@ -123,7 +123,7 @@ def list_folder(folder: Path) -> tuple[list[TestSource], list[str]]:
         elif path.is_file() and path.suffix.lower() in TEST_FILES:
             files.append(TestSource(path, is_named=False))
         else:
-            left_out.append(f"{path}: {'a link to a folder' if path.is_dir() else 'no table, by its ending'}")
+            left_out.append(f"{path}: {'a link to a folder' if path.is_dir() else 'not a table (by its extension)'}")
     return files, left_out
 
 

@@ -77,7 +77,7 @@ def keys_from_labels(
     """
     above = labels_above(line for line in table.source.head() if line.number < table.layout.header_line)
     written = "from the lines above the table" if table.layout.header_line else "from the properties in the file"
-    sources = {"from its name": by_name, written: above, "from the other sheets": of_book}
+    sources = {"from the name": by_name, written: above, "from the other sheets": of_book}
     keys: dict[str, Any] = {}
     facts: dict[str, list[str]] = {}
     is_counted = True

@@ -191,12 +191,12 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     facts = {
         "cycles": f"{drive.cycles:.3g}, {'the first from rest' if drive.from_rest else 'treated as steady'}",
         "frequency": f"{drive.frequency:.4g} Hz, {waveform(drive.coefficients)}",
-        "sampling": f"{describe_sampling(loop)}, {loop.time.size / drive.cycles:.4g} rows a cycle",
+        "sampling": f"{describe_sampling(loop)}, {loop.time.size / drive.cycles:.4g} rows per cycle",
         "amplitude": f"{number(to_length * amplitude, 4)} {length} zero-to-peak",
         # down to the last digit of the amplitude: what lies below is noise
         f"mean {names[0]}": f"{format_aligned([to_length * amplitude, to_length * mean_motion], 4)[1]} {length}",
         f"mean {names[1]}": f"{format_aligned([to_force * half_force, to_force * mean_force], 4)[1]} {force}",
-        "noise": f"{noise} % of half the {names[1]}'s range, a row{drive.correlated}",
+        "noise": f"{noise} % of half the {names[1]} range, per row{drive.correlated}",
     }
     sizes = (np.array([size]) for size in (drive.frequency, amplitude, half_force / amplitude))
     if means := recorded_means(drive):
@@ -243,7 +243,7 @@ def describe_history(history: Loop, labels: Labels) -> Findings:
         "steps": f"{len(steps)} with steady cycles, {max(step.repeat for step in steps)} at most at one point",
         "frequencies": format_frequencies(frequencies),
         "amplitudes": f"{', '.join(f'{factor * level:.4g}' for level in levels)} {unit} zero-to-peak, as reached",
-        "sampling": f"{describe_sampling(history)}, {rows:.3g} rows a cycle at least",
+        "sampling": f"{describe_sampling(history)}, {rows:.3g} rows per cycle at least",
         "noise": f"{100 * max(step.gain_error for step in steps):.2g} % of |K| at most, a point",
     }
     labelled = wrong_labels(labels, history.direction, levels, frequencies)
@@ -282,7 +282,9 @@ def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> F
     for place, (loop, drive) in enumerate(zip(loops, drives, strict=True), start=1):
         rest = loop.part.left_out if loop.part else None
         size, course = number(factor * drive.amplitude, 4), waveform(drive.coefficients)
-        noise = f"noise {number(100 * drive.noise / drive.half_range, 2)} % of half the range, a row{drive.correlated}"
+        noise = (
+            f"noise {number(100 * drive.noise / drive.half_range, 2)} % of half the range, per row{drive.correlated}"
+        )
         words = f"{size} {unit} at {drive.frequency:.4g} Hz, {course}", noise, rest
         facts[f"loop {place}"] = "; ".join(filter(None, words))
         notes = (*drive.notes, *changing_cycles(drive), *ripple(drive))

@@ -177,12 +177,12 @@ class TargetSensitivity:
             f"that all repeats of a test share, in {name}"
         )
         if variance[worst] > 0.25 * self.variances(knowledge.covariance)[worst]:
-            remaining = f"{name}, which no test on offer determines well enough"
+            remaining = f"{name}, which no available test determines well enough"
         size, cause = max(
             (Z95 * float(self.model_error[worst]), "the model error: no test reduces it, but naming its cause may"),
             (
                 float(self.undecided[worst]),
-                "explanations that the tests cannot distinguish: bushfit diagnose names the next test",
+                "explanations that the tests cannot distinguish: bushfit diagnose states the next test",
             ),
             (Z95 * float(np.sqrt(variance[worst])), remaining),
         )

@@ -162,7 +162,7 @@ def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, 
             raise cells.header_error(
                 f'there is no column "{text}"',
                 kind=NoColumnError,
-                expected=f"the header that was named for the {label}, or its number",
+                expected=f"the header that was stated for the {label}, or its number",
                 hint=(f'did you mean "{near}"? ' if near else "name one of this file: ")
                 + f'columns = {{ {role} = "{near or "..."}" }} in the campaign',
             )

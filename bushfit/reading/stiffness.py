@@ -180,7 +180,7 @@ def check_stiffness(
     scale = table.column("loss_factor", "1").scale if pair[1] == "loss_factor" else 1.0
     if scale != 1.0 and 0.0 < largest < LEAST_LOSS_FACTOR:
         raise table.error(
-            "no rubber loses so little",
+            "no rubber has a loss this small",
             column=column,
             found=f"{largest / scale:.3g} {column.unit} at most",
             expected=f"a loss factor above {LEAST_LOSS_FACTOR / scale:g} {column.unit} somewhere",

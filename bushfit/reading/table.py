@@ -315,7 +315,7 @@ class Table(Cells):
                 problem = f"the {role.replace('_', ' ')} is not positive"
                 self.refuse(values[role] <= 0.0, wanted[role], problem, "a number above zero")
                 smallest = f"{LEAST_VALUE / abs(wanted[role].scale):.3g} or more"
-                self.refuse(values[role] < LEAST_VALUE, wanted[role], "no rig records so little", smallest)
+                self.refuse(values[role] < LEAST_VALUE, wanted[role], "no rig records values this small", smallest)
 
     def refuse(
         self, bad: NDArray[np.bool_], column: Column, problem: str, expected: str, hint: str | None = None

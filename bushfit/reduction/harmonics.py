@@ -73,7 +73,7 @@ def least_squares(columns: Floats, values: Floats, weight: NDArray[Any] | None =
     """
     weighed = columns.T if weight is None or np.all(weight == 1.0) else columns.T * weight
     gram, moments = weighed @ columns, weighed @ values
-    if len(gram) <= _FEW_COLUMNS:  # four rows a cycle do not tell two harmonics apart
+    if len(gram) <= _FEW_COLUMNS:  # four rows per cycle do not tell two harmonics apart
         return np.asarray(np.linalg.lstsq(gram, moments, rcond=_SINGULAR)[0])
     return np.linalg.solve(gram, moments)
 

@@ -146,7 +146,7 @@ class Reduction:
         if coarse:
             worst = min(coarse, key=lambda step: step.rows_per_cycle)
             sentences.append(
-                f"{len(coarse)} of {len(steps)} points have fewer than {_FEW_ROWS_PER_CYCLE} rows a cycle "
+                f"{len(coarse)} of {len(steps)} points have fewer than {_FEW_ROWS_PER_CYCLE} rows per cycle "
                 f"({worst.rows_per_cycle:.3g} at {worst.frequency:.4g} Hz): harmonics above half the sampling rate "
                 "may fold onto the fundamental"
             )

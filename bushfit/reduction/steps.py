@@ -125,7 +125,7 @@ def find_steps(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStre
             if count < fewest:
                 why = f"{count} cycle{'s' * (count != 1)} of {count / (end - start):.4g} Hz, fewer than {fewest}"
             elif rows < _FEWEST_ROWS_PER_CYCLE:
-                why = f"{rows:.2g} rows a cycle at {count / (end - start):.4g} Hz, "
+                why = f"{rows:.2g} rows per cycle at {count / (end - start):.4g} Hz, "
                 why += f"fewer than {_FEWEST_ROWS_PER_CYCLE:g}"
             else:
                 step = _step(history, cycles, inside, motion[part], force[part], fewest)

@@ -196,7 +196,9 @@ def test_a_point_at_a_specimen_is_that_of_the_model(paper_model: Model) -> None:
     estimates, _ = estimate_quantities(result, [parse_point("DMA 10 Hz 1 %")])
     modulus = abs(paper_model.stiffness(coupon, 10.0, 0.01))
     assert estimates["stiffness DMA 10 Hz 1 %"].value == pytest.approx(modulus)
-    with pytest.raises(BatchError, match=r"this amplitude is none of the place[\s\S]*an amplitude in %"):
+    with pytest.raises(
+        BatchError, match=r"the unit of this amplitude does not suit this direction or specimen[\s\S]*an amplitude in %"
+    ):
         estimate_quantities(result, [parse_point("DMA 10 Hz 1 mm")])
     with pytest.raises(ModelError, match="no such direction or specimen"):
         estimate_quantities(result, [parse_point("coupon 10 Hz 1 %")])

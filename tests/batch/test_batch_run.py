@@ -157,7 +157,7 @@ def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(
     assert (good["limits"], held["limits"], other["limits"]) == ("pass", "conditional pass", "pass")
     assert good["on a bound"] == ""
     assert "mu (max)" in held["on a bound"]
-    assert "at the max of its fit" in held["on the edge"]
+    assert "at the max bound of the fit" in held["on the edge"]
     assert "warning: at a bound of the fit, because the tests do not determine them: " in done.stderr
     assert "mu of b1" in done.stderr
     assert "b1 passes conditionally: mu 0.2 MPa" in done.stderr

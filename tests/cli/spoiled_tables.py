@@ -66,7 +66,7 @@ IN_SWEEP = [
     ("wide table of what?", wide("tan delta\n", ""), "sweep.csv, line 2: the quantity of a block of this wide table is not stated", "tan delta above each block"),
     ("wide table without units", wide("f [Hz],0.1 mm,0.2 mm", "f [Hz],A=0.1,A=0.2"), "sweep.csv, line 2: this wide table states one quantity in two ways", "one unit for each quantity"),
     *((f"{what} of {size}", column(place, size), "sweep.csv, line 2, column ") for place, what in enumerate(("frequencies", "amplitudes", "stiffnesses")) for size in ("1e-300", "1e300")),
-    ("a frequency of 1e-300", row(2, "5,", "1e-300,"), 'sweep.csv, line 2, column "frequency [Hz]": no rig records so little', 'found: "1e-300"'),
+    ("a frequency of 1e-300", row(2, "5,", "1e-300,"), 'sweep.csv, line 2, column "frequency [Hz]": no rig records values this small', 'found: "1e-300"'),
 ]
 #: The same of a resonance test.
 IN_RESONANCE = [

@@ -223,7 +223,7 @@ def test_run_and_diagnose_write_the_model_that_fit_writes_where_nothing_is_missi
         *("axial, corners", "radial, corners"),
         "two-step procedure (the paper's): 10 passes, agrees with the joint fit within 1 standard error",
         "times less certain than in the joint fit (static.json, dynamic.json; -v shows it)",
-        *("extrapolated beyond", "wrote static.json"),
+        *("extrapolated outside this range", "wrote static.json"),
     )
     places = [ran.stderr.index(word) for word in words]
     assert places == sorted(places), "the result first"

@@ -58,7 +58,7 @@ def test_frequency_responses_of_uff_are_sweeps(own: Path, force: str, length: st
     one = own / "one.uff"  # a file of one group says by its title what one of several does
     pyuff.UFF(str(one)).write_sets([each for each in sets if each.get("id1") in (None, "axial 0.1 mm")], "overwrite")
     run, fitted = typing(own), []
-    assert "from its name: amplitude 0.1 mm" in run("inspect", one, "-o", "one", "--no-plots").stderr
+    assert "from the name: amplitude 0.1 mm" in run("inspect", one, "-o", "one", "--no-plots").stderr
     for name, files in (("uff", ["frf.uff"]), ("csv", sorted(own.glob("*.csv")))):
         run("init", *files, *GEOMETRY, "-o", name)
         fitted.append(values(run("fit", f"{name}/campaign.toml", "-o", f"{name}/x", "--no-plots", "--json")))

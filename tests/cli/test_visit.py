@@ -108,12 +108,12 @@ def test_a_visit_makes_a_campaign_that_fits(
         "Buchse 7.xlsx, sheet axial: sweep, axial",
         "from the other sheets: temperature 23 °C, date 2024-05-03",
         "Dyn_axial_A0,05mm.csv: sweep, axial; frequencies: 11, from 5 to 155 Hz; amplitudes: 0.05 mm",
-        "from its name: amplitude 0.05 mm",
+        "from the name: amplitude 0.05 mm",
         'half of "Dynamic Displacement p-p (mm)", which is peak-to-peak',
         "from the lines above the table: preload 0.9 kN, operator 3",
         "Buchse 7.xlsx, sheet Info: there is only one column",
         "Notizen.txt: there is only one column",
-        "Bild.png: no table, by its ending",
+        "Bild.png: not a table (by its extension)",
         "alt.xlsx: ",
     ):
         assert words in done.stderr, done.stderr

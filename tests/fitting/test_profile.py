@@ -181,5 +181,5 @@ def test_what_is_lacking_is_said_with_what_is_known_and_what_would_help(rig: Rig
         (said,) = [line for line in lines if "standard errors:" in line]
         assert reason in said
         if known:
-            assert any(line.startswith("what is known nevertheless") and known in line for line in lines)
+            assert any(line.startswith("combinations that the tests determine") and known in line for line in lines)
         assert any(line.startswith("the most helpful further test") and further in line for line in lines)

@@ -53,7 +53,7 @@ def test_loops_sines_and_triangles_are_described(loop: Loop, tmp_path: Path, pap
     facts = seen.facts
     assert facts["cycles"].startswith("3")
     assert facts["frequency"] == "0.1 Hz, a sine"
-    assert facts["sampling"] == "even, every 0.01 s, 1000 rows a cycle"
+    assert facts["sampling"] == "even, every 0.01 s, 1000 rows per cycle"
     assert facts["amplitude"] == "1 mm zero-to-peak"
     assert facts["mean force"].startswith("20")
     assert facts["noise"].startswith("0.3 %")
@@ -223,7 +223,7 @@ def test_an_amplitude_without_a_column_is_read_from_the_name_unless_stated(
     seen = inspect_file(held(sweep, tmp_path / f"{name}.csv"), stated)
     assert seen.entry == entry
     assert seen.measured.amplitude[0] == pytest.approx(amplitude)
-    assert ("from its name" in seen.facts) == ("at_amplitude" not in stated)
+    assert ("from the name" in seen.facts) == ("at_amplitude" not in stated)
     assert (seen.assumed is not None) == (name == "axial_A0,1mm")
     overruled = name == "axial_0.2mm" and "at_amplitude" in stated
     assert bool(seen.odd) == overruled

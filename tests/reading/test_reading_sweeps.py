@@ -155,7 +155,7 @@ BAD_SWEEPS: list[tuple[str, dict[str, Any], list[str]]] = [
     (with_line(SWEEP, 3, "15,0.1,600,-0.9"), {}, ["line 3", "loss factor", "-0.5 to 5", '"-0.9"']),
     (with_line(PHASE, 3, "15,0.1,600,95"), {}, ["line 3", "95"]),
     (STORAGE.replace("0.1\n", "91\n"), {}, ["line 2", "a loss factor", "phase in deg"]),
-    (with_line(LOSS, 3, "15,0.1,1e-320,600"), {}, ["line 3", "no rig records so little"]),
+    (with_line(LOSS, 3, "15,0.1,1e-320,600"), {}, ["line 3", "no rig records values this small"]),
     (
         PHASE.replace("0.1\n", "-6.5\n"),
         {"phase_sign": 1},

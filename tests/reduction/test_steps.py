@@ -39,7 +39,7 @@ def off_truth(reduction: Reduction, model: Model) -> Array:
 
 
 @pytest.mark.parametrize(
-    ("kind", "limit"), [("even", 5e-5), ("uneven", 5e-5), ("coarse", 5e-5), ("coarse, nearly 8 rows a cycle", 5e-4)]
+    ("kind", "limit"), [("even", 5e-5), ("uneven", 5e-5), ("coarse", 5e-5), ("coarse, nearly 8 rows per cycle", 5e-4)]
 )
 def test_every_step_has_the_stiffness_of_the_closed_form(
     clean: Loop, paper_model: Model, kind: str, limit: float
@@ -48,15 +48,15 @@ def test_every_step_has_the_stiffness_of_the_closed_form(
     rows = {
         "even": None,
         "uneven": np.sort(np.random.default_rng(5).choice(count, count // 2, replace=False)),
-        "coarse": np.arange(0, count, 3),  # 10.8 rows a cycle at 155 Hz
+        "coarse": np.arange(0, count, 3),  # 10.8 rows per cycle at 155 Hz
         # the 7th and 9th overtone fold onto the fundamental of 155 Hz
-        "coarse, nearly 8 rows a cycle": np.arange(0, count, 4),
+        "coarse, nearly 8 rows per cycle": np.arange(0, count, 4),
     }[kind]
     reduction = reduce([clean if rows is None else clean.select(rows)])
     off = np.abs(off_truth(reduction, paper_model)).max()
     print(f"{kind}: {len(reduction.steps)} points, off by at most {off:.1e} of |K|, without noise")
     assert off < limit
-    assert any("rows a cycle" in line for line in reduction.warnings) == kind.startswith("coarse")
+    assert any("rows per cycle" in line for line in reduction.warnings) == kind.startswith("coarse")
     frequency, amplitude = np.array(POINTS).T
     np.testing.assert_allclose(column(reduction, "frequency"), frequency, rtol=1e-6)
     np.testing.assert_allclose(column(reduction, "amplitude"), amplitude, rtol=2e-4)

@@ -34,8 +34,8 @@ _Figures = dict[tuple[str, str], "Callable[[], Chart | None]"]
 _TONES = {"consistent": "good", "named": "good", "unexplained": "bad"}
 #: Consequence of each verdict for the use of the numbers.
 _CONSEQUENCES = {
-    "consistent": "The model explains the tests within their noise. Use it within the tested range.",
-    "named": "Use the model with the effect that was added, within the tested range.",
+    "consistent": "The model agrees with the tests within their noise. Use the model within the tested range.",
+    "named": "Use the model, which includes the named effect, within the tested range.",
     "ambiguous": "Use stiffness and loss within the tested range. Do not attribute the difference to one cause yet.",
     "described": "Use the whole band, from low to high, within the tested range. The cause is not known.",
     "partly": "Part of the difference is not explained. Use the numbers with their bands, within the tested range.",
