@@ -32,7 +32,7 @@ IN_CAMPAIGN = [
     ('"loop.csv"', '"loop.csv"\nrate = "10 mm"', "campaign.toml, loops #1.rate: the unit does not fit", "a speed, such as mm/min"),
     ('"loop.csv"', '"loop.csv"\nrate = "10 mm/min"\nfrequency = "0.1 Hz"\nwaveform = "sine"', "campaign.toml, loops #1: these keys do not settle the time of a loop", 'rate, or frequency and waveform ("sine" or "triangle") together'),
     ('"loop.csv"', '"loop.csv"\nnoise = "200 %"', "campaign.toml, loops #1.noise: this value is not understood", "less than 1"),
-    ('"loop.csv"', '"loop.csv"\ncolumns = {force = "Kraft" }', 'loop.csv, line 1: there is no column "Kraft"', "the header that was named for the force"),
+    ('"loop.csv"', '"loop.csv"\ncolumns = {force = "Kraft" }', 'loop.csv, line 1: there is no column "Kraft"', "the header that was stated for the force"),
     ('"loop.csv"', '"loop.csv"\ncolumns = {force = "forse" }', 'loop.csv, line 1: there is no column "forse"', 'did you mean "force [N]"?'),
     ('"loop.csv"', '"loop.csv"\nunits = {force = "mm" }', 'loop.csv, line 1, column "force [N]": two units for the force', "one unit, from the header, the units row or the campaign"),
     ('"loop.csv"', '"loop.csv"\nencoding = "klingon"', "loop.csv: unknown encoding", 'a name such as "utf-8", "utf-16", "cp1252", "latin-1" or "gb18030"'),
