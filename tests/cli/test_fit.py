@@ -220,7 +220,7 @@ def test_run_and_diagnose_write_the_model_that_fit_writes_where_nothing_is_missi
     words = (
         *("CMP 15 961: consistent", "  use ", "joint fit", "mu ", "NRMSE", "correlation: ", "tested range"),
         *("axial: 0.1 to 155 Hz, 0.1 to 1 mm", "radial: 5 to 155 Hz, 0.1 to 0.5 mm, not fitted"),
-        *("axial, corners", "radial, corners"),
+        *("axial, first and last", "radial, first and last"),
         "two-step procedure (the paper's): 10 passes, agrees with the joint fit within 1 standard error",
         "times less certain than in the joint fit (static.json, dynamic.json; -v shows it)",
         *("extrapolated outside this range", "wrote static.json"),
