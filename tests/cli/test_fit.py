@@ -146,6 +146,7 @@ def test_five_held_parameters_are_checked_against_the_tests(own: Path, command: 
     assert {entry["vary"] for entry in found["parameters"].values()} == {False}
     assert found["parameters"]["mu"]["value"] == 1.09e6
     assert found["fit"]["nrmse"] < 0.01
+    assert all(place["held_out"] for place in found["fit"]["usable"]), "given values are predictions"
 
 
 def test_held_parameters_that_miss_the_tests_are_said_to(own: Path) -> None:
