@@ -12,16 +12,19 @@ from bushfit.cli.output import Output, with_output
 from bushfit.cli.printing import print_tests
 from bushfit.cli.shared_options import (
     displacement_rates,
+    displacement_unit,
     grid_values,
     kelvin,
     positive,
     prediction_options,
     static_rate_option,
 )
+from bushfit.errors import error_location
 
 if TYPE_CHECKING:
     from bushfit.commands.predict import PredictionOutput
     from bushfit.prediction.static_curve import StaticCurve
+    from bushfit.prediction.superposed import LargeMotion
 
 #: Maximum number of amplitudes per direction that the terminal shows; the CSV has all.
 _MOST_AMPLITUDES = 8
@@ -52,6 +55,11 @@ _MOST_AMPLITUDES = 8
     ),
     flag("--static", "Also write the static curve: force over displacement in a slow motion, and its slope."),
     static_rate_option("Rate of this motion"),
+    option(
+        "--over",
+        "MOTION",
+        'Predict for a small harmonic on a slow large motion, "0.5 Hz 1 mm", or on a static offset, "1 mm".',
+    ),
     flag("--wide", "Also write tables with one column per amplitude, without bands."),
     option(
         "--arms",
@@ -73,6 +81,7 @@ def command(
     base_acceleration: str | None,
     static: bool,
     static_rate: str | None,
+    over: str | None,
     wide: bool,
     arms: str | None,
     output: Output,
@@ -102,6 +111,7 @@ def command(
         "arms": positive(arms, "--arms", "1"),
         "static": static,
         "static_rates": displacement_rates(static_rate),
+        "over": _large_motion(over),
     }
     predicted = predict(result, loaded, wide=wide, **settings)
     _print_summary(output, predicted)
@@ -143,6 +153,22 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
             f"{format_range(force.name, stiffness.min(), stiffness.max())}, loss factor "
             f"{format_range('', loss.min(), loss.max()).strip()}, {format_range('Hz', *prediction.frequency[[0, -1]])}"
         )
+
+
+def _large_motion(text: str | None) -> LargeMotion | None:
+    """Parse --over: a frequency and an amplitude, or an offset; None if the option was not given."""
+    from bushfit.prediction.superposed import LargeMotion
+    from bushfit.units import parse_quantity
+
+    if text is None:
+        return None
+    frequency, hertz, size = text.rpartition("Hz")
+    unit = displacement_unit(size.strip(" ,;"))
+    with error_location(place="--over"):
+        if not hertz:
+            return LargeMotion(parse_quantity(size, unit), unit)
+    slow = positive(frequency + hertz, "--over", "Hz")
+    return LargeMotion(positive(size.strip(" ,;"), "--over", unit) or 0.0, unit, slow or 0.0)
 
 
 def _print_static(output: Output, curve: StaticCurve) -> None:

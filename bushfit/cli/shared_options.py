@@ -130,10 +130,15 @@ def static_rate_option(subject: str) -> Parameter:
     return option("--static-rate", "RATE", f'{subject}, "10 mm/min" [that of the slowest loop, or 10 mm/min].')
 
 
+def displacement_unit(text: str, per: str = "") -> str:
+    """SI unit of the displacement in a quantity such as "2 deg", or "10 mm/min" with `per` "/s": m, rad or 1."""
+    suffix = re.sub(r"^[-+.\d\s]+(e[-+]?\d+)?\s*", "", text, flags=re.IGNORECASE)
+    return next((unit for unit in ("rad", "1") if is_compatible(suffix, unit + per)), "m")
+
+
 def displacement_rates(text: str | None) -> dict[str, float] | None:
     """Parse --static-rate to a rate in SI by the unit of its displacement: m, rad or 1; None if it was not given."""
-    suffix = re.sub(r"^[-+.\d\s]+(e[-+]?\d+)?\s*", "", text or "", flags=re.IGNORECASE)
-    unit = next((unit for unit in ("rad", "1") if is_compatible(suffix, f"{unit}/s")), "m")
+    unit = displacement_unit(text or "", "/s")
     rate = positive(text, "--static-rate", f"{unit}/s")
     return None if rate is None else {unit: rate}
 

@@ -28,6 +28,7 @@ from bushfit.prediction.grid import default_grid, grid_settings, requested_grid,
 from bushfit.prediction.static_curve import StaticCurve, static_curve, static_rate
 from bushfit.prediction.stiffness import PredictedResonance, Prediction, predict_resonance, tested_preload
 from bushfit.prediction.stiffness import predict as predict_stiffness
+from bushfit.prediction.superposed import LargeMotion
 from bushfit.reading.measurement import SAME_TEMPERATURE, Loop, Sweep
 from bushfit.reading.preload import Preload, parse_preload
 from bushfit.report import plots, tables
@@ -137,6 +138,7 @@ def predict(
     arms: float | None = None,
     static: bool = False,
     static_rates: Mapping[str, float] | None = None,
+    over: LargeMotion | None = None,
     notes: Sequence[str] = (),
 ) -> PredictionOutput:
     """Predict stiffness and loss factor over a grid, with 95 % bands.
@@ -159,6 +161,7 @@ def predict(
         static: True to add static curves.
         static_rates: rates of the static curves by SI unit of displacement: "m" [m/s], "rad" [rad/s] or "1" [1/s];
             default the rate of the slowest loop.
+        over: slow large motion or static offset under the harmonic of each frequency and amplitude.
         notes: further warnings.
 
     Returns:
@@ -180,9 +183,9 @@ def predict(
             expected="a model with the effect of temperature",
             hint="fit tests at several temperatures with --effect temperature",
         )
-    if len(preloads) > 1 and (wide or mass or static or static_rates):
-        problem = "wide tables, resonances and static curves are of one preload"
-        raise ModelError(problem, found=", ".join(preloads), expected="one")
+    if (len(preloads) > 1 and (wide or mass)) or (preloads and (static or static_rates)):
+        problem = "wide tables and resonances are of one preload, and static curves are about none"
+        raise ModelError(problem, found=", ".join(preloads), expected="one, or none")
     if preloads and directions is None and result.measured:
         directions = [stated.place for stated in result.measured.preloads] or None
     requested = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
@@ -190,7 +193,7 @@ def predict(
     specimens = {specimen.name: specimen for specimen in (*result.specimens, *(campaign.specimens if campaign else ()))}
     default = (*(_DIRECTIONS if result.model.bushing or not specimens else ()), *specimens.values())
     places = [get_place(name, specimens.values()) for name in settings.directions or ()] or list(default)
-    measured = _predictable_sweeps(result, campaign) if campaign else []
+    measured = _predictable_sweeps(result, campaign) if campaign and not over else []
     drawn_sweeps = [
         sweep
         for sweep in measured
@@ -204,9 +207,10 @@ def predict(
             result,
             place,
             *requested_grid(default_grid(result, place, sweeps), settings, place),
-            sweeps=sweeps_at(drawn_sweeps, place, preload) if campaign else None,
+            sweeps=sweeps_at(drawn_sweeps, place, preload) if measured else None,
             temperature=temperature,
             preload=preload if preloads else None,
+            over=over,
         )
         for place, preload in loads
     ]
@@ -313,6 +317,7 @@ def _files(
         measured = sweeps_at(drawn_sweeps, place, prediction.preload)
         table = tables.sweeps_table(result.model, measured) if measured else None
         title = result.name if isinstance(place, Direction) else str(place)
+        title += f", over {prediction.over.describe(place)}" if prediction.over else ""
         note = plots.style.warnings_note(warnings_of(result, [], (*prediction.warnings, *output.notes)))
         return plots.prediction.prediction_figure(result, prediction, table, title, note, temperature)
 

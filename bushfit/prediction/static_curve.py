@@ -5,17 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bushfit.effects import Level
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.effects.history import History
-from bushfit.effects.unnamed import NAME as UNNAMED
-from bushfit.errors import ModelError
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
 from bushfit.prediction.caveats import extrapolations
 from bushfit.prediction.stiffness import Band, candidates, envelope, uncertainty
+from bushfit.prediction.superposed import require_time_law
 from bushfit.units import number
 
 #: Default rate of a model without loops, in display units per minute (10 mm/min): common in static tests of rubber.
@@ -124,22 +122,3 @@ def _forces(
     secant = (mean[:, -1:] - mean[:, :1]) / (displacement[-1] - displacement[0])
     curves = (loading, unloading, mean, np.gradient(mean, displacement, axis=-1, edge_order=2), secant)
     return [errors.band(curve[0], curve[1:]) for curve in curves]
-
-
-def has_time_law(model: Model) -> bool:
-    """True if all effects of the bushing have a law in time; the correction without a name acts on its harmonic."""
-    effects = model.without(Level.INSTRUMENT).records
-    return not any(effect.harmonic_only and effect.name != UNNAMED for effect in effects)
-
-
-def require_time_law(model: Model) -> None:
-    """Raise a ModelError if an effect of the bushing has no law in time."""
-    if not has_time_law(model):
-        names = [effect.name for effect in model.records if effect.harmonic_only]
-        raise ModelError(
-            "this needs a law in time, which an effect of the model does not have",
-            place=" and ".join(names),
-            found="a law of the steady first harmonic alone",
-            expected="effects with a law in time",
-            hint="fit a model without it",
-        )

@@ -25,6 +25,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.prediction.caveats import MARGIN, extrapolations, point_warnings, unfitted_warnings
+from bushfit.prediction.superposed import LargeMotion, superposed_stiffness_and_slopes
 from bushfit.reading.preload import SAME_PRELOAD, Preload
 from bushfit.reading.runs import nominal
 from bushfit.reduction.resonance import response
@@ -93,6 +94,7 @@ class Prediction:
         measured: measured complex stiffness at these points, mean of the repeats [N/m or N m/rad], (n,); nan at a
             point without a measurement; None without sweeps.
         preload: preload of all points; None if the tests of this direction did not have several.
+        over: slow large motion or static offset under the harmonic; None for the harmonic alone.
     """
 
     direction: Place
@@ -106,11 +108,13 @@ class Prediction:
     if_rigs: Prediction | None = None
     measured: Array | None = None
     preload: Preload | None = None
+    over: LargeMotion | None = None
 
     @property
     def label(self) -> str:
-        """Direction or specimen for users, with the preload if it is known: "axial at a preload of 500 N"."""
-        return f"{self.direction}" + (f" at a preload of {self.preload.text(self.direction)}" if self.preload else "")
+        """Direction or specimen for users, with preload and large motion: "axial at a preload of 500 N"."""
+        preload = f" at a preload of {self.preload.text(self.direction)}" if self.preload else ""
+        return f"{self.direction}{preload}" + (f" over {self.over.describe(self.direction)}" if self.over else "")
 
 
 def predict(
@@ -123,6 +127,7 @@ def predict(
     sweeps: Sequence[MeasuredSweep] | None = None,
     temperature: float | None = None,
     preload: Preload | None = None,
+    over: LargeMotion | None = None,
 ) -> Prediction:
     """Predict the dynamic stiffness on a grid, with 95 % bands from the covariance of the fit (delta method).
 
@@ -138,12 +143,14 @@ def predict(
         sweeps: measured sweeps for comparison; None for no comparison.
         temperature: temperature of the rubber [K]; None for the reference temperature.
         preload: preload within the tested range; None for none, or the tested preload nearest to none.
+        over: slow large motion or static offset under the harmonic; None for the harmonic alone.
 
     Returns:
         Prediction at all combinations of frequency and amplitude.
 
     Raises:
-        ModelError: a frequency or amplitude is not positive, or the preload is outside the tested range.
+        ModelError: a frequency or amplitude is not positive, the preload is outside the tested range, or the model has
+            no law in time for a slow motion.
     """
     for name, values in (("frequency", frequencies), ("amplitude", amplitudes)):
         if not (np.size(values) and np.all(np.isfinite(values)) and np.min(values) > 0):
@@ -152,7 +159,9 @@ def predict(
         axis.ravel() for axis in np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
     )
     conditions = RubberConditions(temperature, preload=tested_preload(result, direction, preload))
-    points = direction, frequency, amplitude, conditions
+    points = direction, frequency, amplitude, conditions, over
+    if over:
+        over.require(direction, frequency, result.model.without(Level.INSTRUMENT))
     predictions = [predict_with_model(source, model, *points) for source, model in candidates(result, rig=rig)]
     bushings = predictions[0]
     rigs = predictions[2 ** len(result.unresolved) - 1] if result.unresolved and not rig else None
@@ -169,8 +178,20 @@ def predict(
         temperature,
         preload,
     )
-    bands |= {"if_rigs": rigs, "measured": measured, "preload": conditions.preload}
-    return replace(bushings, **bands, warnings=tuple(warnings))
+    bands |= {"if_rigs": rigs, "measured": measured, "preload": conditions.preload, "over": over}
+    together = (
+        extrapolations(
+            result,
+            direction,
+            np.array([over.frequency or frequency.min()]),
+            np.array([abs(over.displacement) + amplitude.max()]),
+            temperature,
+            f"{direction}, with the large motion",
+        )
+        if over
+        else ()
+    )
+    return replace(bushings, **bands, warnings=(*warnings, *together))
 
 
 def tested_preload(result: Result, place: Place, preload: Preload | None) -> Preload | None:
@@ -308,7 +329,13 @@ def uncertainty(
 
 
 def predict_with_model(
-    result: Result, model: Model, direction: Place, frequency: Array, amplitude: Array, conditions: RubberConditions
+    result: Result,
+    model: Model,
+    direction: Place,
+    frequency: Array,
+    amplitude: Array,
+    conditions: RubberConditions,
+    over: LargeMotion | None = None,
 ) -> Prediction:
     """Predict the stiffness with one model, with the uncertainty of the fit and the error of the model.
 
@@ -319,14 +346,19 @@ def predict_with_model(
         frequency: frequency of each point [Hz], (n,).
         amplitude: zero-to-peak amplitude of each point [m, rad or 1], (n,).
         conditions: temperature and preload of the rubber.
+        over: slow large motion or static offset under the harmonic; None for the harmonic alone.
 
     Returns:
         Prediction without warnings.
     """
     errors = uncertainty(result, model, direction, frequency, amplitude, conditions)
-    stiffness, slopes = stiffness_and_slopes(
-        model, direction, frequency, amplitude, errors.covariance.names, conditions=conditions
-    )
+    names = errors.covariance.names
+    if over:
+        stiffness, slopes = superposed_stiffness_and_slopes(
+            model, direction, frequency, amplitude, over, names, conditions
+        )
+    else:
+        stiffness, slopes = stiffness_and_slopes(model, direction, frequency, amplitude, names, conditions=conditions)
     slopes = np.concatenate((slopes, errors.relative * stiffness))
     relative, loss_factor = slopes / stiffness, stiffness.imag / stiffness.real
     return Prediction(

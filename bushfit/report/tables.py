@@ -82,7 +82,8 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
     Returns:
         Columns: frequency, amplitude, stiffness, loss factor, storage and loss stiffness; "low" and "high" ends of the
         last four; the four again under the assumption that an unresolved effect belongs to the rig, if there is one;
-        and measured stiffness and loss factor, if they are known; and preload, if the tests have several.
+        measured stiffness and loss factor, if they are known; preload, if the tests have several; and the large
+        motion, if there is one.
     """
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
     motion_name, _, resisted = words(prediction.direction)
@@ -108,6 +109,10 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
     if prediction.preload is not None:
         value, unit = prediction.preload.in_display_unit(prediction.direction)
         columns[f"preload [{unit}]"] = np.full(prediction.frequency.shape, value)
+    if over := prediction.over:
+        columns["large motion, frequency [Hz]"] = np.full(prediction.frequency.shape, over.frequency)
+        displacement = over.displacement * length_factor
+        columns[f"large motion, displacement [{length}]"] = np.full(prediction.frequency.shape, displacement)
     return pd.DataFrame(columns)
 
 

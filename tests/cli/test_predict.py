@@ -154,16 +154,40 @@ def test_predict_writes_the_static_curve_at_the_rate_of_the_slowest_loop(
     assert slower["displacement [mm]"].max() == pytest.approx(0.2)
 
 
+def test_predict_on_a_large_motion_and_on_an_offset(bushfit: Run, tmp_path: Path) -> None:
+    grid = ("--direction", "axial", "--frequencies", "10, 20 Hz", "--amplitudes", "0.1 mm")
+    tables = {}
+    for name, motion in (("slow", "0.5 Hz 1 mm"), ("offset", "-0.8 mm"), ("alone", None)):
+        over = ("--over", motion) if motion else ()
+        done = bushfit("predict", "model/model.json", *grid, *over, "-o", tmp_path / name, "--campaign", CAMPAIGN)
+        tables[name] = pd.read_csv(tmp_path / name / "axial.csv")
+        assert ("measured.csv" in names(tmp_path / name)) is (motion is None)
+        assert (f"axial over {motion}: stiffness" in done.stderr) is (motion is not None)
+        assert ("axial, with the large motion: predicted at strains of" in done.stderr) is (name == "slow")
+    columns = ["large motion, frequency [Hz]", "large motion, displacement [mm]"]
+    assert tables["slow"][columns].to_numpy() == pytest.approx(np.array([[0.5, 1.0]] * 2))
+    assert tables["offset"][columns].to_numpy() == pytest.approx(np.array([[0.0, -0.8]] * 2))
+    stiffness = {name: table["stiffness [N/mm]"].to_numpy() for name, table in tables.items()}
+    assert stiffness["offset"] == pytest.approx(stiffness["alone"], rel=2e-3), "linear but for friction"
+    assert (stiffness["slow"] < 0.95 * stiffness["alone"]).all()
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
+        (("--over", "0.5 Hz"), "--over"),
+        (("--over", "0.5 Hz -1 mm"), "a value above zero"),
+        (("--over", "2 deg"), "this is no motion of the direction"),
+        (("--over", "50 Hz 1 mm"), "do not suit the slow motion"),
         (("--frequencies", "0 Hz"), "predict --static writes the static curve"),
         (("--frequencies", "0:10:5 Hz"), "predict --static writes the static curve"),
         (("--static-rate", "10 mm"), "a speed, such as mm/min"),
         (("--static-rate", "-1 mm/min"), "a value above zero"),
     ],
 )
-def test_what_has_no_static_curve_is_told(bushfit: Run, tmp_path: Path, options: tuple[str, ...], words: str) -> None:
+def test_motions_that_cannot_be_answered_are_told(
+    bushfit: Run, tmp_path: Path, options: tuple[str, ...], words: str
+) -> None:
     done = bushfit("predict", "model/model.json", *options, "-o", tmp_path / "x", status=2)
     assert words in done.stderr
     assert not (tmp_path / "x").exists()

@@ -56,7 +56,9 @@ def prediction_figure(
         Figure with one or two rows of panels, and one more for each group of such sweeps.
     """
     place, fine = prediction.direction, refined(result, prediction, temperature)
-    rig = refined(result, prediction, temperature, rig=True) if rig_effects(result) else None
+    rig = None
+    if rig_effects(result) and not prediction.over:
+        rig = refined(result, prediction, temperature, rig=True)
     of_place = None if table is None else table[table["direction"] == str(place)]
     groups = [] if of_place is None or of_place.empty else sweep_groups(of_place, result)
     free = [group.thinned() for group in groups if group.palette == "loop" and np.isnan(group.curves[0].level)]
@@ -132,8 +134,11 @@ def refined(
         rig: True to include the effects of the rig, as in the tests.
 
     Returns:
-        Prediction on the finer grid, which contains the frequencies and amplitudes of the given one.
+        Prediction on the finer grid, which contains the frequencies and amplitudes of the given one; the given one if
+        it has a large motion, which takes too long to repeat.
     """
+    if prediction.over:
+        return prediction
     grid = [
         values if values.size < 2 else np.union1d(values, np.geomspace(values[0], values[-1], _FINE))
         for values in map(np.unique, (prediction.frequency, prediction.amplitude))

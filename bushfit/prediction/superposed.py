@@ -1,0 +1,132 @@
+"""Stiffness of a small harmonic superposed on a slow large motion or a static offset, from the law in time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bushfit.effects import Level
+from bushfit.effects.contract import Array, RubberConditions
+from bushfit.effects.history import History
+from bushfit.effects.unnamed import NAME as UNNAMED
+from bushfit.errors import ModelError
+from bushfit.geometry import Place
+from bushfit.model.model import Model
+from bushfit.model.sensitivity import force_and_slopes
+from bushfit.units import format_range, number
+
+#: Samples per cycle of the small harmonic: friction, which turns at samples, has an error of 0.01 %.
+_SAMPLES = 64
+#: Smallest and largest ratio of the two frequencies.
+_SLOW, _SLOWEST = 3.0, 10_000.0
+
+
+@dataclass(frozen=True)
+class LargeMotion:
+    """Slow large motion, or static offset, under a small harmonic.
+
+    Args:
+        displacement: zero-to-peak amplitude of the motion, or the offset [m, rad or 1].
+        unit: SI unit of the displacement.
+        frequency: frequency of the motion [Hz]; 0 for an offset.
+    """
+
+    displacement: float
+    unit: str
+    frequency: float = 0.0
+
+    def describe(self, place: Place) -> str:
+        """Format the motion, such as "0.5 Hz 1 mm"."""
+        unit, factor = place.display.displacement
+        size = format_range(unit, factor * self.displacement)
+        return f"{number(self.frequency, 3)} Hz {size}" if self.frequency else size
+
+    def history(self, frequency: float, amplitude: float) -> History:
+        """Steady motion together with a small harmonic.
+
+        Two cycles of the slow motion hold an odd number of cycles of the harmonic, so that no overtone of the slow
+        motion is at the frequency of the harmonic; the slow frequency is adjusted to this number.
+
+        Args:
+            frequency: frequency of the small harmonic [Hz].
+            amplitude: its zero-to-peak amplitude [m, rad or 1].
+        """
+        cycles = 2 * round(frequency / self.frequency - 0.5) + 1 if self.frequency else 1
+        phase = 2.0 * np.pi * np.arange(cycles * _SAMPLES) / _SAMPLES
+        slow = np.sin(2.0 * phase / cycles) if self.frequency else 1.0
+        return History.steady(self.displacement * slow + amplitude * np.sin(phase), frequency, cycles)
+
+    def require(self, place: Place, frequency: Array, model: Model) -> None:
+        """Raise a ModelError if the model has no law in time, or the motion is not slow or of another direction."""
+        require_time_law(model)
+        if place.motion.displacement_unit != self.unit:
+            expected = f"a motion in {place.display.displacement.name}"
+            raise ModelError("this is no motion of the direction", place=str(place), found=self.unit, expected=expected)
+        low, high = _SLOW * self.frequency, _SLOWEST * self.frequency
+        if self.frequency and not (low <= frequency.min() and frequency.max() <= high):
+            raise ModelError(
+                "the frequencies of the small harmonic do not suit the slow motion",
+                place=str(place),
+                found=format_range("Hz", float(frequency.min()), float(frequency.max())),
+                expected=f"{_SLOW:g} to {_SLOWEST:g} times {number(self.frequency, 3)} Hz",
+                hint="choose others with --frequencies",
+            )
+
+
+def superposed_stiffness_and_slopes(
+    model: Model,
+    place: Place,
+    frequency: Array,
+    amplitude: Array,
+    motion: LargeMotion,
+    names: Sequence[str],
+    conditions: RubberConditions,
+) -> tuple[Array, Array]:
+    """Complex stiffness of a small harmonic on a large motion, and its derivatives by parameters.
+
+    Args:
+        model: model; the derivatives are taken at its parameter values.
+        place: direction or specimen.
+        frequency: frequency of the harmonic [Hz], (n,).
+        amplitude: zero-to-peak amplitude of the harmonic [m, rad or 1], (n,).
+        motion: slow motion or offset.
+        names: names of k parameters.
+        conditions: temperature and preload of the rubber.
+
+    Returns:
+        Complex stiffness [N/m or N m/rad], (n,), and its derivatives per SI unit of each parameter, (k, n).
+
+    Notes: first harmonic of the force in the steady state, at the frequency of the small harmonic; it is the mean over
+    the cycle of the slow motion. The correction without a name applies as without the slow motion.
+    """
+    named, columns = model.without(UNNAMED), []
+    for hertz, size in zip(frequency, amplitude, strict=True):
+        history = motion.history(float(hertz), float(size))
+        force, slopes = force_and_slopes(named, place, history, names, conditions)
+        line = history.value.size // _SAMPLES
+        spectrum = np.fft.rfft(np.concatenate((history.value[None], force[None], slopes)))[:, line]
+        columns.append(spectrum[1:] / spectrum[0])
+    response = np.array(columns).T
+    if model.unnamed:
+        corrected = model.stiffness(place, frequency, amplitude, conditions=conditions)
+        response *= corrected / named.stiffness(place, frequency, amplitude, conditions=conditions)
+    return response[0], response[1:]
+
+
+def has_time_law(model: Model) -> bool:
+    """True if all effects of the bushing have a law in time; the correction without a name acts on its harmonic."""
+    effects = model.without(Level.INSTRUMENT).records
+    return not any(effect.harmonic_only and effect.name != UNNAMED for effect in effects)
+
+
+def require_time_law(model: Model) -> None:
+    """Raise a ModelError if an effect of the bushing has no law in time."""
+    if not has_time_law(model):
+        names = [effect.name for effect in model.records if effect.harmonic_only]
+        raise ModelError(
+            "this needs a law in time, which an effect of the model does not have",
+            place=" and ".join(names),
+            found="a law of the steady first harmonic alone",
+            expected="effects with a law in time",
+            hint="fit a model without it",
+        )
