@@ -16,8 +16,8 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
 from bushfit.prediction.caveats import BEYOND, MARGIN, extrapolations, unfitted_warnings
-from bushfit.prediction.static_curve import require_time_law
 from bushfit.prediction.stiffness import Band, candidates, envelope, uncertainty
+from bushfit.prediction.superposed import require_time_law
 from bushfit.units import number
 
 #: Smallest number of samples per mean cycle without a warning: with 20 the springpot errs by 0.7 % of its force.

@@ -169,7 +169,7 @@ def test_predict_on_a_large_motion_and_on_an_offset(bushfit: Run, tmp_path: Path
     assert tables["offset"][columns].to_numpy() == pytest.approx(np.array([[0.0, -0.8]] * 2))
     stiffness = {name: table["stiffness [N/mm]"].to_numpy() for name, table in tables.items()}
     assert stiffness["offset"] == pytest.approx(stiffness["alone"], rel=2e-3), "linear but for friction"
-    assert (stiffness["slow"] < 0.95 * stiffness["alone"]).all()
+    assert (stiffness["slow"] < 0.99 * stiffness["alone"]).all()
 
 
 @pytest.mark.parametrize(
