@@ -49,6 +49,7 @@ class Campaign:
     bushing: Bushing | None
     loops: tuple[Loop, ...] = ()
     sweeps: tuple[Sweep, ...] = ()
+    validation: tuple[Loop, ...] = ()
     fit: FitSettings = field(default_factory=FitSettings)
     predict: PredictSettings = field(default_factory=PredictSettings)
     simulate: SimulateSettings | None = None
@@ -97,9 +98,9 @@ def load_campaign(path: str | Path) -> Campaign:
         _check_places(content, specimens)
     with error_location(place="[report] logo"):
         logo = embedded(path.parent / content.report.logo) if content.report.logo else None
-    loops, sweeps = (
+    loops, sweeps, records = (
         track(f"{kind} read", reader_keywords(path, tests, specimens), len(tests))
-        for kind, tests in (("loops", content.loops), ("sweeps", content.sweeps))
+        for kind, tests in (("loops", content.loops), ("sweeps", content.sweeps), ("records", content.validation))
     )
     found: dict[str, Any] = {
         **{"name": content.name or (bushing or specimens[0]).name, "bushing": bushing, "specimens": specimens},
@@ -112,6 +113,7 @@ def load_campaign(path: str | Path) -> Campaign:
             without_copied_repeats(sweep)
             for sweep in without_copied_tests([read_sweep(**keywords) for keywords in sweeps])
         ),
+        "validation": tuple(read_loop(**keywords) for keywords in records),
         "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
         "logo": logo,
     }

@@ -348,6 +348,36 @@ class SimulatedResonance(SimulatedTest):
 
 
 @dataclass(frozen=True)
+class SimulatedRecord(SimulatedTest):
+    """[[simulate.validation]]: a record of displacement and force under a motion from rest.
+
+    Args:
+        motion: "sines" adds a sine for each frequency; "random" has a spectral density that goes in straight lines over
+            log f through the squares of the amplitudes; "road" has one that falls with the square of the frequency.
+        frequencies: frequencies in ascending order [Hz]; of a random motion, the first and last are its band.
+        amplitudes: zero-to-peak amplitude of each sine; for "random" relative amplitudes at the frequencies, as
+            displacements; none for "road".
+        rms: root mean square of a random or road-like displacement [m or rad, or strain].
+        duration: duration [s].
+    """
+
+    motion: Literal["random", "sines", "road"]
+    frequencies: Several[Frequency]
+    amplitudes: Several[Displacement] = ()
+    rms: Displacement | None = None
+    duration: Annotated[float, si("s"), Field(gt=0, le=3600.0)] = 10.0
+
+    def __post_init__(self) -> None:
+        needed = 0 if self.motion == "road" else len(self.frequencies)
+        if len(self.amplitudes) != needed or (self.rms is None) != (self.motion == "sines"):
+            found = f"{len(self.amplitudes)} amplitudes, {'no' if self.rms is None else 'an'} rms"
+            expected = "an amplitude for each frequency of sines and random, and rms for random and road"
+            raise ValueError(CampaignError("these keys do not state a motion", found=found, expected=expected))
+        if min(np.diff(self.frequencies), default=self.motion == "sines") <= 0.0:
+            raise ValueError(CampaignError("these frequencies are no band", expected="two or more, in ascending order"))
+
+
+@dataclass(frozen=True)
 class SimulateSettings:
     """[simulate]: tests, noise and errors of the virtual rig.
 
@@ -366,6 +396,7 @@ class SimulateSettings:
             the record of a loop.
         level_phase_error: standard deviation of the phase that all repeats of a level share [rad].
         loops, sweeps, resonances: tests; without any, the tests of the paper.
+        validation: validation records.
     """
 
     parameters: Annotated[Mapping[str, ParameterValue], table(parameter_values)] = field(default_factory=dict)
@@ -383,6 +414,7 @@ class SimulateSettings:
     loops: tuple[SimulatedLoop, ...] = ()
     sweeps: tuple[SimulatedSweep, ...] = ()
     resonances: tuple[SimulatedResonance, ...] = ()
+    validation: tuple[SimulatedRecord, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -395,6 +427,8 @@ class CampaignFile:
         specimens: other bodies of the same compound.
         loops: hysteresis loops.
         sweeps: stepped sines.
+        validation: records of displacement and force under any motion, which are compared with the model and never
+            fitted.
         simulate: tests and errors of the virtual rig, used only by bushfit simulate.
         rig: accuracy and limits of the test machine.
         compound: rubber of a bushing that was not tested yet.
@@ -411,6 +445,7 @@ class CampaignFile:
     specimens: tuple[SpecimenSettings, ...] = ()
     loops: tuple[LoopFile, ...] = ()
     sweeps: tuple[SweepFile, ...] = ()
+    validation: tuple[LoopFile, ...] = ()
     rig: RigSettings = field(default_factory=RigSettings)
     compound: Compound | None = None
     fit: Annotated[FitSettings, table(_fit_table)] = field(default_factory=FitSettings)

@@ -11,7 +11,7 @@ from rich.markup import escape
 
 from bushfit.cli.options import command_called, explanations, file_option, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.printing import print_parameters
+from bushfit.cli.printing import print_parameters, print_validations
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
 from bushfit.errors import BushfitError, error_location
 from bushfit.units import display_unit, format_aligned, number, parse_quantity
@@ -103,6 +103,7 @@ def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
     diagnosis = diagnosed.diagnosis
     print_verdict(output, diagnosed)
     print_findings(output, diagnosed)
+    print_validations(output, diagnosed.validations, diagnosed.validations_before)
     for effect in diagnosed.document["effects"] if diagnosis.verdict != "ambiguous" else ():
         output.console.print(f"  [bold]why {effect['name']}:[/bold] {escape(effect['evidence'])}")
     if output.verbose:

@@ -10,11 +10,23 @@ from bushfit.units import format_range, number
 
 if TYPE_CHECKING:
     from bushfit.model.result import ExpectedError, Misfit, Result
+    from bushfit.prediction.validation import Validation
 
 #: Correlation between two parameters above which it is shown without -v: the data determine only their combination.
 _STRONG_CORRELATION = 0.9
 #: Largest number of tests that are shown without -v, those with the largest misfit.
 _MOST_TESTS = 8
+
+
+def print_validations(output: Output, validations: Sequence[Validation], before: Sequence[Validation] = ()) -> None:
+    """Print NRMSE, peak and energy error, and share of points in the band of validation records, if there are any."""
+    from bushfit.report.response import validation_table
+
+    if validations:
+        table = validation_table(validations, before)
+        rows = [(*row[:2], *(number(value, 3) for value in row[2:])) for row in table.itertuples(index=False)]
+        title = "validation records, never fitted: predicted compared with measured force"
+        output.print_table(title, list(table.columns), rows, text_columns=2)
 
 
 def print_step(output: Output, title: str, result: Result) -> None:

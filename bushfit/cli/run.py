@@ -10,7 +10,7 @@ from bushfit.cli.diagnose import print_findings, print_verdict
 from bushfit.cli.options import command_called
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.predict import print_predictions
-from bushfit.cli.printing import print_origin, print_result, print_step
+from bushfit.cli.printing import print_origin, print_result, print_step, print_validations
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
 from bushfit.units import display_unit, format_aligned, number
 
@@ -74,6 +74,7 @@ def print_run(output: Output, name: str, outcome: RunOutput, action: str) -> Non
         print_findings(output, diagnosed)
     if result.measured:
         _print_range(output, outcome)
+    print_validations(output, outcome.validations, diagnosed.validations_before if diagnosed else ())
     print_origin(output, result)
     print_predictions(output, outcome.predicted)
     two_step, joint = outcome.two_step, outcome.joint.result

@@ -9,6 +9,7 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.commands.fit import FitOutput, fit, prepare_tests
 from bushfit.commands.loading import HasResult, as_result
 from bushfit.commands.provenance import campaign_document, option_words, result_document
+from bushfit.commands.respond import validation_files
 from bushfit.diagnosis import workflow
 from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
@@ -18,6 +19,7 @@ from bushfit.fitting.procedures import NEXT
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.planning.knowledge import look_alikes
+from bushfit.prediction.validation import Validation, validate
 from bushfit.report import plots, tables
 from bushfit.report.page import report_page
 from bushfit.report.results import ResultFile, figure_file, json_file, page_file, table_file
@@ -33,6 +35,8 @@ class DiagnosisOutput:
         diagnosis: the diagnosis.
         document: content of diagnosis.json.
         files: documents, tables, figure and page.
+        validations: comparisons of the model to use with the validation records of the campaign.
+        validations_before: comparisons of the joint fit without the added effects; empty if none were added.
     """
 
     name: str
@@ -40,6 +44,8 @@ class DiagnosisOutput:
     diagnosis: Diagnosis
     document: DiagnosisFile
     files: Sequence[ResultFile]
+    validations: Sequence[Validation] = ()
+    validations_before: Sequence[Validation] = ()
 
     def __repr__(self) -> str:
         return f"{self.name}: {self.headline}\n  {self.diagnosis.summary}"
@@ -98,8 +104,12 @@ def diagnose(
     origin = campaign_document(data, "diagnose", options)
     files = [json_file("diagnosis", document), json_file("model", result_document(diagnosis.result, origin))]
     files += diagnosis_files(diagnosis, document, data.campaign.name)
+    records = data.campaign.validation
+    validations = validate(diagnosis.result, records)
+    before = validate((joint or fit(data)).result, records) if records and diagnosis.added else []
+    files += validation_files(validations, before, data.campaign.name)
     files.append(page_file("report", report_page, files))
-    return DiagnosisOutput(data.campaign.name, data, diagnosis, document, files)
+    return DiagnosisOutput(data.campaign.name, data, diagnosis, document, files, validations, before)
 
 
 def diagnosis_files(diagnosis: Diagnosis, document: DiagnosisFile, title: str) -> list[ResultFile]:

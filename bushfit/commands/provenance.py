@@ -71,7 +71,7 @@ def option_words(**options: str | bool | Iterable[str] | None) -> list[str]:
 def input_files(campaign: Campaign) -> list[Path]:
     """Files that were read for a campaign: campaign file, test files and logo."""
     folder, logo = campaign.path.parent, campaign.report.logo
-    tests: tuple[Loop | Sweep, ...] = (*campaign.loops, *campaign.sweeps)
+    tests: tuple[Loop | Sweep, ...] = (*campaign.loops, *campaign.sweeps, *campaign.validation)
     files = [test.source.file for test in tests if test.source]
     return [campaign.path, *(folder / file for file in files), *([folder / logo] if logo else [])]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,10 +20,12 @@ from bushfit.geometry import get_place
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import warnings_of
 from bushfit.prediction.response import TimeResponse, time_response
+from bushfit.prediction.validation import Validation
 from bushfit.reading.displacements import DisplacementHistory, read_displacements
 from bushfit.reading.layout import FileFormat
+from bushfit.reading.tablefile import folder_name
 from bushfit.report import plots
-from bushfit.report.response import response_figures, response_table
+from bushfit.report.response import record_table, response_figures, response_table, validation_table
 from bushfit.report.results import ResultFile, figure_file, table_file
 from bushfit.units import number
 
@@ -79,13 +82,12 @@ class ResponseOutput:
     def files(self) -> list[ResultFile]:
         """Table response.csv and figure response.png."""
 
+        table = table_file("response", lambda: response_table(self.time, self.responses))
+
         def draw() -> Figure:
             note = plots.style.warnings_note(self.warnings)
-            return plots.response.response_figure(
-                f"{self.result.name}: force over time", self.time, self.responses, note
-            )
+            return plots.response.response_figure(f"{self.result.name}: force over time", table.make(), note)
 
-        table = table_file("response", lambda: response_table(self.time, self.responses))
         return [table, figure_file("response", draw)]
 
 
@@ -180,3 +182,27 @@ def _one_cycle(channel: DisplacementHistory) -> DisplacementHistory:
         )
     is_repeated = abs(motion[-1] - motion[0]) < 0.5 * abs(motion[1] - motion[0])
     return replace(channel, displacement=motion[:-1]) if is_repeated else channel
+
+
+def validation_files(validations: Sequence[Validation], before: Sequence[Validation], title: str) -> list[ResultFile]:
+    """Table validation.csv, and for each validation record a table and a figure of measured and predicted force.
+
+    Args:
+        validations: comparisons with the model to use.
+        before: comparisons without the effects that a diagnosis added; empty if none were added.
+        title: beginning of the titles of the figures.
+
+    Returns:
+        Result files, not yet rendered; empty without records.
+    """
+    files = [table_file("validation", lambda: validation_table(validations, before))] if validations else []
+    for validation in validations:
+        name = f"validation_{folder_name(validation.record.name)}"
+        table = table_file(name, partial(record_table, validation))
+        draw = partial(_validation_figure, f"{title}: {validation.record.name}", table)
+        files += [table, figure_file(name, draw)]
+    return files
+
+
+def _validation_figure(title: str, table: ResultFile) -> Figure:
+    return plots.response.response_figure(title, table.make())

@@ -13,6 +13,7 @@ from bushfit.commands.diagnose import DiagnosisOutput, diagnose, diagnosis_files
 from bushfit.commands.fit import FitOutput, campaign_files, fit, fit_static, prepare_tests
 from bushfit.commands.predict import PredictionOutput, predict
 from bushfit.commands.provenance import campaign_document, result_document
+from bushfit.commands.respond import validation_files
 from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.errors import FitError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -20,6 +21,7 @@ from bushfit.fitting.procedures import TwoStep, fit_two_step
 from bushfit.model.document import ModelFile
 from bushfit.model.model import FIVE
 from bushfit.model.result import Result
+from bushfit.prediction.validation import Validation, validate
 from bushfit.report.page import report_page
 from bushfit.report.results import ResultFile, json_file, page_file
 
@@ -51,6 +53,7 @@ class RunOutput:
         predicted: prediction of the model to use.
         document: all documents, as `--json` prints them.
         files: documents, tables, figures and page.
+        validations: comparisons of the model to use with the validation records of the campaign.
     """
 
     data: PreparedCampaign
@@ -62,6 +65,7 @@ class RunOutput:
     predicted: PredictionOutput
     document: Mapping[str, Any]
     files: Sequence[ResultFile]
+    validations: Sequence[Validation] = ()
 
     def __repr__(self) -> str:
         return "\n".join(repr(output) for output in (self.diagnosed, self.result) if output)
@@ -113,9 +117,11 @@ def run(campaign: Campaign | PreparedCampaign, *, loss: Loss | None = None) -> R
     files += campaign_files(data, predicted.result)
     files += diagnosis_files(diagnosed.diagnosis, diagnosed.document, data.campaign.name) if diagnosed else []
     files += [file for file in predicted.files if file.name != "measured"]
+    validations = diagnosed.validations if diagnosed else validate(predicted.result, data.campaign.validation)
+    files += validation_files(validations, diagnosed.validations_before if diagnosed else (), data.campaign.name)
     files.append(page_file("report", report_page, files))
     document = {**documents, "warnings": predicted.warnings}
-    return RunOutput(data, static, two_step, reason, joint, diagnosed, predicted, document, files)
+    return RunOutput(data, static, two_step, reason, joint, diagnosed, predicted, document, files, validations)
 
 
 def _two_step(data: PreparedCampaign) -> tuple[TwoStep | None, str]:

@@ -20,6 +20,9 @@ from bushfit.prediction.stiffness import Band, candidates, envelope, uncertainty
 from bushfit.prediction.superposed import require_time_law
 from bushfit.units import number
 
+#: Largest stroke, relative to the range, that noise of the displacement may cause, and largest share of such strokes
+#: without a warning; chosen.
+_NOISE, _MOST_NOISE = 2e-3, 0.2
 #: Smallest number of samples per mean cycle without a warning: with 20 the springpot errs by 0.7 % of its force.
 _FEWEST_PER_CYCLE = 20.0
 
@@ -86,18 +89,22 @@ def work(history: History, force: Array) -> float:
     return float(np.trapezoid(force, history.value))
 
 
-def time_response(result: Result, place: Place, history: History, *, temperature: float | None = None) -> TimeResponse:
-    """Compute the force for a displacement history, of the bushing as the car will have it.
+def time_response(
+    result: Result, place: Place, history: History, *, temperature: float | None = None, rig: bool = False
+) -> TimeResponse:
+    """Compute the force for a displacement history.
 
     Args:
         result: fitted result.
         place: direction or specimen.
         history: displacement [m, rad or 1], (n,), from `History.sampled`.
         temperature: temperature of the rubber [K]; None for the reference temperature.
+        rig: True to include the effects of the rig, as in the tests; False for the bushing as the car will have it.
 
     Returns:
-        Force with a band that spans all models that agree with the tests. Effects of the rig, a correction without a
-        name and, in a steady state, effects of the first cycles are left out; the band includes the correction.
+        Force with a band that spans all models that agree with the tests. Effects of the rig (unless `rig`), a
+        correction without a name and, in a steady state, effects of the first cycles are left out; the band includes
+        the correction.
 
     Raises:
         ModelError: an effect of the model has no law in time.
@@ -116,7 +123,7 @@ def time_response(result: Result, place: Place, history: History, *, temperature
             replace(alternative, model=alternative.model.without(*left_out)) for alternative in result.alternatives
         ),
     )
-    models = candidates(timed)
+    models = candidates(timed, rig=rig)
     for _, model in models:
         require_time_law(model)
     force = envelope([_force(source, model, place, history, conditions) for source, model in models])
@@ -178,6 +185,12 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
         unit, factor = place.display.displacement
         sine = f"{number(history.frequency, 3)} Hz and {number(factor * history.amplitude.item(), 3)} {unit}"
         warnings.append(f"{place}: {' and '.join(constant)} constant, as in a sine of {sine}")
+    strokes = np.abs(history.turning.strides)
+    if np.mean(strokes < _NOISE * np.ptp(history.value)) > _MOST_NOISE:
+        warnings.append(
+            f"{place}: most reversals of the displacement are as small as noise, and friction follows each of them: "
+            "smooth the displacement"
+        )
     if not history.periodic and (samples := 1.0 / (history.frequency * history.step)) < _FEWEST_PER_CYCLE:
         warnings.append(
             f"{place}: the history has {number(samples, 2)} samples in a mean cycle, and forces between them are "

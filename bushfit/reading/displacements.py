@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bushfit.errors import MeasurementError
+from bushfit.errors import MeasurementError, error_location
 from bushfit.geometry import TRANSLATION, Direction, Place, strain_factor_of_files
 from bushfit.reading.headers import LOOP_COLUMNS
 from bushfit.reading.layout import FileFormat
@@ -112,7 +112,8 @@ def read_displacements(
     wanted["time"] = time_column(table)
     values, notes = table.read_with_notes(wanted, fewest_rows=_FEWEST_ROWS)
     time, more = increasing_time(table.needing(wanted), wanted["time"], values["time"])
-    even, correction = _even_time(table, time)
+    with error_location(table.file, "time"):
+        even, correction = even_time(time)
     notes = (*(note for note in notes if "displacement" in wanted or note not in table.notes), *more, *correction)
     return tuple(
         DisplacementHistory(
@@ -126,7 +127,7 @@ def read_displacements(
     )
 
 
-def _even_time(table: Table, time: Floats) -> tuple[Floats, tuple[str, ...]]:
+def even_time(time: Floats) -> tuple[Floats, tuple[str, ...]]:
     """Even times [s] over a record; and a sentence if the recorded times deviate from them by more than rounding."""
     even = np.linspace(time[0], time[-1], time.size)
     steps, correction = np.diff(time), tuple[str, ...]()
@@ -134,9 +135,8 @@ def _even_time(table: Table, time: Floats) -> tuple[Floats, tuple[str, ...]]:
     if np.any(np.abs(time - even) > _ROUNDING * step):
         count = round((time[-1] - time[0]) / step) + 1
         if count > _MOST_ADDED * time.size:
-            raise table.error(
+            raise MeasurementError(
                 "the times are too uneven",
-                column=table.roles["time"],
                 found=f"steps of {steps.min():.3g} to {steps.max():.3g} s",
                 expected=f"even steps, such as {step:.3g} s",
                 hint="export the record with a fixed rate, or without its pauses",
@@ -150,7 +150,5 @@ def _even_time(table: Table, time: Floats) -> tuple[Floats, tuple[str, ...]]:
             reason = f"{rows[gaps].sum() - gaps.sum()} rows are missing, {longest}"
         correction = (f"{reason}: resampled evenly at {1.0 / step:.6g} Hz, by straight lines",)
     if even.size > _MOST_ROWS:
-        raise MeasurementError(
-            "the history is too long", file=table.file, found=f"{even.size} rows", expected=f"up to {_MOST_ROWS}"
-        )
+        raise MeasurementError("the history is too long", found=f"{even.size} rows", expected=f"up to {_MOST_ROWS}")
     return even, correction

@@ -30,7 +30,7 @@ from bushfit.validation import (
 #: Keys of [[loops]] and [[sweeps]] that state which direction or specimen was tested.
 PLACE_KEYS = ("direction", "specimen")
 #: Lists of tests in [simulate].
-_LISTS = ("loops", "sweeps", "resonances")
+_LISTS = ("loops", "sweeps", "resonances", "validation")
 #: Validator that replaces the direction "shear" of a specimen by None.
 _SHEAR = converter(lambda raw, _: None if raw == "shear" else raw, {"enum": [*Direction, "shear"]})
 

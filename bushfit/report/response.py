@@ -1,4 +1,4 @@
-"""Table of a force over time, and its peak, mean and energy."""
+"""Tables of a force over time, measured and predicted, and its peak, energy and strain."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 import pandas as pd
 
 from bushfit.prediction.response import TimeResponse
+from bushfit.prediction.validation import Validation
 
 
 def response_table(time: Any, responses: Sequence[TimeResponse]) -> pd.DataFrame:
@@ -29,6 +30,36 @@ def response_table(time: Any, responses: Sequence[TimeResponse]) -> pd.DataFrame
         for end, values in (("", response.force.value), (", low", response.force.low), (", high", response.force.high)):
             columns[f"{force}{end}"] = force_factor * values
     return pd.DataFrame(columns)
+
+
+def validation_table(validations: Sequence[Validation], before: Sequence[Validation] = ()) -> pd.DataFrame:
+    """Table of the agreement of predictions with validation records, one row per record.
+
+    Args:
+        validations: comparisons with the model to use.
+        before: comparisons with the model without the effects that a diagnosis added; empty if none were added.
+
+    Returns:
+        Name, direction, NRMSE, peak and energy error, and share of the points inside the band, in percent.
+    """
+    columns = {
+        "test": [validation.record.name for validation in validations],
+        "direction": [str(validation.record.direction) for validation in validations],
+        "NRMSE [%]": [100.0 * validation.nrmse for validation in validations],
+        "peak error [%]": [100.0 * validation.peak_error for validation in validations],
+        "energy error [%]": [100.0 * validation.energy_error for validation in validations],
+        "points in band [%]": [100.0 * validation.share_inside for validation in validations],
+    }
+    if before:
+        columns["NRMSE before [%]"] = [100.0 * validation.nrmse for validation in before]
+    return pd.DataFrame(columns)
+
+
+def record_table(validation: Validation) -> pd.DataFrame:
+    """Table of a validation record over time: displacement, predicted force with its band, and measured force."""
+    table, place = response_table(validation.time, [validation.response]), validation.record.direction
+    unit, factor = place.display.force
+    return table.assign(**{f"measured {place.motion.words[1]} [{unit}]": factor * validation.measured})
 
 
 def response_figures(response: TimeResponse) -> dict[str, float | None]:

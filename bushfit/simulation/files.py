@@ -42,7 +42,7 @@ def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
         `campaign.toml` state the `bushfit reduce` command of each resonance test.
     """
     tables = {
-        **{loop.name: raw_loop_table(loop) for loop in simulated.loops},
+        **{loop.name: raw_loop_table(loop) for loop in (*simulated.loops, *simulated.validation)},
         **{sweep.name: raw_sweep_table(sweep) for sweep in simulated.sweeps},
         **{test.name: raw_resonance_table(test) for _, test in simulated.resonances},
     }
@@ -64,7 +64,11 @@ def _campaign_toml(simulated: Simulated, form: Form) -> str:
     if plan.level_gain_error or plan.level_phase_error:  # repeats do not show these errors: the campaign states them
         errors = {"gain_error": (plan.level_gain_error, "1"), "phase_error": (plan.level_phase_error, "rad")}
         lines += ["", "[rig]", *(f'{key} = "{size:.6g} {unit}"' for key, (size, unit) in errors.items())]
-    for kind, tests in (("loops", simulated.loops), ("sweeps", simulated.sweeps)):
+    for kind, tests in (
+        ("loops", simulated.loops),
+        ("sweeps", simulated.sweeps),
+        ("validation", simulated.validation),
+    ):
         for test in tests:
             lines += table_lines(kind, f"{test.name}.{end}", test.direction, test.temperature, test.preload)
     for mass, resonance in simulated.resonances:

@@ -38,6 +38,7 @@ class Simulated:
         loops, sweeps: simulated tests with noise.
         resonances: mass [kg] and record of each simulated resonance test.
         specimens: tested specimens.
+        validation: validation records with noise.
     """
 
     truth: Model
@@ -46,6 +47,7 @@ class Simulated:
     sweeps: tuple[Sweep, ...]
     resonances: tuple[tuple[float, ResonanceTest], ...] = ()
     specimens: tuple[Specimen, ...] = ()
+    validation: tuple[Loop, ...] = ()
 
     @property
     def result(self) -> Result:
@@ -58,7 +60,8 @@ class Simulated:
         reduced = tuple(reduce_resonance(test, mass).sweep for mass, test in self.resonances)
         bushing, name = self.truth.bushing, self.result.name
         loops = tuple(part for loop in self.loops for part in programme(loop))
-        return Campaign(name, Path(name), bushing, loops, self.sweeps + reduced, specimens=self.specimens)
+        tests = loops, self.sweeps + reduced, self.validation
+        return Campaign(name, Path(name), bushing, *tests, specimens=self.specimens)
 
 
 def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
@@ -106,8 +109,16 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
         frequency, measured = np.array(test.frequencies), _with_noise(ratio[None], plan, random)[0]
         base, source = np.full(ratio.shape, test.base_acceleration), Source(Path(f"{name}.csv"), "")
         resonances.append((test.mass, ResonanceTest(name, test.direction, frequency, measured, base, source)))
-    specimens = dict.fromkeys(test.direction for test in planned if isinstance(test.direction, Specimen))
-    return Simulated(clean.truth, plan, tuple(loops), tuple(sweeps), tuple(resonances), tuple(specimens))
+    records = []
+    for name, (planned_record, record) in zip(_names("record", plan.validation), clean.validation, strict=True):
+        noise = plan.force_noise * np.ptp(record.force) / 2.0 * _filtered_noise(record.time.size, plan, random)
+        place, temperature = planned_record.direction, planned_record.temperature
+        force = record.force + noise
+        records.append(Loop(name, place, record.time, record.displacement, force, temperature=temperature))
+    tested = (*planned, *plan.validation)
+    specimens = dict.fromkeys(test.direction for test in tested if isinstance(test.direction, Specimen))
+    tests = tuple(loops), tuple(sweeps), tuple(resonances)
+    return Simulated(clean.truth, plan, *tests, tuple(specimens), tuple(records))
 
 
 def _names(kind: str, tests: Sequence[SimulatedTest]) -> list[str]:

@@ -11,10 +11,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulateSettings
+from bushfit.campaign.schema import (
+    SimulatedLoop,
+    SimulatedRecord,
+    SimulatedResonance,
+    SimulatedSweep,
+    SimulateSettings,
+)
 from bushfit.campaign.session import planned_session
 from bushfit.effects import Level, Modifier, friction
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
+from bushfit.effects.history import History
 from bushfit.errors import CampaignError
 from bushfit.geometry import Direction, Place
 from bushfit.model import rig
@@ -34,6 +41,9 @@ PAPER_SWEEPS = tuple(
 )
 #: Rows of a simulated loop per cycle, and time steps per row.
 _ROWS_PER_CYCLE, _STEPS_PER_ROW = 1000, 2
+#: Rows per cycle of the fastest sine of a validation record, time steps per row, and share of its duration in which the
+#: motion grows from rest.
+_ROWS_PER_RECORD_CYCLE, _STEPS_PER_RECORD_ROW, _FADE_IN = 40, 10, 0.05
 #: Maximum number of time steps of a programme; they take seconds and a gigabyte.
 _MOST_STEPS = 10_000_000
 #: Smallest and largest number of cycles before a loop is recorded in its steady state.
@@ -53,12 +63,14 @@ class Undisturbed:
         loops: settings of each loop, with its record of time, displacement and force.
         sweeps: settings of each sweep, with its complex stiffness [N/m or N m/rad], (levels, steps).
         resonances: settings of each resonance test, with its complex transmissibility [-], (frequencies,).
+        validation: settings of each validation record, with its time, displacement and force.
     """
 
     truth: Model
     loops: tuple[tuple[SimulatedLoop, rig.Record], ...]
     sweeps: tuple[tuple[SimulatedSweep, Array], ...]
     resonances: tuple[tuple[SimulatedResonance, Array], ...] = ()
+    validation: tuple[tuple[SimulatedRecord, rig.Record], ...] = ()
 
 
 def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = rig.STEPS_PER_CYCLE) -> Undisturbed:
@@ -95,6 +107,7 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
         ),
         tuple((test, _clean_sweep(truth, test, steps_per_cycle)) for test in track("sweeps simulated", sweeps)),
         tuple((test, _clean_resonance(truth, test, steps_per_cycle)) for test in resonances),
+        tuple((test, _clean_record(truth, test, [plan.seed, number])) for number, test in enumerate(plan.validation)),
     )
 
 
@@ -160,6 +173,46 @@ def _clean_programme(truth: Model, test: SimulatedLoop, conditions: RubberCondit
         motions += [amplitude * rig.wave(test.waveform, phase), rest]
     motion = np.concatenate([*motions[:-1], [0.0]])
     return rig.imposed(truth, test.direction, motion, step, test.parts[0][0], conditions=conditions)
+
+
+def _clean_record(truth: Model, test: SimulatedRecord, seed: list[int]) -> rig.Record:
+    """Simulate a validation record from rest without noise, 40 rows and 400 time steps per cycle of its fastest sine.
+
+    The motion fades in over the first twentieth of its duration, so that it begins without a step.
+    """
+    frequency, random = np.array(test.frequencies), np.random.default_rng(seed)
+    step = 1.0 / (frequency[-1] * _ROWS_PER_RECORD_CYCLE * _STEPS_PER_RECORD_ROW)
+    count = round(test.duration / (step * _STEPS_PER_RECORD_ROW)) * _STEPS_PER_RECORD_ROW + 1
+    if count > _MOST_STEPS:
+        raise CampaignError(
+            "a validation record is too long to simulate",
+            place="simulate.validation",
+            found=f"{test.duration:.3g} s at up to {frequency[-1]:.3g} Hz",
+            expected=f"no more than {_MOST_STEPS} steps, {_ROWS_PER_RECORD_CYCLE * _STEPS_PER_RECORD_ROW} a cycle",
+        )
+    time = np.arange(count) * step
+    if test.motion == "sines":
+        phases = 2.0 * np.pi * random.random(frequency.size)
+        motion = np.zeros(count)
+        for f, amplitude, phase in zip(frequency, test.amplitudes, phases, strict=True):
+            motion += amplitude * np.sin(2.0 * np.pi * f * time + phase)
+    else:
+        lines = np.fft.rfftfreq(count, step)
+        inside = (lines >= frequency[0]) & (lines <= frequency[-1])
+        sizes = 1.0 / frequency if test.motion == "road" else np.array(test.amplitudes)
+        spectrum = np.zeros(lines.size, dtype=complex)
+        spectrum[inside] = np.exp(
+            np.interp(np.log(lines[inside]), np.log(frequency), np.log(sizes))
+            + 2j * np.pi * random.random(inside.sum())
+        )
+        motion = np.fft.irfft(spectrum, count)
+        motion *= (test.rms or 0.0) / np.std(motion)
+    motion *= np.minimum(time / (_FADE_IN * test.duration), 1.0)
+    conditions = RubberConditions(test.temperature)
+    mean_frequency = History.sampled(motion, step).frequency
+    record = rig.imposed(truth, test.direction, motion, step, mean_frequency, conditions=conditions)
+    rows = slice(None, None, _STEPS_PER_RECORD_ROW)
+    return rig.Record(record.time[rows], record.displacement[rows], record.force[rows])
 
 
 def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Array:

@@ -48,7 +48,8 @@ class ReportRecord:
         campaign: campaign, as the model file describes it; None if it is not known.
         diagnosis: content of diagnosis.json; None without a diagnosis.
         versions: versions of bushfit and of the numerical packages in use, by name.
-        tables: tables that are known: `gap` (measured minus model), and measured and modelled `sweeps` and `loops`.
+        tables: tables that are known: `gap` (measured minus model), measured and modelled `sweeps` and
+            `loops`, and validation records.
         predictions: predictions for all directions and specimens that were tested or predicted, by file name.
         charts: figures made in the run, by file name; other figures are made from the tables.
     """
@@ -122,7 +123,7 @@ def _tests(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
     for name, header in (("sweeps", "stepped"), ("loops", "frequency [Hz]")):
         if name in tested:
             require_columns(tested[name], "direction", header, "frequency [Hz]", "outlier")
-    return tested
+    return tested | {name: table for name, table in tables.items() if name.startswith("validation_")}
 
 
 def _predictions(
@@ -174,7 +175,8 @@ def read_results(folder: Path) -> list[ResultFile]:
     paths = {name: folder / f"{name}.json" for name in (*MODELS, JOINT, "diagnosis")}
     documents = [json_file(name, read_document(path)) for name, path in paths.items() if path.exists()]
     specimens = report_record(documents, folder).result.specimens
-    names = ("loops", "sweeps", "gap", *place_names([*Direction, *specimens]))
+    records = sorted({path.stem for path in folder.glob("validation_*") if path.suffix in (".csv", ".xlsx")})
+    names = ("loops", "sweeps", "gap", *records, *place_names([*Direction, *specimens]))
     tables = {name: table for name in names if (table := read_table(folder, name)) is not None}
     return [*documents, *(table_file(name, partial(pd.DataFrame, table)) for name, table in tables.items())]
 

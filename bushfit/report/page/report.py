@@ -145,6 +145,10 @@ def draw_figures(record: ReportRecord) -> tuple[list[Picture], list[Picture], bo
         page["gap", "Measured minus model"] = partial(plots.gap.gap_figure, gap, result, diagnosis, result.name)
     if loops is not None:
         page["loops", "Hysteresis loops"] = partial(plots.fits.loops_figure, result, loops, result.name)
+    for name, table in record.tables.items():
+        if name.startswith("validation_"):
+            title = f"Validation record {name.removeprefix('validation_')}, never fitted"
+            page[name, title] = partial(plots.response.response_figure, result.name, table)
     if sweeps is not None and gap is None:
         title = "Sweeps and their residuals"
         appendix["sweeps", title] = partial(plots.fits.sweeps_figure, result, sweeps, result.name)

@@ -1,11 +1,9 @@
 """Figure of a force over time: displacement, force with its band, and force over displacement."""
 
-from collections.abc import Sequence
-
 import numpy as np
+import pandas as pd
 
 from bushfit.effects.contract import Array
-from bushfit.prediction.response import TimeResponse
 from bushfit.report.plots import style
 
 #: Largest number of rows of a curve over time, and of a curve over displacement; a figure has fewer pixels.
@@ -17,46 +15,41 @@ PREDICTED, MEASURED = "#3b528b", "#c1121f"
 
 
 @style.in_own_style
-def response_figure(
-    title: str, time: Array, responses: Sequence[TimeResponse], note: str = "", measured: Array | None = None
-) -> style.Chart:
-    """Figure of responses: for each direction displacement and force over time, and force over displacement.
+def response_figure(title: str, table: pd.DataFrame, note: str = "") -> style.Chart:
+    """Figure of a response: for each direction displacement and force over time, and force over displacement.
 
     Args:
         title: title of the figure.
-        time: time of each row [s], (n,).
-        responses: responses to histories with these times.
+        table: table from `report.response.response_table`, or `record_table` with a measured force.
         note: further sentences below the figure.
-        measured: measured force of the only response [N, N m or Pa], (n,), for comparison; None without measurement.
 
     Returns:
         Figure with three panels per direction.
     """
-    figure = style.Chart(title, len(responses) * 2 * _STRIP)
-    grid = figure.add_gridspec(2 * len(responses), 3)
-    for row, response in enumerate(responses):
-        (length, length_factor), (unit, force_factor), _ = response.direction.display
-        moves, resists, _ = response.direction.motion.words
-        displacement, band = length_factor * response.history.value, response.force
+    is_measured = str(table.columns[-1]).startswith("measured ")
+    count = (table.columns.size - 1) // 4
+    time, *columns = table.to_numpy(dtype=float).T
+    figure = style.Chart(title, count * 2 * _STRIP)
+    grid = figure.add_gridspec(2 * count, 3)
+    for row in range(count):
+        displacement, force, low, high = columns[4 * row : 4 * row + 4]
+        moves, resists = (str(header) for header in table.columns[4 * row + 1 : 4 * row + 3])
         motion = figure.add_subplot(grid[2 * row, :2])
         course = figure.add_subplot(grid[2 * row + 1, :2], sharex=motion)
         loop = figure.add_subplot(grid[2 * row : 2 * row + 2, 2])
         rows = turning_rows(displacement, _MOST_OVER_TIME)
         motion.plot(time[rows], displacement[rows], color=style.GREY, lw=0.7)
-        rows = turning_rows(band.value, _MOST_OVER_TIME)
-        low, high = force_factor * band.low[rows], force_factor * band.high[rows]
-        course.fill_between(time[rows], low, high, color=PREDICTED, alpha=0.3, lw=0)
-        for force, color in ((measured, MEASURED), (band.value, PREDICTED)):
-            if force is not None:
-                rows = turning_rows(force, _MOST_OVER_TIME)
-                course.plot(time[rows], force_factor * force[rows], color=color, lw=0.7)
-                rows = turning_rows(force, _MOST_OVER_DISPLACEMENT)
-                loop.plot(displacement[rows], force_factor * force[rows], color=color, lw=0.5)
-        motion.set_title(str(response.direction), fontsize=style.TEXT, loc="left", color=style.GREY)
-        style.label_axes(motion, "", f"{moves} [{length}]")
-        style.label_axes(course, "time [s]", f"{resists} [{unit}]")
-        style.label_axes(loop, f"{moves} [{length}]", f"{resists} [{unit}]")
-    return figure.explain("Blue: model; shaded: its 95 % band.", "Red: measured." * (measured is not None), note=note)
+        rows = turning_rows(force, _MOST_OVER_TIME)
+        course.fill_between(time[rows], low[rows], high[rows], color=PREDICTED, alpha=0.3, lw=0)
+        for values, color in ((columns[-1], MEASURED), (force, PREDICTED))[not is_measured :]:
+            rows = turning_rows(values, _MOST_OVER_TIME)
+            course.plot(time[rows], values[rows], color=color, lw=0.7)
+            rows = turning_rows(values, _MOST_OVER_DISPLACEMENT)
+            loop.plot(displacement[rows], values[rows], color=color, lw=0.5)
+        style.label_axes(motion, "", moves)
+        style.label_axes(course, "time [s]", resists)
+        style.label_axes(loop, moves, resists)
+    return figure.explain("Blue: model; shaded: its 95 % band.", "Red: measured." * is_measured, note=note)
 
 
 def turning_rows(values: Array, most: int) -> Array:

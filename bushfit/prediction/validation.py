@@ -1,0 +1,79 @@
+"""Measured and predicted force of validation records, which no fit uses."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bushfit.effects.contract import Array
+from bushfit.effects.history import History
+from bushfit.errors import error_location
+from bushfit.model.result import Result
+from bushfit.prediction.response import TimeResponse, time_response, work
+from bushfit.reading.displacements import even_time
+from bushfit.reading.measurement import Loop
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """Comparison of the measured force of a record with the force that a model predicts for its displacement.
+
+    Args:
+        record: record as read, in SI.
+        time: evenly sampled time [s], (n,).
+        response: predicted force at these times, with effects of the rig, as in the test.
+        measured: measured force [N, N m or Pa], without the zero error of the force, (n,).
+    """
+
+    record: Loop
+    time: Array
+    response: TimeResponse
+    measured: Array
+
+    @property
+    def nrmse(self) -> float:
+        """Root mean square of predicted minus measured force, relative to half the range of the measured force."""
+        error = self.response.force.value - self.measured
+        return float(2.0 * np.sqrt(np.mean(np.square(error))) / np.ptp(self.measured))
+
+    @property
+    def peak_error(self) -> float:
+        """Relative error of the predicted largest magnitude of the force."""
+        return float(self.response.peak / np.abs(self.measured).max() - 1.0)
+
+    @property
+    def energy_error(self) -> float:
+        """Relative error of the predicted work of the motion on the bushing."""
+        history = self.response.history
+        return work(history, self.response.force.value) / work(history, self.measured) - 1.0
+
+    @property
+    def share_inside(self) -> float:
+        """Share of the measured points inside the 95 % band of the prediction."""
+        force = self.response.force
+        return float(np.mean((force.low <= self.measured) & (self.measured <= force.high)))
+
+
+def validate(result: Result, records: Sequence[Loop]) -> list[Validation]:
+    """Predict the force of validation records with a fitted model, from rest.
+
+    Args:
+        result: fitted result.
+        records: records of time, displacement and force under any motion.
+
+    Returns:
+        Comparison for each record.
+
+    Notes:
+        The zero of a load cell is unknown: the mean difference between measured and predicted force is removed.
+    """
+    validations = []
+    for record in records:
+        with error_location(record.source.file if record.source else None, "time"):
+            time, _ = even_time(record.time)
+        displacement, force = (np.interp(time, record.time, values) for values in (record.displacement, record.force))
+        history = History.sampled(displacement, float(time[1] - time[0]))
+        response = time_response(result, record.direction, history, temperature=record.temperature, rig=True)
+        measured = force - np.mean(force - response.force.value)
+        validations.append(Validation(record, time, response, measured))
+    return validations

@@ -1,0 +1,135 @@
+"""Validation records: simulated, never fitted, compared by run, diagnose and report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from shell import BUSHING, Run
+
+SIMULATED = f"""{BUSHING}
+[simulate]
+seed = 3
+repeats = 3
+noise = "0.3 %"
+force_noise = "0.2 %"
+
+[simulate.parameters]
+mu = "1.09 MPa"
+m = "0.2 MPa*s^alpha"
+alpha = 0.24
+sigma_fmax = "14.6 kPa"
+eps_half = 0.013
+
+[simulate.effects.inertia]
+mass = "0.2 kg"
+
+[[simulate.loops]]
+direction = "axial"
+amplitude = "1 mm"
+frequency = "0.1 Hz"
+
+[[simulate.sweeps]]
+direction = "axial"
+amplitudes = ["0.1 mm", "0.2 mm", "0.5 mm"]
+frequencies = {{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }}
+
+[[simulate.validation]]
+direction = "axial"
+motion = "random"
+frequencies = ["2 Hz", "60 Hz"]
+amplitudes = ["1 mm", "1 mm"]
+rms = "0.05 mm"
+duration = "3 s"
+
+[[simulate.validation]]
+direction = "axial"
+motion = "sines"
+frequencies = ["2 Hz", "50 Hz"]
+amplitudes = ["0.2 mm", "0.05 mm"]
+duration = "2 s"
+
+[[simulate.validation]]
+direction = "axial"
+motion = "road"
+frequencies = ["1 Hz", "40 Hz"]
+rms = "0.1 mm"
+duration = "4 s"
+"""
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A simulated campaign with three validation records and a hidden mass."""
+    from shell import typing
+
+    folder = tmp_path_factory.mktemp("validation")
+    (folder / "plan.toml").write_text(SIMULATED)
+    typing(folder)("simulate", "plan.toml", "-o", "tests")
+    return folder / "tests/campaign.toml"
+
+
+def test_simulated_motions_have_the_stated_spectra(campaign: Path) -> None:
+    random, sines, road = (pd.read_csv(campaign.parent / f"record_axial_{number}.csv") for number in (1, 2, 3))
+    for table, rms, duration in ((random, 0.05, 3.0), (road, 0.1, 4.0)):
+        assert table["displacement [mm]"].std() == pytest.approx(rms, rel=0.05)
+        assert table["time [s]"].iloc[-1] == pytest.approx(duration, rel=0.01)
+        assert table["displacement [mm]"].iloc[0] == 0.0
+    settled = sines[sines["time [s]"] >= 1.0]
+    step = sines["time [s]"][1]
+    size = 2.0 * np.abs(np.fft.rfft(settled["displacement [mm]"][: round(1.0 / step)])) * step
+    assert size[[2, 50]] == pytest.approx([0.2, 0.05], rel=0.01)
+    for table, ratio in ((random, 1.0), (road, 3.0)):  # of the spectra from 5 to 10 and from 15 to 30 Hz
+        spectrum = np.abs(np.fft.rfft(table["displacement [mm]"])) ** 2
+        frequency = np.fft.rfftfreq(len(table), table["time [s]"][1])
+        low, high = (spectrum[(frequency > end) & (frequency < 2.0 * end)].mean() for end in (5.0, 15.0))
+        assert np.sqrt(low / high) == pytest.approx(ratio, rel=0.25)
+
+
+def test_run_compares_measured_and_predicted_force(campaign: Path, bushfit: Run, tmp_path: Path) -> None:
+    done = bushfit("run", campaign, "-o", tmp_path / "run")
+    assert "validation records, never fitted" in done.stderr
+    table = pd.read_csv(tmp_path / "run/validation.csv")
+    assert table["test"].tolist() == [f"record_axial_{number}" for number in (1, 2, 3)]
+    assert (table["NRMSE [%]"] < 0.6).all()
+    assert (table["NRMSE before [%]"] > 2.0 * table["NRMSE [%]"])[:2].all()
+    assert table[["peak error [%]", "energy error [%]"]].abs().max().max() < 3.0
+    record = pd.read_csv(tmp_path / "run/validation_record_axial_1.csv")
+    error = record["force [N]"] - record["measured force [N]"]
+    nrmse = 200.0 * np.sqrt(np.mean(error**2)) / np.ptp(record["measured force [N]"])
+    assert table["NRMSE [%]"][0] == pytest.approx(nrmse, rel=1e-3)
+    inside = record["measured force [N]"].between(record["force [N], low"], record["force [N], high"])
+    assert table["points in band [%]"][0] == pytest.approx(100.0 * inside.mean(), abs=0.1)
+    page = (tmp_path / "run/report.html").read_text()
+    assert "Validation record record_axial_1, never fitted" in page
+    bushfit("report", tmp_path / "run", "-o", tmp_path / "page")
+    assert "Validation record record_axial_1, never fitted" in (tmp_path / "page/report.html").read_text()
+
+
+def test_a_gain_of_the_force_is_visible(campaign: Path, bushfit: Run, tmp_path: Path) -> None:
+    for file in campaign.parent.glob("*.*"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    table = pd.read_csv(tmp_path / "record_axial_1.csv")
+    table["force [N]"] *= 1.1
+    table.to_csv(tmp_path / "record_axial_1.csv", index=False)
+    done = bushfit("diagnose", tmp_path / "campaign.toml", "-o", tmp_path / "out", "--no-plots")
+    assert "never fitted: predicted compared with measured force" in done.stderr
+    found = pd.read_csv(tmp_path / "out/validation.csv")
+    assert found["peak error [%]"][0] == pytest.approx(100.0 / 1.1 - 100.0, abs=1.5)
+    assert found["energy error [%]"][0] == pytest.approx(100.0 / 1.1 - 100.0, abs=3.0)
+    assert found["NRMSE [%]"][0] > 5.0 * found["NRMSE [%]"][1]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ('rms = "0.05 mm"', "", "these keys do not state a motion"),
+        ('["2 Hz", "60 Hz"]', '["60 Hz", "2 Hz"]', "these frequencies are no band"),
+        ('duration = "3 s"', 'duration = "3000 s"', "too long to simulate"),
+    ],
+)
+def test_impossible_records_are_one_error(bushfit: Run, tmp_path: Path, old: str, new: str, problem: str) -> None:
+    (tmp_path / "plan.toml").write_text(SIMULATED.replace(old, new, 1))
+    assert problem in bushfit("simulate", tmp_path / "plan.toml", "-o", tmp_path / "out", status=2).stderr
