@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field, InstanceOf, WithJsonSchema
 
+from bushfit.campaign.bodies import BushingSettings, SpecimenSettings
 from bushfit.campaign.quantities import (
     Compound,
     EffectsSettings,
@@ -18,7 +19,7 @@ from bushfit.campaign.quantities import (
 from bushfit.effects import is_parameter, parameter_names
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
-from bushfit.geometry import TRANSLATION, Bushing, Direction, Place, Shape, Specimen, SpecimenKind, StatedStrain
+from bushfit.geometry import TRANSLATION, Place, Specimen
 from bushfit.reading.measurement import Stepped, Waveform
 from bushfit.reading.preload import Preload, parse_preload
 from bushfit.reading.resonance import FEWEST_ROWS
@@ -27,7 +28,6 @@ from bushfit.validation import (
     LARGEST_SHAKEN,
     SHAKEN,
     Angle,
-    Count,
     Flag,
     Frequencies,
     Frequency,
@@ -66,71 +66,6 @@ def _fit_table(raw: dict[str, Any]) -> dict[str, Any]:
 _SIMULATED_PLACES = converter(
     lambda raw, info: with_places(raw, [Specimen(**vars(table)) for table in info.data.get("specimens", ())])
 )
-
-
-@dataclass(frozen=True)
-class BushingSettings:
-    """[bushing]: a tube of rubber between two sleeves, by its radii or its diameters.
-
-    Args:
-        name: name of the bushing, used as title of tables and plots.
-        inner_radius, outer_radius: radius of the rubber [m].
-        inner_diameter, outer_diameter: diameter of the rubber in place of the radius [m].
-        length: mean length of the rubber [m].
-        shape: formulas for radial stiffness: those of the paper, or corrected by finite elements.
-    """
-
-    name: Name
-    length: Length
-    inner_radius: Length | None = None
-    outer_radius: Length | None = None
-    inner_diameter: Length | None = None
-    outer_diameter: Length | None = None
-    shape: Shape = "paper"
-
-    def __post_init__(self) -> None:
-        for side in ("inner", "outer"):
-            radius, diameter = getattr(self, f"{side}_radius"), getattr(self, f"{side}_diameter")
-            if (radius is None) == (diameter is None):
-                problem = f"the {side} size of the rubber is {'missing' if radius is None else 'stated twice'}"
-                expected = f"{side}_radius or {side}_diameter"
-                raise ValueError(CampaignError(problem, place=f"{side}_radius", expected=expected))
-
-    def to_bushing(self) -> Bushing:
-        """Make the bushing that the table [bushing] describes; diameters are converted to radii."""
-        radii = {
-            f"{side}_radius": getattr(self, f"{side}_radius") or getattr(self, f"{side}_diameter") / 2.0
-            for side in ("inner", "outer")
-        }
-        return Bushing(self.name, length=self.length, shape=self.shape, **radii)
-
-
-@dataclass(frozen=True)
-class SpecimenSettings:
-    """[[specimens]]: another body of the same compound, and the kind of its tests. See geometry.Specimen.
-
-    Args:
-        name: name of the specimen in tests and tables.
-        kind: "modulus" if tests give strain and modulus, "shear" if tests give displacement and force of blocks.
-        strain: strain in files of a modulus test: engineering shear, tensor (half of it), or that of a bar in tension.
-        area: area of one block in shear [m^2].
-        thickness: thickness of one block in shear [m].
-        elements: number of blocks in parallel.
-    """
-
-    name: Name
-    kind: SpecimenKind
-    strain: StatedStrain = "engineering"
-    area: Annotated[float, si("m^2"), Field(gt=0)] | None = None
-    thickness: Length | None = None
-    elements: Count = 1
-
-    def __post_init__(self) -> None:
-        if self.name in (*Direction, "loops", "sweeps", "gap", "candidates", "measured", "shear"):
-            expected = "a name of its own: its tables are named after it"
-            raise ValueError(
-                CampaignError("another table has this name", place="name", found=self.name, expected=expected)
-            )
 
 
 @dataclass(frozen=True)

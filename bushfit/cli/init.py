@@ -153,7 +153,7 @@ def make_bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, d
         CampaignError, UnitError, ModelError: a size is missing or impossible. Errors name the options as given, radius
             or diameter.
     """
-    from bushfit.campaign.schema import BushingSettings
+    from bushfit.campaign.bodies import BushingSettings
     from bushfit.validation import validate_tables
 
     table, halved = dict[str, str](), list[str]()

@@ -2,22 +2,22 @@
 
 import csv
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from bushfit.errors import MeasurementError
 from bushfit.reading.headers import WORDS, Column, plain
 from bushfit.reading.instruments import word_for_part
-from bushfit.reading.layout import FileFormat, Layout, is_comment, is_row, is_summary_row, is_units_row
+from bushfit.reading.layout import FileFormat, Layout, Line, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, consistent_notations, is_like_number
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 from bushfit.reading.times import clock
 
 #: Largest ratio of left-out rows that look like data to rows of data; chosen: with more, the meaning is in doubt.
-MOST_LEFT_OUT = 0.1
+_MOST_LEFT_OUT = 0.1
 #: Number of first rows that are examined; chosen: a long record need not be read completely.
 _FIRST = 1000
 #: Largest number of lines that a note lists.
@@ -122,6 +122,26 @@ class Cells:
                 return "doubtful" if not is_word else "missing" if word in _MISSING else "word"
         return None
 
+    def without_faults(self) -> tuple[Self, list[Row]]:
+        """Return the table without lines that are not data, and these lines.
+
+        Only lines with letters, dashes or empty cells are tested.
+        """
+        source, layout, faulty = self.source, self.layout, list[Row]()
+        if not isinstance(source, Text) or layout.numbered:
+            return self, faulty
+        chunks, chunk_start = list[bytes](), 0
+        for number, start, end in source.suspicious(layout, _MOST_LEFT_OUT) or ():
+            line = Line(number, source.data[start:end].decode("utf-8", "replace").rstrip())
+            cells = [] if is_comment(line.content, layout.delimiter) else cells_of(line, layout)
+            cells = [*cells, *[""] * (len(self.headers) - len(cells))]
+            if any(cells) and self.fault(cells):
+                faulty.append((number, cells))
+                chunks.append(source.data[chunk_start:start])
+                chunk_start = end
+        data = b"".join([*chunks, source.data[chunk_start:]])
+        return (replace(self, source=Text(data, source.encoding)) if faulty else self), faulty
+
     def note_left_out(self, rows: Sequence[Row] | None = None) -> Iterator[str]:
         """Describe the rows that are left out because they are not data; `rows` are candidates, by default all rows.
 
@@ -141,7 +161,7 @@ class Cells:
                 in_doubt += [(line, cells)] * (fault in ("doubtful", "word"))
                 digits += fault == "doubtful"
         is_much = digits > 1 or len(in_doubt) > _MOST_WORDS
-        if is_much and len(in_doubt) > MOST_LEFT_OUT * sum(1 for _ in self.rows()):
+        if is_much and len(in_doubt) > _MOST_LEFT_OUT * sum(1 for _ in self.rows()):
             raise self.bad_row(*in_doubt[0], len(in_doubt))
         if left_out:
             listed = [

@@ -16,7 +16,7 @@ from bushfit import units
 from bushfit.errors import MeasurementError, UnitError, error_location
 from bushfit.geometry import STRAINING, TRANSLATION, Motion
 from bushfit.reading.blocks import combined
-from bushfit.reading.cells import MOST_LEFT_OUT, Cells, Row
+from bushfit.reading.cells import Cells
 from bushfit.reading.classification import classify
 from bushfit.reading.headers import (
     LOOP_COLUMNS,
@@ -30,11 +30,11 @@ from bushfit.reading.headers import (
     split_convention,
 )
 from bushfit.reading.labelled import Rows, find_labels, select_rows
-from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, Line, find_layout, is_comment
+from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import Numerals, consistent_notations
 from bushfit.reading.parts import OpenedFile, open_file
-from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, Channels, RowSource, Sheet, Text, cells_of
+from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, Channels, RowSource, Sheet, Text
 from bushfit.reading.times import clock
 from bushfit.reading.wide import unpivot
 
@@ -272,7 +272,7 @@ class Table(Cells):
         table, left_out = self.needing(wanted), None
         values = table._read_with_pandas(wanted)
         if values is None:
-            cleaned, left_out = table._without_faults()
+            cleaned, left_out = table.without_faults()
             values = cleaned._read_with_pandas(wanted) if left_out else None
             if values is None:
                 cleaned, left_out, values = table, None, table._row_by_row(wanted)
@@ -362,26 +362,6 @@ class Table(Cells):
             x.min(initial=0.0) >= -LARGEST_VALUE and x.max(initial=0.0) <= LARGEST_VALUE for x in values.values()
         )
         return values if fits else None  # so are numbers that are not finite
-
-    def _without_faults(self) -> tuple["Table", list[Row]]:
-        """Return the table without lines that are not data, and these lines.
-
-        Only lines with letters, dashes or empty cells are tested.
-        """
-        source, layout, faulty = self.source, self.layout, list[Row]()
-        if not isinstance(source, Text) or layout.numbered:
-            return self, faulty
-        chunks, chunk_start = list[bytes](), 0
-        for number, start, end in source.suspicious(layout, MOST_LEFT_OUT) or ():
-            line = Line(number, source.data[start:end].decode("utf-8", "replace").rstrip())
-            cells = [] if is_comment(line.content, layout.delimiter) else cells_of(line, layout)
-            cells = [*cells, *[""] * (len(self.headers) - len(cells))]
-            if any(cells) and self.fault(cells):
-                faulty.append((number, cells))
-                chunks.append(source.data[chunk_start:start])
-                chunk_start = end
-        data = b"".join([*chunks, source.data[chunk_start:]])
-        return (replace(self, source=Text(data, source.encoding)) if faulty else self), faulty
 
     def _row_by_row(self, wanted: Mapping[str, Column]) -> dict[str, Floats]:
         """Values in SI by role, (n,) each, of a table that pandas cannot read.
