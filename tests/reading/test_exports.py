@@ -94,26 +94,3 @@ def test_parts_side_by_side_and_date_cells_of_a_workbook(tmp_path: Path) -> None
     assert len(document["files"]) == len(tests) == 2
     for test, factor in zip(tests, (1.0, 1.1), strict=True):
         check(test, {**LOOP, "force": factor * FORCE})
-
-
-FITTED = [
-    *("phases near 174", "Amplitude RMS [mm]", "damping coefficient alone", "blocks with amplitudes", "F and x"),
-    *("omega with the unit of the hint", "amplitudes stated as rms", "damping is a damping ratio", "decibels"),
-    *("complex numbers", "encoding cp932", "an overflow and means"),
-]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", FITTED)
-def test_a_fit_of_an_export_equals_that_of_a_plain_file(name: str, tmp_path: Path) -> None:
-    values = []
-    for folder, export in (("plain", EXPORTS["damping is a loss factor"]), ("export", EXPORTS[name])):
-        (tmp_path / folder).mkdir()
-        content = export.content if isinstance(export.content, bytes) else export.content.encode()
-        (tmp_path / folder / "sweep.txt").write_bytes(content)
-        inspected(tmp_path / folder, "sweep.txt", **export.stated)
-        done = call(tmp_path / folder, "fit", "campaign.toml", "--json", "-o", "y", "--no-plots")
-        assert done.returncode == 0, done.stderr
-        values.append(json.loads(done.stdout)["parameters"])
-    for parameter, value in values[0].items():
-        assert values[1][parameter]["value"] == pytest.approx(value["value"], rel=1e-4)

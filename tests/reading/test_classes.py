@@ -1,0 +1,111 @@
+"""Classes of files that once were read wrongly, or refused, through `init` and `fit`: as the fit of a plain file.
+
+`inspect --json` gives the values of each of these files in test_exports.py.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commandline import call
+from exports import EXPORTS, Export, loop
+from test_exports import options
+
+GEOMETRY = ("--inner-diameter", "20 mm", "--outer-diameter", "36 mm", "--length", "34 mm", "--direction", "axial")
+PLAIN = {"sweep": EXPORTS["damping is a loss factor"], "loop": Export(loop(), "loop")}
+
+
+def with_hum(amplitude: float) -> Export:
+    """The plain loop, recorded every 2 ms, with a ripple of 25 Hz [mm]."""
+    time = np.arange(15_000) * 2e-3
+    phase = 0.2 * np.pi * time
+    motion = np.sin(phase) + amplitude * np.sin(250.0 * phase)
+    return Export(loop("time [s]|displacement [mm]|force [N]", time, motion, 1000.0 * np.sin(phase + 0.1)), "loop")
+
+
+#: Exports of each class, by its subject.
+CLASSES: dict[str, tuple[str, ...]] = {
+    "sweeps with further columns": ("displacement and force of the points", "mean position and load"),
+    "statements of headers": (
+        *(
+            "omega with the unit of the hint",
+            "log10 f",
+            "Amplitude RMS [mm]",
+            "AmpPkPk(mm)",
+            "amplitudes stated as rms",
+        ),
+        *("damping is a damping ratio", "decibels"),
+    ),
+    "damping coefficients": ("damping coefficient beside a phase", "damping coefficient alone", "MTS elastomer"),
+    "rows and blocks": (
+        *("blocks with amplitudes", "blocks, means, and an end", "missing values", "an overflow and means"),
+        *("MTS793, nine acquisitions", "end of a loop"),
+    ),
+    "signs and ranges of phases": ("phases negative", "phases near 174", "phases near 366", "loss stiffness negative"),
+    "times": ("clock", "ISO", "date and time", "AM and PM", "day numbers", "day numbers as days"),
+    "delimiters": ("columns of one width with a units row", "carets"),
+    "columns": (
+        *(
+            "columns by unit: t [s]|LVDT 2 [mm]|Load Cell [N]",
+            "unit N.mm-1",
+            "real and imaginary",
+            "F and x",
+            "LabVIEW",
+        ),
+        *("no header, columns by number", "unnamed last column", "complex numbers", "encoding cp932"),
+    ),
+    "contradictions": ("amplitudes that agree",),
+}
+#: One of each kind runs with the quick tests.
+_QUICK = {"blocks with amplitudes", "clock"}
+
+
+def fitted(folder: Path, *exports: Export) -> dict[str, float]:
+    """Parameters of the campaign that `init` writes of plain files and of an export, as `fit --json` prints them."""
+    folder.mkdir()
+    stated: dict[str, str] = {}
+    for number, export in enumerate(exports):
+        file = folder / f"{number}_{export.name}"
+        file.write_bytes(export.content if isinstance(export.content, bytes) else export.content.encode())
+        stated |= export.stated
+    files = sorted(file.name for file in folder.iterdir())
+    done = call(folder, "init", *files, *GEOMETRY, *options(stated), "-o", "campaign.toml", "--no-input")
+    assert done.returncode == 0, done.stderr
+    done = call(folder, "fit", "campaign.toml", "--json", "-o", "y", "--no-plots")
+    assert done.returncode == 0, done.stderr
+    return {name: entry["value"] for name, entry in json.loads(done.stdout)["parameters"].items()}
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, float]]:
+    """Parameters of a plain sweep, and of a plain sweep with a plain loop."""
+    folder = tmp_path_factory.mktemp("plain")
+    sweep = EXPORTS["phases negative"]
+    return {"sweep": fitted(folder / "sweep", PLAIN["sweep"]), "loop": fitted(folder / "loop", sweep, PLAIN["loop"])}
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name in _QUICK else pytest.mark.slow)
+        for names in CLASSES.values()
+        for name in names
+    ],
+)
+def test_a_fit_of_an_export_equals_that_of_a_plain_file(
+    name: str, plain: dict[str, dict[str, float]], tmp_path: Path
+) -> None:
+    export = EXPORTS[name]
+    kind = export.kind or "sweep"
+    files = [export] if kind == "sweep" else [EXPORTS["phases negative"], export]
+    assert fitted(tmp_path / "export", *files) == pytest.approx(plain[kind], rel=1e-3)
+
+
+def test_a_fit_of_a_loop_with_hum_is_that_of_the_loop(tmp_path: Path) -> None:
+    """A ripple of 0.5 % is no test of its own."""
+    sweep = EXPORTS["phases negative"]
+    clean, values = (fitted(tmp_path / f"hum{size}", sweep, with_hum(size)) for size in (0.0, 0.005))
+    assert values == pytest.approx(clean, rel=0.02)
