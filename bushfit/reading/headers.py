@@ -110,7 +110,7 @@ _CONVENTIONS: tuple[tuple[re.Pattern[str], AmplitudeConvention], ...] = (
             rf"{_START}(?:{_PEAK}[\s_/-]*(?:(?:to|zu|a|2)[\s_-]*)?{_PEAK}|p[\s_./-]?(?:t[\s_./-]?|2[\s_./-]?)?p"
             rf"|v[\s_-]?pp|c[\s-](?:a[\s-])?c|s[.-]?s|max\.?[\s_./-]*(?:min|to[\s_-]*min)|\(?2\s?[ax](?:_?0)?\)?)\.?{_END}"
             rf"|{_AFTER_UNIT}(?:pk?-?pk?|s-?s){_END}|\((?:total|double|full)\)|(?<=amplitude)[\s,_-]+total{_END}"
-            rf"|{_START}{_PEAK}[\s_/-]*(?:to[\s_-]*)?valley{_END}|[両全](?=振幅)|峰-?峰值?"
+            rf"|{_START}{_PEAK}[\s_/-]*(?:to[\s_-]*)?valley{_END}|[両全双](?=振幅)|峰-?峰值?"
         ),
         "peak-to-peak",
     ),
@@ -120,7 +120,7 @@ _CONVENTIONS: tuple[tuple[re.Pattern[str], AmplitudeConvention], ...] = (
     ),
     (
         re.compile(
-            rf"\u00b1|\+/?-|(?:{_START}|{_AFTER_UNIT}){_ONE_PEAK}\.?{_END}|[片半](?=振幅)|(?<=振幅)(?:峰值|\(?ヒーク値?\)?)"
+            rf"\u00b1|\+/?-|(?:{_START}|{_AFTER_UNIT}){_ONE_PEAK}\.?{_END}|[片半单單](?=振幅)|(?<=振幅)(?:峰值|\(?ヒーク値?\)?)"
         ),
         "zero-to-peak",
     ),

@@ -51,7 +51,7 @@ _KEY_OF = {plain(name): key for key, names in WORDS["above"].items() for name in
 #: Usual names of amplitude and frequency above a table.
 _VOCABULARY = Vocabulary({role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}, {})
 #: Separator between a name and its value above a table.
-_AFTER_KEY = re.compile(r"\t|;|:\s|:$|\s=\s|=|,(?!\d)")
+_AFTER_KEY = re.compile(r"\t|;|:\s|:$|\s=\s|=|,(?!\d)|(?<=[^\W\d]),")
 #: Decimal comma of a number at the start of a value.
 _COMMA = re.compile(r"^([+-]?\d+),(?=\d+(?!\d|[.,]\d))")
 #: Characters of the longest value above a table; chosen: a longer one is a text.

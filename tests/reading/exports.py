@@ -383,5 +383,13 @@ EXPORTS: dict[str, Export] = {
             ("cp1251", "Частота, Гц|Амплитуда, мм|Жёсткость, Н/мм|Угол потерь, град", PHASE), ("cp1252", "Fréquence [Hz]|Amplitude crête [mm]|Raideur [N/mm]|Facteur de perte", ETA),
         )
     },
+    "JIS K 6394": Export(
+        "試験名,防振ゴム動特性\n試験日,2026/05/03\n温度,23℃\n\n" + sweep("周波数(Hz)|片振幅(mm)|動的ばね定数(N/mm)|損失係数(-)", F, A, K, ETA, mark=",")
+    ),
+    "GB/T": Export("试样编号,3\n试验温度,23℃\n" + sweep("频率/Hz|双振幅/mm|动刚度/(kN/mm)|相位角/rad", F, 2 * A, K / 1e3, PHASE * np.pi / 180, mark=",")),
+    "means of levels": Export(
+        sweep("f [Hz]|A0 [mm]|K* [N/mm]|delta [°]|Status", [*F[:5], "MW", *F[5:], "MW"], [*A[:5], "", *A[5:], ""], [*K[:5], 2.5, *K[5:], 2.5], [*PHASE[:5], 2.5, *PHASE[5:], 2.5], ["OK"] * 12),
+        words=["2 rows left out"],
+    ),
     "times too coarse": Export(loop("Time [s]|Displacement [mm]|Force [N]", ["0"] * 300 + ["1"] * 300, DISPLACEMENT, FORCE), None, ["more digits"]),
 }  # fmt: skip
