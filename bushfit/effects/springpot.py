@@ -1,5 +1,7 @@
 """Springpot branch: a fractional derivative, stiffness and loss that grow slowly with frequency."""
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.fft import next_fast_len
 
@@ -85,12 +87,20 @@ def fractional_derivative(alpha: Value, history: History) -> Array:
     """
     values, count = history.value, history.value.shape[-1]
     length = next_fast_len(2 * count, real=True)
-    spectrum = np.fft.rfft(values, length) * np.fft.rfft(grunwald_letnikov_weights(alpha, count), length)
+    orders, row = np.unique(alpha, return_inverse=True)  # of many models, most have the same order
+    weights = np.stack([_weight_spectrum(order, count, length) for order in orders.tolist()])[row]
+    spectrum = np.fft.rfft(values, length) * weights.reshape(*np.shape(alpha)[:-1], -1)
     derivative = history.step**-alpha * np.fft.irfft(spectrum, length)[..., :count]
     if history.second_order:
         derivative[..., 1:] += 0.5 * alpha * np.diff(derivative, axis=-1)
         derivative[..., :1] *= 1.0 + 0.5 * alpha
     return derivative
+
+
+@lru_cache(maxsize=8)
+def _weight_spectrum(alpha: float, count: int, length: int) -> Array:
+    """Spectrum of the weights of a fractional difference, padded with zeros to a length, (length // 2 + 1,)."""
+    return np.fft.rfft(grunwald_letnikov_weights(alpha, count), length)
 
 
 def stress(p: Values, history: History) -> Array:
