@@ -44,11 +44,11 @@ from bushfit.cli.shared_options import (
         "Write the nastran file for another solver: optistruct, with stiffness magnitude and loss angle.",
         type=click.Choice(["optistruct"]),
     ),
-    flag("--time-domain", "Write the materials of abaqus as Prony series, for analyses in time."),
+    flag("--time-domain", "For abaqus: write the materials as Prony series, for analyses in time."),
     option(
         "--cardanic",
         "CONSTANTS",
-        'Stiffness and loss factor of the rotations about x and y in decks: "60 N m/rad, 0.1".',
+        'Stiffness and loss factor for rotation about x and y in solver files, such as "60 N m/rad, 0.1" [0].',
     ),
     static_rate_option("Rate of the curves of adams"),
     option("--accuracy", "ERROR", "Largest permitted error of the modulus in an FMU or prony [1 %].", default="1 %"),

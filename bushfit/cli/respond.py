@@ -23,9 +23,13 @@ if TYPE_CHECKING:
 @click.argument("history", metavar="HISTORY", type=FILE)
 @option_group(
     "Motion and conditions",
-    direction_option("axial, radial, torsion or a specimen [headers, file name]."),
-    flag("--steady", "The history is whole cycles of a steady state [it starts from rest]."),
-    option("--temperature", "TEMP", 'Such as "40 degC", if the model has an effect of temperature [23 degC].'),
+    direction_option("Direction of the motion (axial, radial, torsion) or specimen [from headers or the file name]."),
+    flag("--steady", "The history is whole cycles of a steady motion [it starts from rest]."),
+    option(
+        "--temperature",
+        "TEMP",
+        'Temperature, such as "40 degC", if the model was fitted with --effect temperature [23 degC].',
+    ),
 )
 @history_options()
 @with_output("results/<name> response", "tables", "pictures")

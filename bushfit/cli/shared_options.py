@@ -127,7 +127,9 @@ def prediction_options(campaign: str) -> Parameter:
 
 def static_rate_option(subject: str) -> Parameter:
     """Create the option --static-rate, the rate of `subject`."""
-    return option("--static-rate", "RATE", f'{subject}, "10 mm/min" [that of the slowest loop, or 10 mm/min].')
+    return option(
+        "--static-rate", "RATE", f'{subject}, such as "10 mm/min" [rate of the slowest loop, else 10 mm/min].'
+    )
 
 
 def displacement_unit(text: str, per: str = "") -> str:
