@@ -123,9 +123,10 @@ class Cells:
         return None
 
     def without_faults(self) -> tuple[Self, list[Row]]:
-        """Return the table without lines that are not data, and these lines.
+        """Take lines that are not data out of a text; only lines with letters, dashes or empty cells are tested.
 
-        Only lines with letters, dashes or empty cells are tested.
+        Returns:
+            Table without these lines, and the line number and cells of each of them.
         """
         source, layout, faulty = self.source, self.layout, list[Row]()
         if not isinstance(source, Text) or layout.numbered:
