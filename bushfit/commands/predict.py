@@ -314,7 +314,7 @@ def _files(
 
     def draw(prediction: Prediction) -> Figure:
         place = prediction.direction
-        measured = sweeps_at(drawn_sweeps, place, prediction.preload)
+        measured = [sweep for sweep in drawn_sweeps if sweep.direction == place]
         table = tables.sweeps_table(result.model, measured) if measured else None
         title = result.name if isinstance(place, Direction) else str(place)
         title += f", over {prediction.over.describe(place)}" if prediction.over else ""

@@ -11,7 +11,9 @@ import pandas as pd
 from bushfit.effects.contract import Array
 from bushfit.geometry import Place
 from bushfit.model.result import Result
+from bushfit.prediction.stiffness import Prediction
 from bushfit.reading.measurement import SAME_TEMPERATURE
+from bushfit.reading.preload import SAME_PRELOAD
 from bushfit.report.tables import displacement_header, response_headers, spread
 from bushfit.units import format_range, number
 
@@ -81,31 +83,54 @@ def sweep_groups(table: pd.DataFrame, result: Result) -> list[SweepGroup]:
         result: model, which gives the specimens by their names.
 
     Returns:
-        Groups in the order of the table. The curves of a group differ in level, and in part or temperature if tests
-        differ in these.
+        Groups in the order of the table. The curves of a group differ in level, and in part, temperature or preload if
+        tests differ in these.
     """
     groups, order = [], [*dict.fromkeys(table["direction"])]
     for (name, stepped), rows in table.rename(columns={"sweep": "test"}).groupby(["direction", "stepped"], sort=False):
         place, free = result.place(str(name)), stepped == "neither"
         axis, fixed = cast("tuple[Axis, Axis]", ("frequency", "amplitude")[:: -1 if stepped == "amplitude" else 1])
         unit = "Hz" if fixed == "frequency" else place.display.displacement.name
-        levels, palette = [rows["test" if free else header_of(place, fixed)]], "loop" if free else str(fixed)
+        units, levels, palette = (
+            list[str](),
+            [rows["test" if free else header_of(place, fixed)]],
+            "loop" if free else str(fixed),
+        )
         if not free and "part" in rows and len(set(rows["part"].fillna(""))) > 1:
-            levels, palette = ["part " + rows["part"].fillna("not stated"), *levels], "loop"
+            levels, palette, units = ["part " + rows["part"].fillna("not stated"), *levels], "loop", ["", *units]
         if not free and "temperature [degC]" in rows:
             temperature = rows.groupby("test")["temperature [degC]"].transform("mean")
             if temperature.max() - temperature.min() > SAME_TEMPERATURE:
-                levels, palette = [temperature.round(1), *levels], "temperature"
+                levels, palette, units = [temperature.round(1), *levels], "temperature", ["°C", *units]
+        for header in [] if free else preload_headers(rows):
+            if rows[header].nunique() > 1:
+                levels, palette, units = [rows[header], *levels], "loop", [header[9:-1], *units]
         curves = []
         by_level = rows.groupby([level.to_numpy() for level in levels], sort=not free, dropna=False)
         for values, of_level in by_level:
             *conditions, level = cast("tuple[str | float, ...]", values)
-            texts = [value if isinstance(value, str) else f"{number(value, 3)} °C" for value in conditions]
+            texts = [
+                value if isinstance(value, str) else f"{number(value, 3)} {condition_unit}"
+                for value, condition_unit in zip(conditions, units, strict=True)
+            ]
             texts.append(level if isinstance(level, str) else format_range(unit, level))
             sorted_rows = of_level.sort_values(header_of(place, axis), kind="stable")
             curves.append(Curve(", ".join(texts), np.nan if isinstance(level, str) else level, sorted_rows))
         groups.append(SweepGroup(place, axis, palette, curves))
     return sorted(groups, key=lambda group: order.index(str(group.place)))
+
+
+def preload_headers(table: pd.DataFrame) -> list[str]:
+    """Headers of the columns with preloads, such as "preload [N]"."""
+    return [str(header) for header in table.columns if str(header).startswith("preload [")]
+
+
+def rows_at_preload(table: pd.DataFrame, prediction: Prediction) -> pd.DataFrame:
+    """Rows of measured sweeps at the preload of a prediction; all rows if the prediction or the table has none."""
+    value, unit = prediction.preload.in_display_unit(prediction.direction) if prediction.preload else (0.0, "")
+    if (header := f"preload [{unit}]") not in table.columns:
+        return table
+    return table[~((table[header] - value).abs() > SAME_PRELOAD * max(abs(value), table[header].abs().max()))]
 
 
 def means(rows: pd.DataFrame, x_header: str, *headers: str) -> tuple[Array, ...]:

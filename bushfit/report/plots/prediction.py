@@ -15,7 +15,7 @@ from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.runs import nominal
 from bushfit.report.plots import style
 from bushfit.report.plots.fits import draw_curves, draw_points, points_note, points_to_draw, stiffness_scale
-from bushfit.report.plots.measured import Axis, header_of, sweep_groups
+from bushfit.report.plots.measured import Axis, header_of, rows_at_preload, sweep_groups
 from bushfit.report.tables import IF_RIGS, displacement_header, response_headers, spread, words
 from bushfit.units import display_unit, format_range
 
@@ -59,7 +59,7 @@ def prediction_figure(
     rig = None
     if rig_effects(result) and not prediction.over:
         rig = refined(result, prediction, temperature, rig=True)
-    of_place = None if table is None else table[table["direction"] == str(place)]
+    of_place = None if table is None else rows_at_preload(table[table["direction"] == str(place)], prediction)
     groups = [] if of_place is None or of_place.empty else sweep_groups(of_place, result)
     free = [group.thinned() for group in groups if group.palette == "loop" and np.isnan(group.curves[0].level)]
     rows = [curve.rows for group in groups for curve in group.curves if not np.isnan(curve.level)]
