@@ -290,6 +290,8 @@ def _chi_square(model: Model, data_sets: Sequence[MeasuredTest]) -> float:
 
 
 def _preferred(data_sets: Sequence[_Kind]) -> list[_Kind]:
-    """Select the axial tests; without any, those of the bushing; without any, all."""
+    """Select the axial tests, else those of the bushing, else all; of these, the tests at the smallest preload."""
     axial = [test for test in data_sets if test.direction is Direction.AXIAL]
-    return axial or [test for test in data_sets if not isinstance(test.direction, Specimen)] or list(data_sets)
+    tests = axial or [test for test in data_sets if not isinstance(test.direction, Specimen)] or list(data_sets)
+    loads = [abs(test.test.preload.value) if test.test.preload else 0.0 for test in tests]
+    return [test for test, load in zip(tests, loads, strict=True) if load == min(loads)]

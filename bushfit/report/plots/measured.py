@@ -103,7 +103,7 @@ def sweep_groups(table: pd.DataFrame, result: Result) -> list[SweepGroup]:
             if temperature.max() - temperature.min() > SAME_TEMPERATURE:
                 levels, palette, units = [temperature.round(1), *levels], "temperature", ["°C", *units]
         for header in [] if free else preload_headers(rows):
-            if rows[header].nunique() > 1:
+            if rows[header].min() < rows[header].max():
                 levels, palette, units = [rows[header], *levels], "loop", [header[9:-1], *units]
         curves = []
         by_level = rows.groupby([level.to_numpy() for level in levels], sort=not free, dropna=False)
