@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import random
 import shutil
@@ -50,7 +51,13 @@ LINES: dict[str, list[tuple[str, ...]]] = {
     **{name: [("campaign.toml",)] for name in ("run", "diagnose", "fit")},
     "fit-static": [("campaign.toml",), ("campaign.toml", "--dynamic", "model.json")],
     "fit-dynamic": [("campaign.toml", "--static", "model.json")],
-    "predict": [("model.json",), ("model.json", "--campaign", "campaign.toml")],
+    "predict": [
+        ("model.json",),
+        ("model.json", "--campaign", "campaign.toml"),
+        ("model.json", "--static"),
+        ("model.json", "--over", "0.5 Hz 1 mm"),
+    ],
+    "respond": [("model.json", "loop.csv", "--direction", "axial"), ("model.json", "shaker.csv")],
     "compare": [("model.json", "model.json"), ("campaign.toml", "--families", "kraus")],
     "report": [("res",)],
     "batch": [("list.toml", "--limits", "limits.toml"), ("list.csv",), ("campaign.toml", "--limits", "limits.toml")],
@@ -59,7 +66,7 @@ LINES: dict[str, list[tuple[str, ...]]] = {
     "reduce": [("loop.csv", "--direction", "axial"), ("shaker.csv", "--mass", "0.5 kg", "--direction", "axial")],
     "plan": [("campaign.toml", "--hours", "1"), ("model.json", "--hours", "1")],
     "simulate": [("more.toml",), ("model.json",)],
-    "export": [("model.json", "--format", name) for name in ("nastran", "abaqus", "adams", "csv", "xlsx")],
+    "export": [("model.json", "--format", name) for name in ("nastran", "abaqus", "adams", "prony", "csv", "xlsx")],
     "schema": [("model",), ("campaign",), ("",)],
 }
 VALUES = [
@@ -211,6 +218,8 @@ def tried(command: str, seed: int, folder: Path) -> tuple[list[str], str]:
             done = call(folder, *words)
     except Exception as error:
         return words, f"{type(error).__name__}: {error}"
+    finally:
+        gc.unfreeze()  # a command freezes its objects, since its process ends with it
     said = done.stdout + done.stderr + "".join(file.read_text("utf-8") for file in folder.glob("x/batch.csv"))
     if "internal error" in said or "Traceback" in said:
         return words, said[-500:]
