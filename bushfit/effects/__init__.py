@@ -42,7 +42,10 @@ _KINDS: dict[str, type[Effect]] = {"modulus": Branch, "adjust": Modifier, "stiff
 
 
 def _entry(name: str) -> dict[str, Any]:
-    """Table of an effect in library.toml, completed by the table that "like" names; "law" names the Python file."""
+    """Return the table of an effect in library.toml, completed by the table of the effect named under its key "like".
+
+    The key "law" names the Python file with the equations.
+    """
     entry: dict[str, Any] = dict(_TABLE[name])
     if "like" not in entry:
         return {"law": name.partition(".")[0], **entry}

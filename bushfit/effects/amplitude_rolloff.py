@@ -19,12 +19,12 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
     Args:
         p: parameter values by name: c [1].
-        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
-        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        below: complex stiffness K without this effect, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        Complex stiffness above the layer [N/m or N m/rad], (..., n).
+        Complex stiffness with the effect [N/m or N m/rad], (..., n).
 
     Notes:
         K at the amplitude X (1 - c (f/155 Hz)^2).
@@ -41,15 +41,15 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
 
     Args:
         p: parameter values by name: c [1].
-        below: force of the bushing and the inner layers, as a function of the displacement history.
+        below: force F without this effect, as a function of the displacement history.
         history: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        Force above the layer at each sample [N or N m], (..., n).
+        Force with the effect at each sample [N or N m], (..., n).
 
     Notes:
-        F of the true motion, multiplied by the ratio of the requested to the true motion.
+        Force F of the smaller, true motion, divided by the ratio of the true to the requested amplitude.
     """
     share = _share(p, history.omega)
     return below(history.with_value(history.value * share)) / share

@@ -359,7 +359,7 @@ def scaled_response(
     Args:
         factor: function of the values and the setting that gives the factor.
         p: parameter values of the layer.
-        below: stiffness or force of the bushing and the inner layers.
+        below: function that returns the stiffness or force without this effect.
         motion_and_setting: arguments of `below` (omega and amplitude, or history), then the setting.
     """
     *motion, setting = motion_and_setting
@@ -381,7 +381,8 @@ def harmonic_response(transfer: Value, history: History) -> Array:
     """First-harmonic response over time of an effect that has no equation in time, same shape as the motion.
 
     Args:
-        transfer: complex stress over strain (2 mu^ [Pa]) or force over displacement (K [N/m]), (..., 1).
+        transfer: complex ratio of response to motion: stress over tensor shear strain (2 mu^ [Pa]), or force over
+            displacement (K [N/m or N m/rad]), (..., 1).
         history: strain or displacement over time, (..., n).
 
     >>> harmonic_response(2.0, History.steady(np.array([3.0, 2.0, -1.0, 0.0]), 1.0)).round(6)
@@ -396,6 +397,6 @@ def harmonic_stress(modulus: Callable[[Values, Array, Array], Array], p: Values,
     Args:
         modulus: complex modulus of the branch [Pa].
         p: parameter values by name.
-        history: strain over time, (..., n).
+        history: tensor shear strain e = gamma/2 over time [1], (..., n).
     """
     return harmonic_response(2.0 * modulus(p, np.atleast_1d(history.omega), history.amplitude), history)

@@ -12,6 +12,9 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
         p: parameter values by name, with m [Pa s^alpha], q [1].
         condition: operating condition, with the strain amplitude.
 
+    Returns:
+        The changed value of m by its name.
+
     >>> model = paper.with_effect("coupled_breakdown", {"coupled_breakdown.q": 0.1})
     >>> [round(model.values_at("axial", 25.0, x)["m"]) for x in (1e-4, 1e-3)]
     [209921, 166746]

@@ -25,7 +25,7 @@ _WEIGHTS, _STRAINS = 2.0 / (_NODES + 1) * np.sin(_ANGLES) ** 2, np.sin(0.5 * _AN
 
 
 def _standardised(strain: Value, e_s: Value, spread: Value) -> Array:
-    """Logarithm of the ratio of strain to median yield strain e_s, in units of `spread`; ratios are at least 1e-30."""
+    """Return ln(strain/e_s)/spread, with strain and median yield strain e_s [1]; the ratio is at least 1e-30."""
     return np.log(np.maximum(strain / e_s, 1e-30)) / spread
 
 
@@ -58,7 +58,16 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def _first_loading(strain: Array, e_s: Value, spread: Value) -> Array:
-    """Mean elastic strain of the elements on first loading to a strain: the stress divided by 2 delta."""
+    """Mean elastic strain of the elements, whose yield strains are log-normal, on first loading to `strain` [1].
+
+    Args:
+        strain: tensor shear strain reached from rest [1], (..., n).
+        e_s: median yield strain [1].
+        spread: standard deviation of the natural log of the yield strains [1].
+
+    Returns:
+        Mean elastic strain, the stress divided by 2 delta [1], (..., n).
+    """
     z = _standardised(strain, e_s, spread)
     return strain * ndtr(-z) + e_s * np.exp(0.5 * spread**2) * ndtr(z - spread)
 
@@ -68,7 +77,7 @@ def stress(p: Values, history: History) -> Array:
 
     Args:
         p: parameter values by name: delta [Pa], e_s [1], spread [1].
-        history: strain over time, (..., n).
+        history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
         Stress [Pa], (..., n).

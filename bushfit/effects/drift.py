@@ -12,9 +12,9 @@ from bushfit.effects.contract import Setting, Value, Values, scaled_response
 
 
 def _gain(p: Values, setting: Setting) -> Value:
-    """Relative gain 1 + gain ln(1 + t/onset)/ln(1 + 1/onset) of the force at the time t of a test; 1 if t is unknown.
+    """Relative gain 1 + gain ln(1 + t/onset)/ln(1 + 1/onset) of the force channel at the time t of a test.
 
-    t is a share of the session, from 0 at the first point to 1 at the last.
+    t is a share of the session, from 0 at the first point to 1 at the last; if t is unknown, the gain is 1.
 
     >>> from bushfit.effects.contract import RubberConditions
     >>> halfway = Setting(None, "axial", "sweep", RubberConditions(session_time=0.5))

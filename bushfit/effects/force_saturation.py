@@ -18,12 +18,12 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
     Args:
         p: parameter values by name: level [N], share [1].
-        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
-        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        below: complex stiffness K without this effect, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        Complex stiffness above the layer [N/m or N m/rad], (..., n).
+        Complex stiffness with the effect [N/m or N m/rad], (..., n).
 
     Notes:
         K - share (K N(level/(|K| X)) + correction for the distorted waveform of the force).
@@ -56,12 +56,12 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
 
     Args:
         p: parameter values by name: level [N], share [1].
-        below: force of the bushing and the inner layers, as a function of the displacement history.
+        below: force F without this effect, as a function of the displacement history.
         history: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        Force above the layer at each sample [N or N m], (..., n).
+        Force with the effect at each sample [N or N m], (..., n).
 
     Notes:
         F minus a share of its excess over +-level; not in torsion, which has a torque cell.

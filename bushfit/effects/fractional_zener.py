@@ -22,7 +22,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
     Args:
         p: parameter values by name: c [1], and of the base model m [Pa s^alpha], alpha [1].
-        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
+        omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
         Complex modulus of the first harmonic [Pa], (..., n).
@@ -70,7 +70,7 @@ def stress(p: Values, history: History) -> Array:
 
     Args:
         p: parameter values by name: c [1], and of the base model m [Pa s^alpha], alpha [1].
-        history: strain over time, (..., n).
+        history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
         Stress at each sample [Pa], (..., n).

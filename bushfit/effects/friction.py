@@ -98,7 +98,7 @@ def harmonic_slope(x: Array, shape: Array) -> Array:
 
 
 def _roots(x: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Terms s, D, p, q and z of the formulas in `harmonic_shape`, at the relative strain amplitude x."""
+    """Terms s, D, p, q and z of the formulas in `harmonic_shape`, at the strain amplitude x relative to eps_half."""
     twice = 2.0 * x
     s = np.sqrt(x * (x + 6.0) + 1.0)
     big = s + x + 1.0
@@ -123,7 +123,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
     Args:
         p: parameter values by name: sigma_fmax [Pa], eps_half [1].
-        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
+        omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
         Complex modulus of the first harmonic [Pa], (..., n).
@@ -142,7 +142,7 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
 
     Args:
         p: parameter values by name: sigma_fmax [Pa], eps_half [1].
-        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
+        omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
         Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
@@ -159,14 +159,29 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
 
 
 def _stroke(start: Any, sign: Any, distance: Any) -> tuple[Any, Any, Any]:
-    """Relative stress u at the distance d from the turning point u_s = `start` (Eq. 5), and v and v + d."""
+    """Friction stress u, relative to sigma_fmax, along one stroke of the motion (Eq. 5).
+
+    Args:
+        start: relative stress u_s at the turning point where the stroke begins.
+        sign: +1 or -1, direction of the stroke.
+        distance: strain d since the turning point, relative to eps_half, not negative.
+
+    Returns:
+        u, and two terms that its derivatives use: v and v + d.
+    """
     room = 1.0 - sign * start
     reach = room + distance
     return start + sign * distance * room / reach, room, reach
 
 
 def _stroke_slopes(sign: Any, distance: Any, room: Any, reach: Any) -> tuple[Any, Any]:
-    """Derivatives of u by the start value u_s and by the distance d of a stroke."""
+    """Derivatives of the relative friction stress u along a stroke by its start value u_s and by the distance d.
+
+    Args:
+        sign: +1 or -1, direction of the stroke.
+        distance: strain d since the turning point, relative to eps_half.
+        room, reach: terms v and v + d, as `_stroke` returns them.
+    """
     return 1.0 - (distance / reach) ** 2, sign * (room / reach) ** 2
 
 
@@ -238,7 +253,7 @@ def stress(p: Values, history: History) -> Array:
 
     Args:
         p: parameter values by name: sigma_fmax [Pa], eps_half [1].
-        history: strain over time, (..., n).
+        history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
         Stress at each sample [Pa], (..., n).
@@ -258,7 +273,7 @@ def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
 
     Args:
         p: parameter values by name: sigma_fmax [Pa], eps_half [1].
-        history: strain over time, (..., n).
+        history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
         Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].

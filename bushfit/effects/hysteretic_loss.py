@@ -10,7 +10,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
     Args:
         p: parameter values by name: eta [1], and of the base model mu [Pa].
-        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
+        omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
         Complex modulus of the first harmonic [Pa], (..., n).

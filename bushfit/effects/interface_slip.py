@@ -16,12 +16,12 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
     Args:
         p: parameter values by name: force [N].
-        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
-        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        below: complex stiffness K without this effect, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        Complex stiffness above the layer [N/m or N m/rad], (..., n).
+        Complex stiffness with the effect [N/m or N m/rad], (..., n).
 
     Notes:
         K + i 4 Fc/(pi X).
@@ -38,12 +38,12 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
 
     Args:
         p: parameter values by name: force [N].
-        below: force of the bushing and the inner layers, as a function of the displacement history.
+        below: force F without this effect, as a function of the displacement history.
         history: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        Force above the layer at each sample [N or N m], (..., n).
+        Force with the effect at each sample [N or N m], (..., n).
 
     Notes:
         F + Fc sgn(dx/dt).

@@ -167,13 +167,13 @@ def _loss(stiffness: Complex) -> float:
 
 
 def _times_loss(factor: float, stiffness: Complex) -> Complex:
-    """Stiffness of equal magnitude with the loss factor multiplied by a factor."""
+    """Complex stiffnesses, (n,), with unchanged magnitudes |K| and with loss factors multiplied by `factor`."""
     loss = 1.0 + 1j * factor * stiffness.imag / stiffness.real
     return np.asarray(np.abs(stiffness) * loss / np.abs(loss))
 
 
 def _sine(stiffness: Complex) -> Complex:
-    """Stiffness of equal magnitude, if the stated loss factor is the sine of the loss angle, not its tangent."""
+    """Correct complex stiffnesses, (n,), whose stated loss factor is the sine of the loss angle; |K| is unchanged."""
     sine = np.clip(stiffness.imag / stiffness.real, -1.0, 1.0)
     return np.asarray(np.abs(stiffness) * (np.sqrt(1.0 - sine**2) + 1j * sine))
 

@@ -23,12 +23,12 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
 
     Args:
         p: parameter values by name: compliance [m/N].
-        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
-        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        below: complex stiffness K without this effect, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        Complex stiffness above the layer [N/m or N m/rad], (..., n).
+        Complex stiffness with the effect [N/m or N m/rad], (..., n).
 
     Notes:
         K/(1 + c K) [N/m] with K at the amplitude X e^v that reaches the bushing; does not act in torsion.
@@ -42,7 +42,12 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     compliance = p["compliance"]
 
     def excess(v: Array, inside: Array) -> Array:
-        """Residual v + ln|1 + c K| of the equation for the logarithm v of the amplitude ratio."""
+        """Residual v + ln|1 + c K| of the equation for v, the log of the ratio of the bushing's to the rig's amplitude.
+
+        Args:
+            v: natural log of the ratio of amplitudes, (..., n).
+            inside: complex stiffness K of the bushing at this amplitude, (..., n).
+        """
         relative = compliance * inside
         return v + 0.5 * np.log1p(2.0 * relative.real + relative.real**2 + relative.imag**2)
 
@@ -68,12 +73,12 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
 
     Args:
         p: parameter values by name: compliance [m/N].
-        below: force of the bushing and the inner layers, as a function of the displacement history.
+        below: force F without this effect, as a function of the displacement history.
         history: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
-        Force above the layer at each sample [N or N m], (..., n).
+        Force with the effect at each sample [N or N m], (..., n).
 
     Notes:
         Force F [N] of the motion x - c F that reaches the bushing.
@@ -135,9 +140,13 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
 
 
 def _differences_resolved(reached: Array, missing: Array) -> bool:
-    """Return True if forces of several models for one motion are accurate enough for their differences.
+    """Return True if an iteration for the forces of several models is accurate enough for the models' differences.
 
     The differences, from which a fit computes derivatives, must be accurate to a thousandth or to rounding.
+
+    Args:
+        reached: forces of the models after this iteration, (models, n) [N].
+        missing: change of the forces that the next iteration would make, (models, n) [N].
     """
     if missing.ndim == 1:
         return True

@@ -30,7 +30,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
     Args:
         p: parameter values by name: sigma [Pa], e_s [1], spread [1].
-        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
+        omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
         Complex modulus of the first harmonic [Pa], (..., n).
@@ -60,7 +60,10 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def _loaded(strain: Array, low: Value, high: Value) -> Array:
-    """Mean of min(strain/e_y, 1) over the sliders: stress on first loading, relative to its maximum."""
+    """Mean of min(strain/e_y, 1) over sliders whose slip strains e_y lie between `low` and `high`, log-uniform [1].
+
+    This mean is the stress on first loading, relative to its maximum.
+    """
     slipped = np.clip(strain, low, high)
     return (np.log(slipped / low) + strain * (1.0 / slipped - 1.0 / high)) / np.log(high / low)
 
@@ -70,7 +73,7 @@ def stress(p: Values, history: History) -> Array:
 
     Args:
         p: parameter values by name: sigma [Pa], e_s [1], spread [1].
-        history: strain over time, (..., n).
+        history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
         Stress at each sample [Pa], (..., n).
@@ -95,7 +98,7 @@ def parallel_elements(history: History, yield_strain: Array, weights: Array) -> 
     """Weighted sum of the stresses of Jenkins elements (spring and slider in series), relative to their yield stress.
 
     Args:
-        history: strain over time, (..., n).
+        history: tensor shear strain e = gamma/2 over time [1], (..., n).
         yield_strain: strain at which each element yields, (..., 1, elements).
         weights: weights of the elements, same shape as yield_strain.
 

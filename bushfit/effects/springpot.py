@@ -21,7 +21,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
     Args:
         p: parameter values by name: m [Pa*s^alpha], alpha [1].
-        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
+        omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
         Complex modulus of the first harmonic [Pa], (..., n).
@@ -40,7 +40,7 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
 
     Args:
         p: parameter values by name: m [Pa*s^alpha], alpha [1].
-        omega, strain: angular frequency [rad/s] and strain amplitude [1], (..., n).
+        omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
         Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
@@ -108,7 +108,7 @@ def stress(p: Values, history: History) -> Array:
 
     Args:
         p: parameter values by name: m [Pa*s^alpha], alpha [1].
-        history: strain over time, (..., n).
+        history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
         Stress at each sample [Pa], (..., n).
@@ -126,7 +126,7 @@ def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
 
     Args:
         p: parameter values by name: m [Pa*s^alpha], alpha [1].
-        history: strain over time, (..., n).
+        history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
         Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].

@@ -84,7 +84,7 @@ class Unnamed:
     """Smooth correction over frequency and strain, relative to the stiffness.
 
     Args:
-        size: standard deviation of the Gaussian process.
+        size: standard deviation of the Gaussian process, relative to |K|.
         lengths: correlation lengths in ln frequency and ln strain; a change of temperature is converted to
             the change of frequency that shifts the time scale equally.
         patches: corrections of the directions; a direction without a patch has the correction 0, with an error of the
@@ -103,7 +103,7 @@ class Unnamed:
 
     @cached_property
     def _at_nodes(self) -> tuple[Array, Array]:
-        """Squared magnitudes of the correction and of its standard deviation at all nodes, (m,) each."""
+        """Squared magnitudes of the relative correction, and of its standard deviation, at all m nodes, (m,) each."""
         values = [np.square((patch.in_phase, patch.in_quadrature)).sum(axis=0) for patch in self.patches]
         errors = [np.square((p.in_phase_error, p.in_quadrature_error)).sum(axis=0) for p in self.patches]
         return np.concatenate(values), np.concatenate(errors)
@@ -120,13 +120,13 @@ class Unnamed:
 
     @property
     def uncertainty(self) -> float:
-        """Root mean square error of the correction at the nodes, relative to its root mean square."""
+        """Root mean square of the correction's standard deviations at the nodes, over that of the correction."""
         values, errors = self._at_nodes
         return float(np.sqrt(errors.mean() / max(values.mean(), np.finfo(float).tiny)))
 
     @property
     def far_deviation(self) -> float:
-        """Standard deviation of each part of the correction far from the nodes."""
+        """Standard deviation of the real and of the imaginary part of the relative correction, far from all nodes."""
         return self.largest / _DEVIATIONS
 
     def evaluate(self, setting: Setting, omega: Array, amplitude: Array) -> tuple[Array, Array, Array]:
@@ -170,8 +170,8 @@ def response(values: Values, below: StiffnessBelow, omega: Array, amplitude: Arr
 
     Args:
         values: not used; the data of the correction are in the setting.
-        below: complex stiffness of the bushing and the inner layers, as a function of omega and amplitude.
-        omega, amplitude: angular frequency [rad/s] and displacement amplitude [m or rad], (..., n).
+        below: complex stiffness K without this effect, as a function of omega and amplitude.
+        omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
 
     Returns:
@@ -185,7 +185,7 @@ def first_harmonic(values: Values, below: ForceBelow, displacement: History, set
 
     Args:
         values: not used; the data of the correction are in the setting.
-        below: force of the bushing and the inner layers, as a function of the displacement history.
+        below: force F without this effect, as a function of the displacement history.
         displacement: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
 

@@ -86,12 +86,12 @@ class LeaveOut:
         """Residuals of held-out rows, predicted by the fit to the other rows.
 
         Args:
-            rows: mask of the n held-out rows, (all rows,); the other rows must determine all parameters.
-            clusters: index of the cluster of each row, (all rows,); misfits within a cluster are correlated.
+            rows: mask of the h held-out rows among all n rows, (n,); the other rows must determine all parameters.
+            clusters: index of the cluster of each row, (n,); misfits within a cluster are correlated.
             stepped: False if the fit already excludes the held-out rows.
 
         Returns:
-            Residuals in units of noise, and residuals whitened by the error of the prediction as well, (n,) each.
+            Residuals in units of noise, and residuals whitened by the error of the prediction as well, (h,) each.
 
         Notes:
             The residuals in units of noise have the covariance 1 + J C J^T, with the robust covariance C = A^-1 M A^-1
@@ -116,11 +116,11 @@ class LeaveOut:
         The noise acts directly on held-out rows, and on the others through the parameters that they determine.
 
         Args:
-            rows: mask of the n held-out rows, (all rows,).
-            predicted: predicted residuals of the held-out rows, (n,).
+            rows: mask of the h held-out rows among all n rows, (n,).
+            predicted: predicted residuals of the held-out rows, in units of noise, (h,).
 
         Returns:
-            Derivatives, (all rows,).
+            Derivatives, (n,).
         """
         through = self.basis @ np.linalg.solve(self._rest(rows), self.basis[rows].T @ predicted)
         pull = -through
@@ -128,11 +128,11 @@ class LeaveOut:
         return pull
 
     def _rest(self, rows: Array) -> Array:
-        """Fisher information of all rows but the given ones, along the basis, (m, m)."""
+        """Fisher information of all rows but the given ones (indices or mask), along the m basis vectors, (m, m)."""
         return np.eye(self.components.size) - self.basis[rows].T @ self.basis[rows]
 
     def _basis_step(self, rows: Array) -> Array:
-        """Gauss-Newton step of a fit without the given rows, along the basis, (m,)."""
+        """Gauss-Newton step of a fit without the given rows (indices or mask), along the m basis vectors, (m,)."""
         return -np.linalg.solve(self._rest(rows), self.components - self.basis[rows].T @ self.residual[rows])
 
 
@@ -184,7 +184,8 @@ def expected_errors(solution: FitResult, unfitted: Sequence[MeasuredTest] = ()) 
         unfitted: tests that were not fitted.
 
     Returns:
-        95 % quantile of the error of stiffness and loss factor, for each direction or specimen.
+        For each direction or specimen, the 95 % quantiles of the absolute relative difference of |K| and of the
+        absolute difference of the loss factor.
     """
     model, free, parts = solution.model, solution.moving, list[tuple[str, Array, bool]]()
     whole = LeaveOut.from_fit(solution.jacobian[free], solution.residual)
@@ -216,7 +217,8 @@ def expected_errors_without_refits(
         unfitted: tests that were not fitted.
 
     Returns:
-        95 % quantile of the error of stiffness and loss factor, for each direction or specimen.
+        For each direction or specimen, the 95 % quantiles of the absolute relative difference of |K| and of the
+        absolute difference of the loss factor.
     """
     parts = list[tuple[str, Array, bool]]()
     for number, test in enumerate([*fitted, *unfitted]):
@@ -228,8 +230,9 @@ def expected_errors_without_refits(
 def _by_place(parts: Sequence[tuple[str, Array, bool]]) -> tuple[ExpectedError, ...]:
     """Expected error of each direction, from its predicted points if these are at least half, else from all its points.
 
-    Each part has the name of the direction, the differences in stiffness and loss factor, (2, n), and True if they are
-    predicted from other runs.
+    Args:
+        parts: name of a direction or specimen; absolute relative difference of |K| and absolute difference of the loss
+            factor of n points, (2, n); and True if the points are predicted from other runs.
     """
     found = []
     for place in dict.fromkeys(place for place, _, _ in parts):
@@ -244,7 +247,7 @@ def _by_place(parts: Sequence[tuple[str, Array, bool]]) -> tuple[ExpectedError, 
 
 
 def _absolute_difference(modelled: Array, measured: Array) -> Array:
-    """Absolute relative difference of |K| and absolute difference of the loss factor of complex stiffnesses, (2, n)."""
+    """Absolute relative difference of |K| and absolute difference of loss factors, from complex stiffnesses, (2, n)."""
     return np.abs([np.abs(modelled / measured) - 1.0, loss_factor(modelled) - loss_factor(measured)])
 
 

@@ -136,8 +136,8 @@ def _changes_by_noise(
 
     Args:
         data_sets: tests of one stage.
-        influence: change of each parameter by a unit of each residual, (k, n).
-        basis: orthogonal rows that span the Jacobian of the stage's own parameters, (own, n).
+        influence: change of each of the k parameters by a unit of each of the n whitened residuals, (k, n).
+        basis: r orthogonal rows that span the Jacobian of the stage's own parameters, (r, n).
 
     Returns:
         By noise variance: change of the covariance by one standard error of the noise variance, and the covariance
@@ -154,15 +154,18 @@ def _changes_by_noise(
 
 
 def _inverse(system: Array) -> Array:
-    """Inverse of a square matrix, with undetermined directions limited to _LARGEST_ERROR."""
+    """Inverse of a square matrix; its singular values are limited to `_LARGEST_ERROR`, for undetermined directions."""
     left_vectors, values, right_vectors = np.linalg.svd(system)
     return (right_vectors.T / np.maximum(values, 1.0 / _LARGEST_ERROR)) @ left_vectors.T
 
 
 def linear_errors(slope: Array) -> Array:
-    """Standard errors of parameters in coordinates, (k,), from the Jacobian of whitened residuals, (k, n).
+    """Standard errors of k parameters in their dimensionless coordinates (mostly ln value), (k,).
 
     The noise is assumed known and the model correct; `covariance` adds the errors of both.
+
+    Args:
+        slope: derivatives of the n whitened residuals by the coordinates, (k, n).
     """
     return np.linalg.norm(_inverse(np.linalg.qr(slope.T)[1]), axis=1)
 

@@ -112,7 +112,7 @@ class Descent:
 
     @property
     def expected_fall(self) -> float:
-        """Fall of chi-square still to be expected until convergence, from the linearised model."""
+        """Fall of chi-square still to be expected until convergence, from the linearised model (not relative)."""
         return max(self._step(0.0)[1], 0.0)
 
     @property
@@ -190,7 +190,7 @@ class Descent:
 
     @cached_property
     def _normal(self) -> tuple[Array, Array]:
-        """Gauss-Newton Hessian, (k, k), and gradient, (k,), of half of chi-square by coordinate."""
+        """Gauss-Newton Hessian, (k, k), and gradient, (k,), of half of chi-square by the k parameter coordinates."""
         return self.jacobian @ self.jacobian.T, self.jacobian @ self.residual
 
     @cached_property

@@ -105,7 +105,7 @@ def with_effect(
 
 
 def fit_from(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds) -> Descent:
-    """Prepare a fit of all parameters of a model except the fixed ones, from the values of the model.
+    """Prepare a fit of all parameters of a model except the fixed ones, from the values of the model, without a step.
 
     Args:
         model: model with the start values.

@@ -97,7 +97,7 @@ class Drive:
 
     @property
     def correlated(self) -> str:
-        """Text on the number of rows over which the noise of the force is correlated; "" if it is not."""
+        """Text on the number of rows over which the noise of the force is correlated; "" without correlation."""
         if not self.row_noise.order:
             return ""
         time = self.row_noise.rows_as_one * float(np.median(np.diff(self.phase))) / self.frequency
@@ -129,7 +129,7 @@ class Drive:
 
     @property
     def _rounding(self) -> float:
-        """Half the distance of two rows [cycles], the tolerance for a whole number of cycles."""
+        """Half the distance of two rows [cycles]: tolerance within which a record has a whole number of cycles."""
         return 0.5 * self.cycles / self.loop.time.size
 
     @cached_property
@@ -289,7 +289,7 @@ def _with_row_noise(drive: Drive, loop_harmonics: LoopHarmonics) -> Drive:
 
 
 def _at_reversal(drive: Drive) -> Array:
-    """Mask of the rows near a turning point of the motion, where the force of dry friction jumps, (n,)."""
+    """Mask of the rows near a turning point of the motion, where the force of dry friction jumps, (rows,)."""
     motion, position = drive.history(is_transient=False).value, drive.phase * GRID
     if drive.from_rest:
         turns = np.flatnonzero(reversals(motion))

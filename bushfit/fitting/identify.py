@@ -108,7 +108,11 @@ def undetermined_parameters(
     }
 
     def is_zero(name: str) -> bool:
-        """True if noise alone explains that the amount of an added effect is not its neutral value."""
+        """True if the amount of an added effect differs from its neutral value by no more than noise explains.
+
+        Args:
+            name: name of the parameter in files and reports.
+        """
         neutral, noise = model.parameters[name].neutral, Z95 * (covariance.stderr(name) or 0.0)
         return "." in name and neutral is not None and abs(model.values[name] - neutral) < noise
 
@@ -145,7 +149,11 @@ def undetermined_parameters(
 
 
 def _groups(information: FisherInformation) -> list[list[str]]:
-    """Names of the parameters of each open direction; directions with a common parameter are merged into one group."""
+    """Group the names of parameters that the tests do not determine.
+
+    An open direction is a combination of parameters with a large standard error; directions with a common parameter
+    are merged into one group.
+    """
     errors, vectors = information.directions()
     groups: list[set[str]] = []
     for j in np.flatnonzero(errors > _OPEN):
@@ -160,7 +168,13 @@ def _groups(information: FisherInformation) -> list[list[str]]:
 
 
 def _reasons(model: Model, data_sets: Sequence[MeasuredTest], involved: Sequence[str]) -> Iterator[str]:
-    """Reasons why tests do not determine the parameters `involved`: frequencies, amplitudes or loops are missing."""
+    """Yield reasons why tests do not determine some parameters, such as missing frequencies, amplitudes or loops.
+
+    Args:
+        model: fitted model.
+        data_sets: tests of the campaign.
+        involved: names of the parameters that are not determined.
+    """
     reach = measured_range(model, data_sets)
     (slow, fast), (small, large) = reach.frequency, reach.strain
     loops, _ = split_by_kind(data_sets)
@@ -186,7 +200,17 @@ def _reasons(model: Model, data_sets: Sequence[MeasuredTest], involved: Sequence
 def _known_combinations(
     model: Model, data_sets: Sequence[MeasuredTest], information: FisherInformation, involved: Sequence[str]
 ) -> Iterator[str]:
-    """Texts on combinations of the parameters `involved` that are known well although these are not, with errors."""
+    """Yield texts on moduli that the tests determine although they do not determine each of their parameters.
+
+    Args:
+        model: fitted model.
+        data_sets: tests of the campaign.
+        information: Fisher information of the tests on relative changes of the parameters.
+        involved: names of the parameters that are not determined.
+
+    Yields:
+        Formula, value and relative standard error of each such modulus.
+    """
     errors = dict(zip(information.names, information.errors(), strict=True))
     enough = min(_KNOWN, _BETTER * min(float(errors[name]) for name in involved))
     slow = measured_range(model, data_sets).frequency[0]

@@ -25,8 +25,8 @@ class LineMisfit:
         stepped: quantity that varies along the line, "frequency" or "amplitude"; None if neither is held.
         frequency: frequency of each point [Hz], (n,).
         amplitude: zero-to-peak amplitude of each point [m or rad], (n,).
-        misfit: measured stiffness over model stiffness, minus 1, complex (n,).
-        noise: standard deviation of the gain and the phase of one mean value, (2,).
+        misfit: complex relative difference K_measured/K_model - 1 of each point, averaged over the repeats, (n,).
+        noise: standard deviation of the relative gain and of the phase [rad] of one mean value, (2,).
     """
 
     name: str
@@ -51,7 +51,7 @@ class LineMisfit:
 
     @cached_property
     def smooth(self) -> Array:
-        """Part of the misfit that is a polynomial in the logarithm of the step, complex (n,)."""
+        """Smooth part of `misfit` (K_measured/K_model - 1): a polynomial in the log of the step, complex (n,)."""
         x = np.log(self.step)
         basis = np.polynomial.legendre.legvander(unit(x), min(_SMOOTH_DEGREE, np.unique(x).size - 1))
         return basis @ np.linalg.lstsq(basis.astype(complex), self.misfit, rcond=None)[0]

@@ -239,7 +239,17 @@ def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> fl
 
 
 def _refined(clock: Array, x: Array, frequency: float, rows_per_cycle: float) -> float:
-    """Refine the `frequency` [Hz] of several cycles by Gauss-Newton on the harmonics of the motion x."""
+    """Refine the frequency of several cycles by Gauss-Newton on the harmonics of the motion.
+
+    Args:
+        clock: time of each row [s], (n,).
+        x: displacement relative to the middle of its range, (n,).
+        frequency: first estimate of the frequency [Hz].
+        rows_per_cycle: number of rows in a cycle, which limits the number of harmonics.
+
+    Returns:
+        Frequency [Hz].
+    """
     chosen = spread_rows(x.size, _ROWS_TO_REFINE)
     time, motion = clock[chosen], x[chosen]
     order = resolved_order(rows_per_cycle * chosen.size / x.size, _MOST_HARMONICS)
@@ -260,7 +270,13 @@ def _refined(clock: Array, x: Array, frequency: float, rows_per_cycle: float) ->
 
 
 def _repeats(clock: Array, x: Array, period: float) -> bool:
-    """Return True if the rows after one period [s] repeat the beginning of the motion x, (n,)."""
+    """Return True if a motion repeats: its last rows agree with its rows one period earlier.
+
+    Args:
+        clock: time of each row [s], (n,).
+        x: displacement relative to the middle of its range, (n,).
+        period: duration of the assumed cycle [s].
+    """
     begin = int(np.searchsorted(clock, period))
     if x.size - begin < 2:
         return True

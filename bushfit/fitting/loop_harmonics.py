@@ -108,7 +108,18 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
 
 
 def _cleared(coefficients: Array, noise: float, phase: Array, displacement: Array, inliers: Array) -> Array:
-    """Keep the harmonics of a motion that exceed its noise, or those of a triangle if the rows agree with one."""
+    """Keep the harmonics of a motion that exceed its noise, or those of a triangle if the rows agree with one.
+
+    Args:
+        coefficients: complex harmonics of the displacement, mean first [m or rad].
+        noise: standard deviation of one row's displacement [m or rad].
+        phase: position of each row [cycles], (n,).
+        displacement: measured displacement of each row [m or rad], (n,).
+        inliers: mask of the rows that are no outliers, (n,).
+
+    Returns:
+        Harmonics without noise, of the same shape as `coefficients`.
+    """
     order, fundamental = np.arange(1, GRID // 2, 2), coefficients[1]
     turn, triangle = 1j * fundamental / abs(fundamental), np.zeros(GRID // 2, dtype=complex)
     triangle[0] = coefficients[0]
@@ -158,10 +169,18 @@ def residual_limit(solution: Array, residual: Array, rows: int) -> float:
 
 
 def _fit_without_outliers(columns: Array, values: Array, solution: Array) -> tuple[Array, Array]:
-    """Fit harmonics to a column without its outliers; return them with the mask of the other rows, (n,).
+    """Fit harmonics to a column without its outliers.
 
     Least squares, as in `solution`, may follow a cluster of outliers. Rows are therefore first weighted down by their
     distance; then outliers are found and left out repeatedly until the set of outliers no longer changes.
+
+    Args:
+        columns: mean, cosines and sines at the rows, (n, 2 order + 1).
+        values: values of the column, (n,).
+        solution: harmonics by least squares, (2 order + 1,).
+
+    Returns:
+        Harmonics, (2 order + 1,), and the mask of the rows that are no outliers, (n,).
     """
     inliers, stuck = np.ones(values.size, dtype=bool), are_stuck(values)
     if _inliers(columns, values, solution, stuck).all():
@@ -179,7 +198,15 @@ def _fit_without_outliers(columns: Array, values: Array, solution: Array) -> tup
 
 
 def _column_outliers(loop: Loop, frequency: float, column: Array, solution: Array, residual: Array) -> OutlierRows:
-    """Outliers among all rows of a column, from harmonics fitted to some of the rows."""
+    """Outliers among all rows of a column (displacement or force), from harmonics fitted to some of the rows.
+
+    Args:
+        loop: steady cycles of the loop.
+        frequency: frequency of the motion [Hz].
+        column: values of the column, (n,).
+        solution: harmonics of the column: mean, cosines and sines, (2 order + 1,).
+        residual: residuals of the fitted rows, in the unit of the column.
+    """
     grid = np.arange(GRID + 1) / GRID
     cycle = basis(grid, solution.size // 2) @ solution
     distance = column - np.interp((loop.time - loop.time[0]) * frequency % 1.0, grid, cycle)
@@ -189,7 +216,14 @@ def _column_outliers(loop: Loop, frequency: float, column: Array, solution: Arra
 
 
 def _inliers(columns: Array, values: Array, solution: Array, stuck: Array) -> Array:
-    """Mask of the rows of a column that are neither stuck nor far from the harmonics in `solution`, (n,)."""
+    """Mask of the rows of a column that are neither stuck nor far from its harmonics, (n,).
+
+    Args:
+        columns: mean, cosines and sines at the rows, (n, 2 order + 1).
+        values: values of the column, (n,).
+        solution: harmonics of the column: mean, cosines and sines, (2 order + 1,).
+        stuck: mask of the rows that repeat the value of the row before, (n,).
+    """
     residual = values - columns @ solution
     return ~(stuck | are_outliers(residual, values, residual_limit(solution, residual, values.size)))
 

@@ -71,22 +71,22 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def frequency(self) -> Array:
-        """Frequencies of the operating points [Hz], (n,); a loop is a single one."""
+        """Frequency [Hz] of the only operating point of a loop, (1,), or of each point of a sweep, (n,)."""
         return np.array([self.drive.frequency])
 
     @property
     def amplitude(self) -> Array:
-        """Amplitudes of the operating points, zero-to-peak [m or rad], (n,)."""
+        """Zero-to-peak amplitude [m or rad] of the only point of a loop, (1,), or of all sweep points, (n,)."""
         return np.array([self.drive.amplitude])
 
     @property
     def conditions(self) -> RubberConditions:
-        """Temperature of the rubber at the operating points, and its strains before."""
+        """Temperature of the rubber and its earlier strains, at the only point of a loop or all points of a sweep."""
         return self.test_conditions
 
     @cached_property
     def measured(self) -> Array:
-        """Measured complex stiffness at the operating points [N/m or N m/rad], (n,)."""
+        """Complex stiffness of the loop's first harmonic [N/m or N m/rad], (1,); of a sweep, of each point, (n,)."""
         return np.array([self.drive.first_harmonic()])
 
     @property
@@ -110,11 +110,11 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def relative_noise(self) -> float:
-        """Standard deviation of one point, relative to half the force range (for a sweep relative to |K|)."""
+        """Standard deviation of one row's noise, relative to half the force range (of a sweep: relative to |K|)."""
         return self.drive.noise / self.drive.half_range
 
     def weighted(self, weight: Array) -> Self:
-        """Return the test with the weight of each point multiplied by a factor, (n,)."""
+        """Return the test with the weight of each row (of a sweep: point) multiplied by a factor, (n,)."""
         return replace(self, drive=replace(self.drive, weight=self.drive.weight * weight))
 
     def without(self, points: Array) -> Self:
@@ -134,7 +134,12 @@ class MeasuredLoop(MeasuredBase):
         return replace(self, drive=replace(self.drive, noise=relative * self.drive.half_range))
 
     def with_model_error(self, size: float) -> Self:
-        """Return the test with an error of the model added to its noise, by its standard deviation relative to |K|."""
+        """Return the test with an error of the model added to its noise.
+
+        Args:
+            size: standard deviation of the model's error, relative to half the force range (of a sweep: relative to
+                |K|).
+        """
         test = replace(self, model_error=size)
         test.__dict__["_error_directions"] = self._error_directions
         return test
@@ -163,11 +168,27 @@ class MeasuredLoop(MeasuredBase):
         return force if values is not None else self._keep("force", model, (), force)
 
     def residual(self, model: Model, values: Values | None = None) -> Array:
-        """Whitened residuals, model minus measured, (..., size); `values` replace the model's, with leading axes."""
+        """Whitened residuals: model minus measured in units of noise; independent with variance 1 for a true model.
+
+        Args:
+            model: model to evaluate.
+            values: parameter values in place of the model's own; leading axes are added to the result.
+
+        Returns:
+            Residuals in the force of each row, (..., size); of a sweep of n points, n gains, then n phases.
+        """
         return self._whitened((self.force(model, values) - self.drive.force) * self._per_noise)
 
     def residual_with(self, added: Array, model: Model) -> Array:
-        """Whitened residuals, (size,), with a stiffness added to the model's, complex (n,) [N/m or N m/rad]."""
+        """Whitened residuals, model minus measured in units of noise, of a model with an additional stiffness.
+
+        Args:
+            added: stiffness added to the model's at each operating point (one in a loop), complex [N/m or N m/rad].
+            model: model without the added stiffness.
+
+        Returns:
+            Residuals, (size,).
+        """
         return self.residual(model) + self.residual_change(added, model)
 
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
@@ -178,17 +199,17 @@ class MeasuredLoop(MeasuredBase):
         return self._keep("jacobian", model, tuple(names), self._whitened(self._slopes(model, names) * self._per_noise))
 
     def _slopes(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the force at the rows by parameter value, (len(names), n); caches the force too."""
+        """Derivatives of the force at the n rows by parameter value, (len(names), n); the force is cached too."""
         history = self.drive.history(model.is_transient)
         force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
         self._keep("force", model, (), self.drive.interpolate_at_rows(force) + (self.drive.datum or 0.0))
         return self.drive.interpolate_at_rows(slopes)
 
     def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
-        """Derivatives by parameters of the residuals with an added stiffness (`residual_with`), (k, size).
+        """Derivatives by k parameters of the whitened residuals with an added stiffness (`residual_with`), (k, size).
 
         Args:
-            added: stiffness added to the model's, complex (n,) [N/m or N m/rad].
+            added: stiffness added to the model's at each operating point (one in a loop), complex [N/m or N m/rad].
             model: model at whose values the derivatives are taken.
             names: names of the k parameters.
             as_share: True if the added stiffness remains proportional to the model's; False if it is constant.
@@ -206,9 +227,9 @@ class MeasuredLoop(MeasuredBase):
         The force of a loop changes in its first harmonic only.
 
         Args:
-            change: change of the stiffness at the operating points, complex (..., n) [N/m or N m/rad].
+            change: change of the stiffness at each operating point (one in a loop), complex, (..., 1) [N/m or N m/rad].
             model: model whose stiffness changes.
-            added: stiffness added to the model's at the points, complex (n,) [N/m or N m/rad].
+            added: stiffness added to the model's at the same points, complex [N/m or N m/rad]; a loop does not use it.
         """
         return np.concatenate((change.real, change.imag), axis=-1) @ self._unit_changes
 
@@ -216,20 +237,20 @@ class MeasuredLoop(MeasuredBase):
         return ((self.force(model) - self.drive.force) / self.drive.half_range)[None]
 
     def misfit(self, model: Model) -> Array:
-        """Residuals in units of noise, (size,); rows of a loop are scaled separately, without their correlation."""
+        """Residuals, model minus measured force at each row in units of noise, (size,); correlation is not removed."""
         return (self.force(model) - self.drive.force) * self._per_noise
 
     def distance(self, model: Model) -> Array:
-        """Distance of the measurement from the model at each point of the test, in units of noise, (n,)."""
+        """Absolute difference between model and measured force at each row, in units of noise, (n,)."""
         return np.abs(self.misfit(model))
 
     def displayed_residual(self, model: Model) -> Array:
-        """Residuals for charts, (size,): as `misfit`, but also of points without weight, in units of noise."""
+        """Residuals for charts, model minus measured in units of noise, (size,): also of points without weight."""
         distance = (self.force(model) - self.drive.force) / self.drive.noise
         return np.where(self.weights > 0.0, self.misfit(model), distance)
 
     def outlier_indices(self, model: Model) -> Array:
-        """Indices of the rows whose force is far from the loop's own harmonics, (k,); the model is not used."""
+        """Indices of the rows whose force is far from the harmonics fitted to the loop, (k,); the model is not used."""
         return self.drive.outliers["force"].rows
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
@@ -241,7 +262,7 @@ class MeasuredLoop(MeasuredBase):
                 yield Outlier(self.name, file, row + before + 1, column, noise_units)
 
     def smooth_changes(self) -> Array:
-        """Change of the whitened residuals by eleven smooth changes of the force of half the force range, (11, size).
+        """Change of the whitened residuals by 11 smooth changes of the force, each of half the force range, (11, size).
 
         These are a constant, and cosine and sine of five harmonics; with `fundamental_only` all but the first harmonic
         are 0.
@@ -252,12 +273,18 @@ class MeasuredLoop(MeasuredBase):
         return rows
 
     def smooth_misfit(self, model: Model) -> float:
-        """Largest misfit in the first five harmonics, relative to half the force range (of a sweep: to |K|)."""
+        """Largest absolute difference between model and force in the first five harmonics, relative to half the range.
+
+        For a sweep: largest magnitude of the smooth relative difference of the complex stiffness, `LineMisfit.smooth`.
+        """
         sizes = np.linalg.lstsq(self.smooth_changes().T, self.residual(model), rcond=None)[0]
         return float(np.abs(sizes @ self._waves[:, self.weights > 0.0]).max())
 
     def gain_and_offset(self) -> Array:
-        """Change of the whitened residuals by a gain error of 100 % and an offset of half the force range, (2, n)."""
+        """Change of the n whitened residuals by a gain error of 100 %, and by an offset of the force, (2, n).
+
+        The offset is half the force range.
+        """
         offset = np.full(self.drive.force.size, self.drive.half_range)
         return np.array([self._less_shared(self.unit_gain), self._whitened(offset * self._per_noise)])
 
@@ -283,12 +310,15 @@ class MeasuredLoop(MeasuredBase):
         return smooth_waves(self.drive.phase)
 
     def _in_noise(self, rows: Array) -> Array:
-        """Convert rows [N or N m], (..., n), to units of noise and remove their correlation; 0 if a row is left out."""
+        """Remove the correlation of the noise from rows of force in units of noise, (..., n); rows left out become 0.
+
+        If only the first harmonic is used, the result has the two components along it, (..., 2).
+        """
         white = self.drive.row_noise.whiten(rows) * self._counting
         return white @ self._fundamental if self.fundamental_only else white
 
     def _less_shared(self, white: Array) -> Array:
-        """Whiten uncorrelated rows, (..., n), by the error that all rows share as well: model error or gain error."""
+        """Whiten rows of uncorrelated noise, (..., n), by the error that all rows share: model error or gain error."""
         if self.model_error:
             directions, size = self._error_directions
             share = 1.0 - 1.0 / np.hypot(1.0, self.model_error * size)
@@ -296,12 +326,19 @@ class MeasuredLoop(MeasuredBase):
         return self._gain.whiten(white) if self._gain else white
 
     def _whitened(self, rows: Array) -> Array:
-        """Whiten rows in units of noise, (..., n), by their correlation and by shared errors."""
+        """Whiten rows of force in units of noise: remove the correlation of their noise, and errors shared by all rows.
+
+        Args:
+            rows: differences or derivatives of the force at the n rows, divided by the noise of each row, (..., n).
+
+        Returns:
+            Whitened rows, (..., size), whose noise is independent with unit variance.
+        """
         return self._less_shared(self._in_noise(rows))
 
     @property
     def log_det_covariance(self) -> float:
-        """Natural log of the determinant of the covariance that shared errors give the uncorrelated rows."""
+        """ln det S of the covariance S = 1 + (error shared by all rows) of the uncorrelated rows in units of noise."""
         if self.model_error:
             return float(np.sum(np.log1p(np.square(self.model_error * self._error_directions[1]))))
         return self._gain.log_det_covariance if self._gain else 0.0
@@ -354,7 +391,12 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def _error_directions(self) -> tuple[Array, Array]:
-        """Orthonormal directions of a model error of 100 %, (n, c), and its standard deviation along each, (c,)."""
+        """Directions and sizes of a model error of 100 % of half the force range, among the n uncorrelated rows.
+
+        Returns:
+            c orthonormal directions, (n, c), and the standard deviation of the error along each, in units of noise,
+            (c,).
+        """
         return CommonError(self._error_waves[2 * (self.first_error - 1) :]).principal_errors
 
     def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:

@@ -189,7 +189,12 @@ class MeasuredSweep(MeasuredBase):
 
     @cached_property
     def _distinct(self) -> tuple[Array, Array, Array]:
-        """Frequency and reached amplitude of the distinct operating points; and their index for each point, (n,)."""
+        """Distinct operating points of the sweep, whose repeats are computed once.
+
+        Returns:
+            Frequency [Hz] and reached amplitude [m or rad] of the d distinct points, (2, d); and, for each of the n
+            points of the sweep, the index of its distinct point, (n,).
+        """
         points = self.frequency + 1j * self.sweep.amplitude_reached[self.order]
         distinct, place = np.unique(points, return_inverse=True)
         return distinct.real, distinct.imag, place
@@ -269,9 +274,14 @@ class MeasuredSweep(MeasuredBase):
         return self.whiten(self._deviation_change(change, self.stiffness(model) + added))
 
     def deviation(self, stiffness: Array) -> Array:
-        """Residual of a stiffness at the points before whitening, complex (..., n).
+        """Difference of a stiffness from the measured one, before whitening.
 
-        The real part is the relative difference in magnitude, the imaginary part the difference in phase [rad].
+        Args:
+            stiffness: stiffness at the points of the sweep, complex (..., n) [N/m or N m/rad].
+
+        Returns:
+            Complex (..., n): the real part is the relative difference in magnitude |K|, the imaginary part the
+            difference in phase [rad]; stiffness minus measurement.
         """
         if self.residuals == "complex":
             return np.log(stiffness / self.measured)
@@ -280,7 +290,12 @@ class MeasuredSweep(MeasuredBase):
         return gain + 1j * loss * self._phase_per_loss
 
     def _deviation_change(self, change: Array, stiffness: Array) -> Array:
-        """Change of the residual before whitening, (..., n), by a small change of the stiffness, complex (..., n)."""
+        """Change of `deviation` by a small change of the stiffness, gain + i phase [rad], complex (..., n).
+
+        Args:
+            change: change of the stiffness, complex (..., n) [N/m or N m/rad].
+            stiffness: stiffness that is changed, complex (..., n) [N/m or N m/rad].
+        """
         relative = change / stiffness
         if self.residuals == "complex":
             return relative
@@ -304,7 +319,14 @@ class MeasuredSweep(MeasuredBase):
         return Whitening(self.block_starts, line_starts, random, self.noise, self.weights, points, self.model_error)
 
     def whiten(self, deviation: Array) -> Array:
-        """Whiten deviations by scatter and shared errors: complex (..., n) -> (..., 2 n), gains, then phases."""
+        """Whiten deviations by the scatter and the errors that points share.
+
+        Args:
+            deviation: relative differences in magnitude + i differences in phase [rad], complex (..., n).
+
+        Returns:
+            Whitened residuals in units of noise, (..., 2 n): n gains, then n phases.
+        """
         return self.covariance.whiten(deviation)
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
@@ -326,13 +348,18 @@ class MeasuredSweep(MeasuredBase):
         return np.stack((difference.real, difference.imag))
 
     def scaled_distance(self, deviation: Array, *, shared: bool = True) -> Array:
-        """Magnitude of deviations in units of point-to-point noise, (n,); `shared` subtracts the error of each run."""
+        """Magnitude of deviations (gain + i phase, complex (n,)) in units of point-to-point noise, (n,).
+
+        Args:
+            deviation: relative differences in magnitude + i differences in phase [rad], complex (n,).
+            shared: True to subtract the likeliest error that all points of a run share.
+        """
         return np.hypot(*self.covariance.scaled(deviation, shared=shared))
 
     def distance(self, model: Model) -> Array:
-        """Distance of each point from the model in units of noise, (n,): root mean square of gain and phase.
+        """Distance of each point from the model in units of noise, (n,): root mean square of gain and phase deviation.
 
-        The likeliest error that the points of a block share is subtracted first.
+        The likeliest error that all points of a run share is subtracted first.
         """
         return self.scaled_distance(self.deviation(self.stiffness(model))) / np.sqrt(2.0)
 
@@ -356,10 +383,15 @@ class MeasuredSweep(MeasuredBase):
             yield Outlier(self.name, file, row, "stiffness", noise_units)
 
     def lines(self, model: Model) -> list[LineMisfit]:
-        """Mean misfit of each line (runs at one held amplitude or frequency) over its repeats.
+        """Mean difference between measurement and model along each line, over the repeats of the line.
+
+        A line consists of the runs at one held amplitude or frequency.
+
+        Args:
+            model: model to compare.
 
         Returns:
-            One record for each held value.
+            One record for each line, with the complex relative difference K_measured/K_model - 1 at each step.
         """
         ratio, lines = self.measured / self.stiffness(model) - 1.0, []
         for held_value in np.unique(self.held_value):
@@ -387,7 +419,14 @@ class MeasuredSweep(MeasuredBase):
         return f"run {self.repeat[point]} of {self.name}, {self.direction}"
 
     def shared_error_columns(self, chosen: Array) -> list[Array]:
-        """Changes of the whitened residuals, (2 n,), by a unit error of gain, and of phase, of the points of a mask."""
+        """Change of the whitened residuals, (2 n,), by an error of gain of 100 %, and by an error of phase of 1 rad.
+
+        Args:
+            chosen: mask of the points that have the error, (n,).
+
+        Returns:
+            Two arrays (2 n,): for the gain and for the phase.
+        """
         return [self.whiten(unit * chosen.astype(complex)) for unit in (1.0, 1.0j)]
 
     def columns(self) -> dict[str, Any]:

@@ -39,7 +39,12 @@ class MeasuredBase(ABC):
 
     @abstractmethod
     def relative_difference(self, model: Model) -> Array:
-        """Model minus measured at each point, relative to |K| or to half the force range of a loop, (parts, n)."""
+        """Model minus measured at each of the n points, relative to the measured |K| or half the force range of a loop.
+
+        Returns:
+            Real and imaginary part of the stiffness difference of a sweep, (2, n), or force difference of a loop, (1,
+            n).
+        """
 
     @property
     def residuals_per_point(self) -> int:
@@ -60,17 +65,26 @@ class MeasuredBase(ABC):
         return self.test.source
 
     def relative(self, model: Model) -> Array:
-        """Magnitude of the relative difference of model and test at each point with weight, for the NRMSE, (n,)."""
+        """Magnitude of the relative difference of model and test at each point with weight, (n,), for the NRMSE.
+
+        The difference is that of the complex stiffness relative to |K|, or of a loop's force relative to half its
+        range.
+        """
         return np.linalg.norm(self.relative_difference(model)[:, self.weights > 0.0], axis=0)
 
     def change(self, model: Model, reference: Model) -> float:
-        """Largest difference between two models over the points, relative to |K| or half the force range of a loop."""
+        """Largest difference between two models over the points of the test.
+
+        Returns:
+            Magnitude of the difference of the complex stiffness relative to |K|, or of the force relative to half the
+            force range of a loop.
+        """
         difference = self.relative_difference(model) - self.relative_difference(reference)
         return float(np.linalg.norm(difference, axis=0).max())
 
     @cached_property
     def _last(self) -> dict[str, tuple[Model, Any, Array]]:
-        """Cache of the last response and its derivatives by key, each with its model and parameter names."""
+        """Cache of the last force or stiffness and its derivatives by key, each with its model and parameter names."""
         return {}
 
     def _keep(self, key: str, model: Model, names: Any, values: Array) -> Array:

@@ -207,9 +207,16 @@ def _slope(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
 
 
 def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -> tuple[dict[LineKey, Array], int]:
-    """Variance of gain and phase of each line, (2,), pooled over lines that agree, and its degrees of freedom.
+    """Variance of gain and phase [rad] from point to point, (2,), of each line, pooled over lines that agree.
 
     With few degrees of freedom gain and phase share one variance, unless they differ significantly.
+
+    Args:
+        lines: noise of all lines, by name of the sweep and value held constant.
+        measured: noise of the lines with repeats or enough points.
+
+    Returns:
+        Variances by line, and their degrees of freedom.
     """
     if not measured:
         return {key: line.variance for key, line in lines.items()}, round(min(line.freedom for line in lines.values()))
@@ -235,9 +242,14 @@ def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -
 
 
 def _shared(lines: Sequence[LineNoise], rig: RigSettings) -> Array:
-    """Standard deviation of the errors shared by a run, in gain and phase, (2,), without outlying pairs of repeats.
+    """Standard deviation of the errors of relative gain and phase [rad] shared by a run, (2,), from pairs of repeats.
 
-    Few repeats often agree by chance: below _ENOUGH degrees of freedom the variance is averaged with the rig's class.
+    Outlying pairs are left out. Few repeats often agree by chance: below `_ENOUGH` degrees of freedom the variance is
+    averaged with that of the rig's class.
+
+    Args:
+        lines: noise of the lines with repeats.
+        rig: class of the rig.
     """
     pairs, freedom = np.concatenate([line.shared for line in lines]), sum(line.shared_freedom for line in lines)
     usual = np.abs(pairs) <= _OUTLYING_PAIR * np.median(np.abs(pairs), axis=0) if len(pairs) else np.empty((0, 2), bool)

@@ -165,15 +165,15 @@ def outlying_points(
 
 
 def contradictions(stiffness: Array, place: Array) -> list[tuple[float, int, int]]:
-    """Find operating points whose repeats contradict each other: they differ by 10 % of |K| or more.
+    """Find operating points whose repeats contradict each other: complex stiffnesses that differ by 10 % or more.
 
     Args:
         stiffness: stiffness of the points, complex (n,).
         place: index of the operating point of each point, (n,).
 
     Returns:
-        For each such operating point, the largest first: difference relative to |K|, and indices of the two points that
-        differ most.
+        For each such operating point, the largest first: magnitude of the complex difference relative to |K|, and
+        indices of the two points that differ most.
     """
     value, ends, worst = np.log(stiffness), np.cumsum(np.bincount(place)), dict[int, tuple[float, int, int]]()
     for part in (value.real, value.imag):

@@ -74,7 +74,13 @@ def with_preload(data: PreparedCampaign) -> PreparedCampaign:
 
 
 def _probability_of_chance(data: PreparedCampaign, tests: Sequence[MeasuredTest], fixed: Sequence[str]) -> float:
-    """Probability that chance alone lowers chi-square as much as the effect of preload does, by an F-test."""
+    """p-value of an F-test: probability that chance alone lowers chi-square as much as the effect of preload does.
+
+    Args:
+        data: campaign with prepared tests.
+        tests: tests to fit.
+        fixed: names of parameters that stay fixed.
+    """
     tests = with_gain_weighting(tests, weigh=True)
     model = data.starting_model(data.effects, tests, {})
     names = list(data.free(tuple(model.parameters)))
@@ -92,7 +98,16 @@ def _probability_of_chance(data: PreparedCampaign, tests: Sequence[MeasuredTest]
 
 
 def _fits(data: PreparedCampaign, problem: FitProblem, fixed: Sequence[str]) -> tuple[FitResult, FitResult]:
-    """Fits of a problem without and with the free parameters of the effect of preload."""
+    """Fit the tests of a problem without and with the free parameters of the effect of preload.
+
+    Args:
+        data: campaign with prepared tests.
+        problem: problem of the model without the effect.
+        fixed: names of parameters that stay fixed.
+
+    Returns:
+        The fit without the effect, and the fit with it.
+    """
     plain = estimate(problem, robust=data.robust)
     model = plain.model.with_effect(PRELOAD)
     added = [name for name in model.parameters if name.startswith(f"{PRELOAD}.") and name not in fixed]

@@ -80,7 +80,11 @@ class FitProblem:
         return np.clip(self.coordinates.point(values), *self.limits)
 
     def at_bound(self, point: Array) -> dict[str, End]:
-        """Names of the parameters that are at a bound, with the bound ("min" or "max"), from the coordinates, (k,)."""
+        """Parameters that are at a bound, by name, with the bound ("min" or "max").
+
+        Args:
+            point: dimensionless coordinates of the k free parameters, (k,).
+        """
         low, high = self.limits
         near = _AT_BOUND * np.minimum(high - low, 1.0)
         rooms: dict[End, Array] = {"min": point - low, "max": high - point}
@@ -189,7 +193,7 @@ class FitResult:
         return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
 
     def gain(self, fixed: Collection[str]) -> float:
-        """Fall of chi-square expected from one Gauss-Newton step, with the named parameters fixed."""
+        """Fall of chi-square expected from one Gauss-Newton step of the other parameters, with the named ones fixed."""
         free = [i for i, name in enumerate(self.names) if name not in fixed]
         left_vectors, values, _ = np.linalg.svd(self.jacobian[free].T, full_matrices=False)
         significant = values > ROUNDING * values.max(initial=0.0)

@@ -155,6 +155,10 @@ def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
     """Fit m and alpha to the smallest-amplitude sweep, with the static parameters fixed (paper, section 4.2).
 
     The errors of the static parameters are propagated into those of m and alpha.
+
+    Args:
+        data: prepared campaign.
+        static: result of the static fit, with mu, sigma_fmax and eps_half.
     """
     fixed = {name: static.model.values[name] for name in STATIC}
     found = _fit_step(data, [data.smallest_sweep], BASE, fixed)
@@ -235,7 +239,14 @@ def _without_springpot(data: PreparedCampaign, static: FitResult) -> str:
 def _problem(
     data: PreparedCampaign, tests: Sequence[MeasuredTest], effects: Sequence[str], fixed: Mapping[str, float]
 ) -> FitProblem:
-    """Build the least-squares problem of a model's free parameters, with start values of the campaign or the tests."""
+    """Build the least-squares problem of a model's free parameters, with start values of the campaign or the tests.
+
+    Args:
+        data: prepared campaign.
+        tests: tests to fit.
+        effects: names of the effects of the model.
+        fixed: values of parameters that this fit keeps fixed, by name [SI].
+    """
     model = data.starting_model(effects, tests, fixed)
     names = [name for name in data.free(tuple(model.parameters)) if name not in fixed]
     return FitProblem(model, tests, names, data.bounds)
@@ -244,7 +255,14 @@ def _problem(
 def _fit_step(
     data: PreparedCampaign, tests: Sequence[MeasuredTest], effects: Sequence[str], fixed: Mapping[str, float]
 ) -> FitResult:
-    """Fit one step of the paper's procedure with lmfit."""
+    """Fit one step of the paper's procedure with lmfit.
+
+    Args:
+        data: prepared campaign.
+        tests: tests to fit.
+        effects: names of the effects of the model.
+        fixed: values of parameters that this step keeps fixed, by name [SI].
+    """
     return estimate(_problem(data, tests, effects, fixed), robust=data.robust, solver=solve_with_lmfit)
 
 
@@ -255,7 +273,15 @@ def _result(
     notes: Sequence[str] = (),
     unused: Sequence[MeasuredTest] = (),
 ) -> Result:
-    """Assemble the result of a procedure: the model of the last step, with uncertainty and warnings of all steps."""
+    """Assemble the result of a procedure: the model of the last step, with uncertainty and warnings of all steps.
+
+    Args:
+        data: prepared campaign.
+        steps: fits of the procedure, in order.
+        fixed: covariance of parameters that all steps kept fixed; None if these are exact.
+        notes: sentences to report in addition.
+        unused: tests that no step fitted, which the model is compared with.
+    """
     model, tests = steps[-1].model, [test for step in steps for test in step.data_sets]
     # beside a model error, a parameter at a bound is fixed
     stages = []

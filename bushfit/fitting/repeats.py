@@ -113,9 +113,13 @@ def difference_freedom(steps: int) -> float:
 
 
 def _usual(difference: Array, log_step: Array) -> Array:
-    """Mask of the steps at which the difference of two repeats, complex (n,), is no outlier, (n,).
+    """Mask of the steps at which the difference of two repeats is no outlier, (n,).
 
     The limit is constant, or grows along the run if the differences grow, by Theil's (1950) median slope.
+
+    Args:
+        difference: difference of ln K between the repeats at each step, complex (n,).
+        log_step: natural log of the stepped frequency or amplitude, (n,).
     """
     usual = ~np.isnan(difference)
     if np.count_nonzero(usual) < FEWEST_SOUGHT:

@@ -189,7 +189,13 @@ def _periodogram(rows: Array) -> Array:
 
 
 def _fitted(power: Array, waves: Array, used: Array) -> _Model:
-    """Fit an autoregressive model to the frequencies `used` of a periodogram, with the order of Schwarz's criterion."""
+    """Fit an autoregressive model to a periodogram, with the order of Schwarz's criterion.
+
+    Args:
+        power: periodogram at m frequencies, (m,).
+        waves: complex exponentials exp(-i omega lag) at these frequencies, (lags, m).
+        used: mask of the frequencies to fit, (m,).
+    """
     ends = np.ones(power.size)
     ends[[0, -1]] = 0.5
     cosines, used_numbers = waves.real * (ends / ends.sum()), np.flatnonzero(used)
