@@ -224,7 +224,7 @@ class Screen:
             claim: mistake that is corrected first; None for the tests as recorded.
 
         Returns:
-            Sum of squares in units of a coarse noise; infinite if the model has no response.
+            Sum of squared differences of the complex stiffness in units of a coarse noise; infinite without a response.
         """
         bushing = self.data.campaign.bushing
         if claim and not claim.tests and bushing:
@@ -243,7 +243,17 @@ class Screen:
         return max(_paraboloid_minimum((total - explained).reshape(_EPS_HALF.size, _ALPHA.size)), 0.0)
 
     def _part(self, place: int, data_set: MeasuredTest, mistake: Mistake | None, bushing: Bushing | None) -> Array:
-        """Inner products of a test's three model columns and its target at each of g grid points, (g, 4, 4)."""
+        """Inner products of the three model columns and the measured stiffness of one test, at each of g grid points.
+
+        Args:
+            place: index of the test, loops before sweeps.
+            data_set: the test.
+            mistake: mistake that is corrected in the test; None for the test as recorded.
+            bushing: bushing with its dimensions, corrected if the mistake is in them; None without a bushing.
+
+        Returns:
+            Matrix of products at each value of alpha and eps_half, (g, 4, 4).
+        """
         key = (place, mistake.name if mistake else "", bushing)
         if key not in self._known:
             direction, frequency, amplitude, stiffness, error = _points(data_set, mistake)
@@ -255,7 +265,16 @@ class Screen:
         return self._known[key]
 
     def _columns(self, bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
-        """Complex stiffness as from the function `_columns`, cached for mistakes that keep the operating points."""
+        """Complex stiffness per unit of mu, m and sigma_fmax at all g grid values, (g, 3, n): the function `_columns`, cached.
+
+        Mistakes that keep the operating points share the cached result.
+
+        Args:
+            bushing: bushing with its dimensions; None for tests of specimens.
+            direction: direction or specimen.
+            frequency: [Hz], (n,).
+            amplitude: zero-to-peak [m or rad, or strain], (n,).
+        """
         key = (bushing, direction, frequency.tobytes(), amplitude.tobytes())
         if key not in self._responses:
             self._responses[key] = _columns(bushing, direction, frequency, amplitude)
@@ -280,7 +299,14 @@ def _paraboloid_minimum(misfit: Array) -> float:
 
 
 def _columns(bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
-    """Complex stiffness per unit of mu, m and sigma_fmax at the g grid values of alpha and eps_half, (g, 3, n)."""
+    """Complex stiffness per unit of mu, m and sigma_fmax at the g grid values of alpha and eps_half, (g, 3, n).
+
+    Args:
+        bushing: bushing with its dimensions; None for tests of specimens.
+        direction: direction or specimen.
+        frequency: [Hz], (n,).
+        amplitude: zero-to-peak [m or rad, or strain], (n,).
+    """
     names = ("mu", "m", "sigma_fmax")
     alpha, eps_half = (axis.reshape(-1, 1) for axis in np.meshgrid(_ALPHA, _EPS_HALF))
     model = Model.with_defaults(bushing, BASE, {})

@@ -29,7 +29,7 @@ class _Means(NamedTuple):
     Args:
         sweep: means over narrow bands, or the selected points.
         conditions: temperature and earlier strains at these points, which include those of rows that are left out.
-        shares: variance of a mean relative to the variance of a row, averaged over each line that was reduced to means.
+        shares: variance of the noise of a mean relative to that of one row, averaged over each line reduced to means.
         words: sentence on how the sweep was reduced.
     """
 
@@ -107,7 +107,13 @@ def _some(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
 
 
 def _noise(before: SweepNoise, condensations: Sequence[_Means], rig: RigSettings) -> SweepNoise:
-    """Noise of the sweeps of a rig after some were reduced to means; a stated noise falls with the rows per mean."""
+    """Noise of the sweeps of a rig after some were reduced to means; a stated noise falls with the rows per mean.
+
+    Args:
+        before: noise of the sweeps as measured.
+        condensations: sweeps that were reduced.
+        rig: stated class of the rig.
+    """
     if not condensations:
         return before
     anew, random = sweep_noise([means.sweep for means in condensations], rig), dict(before.random)
@@ -160,8 +166,8 @@ class _Groups:
     """Groups of sweep rows that are averaged together; groups are in the order of measurement.
 
     Args:
-        rows: indices of the grouped rows in the sweep, (n,).
-        place: index of the group that each row belongs to, (n,).
+        rows: indices of the n grouped rows in the sweep, (n,).
+        place: index of the group that each of these rows belongs to, (n,).
         lead: index in the sweep of one row of each group, (g,).
         counts: number of rows in each group, (g,).
     """

@@ -32,9 +32,10 @@ class GapDescription:
     """Description of a gap between model and tests that no known effect explains.
 
     Args:
-        after: model with its smooth correction, and the tests with loops replaced by their first harmonic.
+        after: model with its smooth correction of the stiffness, and the tests with loops replaced by their first
+            harmonic.
         fitted: fit of the parameters with the correction treated as a random error of the model.
-        holdout: errors of predicted runs inside the tested range, without and with the correction; for information.
+        holdout: root mean square residuals of predicted runs inside the tested range, without and with the correction.
         power_law: nearest power law of frequency and amplitude; None if the tests show no power law.
         sentence: text on the size and the form of the gap.
         evidence: text on the range of tests in which the correction is valid.
@@ -97,6 +98,13 @@ def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
     """Predict parts of the sweeps inside the tested range from the other parts, without and with the correction.
 
     The parts are every third frequency (or other step), the middle level and the last repeat of the sweeps.
+
+    Args:
+        before: fit of the model without the correction.
+        fitted: fit with the correction, treated as a random error of the model.
+
+    Returns:
+        Root mean square residuals of the predicted parts without and with the correction.
     """
     solution, tests = before.solution, before.data_sets
     chosen: dict[str, dict[MeasuredTest, Array]] = {}

@@ -84,7 +84,7 @@ class BeforeAfter(TypedDict):
 
 
 class GapEntry(TypedDict):
-    """Entry of diagnosis.json on the misfit between model and tests, in units of noise: fitted and held-out data."""
+    """Entry of diagnosis.json on the root mean square residual, in units of noise, of fitted and of held-out data."""
 
     calibration: Annotated[BeforeAfter, Doc("misfit of the data that were fitted.")]
     heldout: Annotated[
@@ -107,7 +107,10 @@ class OddsEntry(TypedDict):
 
 
 class ExpectedErrorEntry(TypedDict):
-    """Expected error of model.json for the worst direction or specimen: 95 % of its points have smaller errors."""
+    """Expected errors of |K| (relative) and loss factor (absolute) of model.json for the worst direction or specimen.
+
+    95 % of its points have smaller errors.
+    """
 
     stiffness: Annotated[float, Doc("error of |K|, relative to |K|.")]
     loss_factor: Annotated[float, Doc("absolute error of the loss factor.")]
@@ -117,13 +120,13 @@ class ExpectedErrorEntry(TypedDict):
 
 @dataclass(frozen=True)
 class Description:
-    """Power law A e^(i phi) f^p X^q nearest to a gap without a name, added to the model's stiffness.
+    """Power law A e^(i phi) f^p X^q of the complex stiffness that a model lacks, nearest to a gap without a name.
 
     Each quantity is a value with the ends of its 95 % interval.
 
     Args:
-        phase_deg: phi [deg].
-        frequency_power, amplitude_power: p and q [1].
+        phase_deg: phase phi [deg].
+        frequency_power, amplitude_power: powers p and q of the frequency f and the amplitude X [1].
         words: the power law as a sentence.
     """
 

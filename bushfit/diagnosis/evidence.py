@@ -54,7 +54,7 @@ class Evidence:
 
     @property
     def estimate(self) -> FitResult:
-        """Fit whose problem contains the tests as listed in `data_sets`, weighted by their noise."""
+        """Result of the fit with each test weighted by its own noise, without errors that several tests share."""
         return replace(self.solution, problem=replace(self.solution.problem, tests=self.data_sets))
 
     @property
@@ -87,7 +87,7 @@ class Evidence:
 
     @cached_property
     def residual_rows(self) -> Mapping[MeasuredTest, slice]:
-        """Slice of the residuals of each test in the vector of all residuals."""
+        """Slice that the residuals of each test have in the vector of the residuals of all tests."""
         ends = np.cumsum([data_set.size for data_set in self.data_sets]).tolist()
         return {data_set: slice(end - data_set.size, end) for end, data_set in zip(ends, self.data_sets, strict=True)}
 

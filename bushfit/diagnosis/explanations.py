@@ -91,7 +91,7 @@ class FaultyPart(Explanation):
         """Give every point of the faulty part an independent error, for faults other than a common shift or slope.
 
         Returns:
-            The faulty part with one column for each point and component; a loop is returned unchanged.
+            Faulty part with one column for each residual of its points; a loop is returned unchanged.
         """
         if self.family == "loop":
             return self
@@ -102,7 +102,11 @@ class FaultyPart(Explanation):
         return replace(self, group=Group(columns, np.eye(rows.size), act_together=True))
 
     def distance(self, residual: Array) -> float:
-        """Root mean square deviation of the faulty points, in units of noise, from whitened residuals, (n,)."""
+        """Root mean square deviation of the faulty part along its columns, in units of noise.
+
+        Args:
+            residual: whitened residuals of all tests, (n,).
+        """
         columns = self.columns
         amounts = columns @ residual / np.maximum(np.linalg.norm(columns, axis=1), 1e-300)
         return float(np.sqrt(np.mean(amounts**2)))
@@ -113,8 +117,8 @@ class OutlierCluster(FaultyPart):
     """Several outliers at one frequency, which were left out of the fit, as a sign of a disturbance there.
 
     Args:
-        outlier_distance: root mean square distance of the points, in units of noise.
-        size: largest distance of a point, relative to |K|.
+        outlier_distance: root mean square distance of the points from the model, in units of noise.
+        size: largest distance of a point from the model, |K_model - K_measured|/|K_measured|.
         log_odds: natural log of the odds of a disturbance, compared with single wrong rows that coincide by chance.
     """
 
@@ -210,14 +214,14 @@ def compound(evidence: Evidence) -> Group | None:
 def unnamed_curves(evidence: Evidence) -> list[Explanation]:
     """List smooth curves over frequency and strain as explanations of a gap that no effect of the library explains.
 
-    All sweeps of one direction and temperature share a curve.
+    A curve is a smooth complex relative change of the stiffness. All sweeps of one direction and temperature share it.
 
     Args:
         evidence: the fitted model and the tests.
 
     Returns:
-        A smooth and a rough Gaussian process for each direction, a rough one for all directions together, and one
-        explanation for the harmonics of all loops.
+        A smooth and a rough curve (Gaussian process) for each direction, a rough one for all directions together, and
+        one explanation for the harmonics of all loops.
     """
     loops, sweeps = split_by_kind(evidence.data_sets)
     groups: dict[str, Group] = {}
@@ -271,7 +275,18 @@ def _process(
 def _restricted(
     evidence: Evidence, tests: Sequence[MeasuredTest], chosen: Sequence[MeasuredTest], columns: Array, share: Array
 ) -> tuple[Array, Array]:
-    """Set the columns and relative changes of a Gaussian process over `tests` to 0 outside of the `chosen` tests."""
+    """Set the columns and relative changes of a smooth process over `tests` to 0 outside of the `chosen` tests.
+
+    Args:
+        evidence: fitted model and all tests.
+        tests: tests over whose points the process was built.
+        chosen: tests in which the process acts.
+        columns: changes of the whitened residuals by each of c patterns, (c, n).
+        share: complex relative changes of the stiffness by each pattern at the points of `tests`, (c, points).
+
+    Returns:
+        Columns and relative changes, of the same shapes.
+    """
     rows = np.zeros(columns.shape[-1], dtype=bool)
     for test in chosen:
         rows[evidence.residual_rows[test]] = True

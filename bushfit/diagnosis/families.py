@@ -65,7 +65,7 @@ class FittedFamily:
 
     @property
     def words(self) -> str:
-        """Sentence that compares the held-out error of the family with that of the first family."""
+        """Sentence that compares the root mean square held-out residual of the family with that of the first family."""
         if self.gain is None or self.p is None or self.holdout.before is None or self.holdout.after is None:
             return "no part can be held out of both"
         figures = (
@@ -154,7 +154,14 @@ def fit_families(
 def _chain(
     chains: Mapping[str, list[Evidence]], first: Evidence, name: str, fixed: Sequence[str], bounds: Bounds
 ) -> list[Evidence]:
-    """Fit a model family effect by effect, starting from a shorter family in `chains`, whose fits are listed by name.
+    """Fit a model family effect by effect, starting from the fits of a shorter family.
+
+    Args:
+        chains: fits of the families so far, by name, each with one more effect than the fit before.
+        first: fit of the campaign's model.
+        name: name of the family: names of effects joined by +.
+        fixed: names of parameters that are not fitted.
+        bounds: limits of parameters inside their general limits.
 
     Returns:
         Fits with no effect added, one effect, two effects, and so on.
@@ -172,7 +179,13 @@ def _chain(
 
 
 def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bounds) -> float:
-    """Natural log of the marginal likelihood of the tests under the last of several fits, each with one more effect."""
+    """Natural log of the marginal likelihood of the tests under a model family.
+
+    Args:
+        chain: fits with no effect added, one effect, two effects, and so on; the last is that of the family.
+        names: names of the added effects, in this order.
+        bounds: limits of parameters inside their general limits.
+    """
     *before, last = chain
     found = with_model_error(last.estimate, bounds)[0]
     priors = [laplace(name, replace(last, solution=found), one) for name, one in zip(names, before, strict=True)]
@@ -183,7 +196,15 @@ def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bound
 def _gain(
     predictions: Mapping[str, Predicted], data_sets: Sequence[MeasuredTest]
 ) -> tuple[tuple[float, float, float] | None, float | None]:
-    """Reduction of the mean square held-out residual with the ends of its 95 % interval, and its p-value.
+    """Reduction of the mean square held-out residual by a family, compared with the first family, and its p-value.
+
+    Args:
+        predictions: residuals of each held-out part by both families, by name of the part.
+        data_sets: the tests.
+
+    Returns:
+        Reduction in squared units of noise with the ends of its 95 % interval, and the p-value of no difference; None
+        for both if nothing is held out.
 
     Notes:
         By the delta method the variance of the gain is the sum, over the rows of all tests, of the squared derivative

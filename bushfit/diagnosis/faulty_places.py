@@ -125,7 +125,16 @@ def _shifted(
     *,
     sloping: bool = False,
 ) -> FaultyPart:
-    """Suspected fault: an error of gain and phase (and slopes if `sloping`) of the points in one mask per sweep."""
+    """Suspected fault of sweep points: a common error of gain and phase, and of their slopes if `sloping`.
+
+    Args:
+        evidence: the fitted model and the tests.
+        family: kind of the fault, such as "level" or "repeat".
+        name: name of the fault for reports.
+        sweeps: sweeps that have the fault.
+        chosen: mask of the faulty points of each sweep, (n,) each.
+        sloping: True to add errors that grow along the stepped quantity.
+    """
     ends = np.array([[1.0, 1.0], [1.0, -1.0]])[: 1 + sloping]
     unit = np.kron(ends, np.array([[1.0], [1.0j]]))
     return _place(evidence, family, name, sweeps, chosen, _shift_columns(evidence, sweeps, chosen, sloping), unit)
@@ -140,7 +149,17 @@ def _place(
     columns: Array,
     unit: Array,
 ) -> FaultyPart:
-    """Build a suspected fault of sweep points (one mask per sweep) from its residual columns and changes of |K|."""
+    """Build a suspected fault of sweep points from its effect on the residuals.
+
+    Args:
+        evidence: the fitted model and the tests.
+        family: kind of the fault, such as "level" or "repeat".
+        name: name of the fault for reports.
+        sweeps: sweeps that have the fault.
+        chosen: mask of the faulty points of each sweep, (n,) each.
+        columns: change of the whitened residuals by a unit of each of c errors, (c, rows).
+        unit: complex relative change of the stiffness by a unit of each error, at the p ends of the part, (c, p).
+    """
     frequency, amplitude = (
         np.concatenate([getattr(sweep, axis)[mask] for sweep, mask in zip(sweeps, chosen, strict=True)])
         for axis in ("frequency", "amplitude")
@@ -153,7 +172,14 @@ def _place(
 def _shift_columns(
     evidence: Evidence, sweeps: Sequence[MeasuredSweep], chosen: Sequence[Array], sloping: bool = False
 ) -> Array:
-    """Change of the residuals by a unit error of gain and phase, and of their slopes if `sloping`, (2 or 4, rows)."""
+    """Change of the whitened residuals by an error of gain of 100 % and of phase of 1 rad, (2, rows).
+
+    Args:
+        evidence: the fitted model and the tests.
+        sweeps: sweeps with the errors, whose residuals are `rows` in number.
+        chosen: mask of the points with the errors in each sweep, (n,) each.
+        sloping: True to add the same errors times a slope along the log of the stepped quantity: (4, rows).
+    """
     rows = _rows(evidence, sweeps)
     columns = np.zeros((2 + 2 * sloping, rows.stop - rows.start))
     for sweep, mask in zip(sweeps, chosen, strict=True):

@@ -31,7 +31,7 @@ class Group:
 
     @property
     def whole(self) -> Array:
-        """Changes of all residuals per unit amount of each column, (c, n); zero outside `covered_rows`."""
+        """Changes of all residuals per unit amount of each column, (c, n); 0 outside the rows it covers."""
         if self.covered_rows is None:
             return self.columns
         rows, count = self.covered_rows
@@ -41,7 +41,11 @@ class Group:
 
     @property
     def scaled(self) -> Array:
-        """Columns over all residual rows, (c, n); scaled to a 100 % change of |K| each if exactly one column acts."""
+        """Columns of the group over all residual rows, (c, n), for the computation of evidence.
+
+        If exactly one column acts, each is scaled to a change of |K| by 100 %; a column that does not change |K|
+        becomes zero.
+        """
         if self.act_together:
             return self.whole
         visible = self.unit > _UNSEEN

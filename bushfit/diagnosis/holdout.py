@@ -50,7 +50,7 @@ class HoldOutPart:
     points: Sequence[Array]
 
     def rows(self, data_sets: Sequence[MeasuredTest]) -> Array:
-        """Mask of the rows of this part in the residual vector of all tests, (n,)."""
+        """Mask of the rows of this part in the residual vector of all tests, (all residuals,)."""
         return np.concatenate(
             [np.tile(mask, data.residuals_per_point) for data, mask in zip(data_sets, self.points, strict=True)]
         )
@@ -63,7 +63,7 @@ class HoldOutPart:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Root mean square residual of one part, predicted from the other parts.
+    """Root mean square residual of one part of the tests, predicted from the other parts by two models.
 
     Args:
         part: description of the part.
@@ -95,7 +95,7 @@ class Skipped:
 
 @dataclass(frozen=True)
 class HoldOut:
-    """Errors of two models on parts of the tests, each predicted by a fit to the other parts.
+    """Root mean square residuals of two models on parts of the tests, each predicted by a fit to the other parts.
 
     Args:
         parts: results of the parts that were held out.
@@ -113,7 +113,13 @@ class HoldOut:
 
     @classmethod
     def from_residuals(cls, residuals: Mapping[str, Array], skipped: Sequence[Skipped] = ()) -> HoldOut:
-        """Compute the errors from predicted residuals by part, (2 models, 2: in noise and whitened, n)."""
+        """Compute the root mean square residuals by part and over all parts.
+
+        Args:
+            residuals: predicted residuals by name of the part, (2 models: before and after, 2 units: noise, and noise
+                with prediction error, n).
+            skipped: parts that could not be held out.
+        """
         residuals = {name: pair for name, pair in residuals.items() if pair.size}  # one frequency has no top third
         if not residuals:
             return cls((), tuple(skipped))
@@ -123,7 +129,7 @@ class HoldOut:
 
 
 def hold_out(before: Evidence, after: Evidence, bounds: Bounds) -> HoldOut:
-    """Compare the errors of two models on each part of the tests, predicted by fits to the other parts.
+    """Compare the residuals of two models on each part of the tests, predicted by fits to the other parts.
 
     Args:
         before: fit without the added effects.
@@ -131,7 +137,7 @@ def hold_out(before: Evidence, after: Evidence, bounds: Bounds) -> HoldOut:
         bounds: limits of parameters, for a fit to the remaining tests.
 
     Returns:
-        Root mean square errors of both models, by part and over all parts.
+        Root mean square residuals of both models in units of noise, by part and over all parts.
     """
     predictions, skipped = predicted_parts(before, after, bounds)
     return HoldOut.from_residuals({name: prediction.residuals for name, prediction in predictions.items()}, skipped)
@@ -162,7 +168,11 @@ def predicted_parts(before: Evidence, after: Evidence, bounds: Bounds) -> tuple[
 
 
 def _figures(pair: Array) -> tuple[float, float, tuple[float, float]]:
-    """Root mean square of residuals (model before or after, in noise or whitened, n): both in noise, then whitened."""
+    """Root mean square of predicted residuals, (2 models: before and after, 2 units: noise, whitened, n).
+
+    Returns:
+        Values in units of noise before and after; and both whitened, in units of noise and prediction error.
+    """
     (before, before_whitened), (after, after_whitened) = np.sqrt(np.mean(np.square(pair), axis=-1)).tolist()
     return before, after, (before_whitened, after_whitened)
 

@@ -70,7 +70,7 @@ class Hypothesis:
         log_posterior: natural log of prior times evidence, not normalised.
         change: largest relative change of |K| by any of the explanations.
         last_change: relative change of |K| by the last explanation if its evidence is linear; 0 if it was refitted.
-        state: fitted state that has exactly these explanations, or to which the last was added by a linear model.
+        state: step of the search (fitted model) that has exactly these explanations, or all but the last.
         compound_deviates: True if the compound deviates from the model's laws in addition.
     """
 
@@ -107,7 +107,7 @@ class Tests:
     """Tests as recorded, or with one mistake in the record corrected, and the starting model fitted to these tests.
 
     Args:
-        base: fit of the starting model.
+        base: fit of the starting model; its residuals are whitened by scatter and by errors that points share.
         rig: stated class of the rig.
         log_prior: natural log of the prior probability that these are the right records and nothing is missing.
         claim: mistake that is corrected; None for the tests as recorded.
@@ -122,22 +122,32 @@ class Tests:
 
     @cached_property
     def bare(self) -> Evidence:
-        """Fit with residuals in units of the scatter from point to point, without errors that points share."""
+        """Fit of the starting model with residuals in units of the scatter from point to point, to compare hypotheses.
+
+        Errors that points share are not part of this unit; `errors` describes them.
+        """
         return in_scatter_units(self.base)
 
     @cached_property
     def errors(self) -> RigErrors:
-        """Errors of the rig that points share, as changes of the residuals of `bare`."""
+        """Errors of the rig that points share, as changes of residuals in units of the scatter from point to point."""
         return rig_errors(self.bare, self.rig)
 
     @cached_property
     def compound(self) -> Group | None:
-        """Smooth deviation of the rubber from the model's laws, as changes of the residuals of `bare`."""
+        """Smooth deviation of the rubber from the model's laws, as columns of residuals in units of the scatter.
+
+        The columns are used to compare hypotheses; None without tests.
+        """
         return compound(self.bare)
 
     @cached_property
     def compound_in_fits(self) -> Group | None:
-        """Smooth deviation of the rubber from the model's laws, as changes of the residuals of `base`, for refits."""
+        """Smooth deviation of the rubber from the model's laws, as columns of the residuals that a fit minimises.
+
+        These residuals are whitened by the scatter and by errors that points share. The columns are left free when an
+        effect is refitted; None without tests.
+        """
         return compound(self.base)
 
     @cached_property
@@ -145,13 +155,17 @@ class Tests:
         return {place.name: place for place in faulty_places(self.base)}
 
     def in_fits(self, place: FaultyPart) -> FaultyPart:
-        """Convert a faulty part of the tests from residuals of `bare` to residuals of `base`, for refits."""
+        """Convert the columns of a faulty test part from residuals in units of the scatter to those that a fit minimises.
+
+        Args:
+            place: frequency, level, repeat or loop whose points deviate together.
+        """
         fitted = self._places_in_fits[place.name]
         return fitted if len(fitted.columns) == len(place.columns) else fitted.point_by_point()
 
     @cached_property
     def explanations(self) -> list[Explanation]:
-        """Explanations that do not depend on the model's effects: faulty parts of the tests, and smooth curves."""
+        """Possible explanations of the gap that are independent of the effects: faulty test parts, and smooth curves."""
         return [*faulty_places(self.bare), *unnamed_curves(self.bare)]
 
 
@@ -192,13 +206,13 @@ class SearchState:
 
     @property
     def key(self) -> frozenset[Hashable]:
-        """Names that identify the set of effects, faulty places and corrected mistake."""
+        """Names that identify this step of the search: effects, faulty parts of the tests, and corrected mistake."""
         claim = self.tests.claim
         return frozenset((*self.effects, *(place.name for place in self.places), *([claim.key] if claim else [])))
 
     @cached_property
     def bare(self) -> Evidence:
-        """Fit with residuals in units of the scatter from point to point, without errors that points share."""
+        """Fit of this step with residuals in units of the scatter from point to point, without shared errors."""
         return self.tests.bare if self.evidence is self.tests.base else in_scatter_units(self.evidence)
 
     @cached_property
@@ -214,7 +228,7 @@ class SearchState:
 
     @cached_property
     def log_posterior(self) -> float:
-        """Natural log of prior times evidence, with and without a deviation of the compound, added up."""
+        """Natural log of prior times evidence of this step's explanations, summed over compound deviation and none."""
         total = float(np.logaddexp(self.linear.log_evidence, self.linear.log_evidence_with_compound))
         return self.log_prior + self.log_density + total
 
@@ -247,18 +261,25 @@ class SearchState:
 
     @cached_property
     def explanation_evidence(self) -> list[tuple[Explanation, GroupEvidence]]:
-        """Further explanations, each with the evidence of the tests for it in the linearised model."""
+        """Further explanations of the gap, each with the evidence of the tests for it in the linearised model."""
         explanations = [e for e in (*self.proposals, *self.tests.explanations) if e.group is not None]
         return list(zip(explanations, self.weigh(explanations), strict=True))
 
     def weigh(self, explanations: Sequence[Explanation]) -> list[GroupEvidence]:
-        """Compute the evidence of the tests for given explanations, averaged over likely sizes of the rig's errors."""
+        """Compute the evidence of the tests for given explanations, averaged over likely sizes of the rig's errors.
+
+        Args:
+            explanations: effects, faulty parts or curves, each with its residual columns.
+
+        Returns:
+            One evidence per explanation, in the same order.
+        """
         at_nodes = replace(self.linear, chosen_nodes=self._likely_nodes)
         return at_nodes.group_evidence_of([e.group for e in explanations if e.group is not None])
 
     @cached_property
     def _likely_nodes(self) -> Array:
-        """Indices of the likely combinations of rig errors (nodes), with or without a smooth curve as explanation."""
+        """Indices of the likely combinations of rig errors (nodes to average over), with or without a smooth curve."""
         smooth = [e.group for e in self.tests.explanations if e.group and e.kind == "unnamed"]
         curves = replace(self.linear, groups=smooth, compound=None)
         return np.union1d(self.linear.likely(_NEAR), curves.likely(_NEAR))

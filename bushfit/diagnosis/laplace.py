@@ -80,7 +80,7 @@ def _of_amount(size: float, error: float) -> float:
         error: standard error of the amount, relative to the amount.
 
     Returns:
-        Log density per relative change of the amount.
+        Natural log of the density per relative change of the amount.
     """
     times = np.geomspace(SIZES[0], LARGEST, _FINE) / max(size, 1e-12)
     error = max(error, _SHARPEST)

@@ -69,7 +69,7 @@ class LinearModel:
 
     @cached_property
     def _plain(self) -> Array:
-        """Mask of the nodes with rig errors within the class and without a deviation of the compound, (nodes,)."""
+        """Mask of the nodes (error sizes) with rig errors within the class and no deviation of the compound, (nodes,)."""
         return np.array([not self.rig.nodes[n].wide for n in self.nodes]) & (self._deviation == 0.0)
 
     @cached_property
@@ -182,7 +182,11 @@ class LinearModel:
 
     @cached_property
     def _gains(self) -> list[tuple[Array, Array]]:
-        """Gain in log evidence and squared relative change of |K| for each group, (nodes, blocks, sizes) each."""
+        """Gain in log evidence and squared relative change of |K| by each group of columns, in blocks of equal width.
+
+        Returns:
+            For each block width, gain and squared change, (nodes, blocks, sizes) each.
+        """
         gains: list[list[tuple[Array, Array]]] = [[] for _ in self.groups]
         at_nodes = self._at_nodes
         for (numbers, _), projections, gram in zip(self._blocks, at_nodes.projections, at_nodes.grams, strict=True):
@@ -205,7 +209,14 @@ class LinearModel:
     def _over_nodes(
         self, gains: tuple[Array, Array], chosen: Array, with_compound: GroupEvidence | None = None
     ) -> GroupEvidence:
-        """Evidence for a group, averaged over the nodes in the mask `chosen`; `with_compound` is passed on."""
+        """Average the evidence for a group of columns over some of the nodes.
+
+        Args:
+            gains: gain in log evidence, and squared relative change of |K|, by node and size of the amounts, (nodes,
+                sizes).
+            chosen: mask of the nodes, (nodes,).
+            with_compound: evidence together with a compound deviation, copied to the result; None without it.
+        """
         log_evidence = (self._at_nodes.base[:, None, None] + gains[0])[chosen]
         if not log_evidence.size:
             return GroupEvidence(-np.inf, 0.0, float(SIZES[0]), with_compound)
@@ -250,7 +261,11 @@ class LinearModel:
 
     @property
     def deviation(self) -> tuple[float, float]:
-        """Posterior relative change of |K| by the compound's deviation (root mean square), and its likeliest size."""
+        """Size of the compound's deviation from the model's laws, relative to |K|.
+
+        Returns:
+            Root mean square over the posterior, and the likeliest size.
+        """
         bent = self._deviation > 0.0
         share = np.exp(self._at_nodes.base[bent] - self.log_evidence_with_compound)
         sizes = self._deviation[bent]
@@ -318,10 +333,12 @@ class LinearModel:
 
 @dataclass(frozen=True, eq=False)
 class _AtNodes:
-    """Evidence and inner products at each node, with parameters and the compound's deviation projected out (P).
+    """Evidence and inner products at each node, a combination of sizes of rig errors and the compound's deviation.
+
+    P projects out the parameters and the compound's deviation, and whitens by the rig's errors.
 
     Args:
-        base: log of node weight times evidence without a group, (nodes,).
+        base: natural log of node weight times evidence without a group, (nodes,).
         misfit: r^T P r of the residuals r, (nodes,).
         changes: square of the largest relative change of |K| by the compound's deviation, (nodes,).
         projections: U^T P r of the group columns U, one array (nodes, blocks, width) per block width.
@@ -342,7 +359,12 @@ def _log_sum(values: Array) -> float:
 
 
 def _columns(rows: Array, chosen: Array) -> Array:
-    """Select the columns in a mask, (n,) bool, from a matrix; a view without a copy if they are adjacent."""
+    """Select columns of a matrix by a mask; a view without a copy if the selected columns are adjacent.
+
+    Args:
+        rows: matrix, (m, n).
+        chosen: mask of the columns, (n,).
+    """
     places = np.flatnonzero(chosen)
     if places.size and places[-1] - places[0] + 1 == places.size:
         return rows[:, places[0] : places[-1] + 1]
@@ -350,7 +372,15 @@ def _columns(rows: Array, chosen: Array) -> Array:
 
 
 def _block_products(part: Array, block_rows: Array) -> Array:
-    """Inner products of the rows within each block, (m, g) -> (m, g, g); blocks of zero rows are skipped for speed."""
+    """Inner products of the rows within each block; blocks of zero rows are skipped for speed.
+
+    Args:
+        part: rows of residual columns, (rows, n).
+        block_rows: indices of the rows of each block, (blocks, width).
+
+    Returns:
+        Products, (blocks, width, width).
+    """
     filled = np.any(np.any(part, axis=1)[block_rows], axis=1)
     products, rows = np.zeros((*block_rows.shape, block_rows.shape[1])), part[block_rows[filled]]
     products[filled] = rows @ rows.swapaxes(-1, -2)

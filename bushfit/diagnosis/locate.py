@@ -41,7 +41,7 @@ def find_regions(evidence: Evidence) -> tuple[MisfitRegion, ...]:
 
 
 def _sweep_regions(evidence: Evidence) -> Iterator[MisfitRegion]:
-    """Yield a region of smooth misfit of storage and one of loss stiffness for the sweeps of each direction."""
+    """Yield regions of smooth deviation of sweeps from the model: one of storage, one of loss for each direction."""
     _, sweeps = split_by_kind(evidence.data_sets)
     lines = [line for sweep in sweeps for line in sweep.lines(evidence.model)]
     for direction, stepped in dict.fromkeys((line.direction, line.stepped) for line in lines):
@@ -78,7 +78,7 @@ def _read_sweep(
     Args:
         part: "storage" or "loss".
         lines: lines of the sweeps of one direction.
-        pieces: smooth misfit along each line, relative to |K|, (n,) each.
+        pieces: smooth misfit along each line, measured minus model relative to |K|, (n,) each.
         touched: indices of the lines that belong to the region.
         spans: lowest and highest frequency [Hz], and amplitude [m or rad], of the region.
     """
@@ -113,7 +113,13 @@ def _read_sweep(
 
 
 def _trend(stepped: str, step: Array, misfit: Array) -> str:
-    """Phrase on the trend of a misfit along a line: constant, or with the power of the step that correlates best."""
+    """Phrase on the trend of a misfit along a line: constant, or with the power of the step that correlates best.
+
+    Args:
+        stepped: "frequency" or "amplitude".
+        step: frequency [Hz] or amplitude [m or rad] of each point, (n,).
+        misfit: measured minus model storage or loss stiffness, relative to |K|, (n,).
+    """
     if np.var(misfit) < _FLAT * np.mean(np.square(misfit)):
         return f"nearly constant over {stepped}"
     shapes = {

@@ -160,10 +160,17 @@ def remaining_entropy(odds: Sequence[float] | Array, distances: Array) -> Array:
 
 
 def _distances(test: NextTest, models: Sequence[Model], place: Place, frequency: Array, amplitude: Array) -> Array:
-    """Chi-square between the responses of each pair of models to a test, (models, models).
+    """Distance between the responses of each pair of models to a test: chi-square for its noise, (models, models).
 
     The empty fixture is compared by its stiffness and the steel dummy by its compliance, both relative to the bushing,
     because either is nearly zero and its logarithm has no meaning.
+
+    Args:
+        test: candidate test.
+        models: one fitted model for each explanation.
+        place: direction or specimen.
+        frequency: [Hz], (n,).
+        amplitude: zero-to-peak [m or rad, or strain], (n,).
     """
     if test.mounted is None:
         responses = [np.log(model.stiffness(place, frequency, amplitude)) for model in models]
@@ -182,7 +189,13 @@ def _distances(test: NextTest, models: Sequence[Model], place: Place, frequency:
 
 
 def _fixture(model: Model, place: Place, stiffness: float) -> Model:
-    """Model of an elastic spring of a stiffness [N/m or N m/rad] with the rig effects of another model."""
+    """Model of an elastic spring in place of the bushing, with the rig effects of another model.
+
+    Args:
+        model: model with the rig effects.
+        place: direction or specimen.
+        stiffness: stiffness of the spring [N/m or N m/rad].
+    """
     rig = [effect.name for effect in model.records if effect.level is Level.INSTRUMENT]
     values = {**model.values, "mu": min(stiffness / model.stiffness_per_modulus(place), _LARGEST_MODULUS)}
     return Model.with_defaults(model.bushing, ("elastic", *rig), values)

@@ -106,7 +106,7 @@ class PowerLaw:
 
     @property
     def determined(self) -> list[bool]:
-        """True for phase, frequency power and amplitude power, in this order, if the tests determine the quantity."""
+        """Three flags: True if the tests determine the phase, the power of frequency and the power of amplitude."""
         widths = (_PHASE_WIDTH, _POWER_WIDTH, _POWER_WIDTH)
         intervals = (self.phase_deg, self.frequency_power, self.amplitude_power)
         return [high - low < 2.0 * width for (_, low, high), width in zip(intervals, widths, strict=True)]
@@ -149,11 +149,12 @@ class PowerLaw:
 class Term:
     """Complex stiffness that is added to a model, at the p operating points of all tests except those of coupons.
 
-    Its values and shapes are complex numbers in the unit `measure`.
+    Values of the term at the points are complex numbers in the unit `measure`; a shape is a set of such values.
 
     Args:
         evidence: the fitted model and the tests.
-        measure: unit of the term: stiffness, modulus, or share of the model's stiffness.
+        measure: unit of the term: stiffness [N/m or N m/rad], shear modulus [Pa], or share of the model's stiffness
+            [1].
     """
 
     evidence: Evidence
@@ -174,7 +175,7 @@ class Term:
 
     @cached_property
     def points(self) -> Array:
-        """Logarithms of frequency and motion (displacement, rotation or strain) about their means, (p, 2)."""
+        """Natural log of frequency, and of motion (displacement, rotation or strain), minus their means, (p, 2)."""
         model, over_strain = self.evidence.model, self.measure != "stiffness"
         axes = [
             (test.frequency, test.amplitude * (model.unit_strain(test.direction) if over_strain else 1.0))
@@ -184,24 +185,29 @@ class Term:
         return points - points.mean(axis=0)
 
     def stiffness(self, model: Model) -> Array:
-        """Complex stiffness of a model at each point, (p,) [N/m or N m/rad]."""
+        """Complex stiffness of a model at each of the p operating points, (p,) [N/m or N m/rad]."""
         return np.concatenate(
             [model.stiffness(test.direction, test.frequency, test.amplitude, kind=test.kind) for test, _ in self.tests]
         )
 
     def unit(self, model: Model) -> Array:
-        """Stiffness [N/m or N m/rad] per unit of the term at each point, (p,)."""
+        """Stiffness that one unit of the term adds at each of the p operating points, (p,) [N/m or N m/rad]."""
         if self.measure == "gain":
             return self.stiffness(model)
         per_unit = model.stiffness_per_modulus if self.measure == "modulus" else lambda _: 1.0
         return np.concatenate([np.full(test.frequency.size, per_unit(test.direction)) for test, _ in self.tests])
 
     def scaled(self, shapes: Array, model: Model) -> Array:
-        """Scale c shapes of the term, (c, p), so that the largest relative change of |K| by each is 100 %."""
+        """Scale c shapes of an added stiffness, (c, p), so that the largest change by each is 100 % of |K|."""
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
     def residual(self, value: Array, model: Model) -> Array:
-        """Whitened residuals, (n,), of a model to which the term, with complex values at the points, (p,), is added."""
+        """Whitened residuals of a model with an added stiffness, model minus measured in units of noise, (n,).
+
+        Args:
+            value: complex values of the added stiffness at the p operating points, in the unit of the term, (p,).
+            model: model without the added stiffness.
+        """
         residuals, added = residual(model, self.evidence.data_sets), value * self.unit(model)
         for test, points in self.tests:
             residuals[self.evidence.residual_rows[test]] = test.residual_with(added[points], model)
@@ -321,7 +327,16 @@ class _Grid:
 
 
 def _settled_grid(fitted: Evidence, term: Term, plain: LinearModel, model: Model, bounds: Bounds) -> _Grid | None:
-    """Narrow a grid of power laws about the most probable pair of powers, and fit the model's parameters, in turn.
+    """Find the power law nearest to the gap: narrow a grid of powers about the most probable pair, step by step.
+
+    After each step the parameters of the model and the amount of the power law are fitted again.
+
+    Args:
+        fitted: the fitted model and the tests.
+        term: complex stiffness that is added to the model, with its unit.
+        plain: linearised residuals of the model without a term, which describe the errors of the rig.
+        model: model at its starting parameters.
+        bounds: limits of parameters inside their general limits.
 
     Returns:
         The last grid, linearised about the fitted model and power law; None without convergence.
@@ -351,10 +366,17 @@ def _settled_grid(fitted: Evidence, term: Term, plain: LinearModel, model: Model
 
 
 def _stepped(term: Term, model: Model, value: Array, shape: Array, bounds: Bounds) -> tuple[Model, Array]:
-    """Take one damped Gauss-Newton step of the model's parameters and of a term of one shape, (1, p).
+    """Take one damped Gauss-Newton step of the model's parameters and of the amount of an added stiffness.
+
+    Args:
+        term: added stiffness, with its unit.
+        model: model at its current parameters.
+        value: complex values of the added stiffness at the p points, in the unit of the term, (p,).
+        shape: shape of the added stiffness at the points, (1, p).
+        bounds: limits of parameters inside their general limits.
 
     Returns:
-        The model, and the complex values of the term at the points, (p,).
+        The model, and the complex values of the added stiffness at the points, (p,).
     """
     shape = term.scaled(shape, model)
     residuals, rows, columns = term.linearised(model, value, shape)

@@ -141,6 +141,11 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
 def _replacement(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> tuple[Model, float] | None:
     """Replace a branch of the model by an effect, at the starting values with the smallest chi-square after one step.
 
+    Args:
+        evidence: the fitted model and the tests.
+        effect: effect that replaces the branch.
+        fixed: names of parameters that are not fitted.
+
     Returns:
         The model at these values, and the expected decrease of chi-square; None if the effect has no response.
     """
@@ -183,7 +188,7 @@ def sensitivity(
     none = model.values[amount]
 
     def residuals_of(shapes: Sequence[Mapping[str, float]]) -> Array:
-        """Whitened residuals with a small amount of the effect at each shape.
+        """Whitened residuals of all tests with a small amount of the effect, at each set of its shape parameters.
 
         Returns:
             Residuals, (shapes + 1, n); the last row is without the effect.

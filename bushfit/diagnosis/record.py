@@ -39,7 +39,7 @@ class DiagnosisSettings:
 
     Args:
         max_effects: maximum number of added effects.
-        tolerance: share of |K| (or of half a loop's force range) below which gaps are ignored.
+        tolerance: gap, relative to |K| (or to half a loop's force range), up to which an explanation is neglected.
         adopt: names of effects to add, and of mistakes to correct, whatever the evidence.
         without: names of effects (with their twins) and mistakes not to consider.
         unresolved: effects of the starting model that earlier tests could not distinguish from a twin of the rig.
@@ -54,7 +54,7 @@ class DiagnosisSettings:
 
 @dataclass(frozen=True)
 class MisfitRegion:
-    """One region in which model and measurement disagree.
+    """One region of frequency and amplitude in which model and measurement disagree.
 
     Args:
         direction: direction or specimen.
@@ -62,7 +62,7 @@ class MisfitRegion:
         frequency: lowest and highest frequency [Hz].
         amplitude: lowest and highest amplitude, zero-to-peak [m or rad, or strain].
         component: "storage" or "loss" stiffness of sweeps, or "force" of a loop.
-        excess: root mean square of the smooth misfit, in units of its noise.
+        excess: root mean square of the smooth part of measured minus model, in units of the noise of this part.
         reading: description of the region as a sentence.
     """
 

@@ -61,11 +61,13 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class RigErrors:
-    """Errors of the rig in a set of tests, independent of the model.
+    """Random errors of the rig in a set of tests: errors that points share, with the sizes that they may have.
+
+    The tests' residuals are in units of the scatter from point to point. The errors do not depend on the model.
 
     Args:
-        blocks: blocks of residual rows with their shared errors.
-        nodes: combinations of sizes of the errors, over which the evidence is averaged.
+        blocks: sets of residual rows that share gain and phase errors with each other and with no other rows.
+        nodes: combinations of sizes of the errors with prior weights, over which the evidence is averaged.
     """
 
     blocks: Sequence[Block]
@@ -73,7 +75,12 @@ class RigErrors:
 
     @cached_property
     def combinations(self) -> tuple[Array, Array]:
-        """Distinct (scatter, *errors) of nodes, (combinations, 1 + kinds), and the index of each node, (nodes,)."""
+        """Distinct combinations of error sizes among the nodes, which may differ in the compound's deviation only.
+
+        Returns:
+            Scatter and sizes of the errors of runs, levels, drift and loops, (combinations, 1 + kinds); and the index
+            of the combination of each node, (nodes,).
+        """
         sizes = np.array([(node.scatter, *node.errors) for node in self.nodes])
         distinct, index = np.unique(sizes, axis=0, return_inverse=True)
         return distinct, index.ravel()
@@ -108,8 +115,8 @@ class RigErrors:
 def in_scatter_units(evidence: Evidence) -> Evidence:
     """Express the residuals of a fit in units of the scatter from point to point, without errors that points share.
 
-    Residuals of sweeps are differences of ln K: relative to the measurement, noise would seem smaller where
-    the model is wrong.
+    Residuals of sweeps are differences of ln K (gain and phase): relative to the measurement, noise would seem smaller
+    where the model is wrong.
 
     Args:
         evidence: the fitted model and the tests.
@@ -187,7 +194,15 @@ def blocks(evidence: Evidence, rig: RigSettings) -> Iterator[Block]:
 
 
 def _shared_errors(count: int, runs: Sequence[Array]) -> tuple[Array, Array]:
-    """Unit errors that n points at one level of a sweep share (level, runs, drift), (w, n), and their kinds, (w,)."""
+    """Unit errors that n points at one level of a sweep share: of the level, of each run, and drift along each run.
+
+    Args:
+        count: number n of points.
+        runs: indices of the points of each run.
+
+    Returns:
+        Value of each of the w errors at the points, (w, n), and the kind of each error, (w,).
+    """
     columns, kinds = [np.ones(count)], [_LEVEL]
     for run in runs:
         orders = np.arange(1, WAVES + 1)[:, None] if run.size >= _FEWEST else np.empty((0, 1))

@@ -111,7 +111,7 @@ class Search:
         return self._log_priors[key]
 
     def _register(self, state: SearchState) -> SearchState:
-        """Record a state and its hypotheses, so that the search does not visit it again; return the state."""
+        """Record a state of the search (a fitted model) and its hypotheses, to visit it only once; return the state."""
         self._visited.add(state.key)
         for hypothesis in state.hypotheses:
             self._note(hypothesis)
@@ -142,9 +142,13 @@ class Search:
         return replace(plain, places=(place,), log_posterior=log_posterior, change=place.size, last_change=place.size)
 
     def _grow(self, state: SearchState, depth: int) -> Iterator[SearchState]:
-        """Extend a state by each of its most promising effects (refitted) and faulty places.
+        """Extend a state of the search by each of its most promising effects (refitted) and faulty parts of the tests.
 
         States without one of the earlier effects follow each extension: the last effect may make that one unnecessary.
+
+        Args:
+            state: fitted model with some explanations.
+            depth: number of explanations in the state.
         """
         by_evidence, by_score = REFITS[1 if depth else 2 if state.evidence.reduced_chi_square > _BENT else 0]
         for grown in self._with_effects(state, self._promising(state, by_evidence, by_score), depth):
@@ -174,10 +178,15 @@ class Search:
         return list(dict.fromkeys([*(name for name in first if gains[name] > -_SLIGHT), *second]))
 
     def _with_effects(self, state: SearchState, names: Sequence[str], depth: int) -> list[SearchState]:
-        """Extend a state by each of the named effects, refitted with all parameters.
+        """Extend a state of the search by each of the named effects, refitted with all parameters.
 
         Each effect is refitted with the compound's likeliest deviation left free, and without a deviation if none
         remains with the effect; the more probable fit is kept.
+
+        Args:
+            state: fitted model with some explanations.
+            names: names of the effects to add, one at a time.
+            depth: number of explanations in the state.
         """
         request = self.request
         if not names or len(state.effects) >= request.max_effects:
@@ -198,7 +207,14 @@ class Search:
         return list(grown.values())
 
     def _with_effect(self, state: SearchState, name: str, evidence: Evidence, depth: int) -> SearchState:
-        """Add an effect, fitted in `evidence`, to a state with `depth` explanations, of which the prior depends."""
+        """Add an effect to a state of the search, a fitted model with some explanations.
+
+        Args:
+            state: state without the effect.
+            name: name of the effect.
+            evidence: fit with the effect.
+            depth: number of explanations in the state, which the prior depends on.
+        """
         log_density, precision, change = laplace(name, evidence, state.evidence)
         return replace(
             state,
@@ -268,9 +284,13 @@ class Search:
 
 
 def _record_change(base: Evidence, corrected: Evidence) -> float:
-    """Largest relative change of a recorded stiffness, amplitude or frequency by a correction of the record.
+    """Largest relative change of a recorded stiffness (complex), amplitude or frequency by a correction of the record.
 
     The value is 1 if the dimensions of the bushing or the direction of a test are corrected.
+
+    Args:
+        base: fit to the tests as recorded.
+        corrected: fit to the corrected tests.
     """
     pairs = list(zip(base.data_sets, corrected.data_sets, strict=True))
     if base.model.bushing != corrected.model.bushing or any(

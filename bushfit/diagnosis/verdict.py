@@ -123,7 +123,13 @@ def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float) -> Findin
 
 
 def _single(first: Composition, nothing: float, leads: Sequence[str]) -> Finding:
-    """Decide the verdict if one explanation, `first`, is nearly certain; `leads` are effects that only help."""
+    """Decide the verdict if one explanation is nearly certain.
+
+    Args:
+        first: the explanation.
+        nothing: probability that nothing is missing.
+        leads: names of effects that reduce the gap but do not explain it.
+    """
     best, names = first.best, first.names
     leads = tuple(dict.fromkeys((*names, *leads)))
     if first.may_mislead or not (names or best.claim or first.unnamed):
@@ -136,7 +142,11 @@ def _single(first: Composition, nothing: float, leads: Sequence[str]) -> Finding
 
 
 def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
-    """Effects of the most probable hypothesis that hypotheses of nearly all the probability have in common."""
+    """Names of effects of the most probable hypothesis that nearly all hypotheses, by probability, contain.
+
+    Args:
+        pairs: hypotheses and their posterior probabilities, the most probable first.
+    """
     share: dict[str, float] = defaultdict(float)
     for hypothesis, weight in pairs:
         for name in hypothesis.effects:

@@ -125,7 +125,13 @@ class InitialFit:
 
 
 def _initial_fit(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> InitialFit:
-    """Fit the starting model with the adopted effects; gain errors of loops have the stated or an assumed class."""
+    """Fit the starting model with the adopted effects; gain errors of loops have the stated or an assumed class.
+
+    Args:
+        data: campaign with prepared tests.
+        model: starting model; None for the paper's three branches and the effects of [fit].
+        settings: settings of the diagnosis, with the effects to adopt.
+    """
     hint = "add measured tests to the campaign"
     data_sets = data.require_tests(data.data_sets, "there is nothing to diagnose", hint)
     fixed = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
