@@ -265,7 +265,7 @@ class Screen:
         return self._known[key]
 
     def _columns(self, bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
-        """Complex stiffness per unit of mu, m and sigma_fmax at all g grid values, (g, 3, n): the function `_columns`, cached.
+        """Complex stiffness per unit of mu, m and sigma_fmax at all g grid values, (g, 3, n); cached.
 
         Mistakes that keep the operating points share the cached result.
 

@@ -155,7 +155,7 @@ class Tests:
         return {place.name: place for place in faulty_places(self.base)}
 
     def in_fits(self, place: FaultyPart) -> FaultyPart:
-        """Convert the columns of a faulty test part from residuals in units of the scatter to those that a fit minimises.
+        """Convert a faulty test part from residuals in units of the scatter to the residuals that a fit minimises.
 
         Args:
             place: frequency, level, repeat or loop whose points deviate together.
@@ -165,7 +165,7 @@ class Tests:
 
     @cached_property
     def explanations(self) -> list[Explanation]:
-        """Possible explanations of the gap that are independent of the effects: faulty test parts, and smooth curves."""
+        """Explanations of the gap that are independent of the model's effects: faulty test parts, and smooth curves."""
         return [*faulty_places(self.bare), *unnamed_curves(self.bare)]
 
 

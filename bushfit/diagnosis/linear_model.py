@@ -69,7 +69,7 @@ class LinearModel:
 
     @cached_property
     def _plain(self) -> Array:
-        """Mask of the nodes (error sizes) with rig errors within the class and no deviation of the compound, (nodes,)."""
+        """Mask of the nodes (error sizes) with rig errors within the class and no compound deviation, (nodes,)."""
         return np.array([not self.rig.nodes[n].wide for n in self.nodes]) & (self._deviation == 0.0)
 
     @cached_property
