@@ -17,7 +17,8 @@ from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint, fit_two_step
 from bushfit.model.result import Result
-from bushfit.prediction.stiffness import predict, predict_resonance
+from bushfit.prediction.resonance import predict_resonance
+from bushfit.prediction.stiffness import predict
 from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.measurement import loss_factor
 from bushfit.reading.resonance import read_resonance

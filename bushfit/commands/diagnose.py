@@ -20,7 +20,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.planning.knowledge import look_alikes
 from bushfit.prediction.validation import Validation, validate
-from bushfit.report import plots, tables
+from bushfit.report import diagnosed, plots
 from bushfit.report.page import report_page
 from bushfit.report.results import ResultFile, figure_file, json_file, page_file, table_file
 
@@ -123,9 +123,9 @@ def diagnosis_files(diagnosis: Diagnosis, document: DiagnosisFile, title: str) -
     Returns:
         Files gap.csv, gap.png and candidates.csv, not yet rendered.
     """
-    gap = table_file("gap", partial(tables.gap_table, diagnosis))
+    gap = table_file("gap", partial(diagnosed.gap_table, diagnosis))
     figure = figure_file("gap", lambda: plots.gap.gap_figure(gap.make(), diagnosis.result, document, title))
-    return [gap, figure, table_file("candidates", partial(tables.candidates_table, diagnosis))]
+    return [gap, figure, table_file("candidates", partial(diagnosed.candidates_table, diagnosis))]
 
 
 def _require_free_parameter(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> None:

@@ -25,8 +25,9 @@ from bushfit.model.arms import Arms, model_arms
 from bushfit.model.result import ExpectedError, Misfit, Result, transfer_compound
 from bushfit.prediction.caveats import warnings_of
 from bushfit.prediction.grid import default_grid, grid_settings, requested_grid, static_reach
+from bushfit.prediction.resonance import PredictedResonance, predict_resonance
 from bushfit.prediction.static_curve import StaticCurve, static_curve, static_rate
-from bushfit.prediction.stiffness import PredictedResonance, Prediction, predict_resonance, tested_preload
+from bushfit.prediction.stiffness import Prediction, tested_preload
 from bushfit.prediction.stiffness import predict as predict_stiffness
 from bushfit.prediction.superposed import LargeMotion
 from bushfit.reading.measurement import SAME_TEMPERATURE, Loop, Sweep

@@ -200,7 +200,7 @@ class Effect:
         twins: effects with the same equation in all tests, mostly of the rig. The effect of the bushing, which lists
             the twins, is proposed; the tests determine its size but cannot distinguish it from its twins.
         replaces: name of the paper's branch that the effect replaces; None if the effect is added.
-        depends_on: names of the `RubberConditions` that the effect depends on.
+        depends_on: names of the `RubberConditions` on which the effect depends.
         assumption: sentence on the value of these quantities in a prediction; empty for effects of the rig.
         in_place_of: function from the values of the replaced branch to start values for a fit, the most probable
             first; None if the effect replaces no branch.

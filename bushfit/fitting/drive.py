@@ -336,7 +336,11 @@ def _rests(
 
 
 def recorded_means(drive: Drive) -> list[Preload]:
-    """Mean displacement and mean force of a loop, those that are too large for a zero error of a sensor."""
+    """Mean displacement and mean force of a loop that are too large for a zero error of a sensor.
+
+    Returns:
+        Means [m, rad or 1, and N or N m]; none, one or both.
+    """
     if drive.datum is None:
         return []
     motion, means = drive.loop.direction.motion, list[Preload]()

@@ -19,7 +19,8 @@ from bushfit.effects.contract import Array
 from bushfit.geometry import Place
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.result import Result
-from bushfit.prediction.stiffness import Band, Prediction, predict
+from bushfit.prediction.bands import Band
+from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.units import format_aligned, format_range, number
 
 #: Probability that chance alone causes a reported difference.

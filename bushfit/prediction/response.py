@@ -15,8 +15,8 @@ from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
+from bushfit.prediction.bands import Band, candidates, envelope, uncertainty
 from bushfit.prediction.caveats import BEYOND, MARGIN, extrapolations, unfitted_warnings
-from bushfit.prediction.stiffness import Band, candidates, envelope, uncertainty
 from bushfit.prediction.superposed import require_time_law
 from bushfit.units import number
 

@@ -11,8 +11,8 @@ from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
+from bushfit.prediction.bands import Band, candidates, envelope, uncertainty
 from bushfit.prediction.caveats import extrapolations
-from bushfit.prediction.stiffness import Band, candidates, envelope, uncertainty
 from bushfit.prediction.superposed import require_time_law
 from bushfit.units import number
 

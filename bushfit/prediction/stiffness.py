@@ -7,10 +7,9 @@ without the effect; such effects are called unresolved.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import partial
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -19,61 +18,18 @@ from bushfit.effects import Level
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.errors import ModelError
 from bushfit.fitting.preparation import MeasuredSweep
-from bushfit.geometry import TRANSLATION, Place
-from bushfit.model.covariance import Z95, Covariance
+from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_and_slopes
-from bushfit.prediction.caveats import MARGIN, extrapolations, point_warnings, unfitted_warnings
+from bushfit.prediction.bands import Band, candidates, envelope, uncertainty
+from bushfit.prediction.caveats import MARGIN, extrapolations, point_warnings
 from bushfit.prediction.superposed import LargeMotion, superposed_stiffness_and_slopes
 from bushfit.reading.preload import SAME_PRELOAD, Preload
 from bushfit.reading.runs import nominal
-from bushfit.reduction.resonance import response
-from bushfit.units import number
 
-#: Strain at which the resonance of a mass is looked for first; chosen: small for any rubber.
-_SMALL_STRAIN = 1e-4
-#: Lowest and highest frequency about a resonance over that of small strain.
-_DECADE = (0.2, 4.0)
-#: Frequencies of this range; chosen: 0.5 % apart, the accuracy to which tests determine a peak.
-_RESONANCE_POINTS = 600
-#: Transmissibility from which a point counts as near the peak; chosen: about 0.6 to 1.3 of the peak's frequency, where
-#: the mount decides how far the mass moves.
-_NEAR_PEAK = 1.5
 #: Predicted quantities.
 _BANDS = ("stiffness", "loss_factor", "storage_stiffness", "loss_stiffness")
-
-
-@dataclass(frozen=True, eq=False)
-class Band:
-    """Predicted quantity at n operating points, with its 95 % band.
-
-    Args:
-        value, low, high: prediction, and lower and upper end of its 95 % band, (n,) each.
-        root: changes of the quantity by r independent errors of one standard deviation, (r, n); their root sum of
-            squares is the standard error. r is 0 if the uncertainty is unknown.
-    """
-
-    value: Array
-    low: Array
-    high: Array
-    root: Array = field(default_factory=lambda: np.empty((0, 1)))
-
-    def logarithm(self) -> Band:
-        """Band of the natural logarithm of the (positive) quantity."""
-        low, high = (np.log(self.value) + end / self.value - 1.0 for end in (self.low, self.high))
-        return Band(np.log(self.value), low, high, self.root / self.value)
-
-    def minus(self, subtrahend: Band) -> Band:
-        """Band of the difference from another quantity, at the same points and with independent errors.
-
-        Notes: the distance from the difference to an end of its band is the root sum of squares of the distances in the
-        two bands (G. Zou, A. Donner, Stat. Med. 27 (2008) 1693).
-        """
-        value = self.value - subtrahend.value
-        low = value - np.hypot(self.value - self.low, subtrahend.high - subtrahend.value)
-        high = value + np.hypot(self.high - self.value, subtrahend.value - subtrahend.low)
-        return Band(value, low, high, np.concatenate((self.root, -subtrahend.root)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,105 +185,6 @@ def tested_preload(result: Result, place: Place, preload: Preload | None) -> Pre
     return Preload(preload.value, tested.unit)
 
 
-def car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
-    """List the models that may describe the bushing in the car, without instrument effects.
-
-    Each model has a different subset of the unresolved effects.
-
-    Args:
-        model: fitted model.
-        unresolved: names of effects that belong either to the bushing or to the rig.
-
-    Returns:
-        Models; the first has all unresolved effects, the last has none.
-    """
-    bare = model.without(Level.INSTRUMENT)
-    count = range(len(unresolved) + 1)
-    return [bare.without(*names) for size in count for names in combinations(unresolved, size)]
-
-
-def _alternatives(result: Result, *, rig: bool) -> Iterator[Model]:
-    """Yield each model that the tests do not rule out, with the effects of the rig or as in the car (`car_models`)."""
-    resolved = {*result.model.effects} - {*result.unresolved}
-    for model in (alternative.model for alternative in result.alternatives):
-        twins = [effect.name for effect in model.records if effect.twins and effect.name not in resolved]
-        yield from [model] if rig else car_models(model, twins)
-
-
-def candidates(result: Result, *, rig: bool = False) -> list[tuple[Result, Model]]:
-    """List the models that agree with the tests, the predicted one first; a band spans the predictions of all.
-
-    Args:
-        result: fitted result.
-        rig: True to include the effects of the rig, as in the tests.
-
-    Returns:
-        Models with the result that gives their errors: `car_models`, then the alternatives, which have no model error.
-    """
-    models = [result.model] if rig else car_models(result.model, result.unresolved)
-    explained = replace(result, model_error=None)
-    return [(result, model) for model in models] + [(explained, model) for model in _alternatives(result, rig=rig)]
-
-
-def envelope(bands: Sequence[Band]) -> Band:
-    """Band of the first of several predictions, widened to include the bands of the others."""
-    low, high = (np.array([getattr(band, end) for band in bands]) for end in ("low", "high"))
-    return replace(bands[0], low=low.min(axis=0), high=high.max(axis=0))
-
-
-@dataclass(frozen=True, eq=False)
-class Uncertainty:
-    """Errors of a prediction with one model: of its parameters, and of the model itself.
-
-    Args:
-        covariance: covariance of the k uncertain parameters of the model.
-        scale: factor of the parameters' errors at each point, (n,); below 1 where the error of the model replaces them.
-        relative: complex relative errors of the stiffness by e independent errors of the model, (e, n); e is 0 or 2.
-    """
-
-    covariance: Covariance
-    scale: Array
-    relative: Array
-
-    def band(self, value: Array, slopes: Array) -> Band:
-        """95 % band of a quantity, (n,), from its changes by parameters and model errors, (k + e, n)."""
-        count = len(self.covariance.names)
-        half = np.hypot(
-            self.scale * self.covariance.half_width(slopes[:count]), Z95 * np.linalg.norm(slopes[count:], axis=0)
-        )
-        root = np.concatenate((self.scale * (self.covariance.root.T @ slopes[:count]), slopes[count:]))
-        return Band(value, value - half, value + half, root)
-
-
-def uncertainty(
-    result: Result, model: Model, place: Place, frequency: Array, amplitude: Array, conditions: RubberConditions
-) -> Uncertainty:
-    """Collect the errors of a prediction with one model at operating points.
-
-    Args:
-        result: fitted result, which provides the covariance and the model error.
-        model: the fitted model or a variant with fewer or other effects.
-        place: direction or specimen.
-        frequency: frequency of each point [Hz], (n,).
-        amplitude: zero-to-peak amplitude of each point [m, rad or 1], (n,).
-        conditions: temperature of the rubber.
-
-    Returns:
-        Errors. An unnamed correction or a model error adds an error of the real and one of the imaginary part; within
-        the measured range these replace the errors of the parameters.
-    """
-    names = [name for name in result.covariance.names if name in model.values]
-    covariance = result.covariance.restricted(names)
-    correction = model.unnamed or result.model_error
-    if not correction:
-        return Uncertainty(covariance, np.ones(frequency.size), np.empty((0, frequency.size)))
-    share, error, weight = correction.evaluate(
-        model.setting(place, conditions=conditions), 2.0 * np.pi * frequency, amplitude
-    )
-    relative = error / (1.0 + share) if model.unnamed else np.hypot(error, [share.real, share.imag])
-    return Uncertainty(covariance, np.sqrt(1.0 - np.square(weight)), np.array([[1.0], [1.0j]]) * relative)
-
-
 def predict_with_model(
     result: Result,
     model: Model,
@@ -394,101 +251,3 @@ def measured_stiffness(direction: Place, frequency: Array, amplitude: Array, swe
     near = (np.abs(f / frequency[:, None] - 1.0) <= MARGIN) & (far <= MARGIN)
     count = near.sum(axis=1)
     return np.where(count > 0, near @ stiffness / np.maximum(count, 1), np.nan)
-
-
-@dataclass(frozen=True, eq=False)
-class PredictedResonance:
-    """Predicted response of a mass on a bushing whose base is shaken with a sine of constant acceleration.
-
-    Args:
-        place: direction or specimen.
-        mass: mass on the bushing [kg].
-        base_acceleration: zero-to-peak acceleration of the base [m/s^2].
-        frequency: frequency of each point [Hz], (n,).
-        amplitude: zero-to-peak deformation of the bushing [m], (n,).
-        transmissibility: complex ratio of the accelerations of mass and base [-], (n,).
-        stiffness: complex stiffness of the bushing at each frequency and amplitude [N/m], (n,).
-        warnings: sentences on a direction, and on frequencies and strains near the peak, that were not fitted, and on
-            unresolved effects.
-        if_rigs: response at these frequencies if the unresolved effects belong to the rig; None without such effects.
-    """
-
-    place: Place
-    mass: float
-    base_acceleration: float
-    frequency: Array
-    amplitude: Array
-    transmissibility: Array
-    stiffness: Array
-    warnings: tuple[str, ...] = ()
-    if_rigs: PredictedResonance | None = None
-
-    @property
-    def peak(self) -> tuple[float, float]:
-        """Frequency of the largest transmissibility [Hz], and its magnitude |T| [-]."""
-        index = int(np.argmax(np.abs(self.transmissibility)))
-        return float(self.frequency[index]), float(abs(self.transmissibility[index]))
-
-
-def predict_resonance(
-    result: Result,
-    place: Place,
-    mass: float,
-    base_acceleration: float,
-    frequencies: Sequence[float] | Array | None,
-    *,
-    temperature: float | None = None,
-    preload: Preload | None = None,
-) -> PredictedResonance:
-    """Predict the response of a mass on the bushing or specimen, whose stiffness depends on amplitude.
-
-    Args:
-        result: fitted result.
-        place: direction of translation, or specimen with a displacement.
-        mass: mass on the bushing [kg].
-        base_acceleration: zero-to-peak acceleration of the base [m/s^2].
-        frequencies: frequencies [Hz]; None for a range about the resonance.
-        temperature: temperature of the rubber [K]; None for the reference temperature.
-        preload: preload within the tested range; None as in `predict`.
-
-    Returns:
-        Transmissibility and amplitude at the frequencies.
-
-    Raises:
-        ModelError: the direction has no displacement and force, such as torsion.
-    """
-    if place.motion is not TRANSLATION:
-        raise ModelError("this cannot carry a mass", found=str(place), expected="a direction or mount with a stiffness")
-    bushings, *rig_models = car_models(result.model, result.unresolved)
-    conditions = RubberConditions(temperature, preload=tested_preload(result, place, preload))
-    if frequencies is None:
-        small = bushings.stiffness(place, 1.0, _SMALL_STRAIN / bushings.unit_strain(place), conditions=conditions)
-        resonance = float(np.sqrt(np.abs(small) / mass)) / (2.0 * np.pi)
-        frequencies = resonance * np.geomspace(_DECADE[0], _DECADE[1], _RESONANCE_POINTS)
-    frequency = np.asarray(frequencies, dtype=float)
-    base = base_acceleration / (2.0 * np.pi * frequency) ** 2
-
-    def shaken(model: Model) -> PredictedResonance:
-        stiffness_at = partial(model.stiffness, place, frequency, conditions=conditions)
-        amplitude, ratio = response(stiffness_at, mass, frequency, base)
-        stiffness = stiffness_at(amplitude)
-        return PredictedResonance(place, mass, base_acceleration, frequency, amplitude, ratio, stiffness)
-
-    predicted, if_rigs = shaken(bushings), shaken(rig_models[-1]) if rig_models else None
-    near = np.abs(predicted.transmissibility) >= min(_NEAR_PEAK, predicted.peak[1])
-    subject = f"{place}, resonance of {number(mass, 3)} kg"
-    warnings = [
-        *unfitted_warnings(result, place),
-        *extrapolations(result, place, frequency[near], predicted.amplitude[near], temperature, subject),
-    ]
-    if result.alternatives:
-        peaks = np.array([shaken(model).peak for model in _alternatives(result, rig=False)])
-        (low, smallest), (high, largest) = peaks.min(axis=0), peaks.max(axis=0)
-        span = f"{number(low, 4)} to {number(high, 4)} Hz, |T| {number(smallest, 4)} to {number(largest, 4)}"
-        warnings += [*result.undecided, f"{subject}: {span}, for all models that agree with the tests"]
-    if if_rigs:
-        peak, ratio = (number(value, 4) for value in if_rigs.peak)
-        warnings.append(
-            f"{subject}: at {peak} Hz, |T| {ratio}, if {' and '.join(result.unresolved)} belongs to the rig"
-        )
-    return replace(predicted, warnings=tuple(warnings), if_rigs=if_rigs)

@@ -57,7 +57,17 @@ class LargeMotion:
         return History.steady(self.displacement * slow + amplitude * np.sin(phase), frequency, cycles)
 
     def require(self, place: Place, frequency: Array, model: Model) -> None:
-        """Raise a ModelError if the model has no law in time, or the motion is not slow or of another direction."""
+        """Check that the small harmonic can be superposed on this motion.
+
+        Args:
+            place: direction or specimen of the small harmonic.
+            frequency: frequencies of the small harmonic [Hz], (n,).
+            model: model, whose effects must have laws in time.
+
+        Raises:
+            ModelError: an effect has no law in time, the motion is of another kind than the direction, or it is not
+                slow compared with the small harmonic.
+        """
         require_time_law(model)
         if place.motion.displacement_unit != self.unit:
             expected = f"a motion in {place.display.displacement.name}"

@@ -128,7 +128,14 @@ def read_displacements(
 
 
 def even_time(time: Floats) -> tuple[Floats, tuple[str, ...]]:
-    """Even times [s] over a record; and a sentence if the recorded times deviate from them by more than rounding."""
+    """Space the times of a record evenly.
+
+    Returns:
+        Even times [s], (n,); and a sentence if the recorded times deviate from them by more than rounding.
+
+    Raises:
+        MeasurementError: the times are too uneven, or too many.
+    """
     even = np.linspace(time[0], time[-1], time.size)
     steps, correction = np.diff(time), tuple[str, ...]()
     step = float(np.median(steps))

@@ -1,13 +1,11 @@
 """Tables for spreadsheets: units in every header, one row per point."""
 
-import re
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from bushfit.diagnosis.record import Diagnosis, level_of
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError, printable
 from bushfit.fitting.master_curve import ShiftedSweep
@@ -16,16 +14,12 @@ from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Display, Place
 from bushfit.model.arms import Arms, arm_rows
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
+from bushfit.prediction.resonance import PredictedResonance
 from bushfit.prediction.static_curve import StaticCurve
-from bushfit.prediction.stiffness import PredictedResonance, Prediction
+from bushfit.prediction.stiffness import Prediction
 from bushfit.reading.measurement import loss_factor
 from bushfit.units import CELSIUS
 
-#: Headers of the measured and modelled responses and of the outlier flag in the tables of loops and sweeps.
-_MEASURED = re.compile(
-    r"outlier$|(strain amplitude|(model )?"
-    r"(displacement|rotation|strain|force|moment|stress|stiffness|modulus|loss factor)) \["
-)
 #: Separator of the warnings of a bushing in the table of a batch.
 BETWEEN = " | "
 #: Display unit of amplitudes and its factor from SI, by SI unit: mm for m, % for strain.
@@ -267,7 +261,7 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
                 {
                     "sweep": data_set.sweep.name,
                     "direction": str(place),
-                    **_condition_columns(data_set),
+                    **condition_columns(data_set),
                     "frequency [Hz]": data_set.frequency,
                     **amplitude_column(place, data_set.amplitude),
                     "repeat": data_set.repeat,
@@ -284,7 +278,7 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
     return pd.concat(tables, ignore_index=True)
 
 
-def _condition_columns(data_set: MeasuredSweep) -> dict[str, Any]:
+def condition_columns(data_set: MeasuredSweep) -> dict[str, Any]:
     """Columns of the stepped quantity of a sweep, and of temperature, preload, part and error if its test has them."""
     sweep, conditions = data_set.sweep, data_set.source.conditions if data_set.source else {}
     columns: dict[str, Any] = {"stepped": sweep.stepped or "neither"}
@@ -298,39 +292,6 @@ def _condition_columns(data_set: MeasuredSweep) -> dict[str, Any]:
     if sweep.relative_error is not None:
         columns["stated error [-]"] = sweep.relative_error[data_set.order]
     return columns
-
-
-def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """Table of the gap, measured minus model, before and after the effects that a diagnosis adds to the model.
-
-    The gap is in units of noise and in percent: of |K| for sweeps, of half the force range for loops. Frequency and
-    amplitude are those recorded, even if the diagnosis corrects a mistake in the record.
-
-    Args:
-        diagnosis: finished diagnosis with the models before and after.
-
-    Returns:
-        A row per point of a sweep or row of a loop, with the measured response and that of the final model.
-    """
-    before, after = diagnosis.before, diagnosis.after
-    tables = []
-    for data_set, corrected in zip(before.data_sets, after.data_sets, strict=True):
-        columns: dict[str, Any] = {"test": data_set.name, "kind": data_set.kind, "direction": str(data_set.direction)}
-        columns |= _condition_columns(data_set) if isinstance(data_set, MeasuredSweep) else {}
-        columns |= data_set.columns()
-        for name, model, test in (("before", before.model, data_set), ("after", after.model, corrected)):
-            in_noise, percent = (
-                np.split(-test.misfit(model), test.residuals_per_point),
-                -100.0 * test.relative_difference(model),
-            )
-            columns |= {
-                f"{part} {name} [noise]": column for part, column in zip(test.components, in_noise, strict=True)
-            }
-            columns |= {f"{part} {name} [%]": column for part, column in zip(test.components, percent, strict=True)}
-        table: Any = loops_table if data_set.kind == "loop" else sweeps_table
-        responses = table(diagnosis.result.model, [data_set])
-        tables.append(pd.DataFrame(columns | {name: responses[name] for name in responses if _MEASURED.match(name)}))
-    return pd.concat(tables, ignore_index=True)
 
 
 def master_curve_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:
@@ -364,27 +325,6 @@ def shift_factors_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:
         value, error = np.array([getattr(shifted, key) for shifted in shifted_sweeps]).T / np.log(10.0)
         columns |= {name: value, f"{name}, low": value - Z95 * error, f"{name}, high": value + Z95 * error}
     return pd.DataFrame(columns)
-
-
-def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
-    """Table of the results of a diagnosis for every effect that could explain the gap.
-
-    Returns:
-        A row per effect: level, score, gain in chi-square, probability, fitted parameters, and reason for the result.
-    """
-    rows = [
-        {
-            "effect": judged.name,
-            "level": level_of(judged.name),
-            "score": judged.score,
-            "chi-square gain": judged.gain,
-            "probability": round(judged.probability, 9),
-            "parameters": "; ".join(f"{name} = {value:.6g}" for name, value in judged.parameters.items()),
-            "why": judged.why,
-        }
-        for judged in diagnosis.candidates
-    ]
-    return pd.DataFrame(rows)
 
 
 def shortened(name: str, letters: int) -> str:

@@ -31,7 +31,8 @@ from bushfit.model.file import from_document, to_document
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result, transfer_compound
 from bushfit.prediction.caveats import caveats
-from bushfit.prediction.stiffness import predict, predict_resonance
+from bushfit.prediction.resonance import predict_resonance
+from bushfit.prediction.stiffness import predict
 from bushfit.report.results import to_json
 from bushfit.units import number
 

@@ -31,7 +31,8 @@ from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
-from bushfit.prediction.stiffness import Band, predict
+from bushfit.prediction.bands import Band
+from bushfit.prediction.stiffness import predict
 
 Rig = Callable[..., Campaign]
 NAMES = ("paper", "soft and long", "stiff and thin", "strongly filled")

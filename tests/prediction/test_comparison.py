@@ -18,8 +18,8 @@ from bushfit.geometry import Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
+from bushfit.prediction.bands import Band
 from bushfit.prediction.comparison import Comparison, ParameterContrast, compare, holm, with_holm
-from bushfit.prediction.stiffness import Band
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 

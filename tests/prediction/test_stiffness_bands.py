@@ -17,7 +17,8 @@ from bushfit.model.model import Model
 from bushfit.model.result import Range, Result, transfer_compound
 from bushfit.prediction.caveats import caveats
 from bushfit.prediction.grid import PAPER_AMPLITUDES, PAPER_FREQUENCIES, default_grid
-from bushfit.prediction.stiffness import predict, predict_resonance
+from bushfit.prediction.resonance import predict_resonance
+from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Sweep
 from bushfit.report.tables import predicted_resonance_table, prediction_table
 from bushfit.simulation.measured import measure

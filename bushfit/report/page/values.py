@@ -7,9 +7,10 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.model.covariance import Z95
+from bushfit.prediction.bands import Band
 from bushfit.prediction.caveats import agrees_within_noise
 from bushfit.prediction.static_curve import static_curve, static_rate
-from bushfit.prediction.stiffness import Band, Prediction, predict
+from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.prediction.superposed import has_time_law
 from bushfit.report.page.record import ReportRecord
 from bushfit.report.tables import spread

@@ -50,7 +50,7 @@ def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any]
     phase of the cycle. All maps share one colour scale, and all loops of one direction or specimen share one y axis.
 
     Args:
-        table: table of the gap from `tables.gap_table`.
+        table: table of the gap from `diagnosed.gap_table`.
         result: final model, which gives the specimens by their names.
         diagnosis: content of diagnosis.json.
         title: title of the figure.
@@ -104,7 +104,7 @@ def column_titles(table: pd.DataFrame, diagnosis: Mapping[str, Any]) -> dict[str
     """Titles of the columns of the figure, with the root mean square gap in units of noise.
 
     Args:
-        table: table of the gap from `tables.gap_table`.
+        table: table of the gap from `diagnosed.gap_table`.
         diagnosis: content of diagnosis.json.
 
     Returns:

@@ -19,11 +19,12 @@ from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import predict
+from bushfit.report.diagnosed import gap_table
 from bushfit.report.plots.fits import loops_figure, sweeps_figure
 from bushfit.report.plots.gap import gap_figure
 from bushfit.report.plots.prediction import prediction_figure
 from bushfit.report.plots.style import in_own_style
-from bushfit.report.tables import gap_table, loops_table, sweeps_table
+from bushfit.report.tables import loops_table, sweeps_table
 
 Swept = Callable[..., MeasuredSweep]
 Looped = Callable[..., MeasuredLoop]

@@ -1,0 +1,147 @@
+"""95 % bands: errors of the parameters and of the model, and the span of the models that the tests do not rule out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+
+import numpy as np
+
+from bushfit.effects import Level
+from bushfit.effects.contract import Array, RubberConditions
+from bushfit.geometry import Place
+from bushfit.model.covariance import Z95, Covariance
+from bushfit.model.model import Model
+from bushfit.model.result import Result
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """Predicted quantity at n operating points, with its 95 % band.
+
+    Args:
+        value, low, high: prediction, and lower and upper end of its 95 % band, (n,) each.
+        root: changes of the quantity by r independent errors of one standard deviation, (r, n); their root sum of
+            squares is the standard error. r is 0 if the uncertainty is unknown.
+    """
+
+    value: Array
+    low: Array
+    high: Array
+    root: Array = field(default_factory=lambda: np.empty((0, 1)))
+
+    def logarithm(self) -> Band:
+        """Band of the natural logarithm of the (positive) quantity."""
+        low, high = (np.log(self.value) + end / self.value - 1.0 for end in (self.low, self.high))
+        return Band(np.log(self.value), low, high, self.root / self.value)
+
+    def minus(self, subtrahend: Band) -> Band:
+        """Band of the difference from another quantity, at the same points and with independent errors.
+
+        Notes: the distance from the difference to an end of its band is the root sum of squares of the distances in the
+        two bands (G. Zou, A. Donner, Stat. Med. 27 (2008) 1693).
+        """
+        value = self.value - subtrahend.value
+        low = value - np.hypot(self.value - self.low, subtrahend.high - subtrahend.value)
+        high = value + np.hypot(self.high - self.value, subtrahend.value - subtrahend.low)
+        return Band(value, low, high, np.concatenate((self.root, -subtrahend.root)))
+
+
+def car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
+    """List the models that may describe the bushing in the car, without instrument effects.
+
+    Each model has a different subset of the unresolved effects.
+
+    Args:
+        model: fitted model.
+        unresolved: names of effects that belong either to the bushing or to the rig.
+
+    Returns:
+        Models; the first has all unresolved effects, the last has none.
+    """
+    bare = model.without(Level.INSTRUMENT)
+    count = range(len(unresolved) + 1)
+    return [bare.without(*names) for size in count for names in combinations(unresolved, size)]
+
+
+def alternative_models(result: Result, *, rig: bool) -> Iterator[Model]:
+    """Yield each model that the tests do not rule out, with the effects of the rig or as in the car (`car_models`)."""
+    resolved = {*result.model.effects} - {*result.unresolved}
+    for model in (alternative.model for alternative in result.alternatives):
+        twins = [effect.name for effect in model.records if effect.twins and effect.name not in resolved]
+        yield from [model] if rig else car_models(model, twins)
+
+
+def candidates(result: Result, *, rig: bool = False) -> list[tuple[Result, Model]]:
+    """List the models that agree with the tests, the predicted one first; a band spans the predictions of all.
+
+    Args:
+        result: fitted result.
+        rig: True to include the effects of the rig, as in the tests.
+
+    Returns:
+        Models with the result that gives their errors: `car_models`, then the alternatives, which have no model error.
+    """
+    models = [result.model] if rig else car_models(result.model, result.unresolved)
+    explained = replace(result, model_error=None)
+    return [(result, model) for model in models] + [(explained, model) for model in alternative_models(result, rig=rig)]
+
+
+def envelope(bands: Sequence[Band]) -> Band:
+    """Band of the first of several predictions, widened to include the bands of the others."""
+    low, high = (np.array([getattr(band, end) for band in bands]) for end in ("low", "high"))
+    return replace(bands[0], low=low.min(axis=0), high=high.max(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Errors of a prediction with one model: of its parameters, and of the model itself.
+
+    Args:
+        covariance: covariance of the k uncertain parameters of the model.
+        scale: factor of the parameters' errors at each point, (n,); below 1 where the error of the model replaces them.
+        relative: complex relative errors of the stiffness by e independent errors of the model, (e, n); e is 0 or 2.
+    """
+
+    covariance: Covariance
+    scale: Array
+    relative: Array
+
+    def band(self, value: Array, slopes: Array) -> Band:
+        """95 % band of a quantity, (n,), from its changes by parameters and model errors, (k + e, n)."""
+        count = len(self.covariance.names)
+        half = np.hypot(
+            self.scale * self.covariance.half_width(slopes[:count]), Z95 * np.linalg.norm(slopes[count:], axis=0)
+        )
+        root = np.concatenate((self.scale * (self.covariance.root.T @ slopes[:count]), slopes[count:]))
+        return Band(value, value - half, value + half, root)
+
+
+def uncertainty(
+    result: Result, model: Model, place: Place, frequency: Array, amplitude: Array, conditions: RubberConditions
+) -> Uncertainty:
+    """Collect the errors of a prediction with one model at operating points.
+
+    Args:
+        result: fitted result, which provides the covariance and the model error.
+        model: the fitted model or a variant with fewer or other effects.
+        place: direction or specimen.
+        frequency: frequency of each point [Hz], (n,).
+        amplitude: zero-to-peak amplitude of each point [m, rad or 1], (n,).
+        conditions: temperature of the rubber.
+
+    Returns:
+        Errors. An unnamed correction or a model error adds an error of the real and one of the imaginary part; within
+        the measured range these replace the errors of the parameters.
+    """
+    names = [name for name in result.covariance.names if name in model.values]
+    covariance = result.covariance.restricted(names)
+    correction = model.unnamed or result.model_error
+    if not correction:
+        return Uncertainty(covariance, np.ones(frequency.size), np.empty((0, frequency.size)))
+    share, error, weight = correction.evaluate(
+        model.setting(place, conditions=conditions), 2.0 * np.pi * frequency, amplitude
+    )
+    relative = error / (1.0 + share) if model.unnamed else np.hypot(error, [share.real, share.imag])
+    return Uncertainty(covariance, np.sqrt(1.0 - np.square(weight)), np.array([[1.0], [1.0j]]) * relative)

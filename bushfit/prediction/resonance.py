@@ -1,0 +1,129 @@
+"""Resonance of a mass on the bushing, whose stiffness depends on the amplitude of the resonance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from bushfit.effects.contract import Array, RubberConditions
+from bushfit.errors import ModelError
+from bushfit.geometry import TRANSLATION, Place
+from bushfit.model.model import Model
+from bushfit.model.result import Result
+from bushfit.prediction.bands import alternative_models, car_models
+from bushfit.prediction.caveats import extrapolations, unfitted_warnings
+from bushfit.prediction.stiffness import tested_preload
+from bushfit.reading.preload import Preload
+from bushfit.reduction.resonance import response
+from bushfit.units import number
+
+#: Strain at which the resonance of a mass is looked for first; chosen: small for any rubber.
+_SMALL_STRAIN = 1e-4
+#: Lowest and highest frequency about a resonance over that of small strain.
+_DECADE = (0.2, 4.0)
+#: Frequencies of this range; chosen: 0.5 % apart, the accuracy to which tests determine a peak.
+_RESONANCE_POINTS = 600
+#: Transmissibility from which a point counts as near the peak; chosen: about 0.6 to 1.3 of the peak's frequency, where
+#: the mount decides how far the mass moves.
+_NEAR_PEAK = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class PredictedResonance:
+    """Predicted response of a mass on a bushing whose base is shaken with a sine of constant acceleration.
+
+    Args:
+        place: direction or specimen.
+        mass: mass on the bushing [kg].
+        base_acceleration: zero-to-peak acceleration of the base [m/s^2].
+        frequency: frequency of each point [Hz], (n,).
+        amplitude: zero-to-peak deformation of the bushing [m], (n,).
+        transmissibility: complex ratio of the accelerations of mass and base [-], (n,).
+        stiffness: complex stiffness of the bushing at each frequency and amplitude [N/m], (n,).
+        warnings: sentences on a direction, and on frequencies and strains near the peak, that were not fitted, and on
+            unresolved effects.
+        if_rigs: response at these frequencies if the unresolved effects belong to the rig; None without such effects.
+    """
+
+    place: Place
+    mass: float
+    base_acceleration: float
+    frequency: Array
+    amplitude: Array
+    transmissibility: Array
+    stiffness: Array
+    warnings: tuple[str, ...] = ()
+    if_rigs: PredictedResonance | None = None
+
+    @property
+    def peak(self) -> tuple[float, float]:
+        """Frequency of the largest transmissibility [Hz], and its magnitude |T| [-]."""
+        index = int(np.argmax(np.abs(self.transmissibility)))
+        return float(self.frequency[index]), float(abs(self.transmissibility[index]))
+
+
+def predict_resonance(
+    result: Result,
+    place: Place,
+    mass: float,
+    base_acceleration: float,
+    frequencies: Sequence[float] | Array | None,
+    *,
+    temperature: float | None = None,
+    preload: Preload | None = None,
+) -> PredictedResonance:
+    """Predict the response of a mass on the bushing or specimen, whose stiffness depends on amplitude.
+
+    Args:
+        result: fitted result.
+        place: direction of translation, or specimen with a displacement.
+        mass: mass on the bushing [kg].
+        base_acceleration: zero-to-peak acceleration of the base [m/s^2].
+        frequencies: frequencies [Hz]; None for a range about the resonance.
+        temperature: temperature of the rubber [K]; None for the reference temperature.
+        preload: preload within the tested range; None as in `predict`.
+
+    Returns:
+        Transmissibility and amplitude at the frequencies.
+
+    Raises:
+        ModelError: the direction has no displacement and force, such as torsion.
+    """
+    if place.motion is not TRANSLATION:
+        raise ModelError("this cannot carry a mass", found=str(place), expected="a direction or mount with a stiffness")
+    bushings, *rig_models = car_models(result.model, result.unresolved)
+    conditions = RubberConditions(temperature, preload=tested_preload(result, place, preload))
+    if frequencies is None:
+        small = bushings.stiffness(place, 1.0, _SMALL_STRAIN / bushings.unit_strain(place), conditions=conditions)
+        resonance = float(np.sqrt(np.abs(small) / mass)) / (2.0 * np.pi)
+        frequencies = resonance * np.geomspace(_DECADE[0], _DECADE[1], _RESONANCE_POINTS)
+    frequency = np.asarray(frequencies, dtype=float)
+    base = base_acceleration / (2.0 * np.pi * frequency) ** 2
+
+    def shaken(model: Model) -> PredictedResonance:
+        stiffness_at = partial(model.stiffness, place, frequency, conditions=conditions)
+        amplitude, ratio = response(stiffness_at, mass, frequency, base)
+        stiffness = stiffness_at(amplitude)
+        return PredictedResonance(place, mass, base_acceleration, frequency, amplitude, ratio, stiffness)
+
+    predicted, if_rigs = shaken(bushings), shaken(rig_models[-1]) if rig_models else None
+    near = np.abs(predicted.transmissibility) >= min(_NEAR_PEAK, predicted.peak[1])
+    subject = f"{place}, resonance of {number(mass, 3)} kg"
+    warnings = [
+        *unfitted_warnings(result, place),
+        *extrapolations(result, place, frequency[near], predicted.amplitude[near], temperature, subject),
+    ]
+    if result.alternatives:
+        peaks = np.array([shaken(model).peak for model in alternative_models(result, rig=False)])
+        (low, smallest), (high, largest) = peaks.min(axis=0), peaks.max(axis=0)
+        span = f"{number(low, 4)} to {number(high, 4)} Hz, |T| {number(smallest, 4)} to {number(largest, 4)}"
+        warnings += [*result.undecided, f"{subject}: {span}, for all models that agree with the tests"]
+    if if_rigs:
+        peak, ratio = (number(value, 4) for value in if_rigs.peak)
+        warnings.append(
+            f"{subject}: at {peak} Hz, |T| {ratio}, if {' and '.join(result.unresolved)} belongs to the rig"
+        )
+    return replace(predicted, warnings=tuple(warnings), if_rigs=if_rigs)

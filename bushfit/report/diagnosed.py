@@ -1,0 +1,71 @@
+"""Tables of a diagnosis: the gap at every point, and the effects that were considered."""
+
+import re
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from bushfit.diagnosis.record import Diagnosis, level_of
+from bushfit.fitting.preparation import MeasuredSweep
+from bushfit.report.tables import condition_columns, loops_table, sweeps_table
+
+#: Headers of the measured and modelled responses and of the outlier flag in the tables of loops and sweeps.
+_MEASURED = re.compile(
+    r"outlier$|(strain amplitude|(model )?"
+    r"(displacement|rotation|strain|force|moment|stress|stiffness|modulus|loss factor)) \["
+)
+
+
+def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """Table of the gap, measured minus model, before and after the effects that a diagnosis adds to the model.
+
+    The gap is in units of noise and in percent: of |K| for sweeps, of half the force range for loops. Frequency and
+    amplitude are those recorded, even if the diagnosis corrects a mistake in the record.
+
+    Args:
+        diagnosis: finished diagnosis with the models before and after.
+
+    Returns:
+        A row per point of a sweep or row of a loop, with the measured response and that of the final model.
+    """
+    before, after = diagnosis.before, diagnosis.after
+    tables = []
+    for data_set, corrected in zip(before.data_sets, after.data_sets, strict=True):
+        columns: dict[str, Any] = {"test": data_set.name, "kind": data_set.kind, "direction": str(data_set.direction)}
+        columns |= condition_columns(data_set) if isinstance(data_set, MeasuredSweep) else {}
+        columns |= data_set.columns()
+        for name, model, test in (("before", before.model, data_set), ("after", after.model, corrected)):
+            in_noise, percent = (
+                np.split(-test.misfit(model), test.residuals_per_point),
+                -100.0 * test.relative_difference(model),
+            )
+            columns |= {
+                f"{part} {name} [noise]": column for part, column in zip(test.components, in_noise, strict=True)
+            }
+            columns |= {f"{part} {name} [%]": column for part, column in zip(test.components, percent, strict=True)}
+        table: Any = loops_table if data_set.kind == "loop" else sweeps_table
+        responses = table(diagnosis.result.model, [data_set])
+        tables.append(pd.DataFrame(columns | {name: responses[name] for name in responses if _MEASURED.match(name)}))
+    return pd.concat(tables, ignore_index=True)
+
+
+def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
+    """Table of the results of a diagnosis for every effect that could explain the gap.
+
+    Returns:
+        A row per effect: level, score, gain in chi-square, probability, fitted parameters, and reason for the result.
+    """
+    rows = [
+        {
+            "effect": judged.name,
+            "level": level_of(judged.name),
+            "score": judged.score,
+            "chi-square gain": judged.gain,
+            "probability": round(judged.probability, 9),
+            "parameters": "; ".join(f"{name} = {value:.6g}" for name, value in judged.parameters.items()),
+            "why": judged.why,
+        }
+        for judged in diagnosis.candidates
+    ]
+    return pd.DataFrame(rows)
