@@ -70,7 +70,7 @@ class History:
             The mean frequency is the rms rate over the rms displacement from the mean, over 2 pi (S. O. Rice, Bell
             Syst. Tech. J. 24 (1945) 46), that of a sine for a sine; but at least one cycle in the history.
 
-        >>> History.sampled(np.sin(np.linspace(0.0, 20.0 * np.pi, 1000)), 1e-3).frequency.round(2)
+        >>> round(History.sampled(np.sin(np.linspace(0.0, 20.0 * np.pi, 1000)), 1e-3).frequency, 2)
         10.01
         """
         moving, resting = float(np.std(np.diff(value))) / step, float(np.std(value))

@@ -140,7 +140,7 @@ def test_a_worker_that_dies_costs_a_second_try_and_only_what_always_kills_is_giv
     assert sorted(number for number, _ in found) == list(range(count)), "each row once"
     for number, result in found:
         if 100 + number in deadly:
-            assert "its worker process died" in result
+            assert "its worker process ended" in result
         else:
             assert result == str(2 * (100 + number))
     assert len(list(tmp_path.iterdir())) == len(once + deadly)
