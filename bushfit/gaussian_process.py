@@ -63,9 +63,14 @@ def in_lengths(points: Array, lengths: Sequence[float]) -> Array:
 
 
 def matern(points: Array, nodes: Array) -> Array:
-    """Matern 5/2 correlation of points with nodes.
+    """Matern 5/2 correlation of points with nodes, both in units of the correlation lengths.
 
-    Both are in units of the correlation lengths: points (..., n, d), nodes (m, d) -> correlation (..., n, m).
+    Args:
+        points: points, (..., n, d).
+        nodes: nodes, (m, d).
+
+    Returns:
+        Correlation of each point with each node, (..., n, m).
 
     >>> matern(np.zeros((1, 2)), np.array([[0.0, 0.0], [1.0, 0.0], [9.0, 0.0]])).round(3)
     array([[1.   , 0.524, 0.   ]])

@@ -53,7 +53,13 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
 
 
 def _studentised(values: Array, errors: Array, usual: Array) -> Array:
-    """Deviation of each value from the mean of the other usual values, in their standard deviations, (n,)."""
+    """Deviation of each value from the mean of the other usual values, in their standard deviations, (n,).
+
+    Args:
+        values: values of one quantity of the n parts, (n,).
+        errors: standard error of each value, (n,).
+        usual: True for parts that are not outliers, (n,).
+    """
     count, other_count = usual.sum(), usual.sum() - usual  # (n,): how many others each value is held against
     if count < FEWEST - 1:
         return np.full(values.size, np.nan)
@@ -73,7 +79,9 @@ def _studentised(values: Array, errors: Array, usual: Array) -> Array:
 def smallest_deviation(parts: int, quantities: int) -> float | None:
     """Smallest deviation, in standard deviations, that makes a part an outlier; None for fewer than five parts.
 
-    The arguments are the numbers of parts and of quantities in the batch.
+    Args:
+        parts: number of parts in the batch.
+        quantities: number of compared quantities.
     """
     if parts < FEWEST or quantities < 1:
         return None

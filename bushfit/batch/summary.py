@@ -96,7 +96,7 @@ class BatchResult:
 
     @cached_property
     def is_poor(self) -> Array:
-        """True for each part whose fitted model misses its tests, (n,)."""
+        """True for each part whose fitted model misses its tests by more than noise and the allowed NRMSE, (n,)."""
         return np.array([bool(describe_poor_fit(record, self.plan.limits)) for record in self.records])
 
     @cached_property
@@ -126,7 +126,7 @@ class BatchResult:
 
     @cached_property
     def curve_deviation(self) -> Array:
-        """Relative deviation of the measured |K| of each part from the median part, mean over the curve, (n,)."""
+        """Relative deviation of each part's |K| from the median part's, averaged over the measured curve, (n,)."""
         if not self.curves:
             return np.full(len(self.records), np.nan)
         logarithms = np.log([*self.curves.values()])

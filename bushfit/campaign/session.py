@@ -110,9 +110,15 @@ def session(bushing: Bushing | None, visits: Sequence[SessionTest]) -> list[Rubb
 
 
 def _last_larger(strain: Array, session_time: Array) -> tuple[Array, Array]:
-    """Last earlier strain amplitude of a larger level for each point, and the session time since then, (n,) each.
+    """Find the last earlier strain amplitude of a larger level than that of each point.
 
-    If no earlier strain was larger, the values are 0 and the session time of the point.
+    Args:
+        strain: strain amplitude of each point, in measured order [1], (n,).
+        session_time: time of each point in the session, from 0 to 1, (n,).
+
+    Returns:
+        The larger strain amplitude, and the session time since then, (n,) each; 0 and the session time of the point if
+        no earlier strain was larger.
     """
     # an unknown strain, of a resonance test, counts as none
     level = np.round(np.log(np.maximum(strain, 1e-9)) / np.log1p(_LEVEL_STEP))

@@ -180,7 +180,15 @@ def _compared(
     notes: Sequence[str] = (),
     command: str = "",
 ) -> ComparisonOutput:
-    """Compare each result with the first, in the directions and at the operating points of `grid`."""
+    """Compare each result with the first, in the directions and at the operating points of a grid.
+
+    Args:
+        entries: compared results, the reference first.
+        grid: directions, frequencies and amplitudes; None for the default of an axis.
+        families: model families to which the entries belong; empty for other results.
+        notes: further warnings.
+        command: command line for the document.
+    """
     results, labels = [entry.result for entry in entries], list(ascii_uppercase[: len(entries)])
     columns, grids = _common_places(results, grid.directions), []
     for places in columns:
@@ -244,7 +252,14 @@ def _warnings(
     *,
     are_families: bool,
 ) -> list[str]:
-    """Warnings on results that share tests, then the warnings of each result with the letters of the results."""
+    """Warnings on results that share tests, then the warnings of each result with the letters of the results.
+
+    Args:
+        labels: letters of the results.
+        entries: compared results, the reference first.
+        comparisons: comparison of each further result with the reference.
+        are_families: True if the results are model families, which share their tests by design.
+    """
     shared = "intervals of their {} assume independent tests and are usually too wide"
     if are_families:
         warnings = [
@@ -285,6 +300,11 @@ def _fit_families(
     campaign: Campaign, names: Sequence[str], directions: Sequence[str] | None
 ) -> tuple[list[ComparedResult], list[FittedFamily], list[str]]:
     """Fit model families to a campaign: the model of [fit], then the named families, or all families of the library.
+
+    Args:
+        campaign: the campaign.
+        names: names of families; empty or None for all.
+        directions: directions or specimens whose tests are fitted; None for the default.
 
     Returns:
         Entries for the comparison, the fitted families in the same order, and notes.
@@ -355,7 +375,13 @@ def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
 
 
 def _family_document(label: str, family: FittedFamily, result: Result) -> FamilyEntry:
-    """Make the entry of a model family, by its letter (`label`), in compare.json: its fit and held-out error."""
+    """Make the entry of a model family in compare.json: its fit and its root mean square held-out residual.
+
+    Args:
+        label: letter of the family.
+        family: fitted family.
+        result: result of its fit.
+    """
     evidence, held_out = family.evidence, family.holdout
     return {
         "label": label,

@@ -149,9 +149,15 @@ def _knowledge(source: Campaign | Result | Knowledge, rivals: Sequence[str] | No
 def _wanted_points(
     result: Result, grid: PredictSettings, campaign: Campaign | None, default: Sequence[Place]
 ) -> Iterator[Points]:
-    """Operating points of the wanted predictions, one `Points` per direction.
+    """Yield the operating points of the wanted predictions, one `Points` per direction.
 
     The grid is that of the arguments, else that of [predict], else the default grid of `predict`.
+
+    Args:
+        result: fitted result or model.
+        grid: grid that the arguments state; None for the default of an axis.
+        campaign: campaign with a table [predict]; None without one.
+        default: directions or specimens if the grid states none.
     """
     settings = grid_settings(grid, campaign)
     places = [get_place(name, result.specimens) for name in settings.directions or ()]
@@ -165,7 +171,11 @@ def _wanted_points(
 def _targets(name: str, half_width: float, knowledge: Knowledge, points: Sequence[Points]) -> list[Target]:
     """Targets with a name such as "mu", "stiffness" (all predicted directions) or "stiffness.axial".
 
-    `half_width` is the wanted half-width of the 95 % interval relative to the value.
+    Args:
+        name: name of a parameter or prediction, with or without a direction.
+        half_width: wanted half-width of the 95 % interval relative to the value.
+        knowledge: knowledge before the tests, with the names of the parameters.
+        points: operating points of the predictions.
     """
     possible = {parameter: [Target(parameter, half_width)] for parameter in knowledge.names}
     for quantity in PREDICTED:

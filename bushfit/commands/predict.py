@@ -112,12 +112,12 @@ class PredictionOutput:
 
     @cached_property
     def tests(self) -> tuple[Misfit, ...]:
-        """Relative difference between model and measurement for each measured sweep."""
+        """Misfit of the model with each measured sweep and run: NRMSE, reduced chi-square, mean error of |K|."""
         return misfits(self.result.model, *split_by_fit(self.result, self.measured))
 
     @cached_property
     def usable(self) -> tuple[ExpectedError, ...]:
-        """Expected error of the prediction at each direction or specimen, from the measured sweeps."""
+        """Expected error of |K| (relative) and loss factor (absolute) in each direction, from the measured sweeps."""
         return expected_errors_without_refits(self.result.model, *split_by_fit(self.result, self.measured))
 
 
@@ -249,7 +249,16 @@ def predict(
 
 
 def _preloads(result: Result, place: Place, preloads: Sequence[str]) -> list[Preload | None]:
-    """Preloads of a prediction in a direction: those of the texts, or else the default."""
+    """Preloads of a prediction in a direction: those of the texts, or else the default.
+
+    Args:
+        result: fitted result.
+        place: direction or specimen.
+        preloads: texts such as "500 N"; empty for the default.
+
+    Returns:
+        Preloads; None for a prediction that does not depend on a preload.
+    """
     if not preloads:
         return [tested_preload(result, place, None)]
     parsed = [parse_preload(text, place) for text in preloads]
@@ -306,7 +315,14 @@ def split_by_fit(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[list[
 def _files(
     output: PredictionOutput, drawn_sweeps: Sequence[MeasuredSweep], temperature: float | None, *, wide: bool
 ) -> list[ResultFile]:
-    """Tables and figures of a prediction at a temperature [K]; the figures show the sweeps in `drawn_sweeps`."""
+    """Tables and figures of a prediction.
+
+    Args:
+        output: the prediction.
+        drawn_sweeps: measured sweeps that the figures show.
+        temperature: temperature of the prediction [K]; None for the reference temperature.
+        wide: True to add tables with one column per amplitude.
+    """
     result, by_place = output.result, dict[Place, list[Prediction]]()
     for prediction in output.predictions:
         by_place.setdefault(prediction.direction, []).append(prediction)

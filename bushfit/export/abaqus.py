@@ -65,7 +65,13 @@ def export(request: ExportRequest) -> Exported:
 
 
 def _behavior(units: UnitSystem, rank: int, level: AmplitudeLevel) -> Iterator[str]:
-    """Yield the lines of the connector behavior (elasticity and damping) of one amplitude."""
+    """Yield the lines of the connector behavior (elasticity and damping) of one amplitude.
+
+    Args:
+        units: unit system of the deck.
+        rank: number of the amplitude level, from 1.
+        level: stiffness of all directions at this amplitude.
+    """
     yield f"*CONNECTOR BEHAVIOR, NAME=BUSHING_{rank}"
     frequency = level[0].frequency * units.frequency.factor
     diagonals = np.zeros((2, 6, frequency.size))
@@ -81,7 +87,13 @@ def _behavior(units: UnitSystem, rank: int, level: AmplitudeLevel) -> Iterator[s
 
 
 def _materials(request: ExportRequest, units: UnitSystem, series: Sequence[PronySeries]) -> Iterator[str]:
-    """Yield the lines of a material for the strain at each amplitude of the first direction; `series` may be empty."""
+    """Yield the lines of a material for the strain at each amplitude of the first direction.
+
+    Args:
+        request: model, predictions and settings.
+        units: unit system of the deck.
+        series: Prony series at each amplitude; empty to write materials in the frequency domain.
+    """
     model, first = request.result.model.without(EffectLevel.INSTRUMENT), exported_directions(request)[0]
     long_term = series[0].long_term if series else model.values[LONG_TERM]
     for rank, table in enumerate(stiffness_tables(first), start=1):

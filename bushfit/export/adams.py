@@ -73,11 +73,21 @@ class _Element(NamedTuple):
     exact: complex
 
     def damping(self, kind: Kind) -> float:
-        """Damping coefficient [N s/m or N m s/rad] for Adams Car, or loss angle [rad] for Adams Car Ride."""
+        """Damping coefficient [N s/m or N m s/rad] for Adams Car, or loss angle [rad] for Adams Car Ride.
+
+        Args:
+            kind: which of the two property files.
+        """
         return float(self.exact.imag / (2.0 * np.pi * self.frequency) if kind == "car" else np.angle(self.exact))
 
     def loss(self, kind: Kind) -> str:
-        """Sentence on the errors of |K| and loss factor over the grid due to a single curve and a single damping."""
+        """Sentence on the relative error of |K| and the absolute error of the loss factor over the grid.
+
+        The errors are due to a single static curve and a single damping.
+
+        Args:
+            kind: which of the two property files, Adams Car or Adams Car Ride.
+        """
         damping, written, exact = self.damping(kind), [], []
         for table in self.tables:
             force = np.interp(table.amplitude * _COSINE, self.curve.displacement, self.curve.mean.value)
@@ -131,7 +141,14 @@ def _element(request: ExportRequest, prediction: Prediction) -> _Element:
 def _property_file(
     request: ExportRequest, elements: Sequence[_Element], kind: Kind, losses: Sequence[str]
 ) -> Iterator[str]:
-    """Yield the lines of a property file for Adams Car or Adams Car Ride."""
+    """Yield the lines of a property file for Adams Car or Adams Car Ride.
+
+    Args:
+        request: model, predictions and settings.
+        elements: element of each direction.
+        kind: which of the two files.
+        losses: sentences on properties that the format cannot represent.
+    """
     amplitudes = describe_amplitudes([element.reference for element in elements])
     rates = ", ".join(f"{element.curve.direction} {element.curve.rate_text}" for element in elements)
     about = [f"damping at {number(elements[0].frequency, 4)} Hz, {amplitudes}", f"static curves at {rates}"]

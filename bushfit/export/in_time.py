@@ -178,7 +178,14 @@ def _values(
 
 
 def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Arms, ...]) -> dict[str, str]:
-    """Name of the FMU value for each field of the C structure of one direction or specimen."""
+    """Name of the FMU value for each field of the C structure of one direction or specimen.
+
+    Args:
+        model: model in the export.
+        place: direction or specimen.
+        names: name of the FMU value of each parameter.
+        arms: Maxwell arms that replace viscoelastic effects.
+    """
     layers = model.layers(model.setting(place))
     fields = {key: names[key] for key in ("unit_strain", "stiffness_per_modulus")}
     fields |= {f"size[{index}]": names[part.size] for index, part in enumerate(arms)}
@@ -191,7 +198,14 @@ def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Ar
 
 
 def _steady_losses(model: Model, omitted: list[str], prediction: Prediction, conditions: RubberConditions) -> list[str]:
-    """Write a sentence on the error of the steady stiffness due to constant modifiers and omitted effects; or none."""
+    """Write a sentence on the relative error of |K| due to constant modifiers and omitted effects; or none.
+
+    Args:
+        model: model in the export, without effects of the rig.
+        omitted: names of the effects that are left out.
+        prediction: dynamic stiffness over the grid of the export.
+        conditions: temperature of the rubber.
+    """
     fixed = [effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.shift_factor]
     if not (fixed or omitted):
         return []

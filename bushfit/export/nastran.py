@@ -55,7 +55,15 @@ def export(request: ExportRequest) -> Exported:
 
 
 def _property(names: Sequence[str], form: Form, units: UnitSystem, pid: int, level: AmplitudeLevel) -> Iterator[str]:
-    """Yield the lines of PBUSH, PBUSHT and the tables of one amplitude, for the property number `pid`."""
+    """Yield the lines of PBUSH, PBUSHT and the tables of one amplitude.
+
+    Args:
+        names: names of the tables in the property, for stiffness and damping.
+        form: conversion of the complex stiffness to these two quantities.
+        units: unit system of the deck.
+        pid: property number.
+        level: stiffness of all directions at this amplitude.
+    """
     rows = [(dof, *form.in_units(table, units)) for dof, table in by_dof(level)]
     several = level[0].frequency.size > 1
     nominal, numbers = [dict[int, str](), dict[int, str]()], [dict[int, str](), dict[int, str]()]

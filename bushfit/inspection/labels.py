@@ -104,7 +104,17 @@ def keys_from_labels(
 
 
 def _held_quantity(table: Table, place: Place, key: str, sources: Mapping[str, Labels]) -> tuple[str, StatedQuantity]:
-    """Find the constant amplitude or frequency of a sweep in its labels: origin of the label, and stated quantity."""
+    """Find the constant amplitude or frequency of a sweep in its labels.
+
+    Args:
+        table: table of the sweep.
+        place: direction or specimen, which determines the unit of an amplitude.
+        key: campaign key of the quantity.
+        sources: labels by their origin, such as the name of the file.
+
+    Returns:
+        Origin of the label, and the stated quantity.
+    """
     role = _HELD_ROLES[key]
     expected = place.motion.displacement_unit if role == "amplitude" else "Hz"
     label, found = next(

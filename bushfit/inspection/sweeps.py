@@ -155,7 +155,10 @@ def missing_frequencies(sweep: Sweep) -> Iterator[str]:
 
 
 def distance_from_repeats(sweep: Sweep) -> Array:
-    """Complex distance of ln K of each point from the median of its repeats, NaN for fewer than three repeats, (n,)."""
+    """Complex difference of ln K (gain + i phase [rad]) of each point from the median of its repeats, (n,).
+
+    The value is NaN for points with fewer than three repeats.
+    """
     log_stiffness, distance = np.log(sweep.stiffness), np.full(sweep.frequency.size, np.nan + 0j)
     for rows in group_rows(sweep.frequency, sweep.amplitude):
         if rows.size > 2:
@@ -164,10 +167,10 @@ def distance_from_repeats(sweep: Sweep) -> Array:
 
 
 def distance_from_curve(sweep: Sweep) -> Array:
-    """Complex distance of ln K of each point from a smooth curve through its run.
+    """Complex difference of ln K (gain + i phase [rad]) of each point from a smooth curve through its run.
 
     Returns:
-        Distance of the points that deviate far more than the scatter of their run; 0 for the others, (n,).
+        Difference of the points that deviate far more than the scatter of their run; 0 for the others, (n,).
 
     Notes:
         Two curves are fitted by least absolute distances, which a few outliers do not bend, even at an end of the run:

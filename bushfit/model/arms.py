@@ -248,7 +248,19 @@ def _starts(omega: Array, target: Array, arms: int) -> Iterator[tuple[Array, Arr
 def _fit(
     omega: Array, target: Array, total: Array, beyond: float, moduli: Array, time: Array, rounds: int = 1
 ) -> tuple[float, Array, Array]:
-    """Fit Maxwell arms to complex moduli [Pa] from start values; return largest error over total, moduli and times [s].
+    """Fit Maxwell arms to complex moduli from start values, for the smallest maximum error.
+
+    Args:
+        omega: angular frequencies [rad/s], (n,).
+        target: complex moduli [Pa], (n,).
+        total: complex moduli that errors are relative to [Pa], (n,).
+        beyond: factor by which relaxation times may lie outside the band.
+        moduli: start moduli of the arms [Pa], (k,).
+        time: start relaxation times [s], (k,).
+        rounds: number of fits, each with weights multiplied by the error of the last.
+
+    Returns:
+        Largest |error|/|total| over the frequencies, moduli [Pa] and relaxation times [s], (k,) each.
 
     Notes: repeated least squares in the logarithms, with weights multiplied by the error (Lawson's method for the
     smallest maximum error); the logarithms keep all moduli and times positive.

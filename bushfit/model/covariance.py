@@ -48,8 +48,8 @@ class Covariance:
     def root(self) -> Array:
         """Square root of the covariance: matrix B with B B^T equal to the covariance, (k, k).
 
-        Notes: |B^T slope| is the standard error of a quantity with the derivatives `slope`, (k,). Unlike
-        sqrt(slope^T C slope), it is never the root of a negative number for an ill-conditioned covariance C.
+        Notes: |B^T slope| is the standard error of a quantity with the derivatives `slope` by the parameters, (k,).
+        Unlike sqrt(slope^T C slope), it is never the root of a negative number for an ill-conditioned covariance C.
         """
         sigma = np.sqrt(np.diag(self.matrix))
         safe = np.where(sigma > 0.0, sigma, 1.0)

@@ -145,7 +145,7 @@ class FitTable(Quality):
 
     @property
     def quality(self) -> Quality:
-        """Quality of the fit, without the ranges of the tests."""
+        """Agreement of the model with its tests (NRMSE, reduced chi-square, residual count, noise), without ranges."""
         return Quality(self.nrmse, self.reduced_chi_square, self.points, self.noise, self.loop_gain_error)
 
     @property

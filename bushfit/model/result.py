@@ -33,8 +33,9 @@ class Quality:
     """Agreement of a model with the data that it was fitted to.
 
     Args:
-        nrmse: root mean square difference, relative to half a loop's force range and to |K|.
-        reduced_chi_square: mean square residual in units of noise; 1 if only noise remains.
+        nrmse: root mean square of model minus measurement: of complex stiffness relative to |K|, of a loop's force
+            relative to half its range.
+        reduced_chi_square: sum of squared residuals in units of noise per degree of freedom; 1 if only noise remains.
         points: number of residuals.
         noise: relative standard deviation of the noise of one point, root mean square over all points.
         loop_gain_error: relative standard deviation of the force gain of a loop, by the class of the rig; None without
@@ -107,7 +108,8 @@ class Misfit:
         value: constant value of this quantity; None for the whole test.
         unit: SI unit of the value: "m", "rad" or "1" for an amplitude, "Hz" for a frequency.
         points: number of points with weight: operating points of a sweep, rows of a loop.
-        nrmse: root mean square difference, relative to |K| or to half the loop's force range.
+        nrmse: root mean square difference of the complex stiffness relative to |K|, or of a loop's force relative to
+            half its range.
         reduced_chi_square: mean square residual in units of noise.
         gain: mean relative error of the model's |K|: positive if the model is stiffer than measured.
     """
@@ -130,8 +132,8 @@ class ExpectedError:
 
     Args:
         place: name of the direction or specimen.
-        stiffness: relative error of |K|.
-        loss_factor: absolute error of the loss factor.
+        stiffness: absolute value of the relative error of |K|.
+        loss_factor: absolute value of the error of the loss factor, not relative.
         points: number of compared operating points; a loop is one point.
         held_out: True if each point was predicted by a fit without its run, False if by the fit to all points.
     """

@@ -107,9 +107,16 @@ def _add_slopes(
     sensitivities: Callable[..., dict[str, Array]] | None,
     test: tuple[object, ...],
 ) -> None:
-    """Add the derivatives of a branch by the named parameters to `slopes`, (len(names), n).
+    """Add the derivatives of a branch's response by the named parameters to the derivatives of the whole response.
 
-    `respond` and `sensitivities` (None without analytic derivatives) are called with the values and then `test`.
+    Args:
+        slopes: derivatives by parameter, changed in place, (len(names), n).
+        model: model; the derivatives are taken at its parameter values.
+        names: names of the parameters.
+        branch: effect that adds a stress.
+        respond: function of the parameter values and `test` that returns the branch's response, (n,).
+        sensitivities: the same for derivatives by parameter name; None for numerical derivatives.
+        test: further arguments of both functions.
     """
     row = {name: i for i, name in enumerate(names)}
     qualified = {parameter.name: qualified_name(branch, parameter) for parameter in branch.parameters}
@@ -127,7 +134,17 @@ def _add_slopes(
 def _differences_at(
     place: Place, model: Model, names: Sequence[str], respond: Callable[[Values], Array]
 ) -> tuple[Array, Array]:
-    """Response and derivatives as from `differences`, but 0 for parameters without effect in the direction `place`."""
+    """Response and derivatives by one-sided differences, 0 for parameters that have no influence in a direction.
+
+    Args:
+        place: direction or specimen.
+        model: model; the derivatives are taken at its parameter values.
+        names: names of k parameters.
+        respond: function from parameter values to the response, as of `differences`.
+
+    Returns:
+        Response, (n,), and its derivatives per SI unit of each parameter, (k, n).
+    """
     local = [i for i, name in enumerate(names) if place_suffix(name) in (None, str(place))]
     response, local_slopes = differences(model, [names[i] for i in local], respond)
     slopes = np.zeros((len(names), response.size), dtype=response.dtype)

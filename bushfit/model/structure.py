@@ -82,7 +82,15 @@ def in_groups(layers: Sequence[Layer]) -> list[list[Layer]]:
 
 
 def as_one_layer(group: Sequence[Layer], values: Values) -> tuple[Layer, Values]:
-    """Combine a group from `in_groups` into its first layer, with values that have the sum of all amounts."""
+    """Combine adjacent layers with the same equation into the first of them, whose amount is the sum of all amounts.
+
+    Args:
+        group: layers with the same equation, such as two compliances in series.
+        values: parameter values [SI] by qualified name.
+
+    Returns:
+        The layer, and the values with the summed amount.
+    """
     first, layer_values = group[0], [values_for_effect(layer, values) for layer in group]
     return first, {
         **layer_values[0],

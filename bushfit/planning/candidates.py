@@ -128,7 +128,13 @@ def candidates(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
 
 
 def _possible_tests(knowledge: Knowledge, rig: RigSettings, tests: Sequence[Test]) -> list[Test]:
-    """Remove loops and sweep steps beyond the limits of the rig or the rubber, then sweeps of fewer than two steps."""
+    """Remove loops and sweep steps beyond the limits of the rig or the rubber, then sweeps of fewer than two steps.
+
+    Args:
+        knowledge: model that predicts forces and strains.
+        rig: limits of the rig.
+        tests: runs to check.
+    """
     possible: list[Test] = []
     for test in tests:
         (frequency, amplitude), place = operating_points(test), test.direction

@@ -30,7 +30,7 @@ class PlannedRun(TypedDict):
 
 
 class ErrorComparison(TypedDict):
-    """Standard error before further tests, with the planned tests, and with the standard programme."""
+    """Relative standard error of a parameter or of |K| before further tests, with the plan, and with the standard tests."""
 
     before: Annotated[float, Field(description="Standard error without further tests.")]
     planned: Annotated[float, Field(description="Standard error with the tests of the plan.")]
@@ -78,7 +78,7 @@ class Rivalry(TypedDict):
 
 
 class SimulationCheck(TypedDict):
-    """Predicted standard errors compared with fits to simulations of the plan."""
+    """Standard errors that a plan predicts, and root mean square errors of fits to simulations of the plan."""
 
     campaigns: Annotated[int, Field(description="Number of simulated campaigns.")]
     failed: Annotated[int, Field(description="Number of campaigns that could not be fitted.")]

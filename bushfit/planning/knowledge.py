@@ -139,6 +139,11 @@ def _with_bounded(knowledge: Knowledge, bounded: tuple[str, ...], data_sets: Seq
 
     Parameters without effect on these tests are omitted. The excess of the noise over the assumed noise follows from
     the errors of the other parameters.
+
+    Args:
+        knowledge: knowledge of the parameters that are not at a bound.
+        bounded: names of the parameters at a bound.
+        data_sets: tests of the campaign.
     """
     k = len(knowledge.names)
     slopes = relative_slopes(replace(knowledge, bounded=bounded), data_sets)
@@ -159,7 +164,17 @@ def _with_bounded(knowledge: Knowledge, bounded: tuple[str, ...], data_sets: Seq
 
 
 def _add_effects(plain: Evidence, names: Sequence[str], fixed: Sequence[str], bounds: Bounds) -> dict[str, Evidence]:
-    """Fit the model with each effect added in turn, by name of the effect; effects without influence are omitted."""
+    """Fit the model with each effect added in turn.
+
+    Args:
+        plain: fit without the effects.
+        names: names of the effects.
+        fixed: names of parameters that are not fitted.
+        bounds: limits of parameters [SI], inside their default limits.
+
+    Returns:
+        Fit with each effect by its name; effects without influence on these tests are omitted.
+    """
     proposed = [proposal for proposal in proposals(plain, (), fixed) if proposal.name in names]
     return refitted(plain, proposed, {}, fixed, bounds)
 

@@ -121,7 +121,7 @@ def rig_effects(result: Result) -> list[str]:
 
 
 def agrees_within_noise(result: Result, direction: Place) -> bool:
-    """True if a direction has measured sweeps that were not fitted, and all agree with the model within their noise."""
+    """True if a direction has measured sweeps that were not fitted, and none misses the model by more than its noise."""
     misfits = [test for test in result.tests if test.place == str(direction) and test.held is None and not test.fitted]
     return bool(misfits) and all(test.reduced_chi_square <= _AGREEMENT for test in misfits)
 
@@ -185,7 +185,7 @@ def _compressible(result: Result, bushing: Bushing) -> Iterator[str]:
 
 
 def _radial_error(bushing: Bushing) -> str:
-    """Phrase on the deviation of the bushing's radial formulas from finite elements of the same shape."""
+    """Phrase on the relative deviation of the bushing's radial stiffness and strain formulas from finite elements."""
     if bushing.correction is None:
         return "which was not compared with finite elements of this shape"
     if bushing.shape == "calibrated":
@@ -238,7 +238,7 @@ def point_warnings(
 
 
 def format_deviation(ratios: Array) -> str:
-    """Format the smallest and largest deviation of ratios from 1 as percentages: "+1.2 to +3.4 %"."""
+    """Format the smallest and largest deviation of ratios (measured over model, (n,)) from 1: "+1.2 to +3.4 %"."""
     ends = [number(100.0 * end - 100.0, 2, "+") for end in (np.nanmin(ratios), np.nanmax(ratios))]
     return f"{' to '.join(dict.fromkeys(ends))} %"
 

@@ -336,7 +336,13 @@ def joint_p_value(difference: Array, matrix: Array, freedom: Array) -> tuple[flo
 
 
 def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
-    """Phrase on the differences beyond chance with their points, and on an upper limit at the other points."""
+    """Phrase on the differences beyond chance with their points, and on an upper limit at the other points.
+
+    Args:
+        band: differences with simultaneous 95 % bands, in ln |K| or in the loss factor, (n,).
+        unit: "%" for relative differences of |K|; "" for differences of the loss factor.
+        contrast: the compared stiffness, with its operating points.
+    """
 
     def figures(i: int, word: str) -> str:
         value, ends = abs(band.value[i]), sorted((abs(band.low[i]), abs(band.high[i])))

@@ -136,10 +136,15 @@ def common_grid(
 
 
 def _limit(values: Array, ranges: Sequence[Any], count: int) -> Array:
-    """Select the values, (n,), within all `ranges` (low, high).
+    """Select the values within all ranges, (n,).
 
     If fewer than two are, the result is `count` even values over the range that all ranges share; without a shared
     range, all values.
+
+    Args:
+        values: frequencies or amplitudes, (n,).
+        ranges: pairs of lowest and highest value.
+        count: number of values over the shared range.
     """
     inside, low, high = _inside(values, ranges), max(low for low, _ in ranges), min(high for _, high in ranges)
     if low > high * (1 + MARGIN):

@@ -132,7 +132,14 @@ def time_response(
 
 
 def _force(result: Result, model: Model, place: Place, history: History, conditions: RubberConditions) -> Band:
-    """Force of one model with its 95 % band.
+    """Force of one model over a displacement history, with its 95 % band.
+
+    Args:
+        result: fitted result, which gives the errors.
+        model: the fitted model or a variant with other effects.
+        place: direction or specimen.
+        history: displacement [m, rad or 1], (n,).
+        conditions: temperature of the rubber.
 
     Notes: the model's relative errors of real and imaginary part multiply the force and its Hilbert transform. They are
     the larger of those at the peak amplitude and at that of a sine of equal rms, at the mean frequency.

@@ -109,7 +109,19 @@ def static_curve(
 def _forces(
     result: Result, model: Model, place: Place, displacement: Array, rate: float, conditions: RubberConditions
 ) -> list[Band]:
-    """Loading, unloading, mean, slope and secant of one model in the steady state of a triangular motion."""
+    """Bands of the static curve of one model, in the steady state of a slow triangular motion.
+
+    Args:
+        result: fitted result, which gives the errors.
+        model: the fitted model or a variant with other effects.
+        place: direction or specimen.
+        displacement: even displacements from -reach to reach [m, rad or 1], (n,).
+        rate: rate of the motion [m/s, rad/s or 1/s].
+        conditions: temperature of the rubber.
+
+    Returns:
+        Loading force, unloading force, their mean, its slope (derivative by displacement), (n,) each, and secant, (1,).
+    """
     strokes = np.linspace(displacement[0], displacement[-1], _SAMPLES * (_POINTS - 1) + 1)
     frequency = rate / (4.0 * displacement[-1])
     cycle = History.steady(np.concatenate((strokes, strokes[-2:0:-1])), frequency)

@@ -65,7 +65,14 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
 def _side_by_side(
     source: RowSource, layout: Layout, sides: Sequence[slice], vocabulary: Vocabulary
 ) -> tuple[RowSource, Layout]:
-    """Combine blocks of columns side by side, each with the same headers and maybe a title above, into one table."""
+    """Combine blocks of columns side by side, each with the same headers and maybe a title above, into one table.
+
+    Args:
+        source: lines or rows of the file.
+        layout: location and headers of the whole header line.
+        sides: columns of each block.
+        vocabulary: known column names.
+    """
     above = [split(line.content, layout.delimiter) for line in source.head() if line.number < layout.header_line]
     titles = [next(filter(None, (cell for row in reversed(above) for cell in row[side])), "") for side in sides]
     width = len([header for header in layout.headers[sides[0]] if header])
@@ -87,7 +94,13 @@ def _side_by_side(
 
 
 def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple[RowSource, Layout]:
-    """Combine blocks one below the other, each with its header or lines that state a quantity, into one table."""
+    """Combine blocks one below the other, each with its header or lines that state a quantity, into one table.
+
+    Args:
+        source: lines or rows of the file.
+        layout: location and headers of the first block.
+        vocabulary: known column names.
+    """
     header = [plain(text) for text in layout.headers]
     above = [line for line in source.head() if line.number < layout.header_line]
     between: list[Line] = []
@@ -132,7 +145,14 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
 def _one_table(
     source: RowSource, layout: Layout, parts: Iterable[_BlockRow], added: dict[str, list[str]]
 ) -> tuple[RowSource, Layout]:
-    """Build one table of the rows of all blocks, with columns of one text per block, given in `added` by header."""
+    """Build one table of the rows of all blocks, with added columns that show the block of each row.
+
+    Args:
+        source: lines or rows of the file.
+        layout: location and headers of the first block.
+        parts: rows of the blocks, each with the index of its block.
+        added: one text per block, by the header of the added column.
+    """
     width = len(layout.headers)
     numbers: list[int] = []
     content: list[Sequence[str | float]] = []

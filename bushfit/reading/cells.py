@@ -250,7 +250,12 @@ class Cells:
         )
 
     def place(self, line: int | None, column: Column | None) -> str | None:
-        """Return the location in the file, such as "line 3, column "Time [s]""; None if nothing is known."""
+        """Return the location in the file for an error, such as "line 3, column "Time [s]""; None if nothing is known.
+
+        Args:
+            line: line number; None if the problem is not on one line.
+            column: column of the cell; None if the problem is not in one column.
+        """
         source = self.source
         parts = [
             f'{word_for_part(self.file)} "{source.sheet}"' if source.sheet else None,

@@ -170,7 +170,14 @@ def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, 
 
 
 def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | None = None) -> Column:
-    """Make the column of a header, with the unit on which header, units row and user agree."""
+    """Make the column of a header, with the unit on which header, units row and user agree.
+
+    Args:
+        cells: header and rows of the table.
+        heading: meaning of the header: role, unit and convention.
+        index: index of the column.
+        stated_unit: unit that the user states; None without one.
+    """
     parsed = [parse_unit(text) for text in (heading.unit, cells.layout.units[index], stated_unit) if text]
     texts = sorted({text for text, *_ in parsed if text})
     conventions = {convention for convention in (heading.convention, *(part[1] for part in parsed)) if convention}
@@ -197,6 +204,10 @@ def _first_numbers(cells: Cells, columns: Sequence[Column]) -> NDArray[np.float6
 
 def _preferred(cells: Cells, first: Column, second: Column) -> Column:
     """Choose between two columns for one role: frequency in Hz rather than rad/s, else the first of two equal ones.
+
+    Args:
+        cells: header and rows of the table.
+        first, second: the two columns.
 
     Raises:
         MeasurementError: columns that differ.
@@ -240,10 +251,19 @@ def _preferred(cells: Cells, first: Column, second: Column) -> Column:
 def _add_by_unit(
     cells: Cells, roles: dict[str, Column], names: Mapping[str, Sequence[str]], motion: Motion
 ) -> list[str]:
-    """Add columns to `roles` that are recognised by their unit and words in their name; return a sentence for each.
+    """Recognise columns by their unit and words in their name, and add them to the known columns.
 
     A column is added if no other column has such a unit, apart from set points and means. Frequency, amplitude and
     phase are added only to a table with a stiffness or a force amplitude.
+
+    Args:
+        cells: header and rows of the table.
+        roles: columns found so far, by role; changed in place.
+        names: usual column names, by role.
+        motion: kind of motion: translation, rotation or strain.
+
+    Returns:
+        A sentence on each added column.
     """
     if len(roles) + len(cells.headers) < 3:
         return []
@@ -294,9 +314,17 @@ def _add_by_unit(
 
 
 def _add_motion_as_amplitude(cells: Cells, roles: dict[str, Column], stated_units: Mapping[str, str]) -> list[str]:
-    """Add a column to `roles` that is named like a displacement as the amplitude of a sweep; return a sentence on it.
+    """Use a column that is named like a displacement as the amplitude of a sweep, and add it to the known columns.
 
     The table must have a force amplitude; a stiffness, if there is one, must agree with force over displacement.
+
+    Args:
+        cells: header and rows of the table.
+        roles: columns found so far, by role; changed in place.
+        stated_units: units as the user states them, by role.
+
+    Returns:
+        A sentence on the added column; empty without one.
     """
     motions = Vocabulary({"amplitude": [*LOOP_COLUMNS["displacement"], "x", "u", "s", "w"]}, {})
     candidates = [

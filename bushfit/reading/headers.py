@@ -142,7 +142,7 @@ _NAME_END = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
 
 
 def _combined_names(body: str, quantity: str) -> list[str]:
-    """Column names that combine the names of a body, such as "base", with those of a quantity, such as "phase"."""
+    """Column names that combine each name of a body, such as "base", with each name of a quantity, such as "phase"."""
     parts = WORDS["resonance_parts"]
     return [
         name
@@ -172,7 +172,15 @@ RESONANCE_COLUMNS: Mapping[str, Sequence[str]] = {
 
 
 def of_motion(names: Mapping[str, Sequence[str]], motion: Motion) -> dict[str, Sequence[str]]:
-    """Return column names by role for a kind of motion: in a test of strain, G' names a modulus and not a stiffness."""
+    """Adapt column names to a kind of motion: in a test of strain, for example, G' names a modulus, not a stiffness.
+
+    Args:
+        names: usual column names, by role such as "stiffness".
+        motion: kind of motion: translation, rotation or strain.
+
+    Returns:
+        Column names by role.
+    """
     return {role: _STRAINING.get(role, usual) if motion is STRAINING else usual for role, usual in names.items()}
 
 
@@ -201,7 +209,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Heading:
-    """Meaning of a header cell: role of its column (such as "force"), unit, convention and logarithm; see `Column`."""
+    """Meaning of a header cell: role of its column (such as "force"), unit, amplitude convention, and logarithm."""
 
     role: str
     unit: str | None = None

@@ -153,6 +153,12 @@ def _split_by_length(
 
     The base becomes the first column, unless a channel of the group is named as such. Channels without a base are added
     to all tables of their length.
+
+    Args:
+        name: name of the group.
+        channels: channels of the group.
+        properties: properties of the recording, as lines above each table.
+        recording: file format.
     """
     lengths: dict[int, dict[bytes, list[Channel]]] = {}
     for channel in channels:

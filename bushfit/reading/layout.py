@@ -163,7 +163,18 @@ def find_layout(
 def _candidates(
     lines: Sequence[Line], before: Sequence[int], delimiters: Sequence[str], vocabulary: Vocabulary, commented: bool
 ) -> Iterator[tuple[tuple[int, ...], int, str, list[str]]]:
-    """Yield rank, line index, delimiter and cells of each possible header: a line that names two columns or more."""
+    """Yield the lines that may be the header: those that name two columns or more.
+
+    Args:
+        lines: non-empty lines at the start of the file.
+        before: indices of lines that may be the header.
+        delimiters: possible characters between cells.
+        vocabulary: known column names.
+        commented: True for comments, False for other lines.
+
+    Yields:
+        Rank for the choice among headers, index in `lines`, delimiter and header cells.
+    """
     for index in before:
         for order, delimiter in enumerate(delimiters):
             content = lines[index].content
@@ -239,10 +250,19 @@ def _first_rows(lines: Sequence[Line], delimiters: Sequence[str]) -> tuple[int, 
 def _likeliest(
     lines: Sequence[Line], before: Sequence[int], end: int, delimiters: Sequence[str]
 ) -> tuple[int, str, list[str]]:
-    """Index, delimiter and cells of the likeliest header if no line names the columns of a test.
+    """Find the likeliest header if no line names the columns of a test.
 
     The header is the last line above the first row of numbers that has as many cells, or else that row itself; without
     rows of numbers, the first line.
+
+    Args:
+        lines: non-empty lines at the start of the file.
+        before: indices of lines that may be the header.
+        end: index of the first row of numbers.
+        delimiters: possible characters between cells.
+
+    Returns:
+        Index of the header in `lines`, delimiter and header cells.
     """
     if end == len(lines):
         first = next(iter(before), 0)
@@ -261,7 +281,14 @@ def _likeliest(
 
 
 def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence[str]) -> Layout:
-    """Layout of the table below a header, with its units row if there is one, and with columns that have no header."""
+    """Layout of the table below a header, with its units row if there is one, and with columns that have no header.
+
+    Args:
+        lines: non-empty lines at the start of the file.
+        index: index of the header in `lines`.
+        delimiter: character between cells.
+        headers: header cells.
+    """
     units_line, row, number = None, [""] * len(headers), lines[index].number
     if all(is_like_number(cell) for cell in headers) and len(headers) > 1:
         return Layout(delimiter, tuple(map(str, range(1, len(headers) + 1))), number, tuple(row), None, headerless=True)

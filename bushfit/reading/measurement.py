@@ -98,7 +98,7 @@ class Loop:
         _check_lengths(self.name, self.time, self.displacement, self.force)
 
     def select(self, rows: slice | NDArray[np.bool_]) -> Loop:
-        """Return the loop with only the rows that a slice or a mask, (n,), selects."""
+        """Return the loop with only some of its n rows, given by a slice or a mask, (n,)."""
         return replace(self, **{name: getattr(self, name)[rows] for name in ("time", "displacement", "force")})
 
 

@@ -136,6 +136,11 @@ def _by_rank(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | N
 
     All runs must have equally many points, and levels must not overlap; otherwise, or if there is only one run, the
     amplitudes are returned unchanged.
+
+    Args:
+        frequency: frequency of each point [Hz], (n,).
+        amplitude: reached amplitude of each point, (n,).
+        repeat: number of the repeat of each point, (n,); None if the file does not state it.
     """
     falls = np.append(False, (np.diff(amplitude) < 0.0) | (np.diff(frequency) != 0.0))
     run = np.cumsum(falls) if repeat is None else _group_numbers(frequency, repeat)

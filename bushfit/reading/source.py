@@ -125,7 +125,15 @@ class Text:
         return {n: (list(frame[n].cat.categories), frame[n].cat.codes.to_numpy().astype(np.intp)) for n in indices}
 
     def _frame(self, layout: Layout, width: int, used: list[int] | None, types: Any, decimal: str) -> Any:
-        """Data frame of the columns with indices `used`, or all; None if pandas cannot parse the text."""
+        """Data frame of some columns; None if pandas cannot parse the text.
+
+        Args:
+            layout: location of the table.
+            width: number of columns of the table.
+            used: indices of the columns to read; None for all.
+            types: data types of the columns, as pandas takes them.
+            decimal: decimal mark.
+        """
         import pandas as pd
 
         start, mark = self.offset(layout.lines_before_data), layout.delimiter

@@ -190,9 +190,16 @@ def sweep_columns(
 def _rows_at_temperature(
     table: Table, values: Mapping[str, Floats], stated: float | None
 ) -> tuple[NDArray[np.intp], float | None, Floats | float | None]:
-    """Indices of the rows at the stated temperature, temperature of the test, and temperature of each of these rows.
+    """Select the rows of a sweep at the temperature of the test.
 
-    Temperatures are in K, and None if unknown; the temperature of the test is the stated one, or else the mean.
+    Args:
+        table: table of the sweep, for errors.
+        values: values in SI by role, (n,) each.
+        stated: temperature that the campaign states [K]; None if it states none.
+
+    Returns:
+        Indices of the rows; temperature of the test [K], the stated one or else the mean, None if unknown; and
+        temperature of each row [K], None if unknown.
 
     Raises:
         MeasurementError: the file has several temperatures and none is stated, or too few rows are near the stated one.

@@ -93,7 +93,15 @@ def _text(function: Mapping[str, Any], key: str) -> str:
 def _axis(
     function: Mapping[str, Any], axis: str, values: NDArray[Any], direction: int, factors: Mapping[str, Any]
 ) -> Channel:
-    """Values of an axis of a function as a channel, in the unit of its label or in SI by the factors of dataset 164."""
+    """Values of an axis of a function as a channel, in the unit of its label or in SI by the factors of dataset 164.
+
+    Args:
+        function: function of the universal file (dataset 58).
+        axis: prefix of the keys of the axis.
+        values: values along the axis, (n,).
+        direction: number of the degree of freedom, which names the channel.
+        factors: factors to SI from dataset 164.
+    """
     name, si, factor = _QUANTITIES.get(function[f"{axis}_spec_data_type"], ("", "", ""))
     if label := _text(function, f"{axis}_axis_units_lab"):
         return Channel(name, values, label)

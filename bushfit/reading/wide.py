@@ -146,7 +146,13 @@ def _find_blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple
 
 
 def _read_block(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: Vocabulary) -> list[_WideColumn]:
-    """Read the columns of a block with their meanings; an empty list if it is not a block of a wide table."""
+    """Read the columns of a block with their meanings; an empty list if it is not a block of a wide table.
+
+    Args:
+        headers: cells of the header rows.
+        data: rows of numbers.
+        vocabulary: known column names.
+    """
     columns = [index for index in range(1, len(data[0][1])) if any(cells[index] != "" for _, cells in data)]
     meanings = dict.fromkeys(columns, _Meaning())
     down, across = _Meaning(), _Meaning()
@@ -231,6 +237,12 @@ def _long_table(
     series: Sequence[_WideColumn], source: RowSource, file: Path, vocabulary: Vocabulary
 ) -> tuple[RowSource, Layout]:
     """Build a long table (a row per frequency and amplitude) from all blocks of a wide table, with its layout.
+
+    Args:
+        series: columns of all blocks, with their meanings.
+        source: lines or rows of the file.
+        file: path, for errors.
+        vocabulary: known column names.
 
     Raises:
         MeasurementError: a block does not state its quantity, blocks differ in their frequencies or amplitudes, or a

@@ -240,10 +240,13 @@ def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
 
 
 def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
-    """Number of cycles after which a run of cycles changes its frequency or amplitude most; 0 if the run is steady.
+    """Number of cycles after which a run of m cycles changes its frequency or amplitude most; 0 if the run is steady.
 
-    `phase` is the deviation of the crossings from an even sine, (m + 1,), in units of `jitter` [periods]; `level` is ln
-    of the amplitude of each cycle, (m,), in units of `spread`.
+    Args:
+        phase: deviation of the crossings from those of an even sine, in units of `jitter`, (m + 1,).
+        level: natural log of the amplitude of each cycle, in units of `spread`, (m,).
+        jitter: scatter of the crossings [periods].
+        spread: scatter of the log amplitudes.
     """
     count = level.size
     if count < 2 * _FEWEST_CYCLES:
@@ -293,7 +296,10 @@ def select_steady_cycles(motion: Complex, stiffness: Complex, fewest: int) -> sl
 
 
 def _truncation(series: Complex, most_cut: int) -> int:
-    """Number of values, at most `most_cut`, to cut at the start of k series, (k, m), for the least error of means."""
+    """Number of values to cut at the start of k series, (k, m), so that the standard error of their means is smallest.
+
+    At most `most_cut` values are cut, the same number from each series.
+    """
     if most_cut < 1:
         return 0
     back = (series - series.mean(axis=1, keepdims=True))[:, ::-1]

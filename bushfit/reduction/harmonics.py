@@ -222,7 +222,13 @@ class HarmonicFit:
 
 
 def _drift_and_harmonics(time: Floats, values: Floats, frequency: float, order: int) -> tuple[int, Floats, Floats]:
-    """Fit drift and at most `order` harmonics of a frequency [Hz] to both channels, (2, n), over time [s], (n,).
+    """Fit drift and harmonics to displacement and force by least squares.
+
+    Args:
+        time: time of each row, 0 in the middle [s], (n,).
+        values: displacement and force, (2, n).
+        frequency: fundamental frequency [Hz].
+        order: largest number of harmonics.
 
     Returns:
         Number of harmonics that the rows determine, at most `order`; coefficients, (p, 2); and their covariance for
@@ -247,9 +253,12 @@ def _drift_and_harmonics(time: Floats, values: Floats, frequency: float, order: 
 
 
 def _chunks(time: Floats, frequency: float, order: int) -> Iterator[tuple[slice, Floats]]:
-    """Generate, chunk by chunk, a slice of m rows and the drift and harmonics at these rows, (3 + 2 order, m).
+    """Yield, chunk by chunk, a slice of m rows and the drift and harmonics at these rows, (3 + 2 order, m).
 
-    Time [s], (n,), is centred at 0; frequency in Hz.
+    Args:
+        time: time of each row, 0 in the middle [s], (n,).
+        frequency: fundamental frequency [Hz].
+        order: number of harmonics.
     """
     half = max(float(np.abs(time[[0, -1]]).max()), 1e-300)
     for start in range(0, time.size, _CHUNK_ROWS):

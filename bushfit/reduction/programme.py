@@ -180,9 +180,14 @@ def _alike_runs(values: Floats, reach: Floats) -> Iterator[slice]:
 
 
 def _extend_span(span: SteadySpan, time: Floats, motion: Floats, before: float, after: float) -> SteadySpan:
-    """Extend a part by half a cycle on either side if the motion is periodic there.
+    """Extend a part of constant amplitude and rate by half a cycle on either side if the motion is periodic there.
 
-    The part is not extended beyond `before`, the end of the previous part, and `after`, the beginning of the next one.
+    Args:
+        span: part of the record.
+        time: time of each row [s], or row numbers, (n,).
+        motion: displacement [m or rad], (n,).
+        before: end of the previous part, in the unit of the time; the part is not extended beyond it.
+        after: beginning of the next part; the part is not extended beyond it either.
     """
     limits = []
     for limit, neighbour, shift in ((span.begin, before, span.period), (span.end, after, -span.period)):
@@ -245,7 +250,7 @@ def left_out(gaps: Iterable[str], cycles: float) -> str:
 
 
 def measure_softening(loop: Loop, span: SteadySpan, *, from_rest: bool) -> float | None:
-    """Measure the softening of the rubber in a part: relative excess of the stiffness of the first over the last cycle.
+    """Measure the softening of the rubber in a part: relative excess of |K| of the first over the last cycle.
 
     Args:
         loop: the whole record.
@@ -253,7 +258,7 @@ def measure_softening(loop: Loop, span: SteadySpan, *, from_rest: bool) -> float
         from_rest: True if the part begins from rest.
 
     Returns:
-        Relative excess of |K|; None if it is within noise and the memory of the rubber (springpot and friction).
+        |K_first|/|K_last| - 1; None if it is within noise and the memory of the rubber (springpot and friction).
     """
     if span.cycles < 1.95:  # first and last are one
         return None
@@ -266,7 +271,17 @@ def measure_softening(loop: Loop, span: SteadySpan, *, from_rest: bool) -> float
 
 
 def _stiffness(loop: Loop, begin: float, period: float) -> tuple[complex, float]:
-    """Complex stiffness [N/m or N m/rad] of one cycle, from its beginning and period [s], and its relative error."""
+    """Complex stiffness of one cycle of a record, from the first harmonics of force and displacement.
+
+    Args:
+        loop: the whole record.
+        begin: beginning of the cycle [s, or row number].
+        period: duration of the cycle, in the same unit.
+
+    Returns:
+        Stiffness [N/m or N m/rad], and the standard error of |K| due to the scatter of the force, relative to |K|;
+        1 and infinity if the cycle has too few rows.
+    """
     clock = _clock(loop)
     first, last = np.searchsorted(clock, [begin, begin + period])
     rows = slice(first, last, max(1, (last - first) // 10_000))

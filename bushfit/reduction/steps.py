@@ -204,7 +204,12 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
 
 
 def _creeps(values: Floats, smallest: float) -> bool:
-    """Return True if values, (n,), have a linear trend larger than `smallest` in total and than their scatter."""
+    """Return True if values have a linear trend, in total larger than `smallest` and than their scatter explains.
+
+    Args:
+        values: values in order, (n,).
+        smallest: smallest total change that counts, in the unit of the values.
+    """
     if values.size < 3:
         return False
     number = np.arange(values.size) - (values.size - 1) / 2.0

@@ -22,7 +22,12 @@ _PAUSE = 2.5
 
 
 def reversals(values: Floats, rows: Integers) -> Integers:
-    """Select the rows, among given increasing row indices, at which the values change direction, and both ends."""
+    """Select the rows at which the values change direction, among given rows, and both ends.
+
+    Args:
+        values: values of a channel, (n,).
+        rows: row indices, increasing.
+    """
     direction = np.sign(np.diff(values[rows]))
     inner = 1 + np.flatnonzero(direction[1:] != direction[:-1])
     return np.concatenate((rows[:1], rows[inner], rows[1:][-1:]))

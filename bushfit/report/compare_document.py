@@ -62,7 +62,7 @@ class ComparedPair(TypedDict):
 
 
 class HeldOutPart(TypedDict):
-    """Errors of two model families on a part of the tests that was held out of the fit."""
+    """Root mean square residuals of two model families, in units of noise, on a held-out part of the tests."""
 
     part: Annotated[str, Doc("name of the part of the tests.")]
     first: Annotated[Number, Doc("root mean square residual of the first family, in units of noise.")]

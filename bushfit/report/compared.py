@@ -179,13 +179,15 @@ class ComparisonDocument:
             ]
 
     def differences_at(self, place: str) -> dict[str, pd.DataFrame]:
-        """Tables of the differences from the reference at one direction or specimen.
+        """Tables of the differences of stiffness and loss factor from the reference, at one direction or specimen.
 
         Args:
             place: name of the direction or specimen.
 
         Returns:
-            Table of each result but the reference, by its label; a row per operating point.
+            Table of each result but the reference, by its label; a row per operating point. Columns: values of both
+            results; relative difference of |K| [%] and absolute difference of the loss factor (result minus reference),
+            with their 95 % bands; "yes" or "no" for a significant difference.
 
         Raises:
             ModelError: a direction or specimen that a pair does not have, or columns of different lengths.
@@ -264,7 +266,12 @@ def parameter_cells(row: ParameterContrast) -> list[str]:
 
 
 def format_difference(value: float, width: float) -> str:
-    """Format a difference with its sign, to two significant digits of the `width` of its interval (same unit)."""
+    """Format a difference with its sign, to two significant digits of its interval.
+
+    Args:
+        value: difference, in any unit.
+        width: width of its 95 % interval, in the same unit; infinite if unknown.
+    """
     if width >= _OPEN:
         return number(value, 2, "+")
     decimals = max(1 - math.floor(math.log10(width)), 0) if width > 0.0 else _DIGITS

@@ -39,7 +39,7 @@ class ParameterRow(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Name of the parameter, followed by its state in brackets if it has one."""
+        """Name of the parameter, followed in brackets by its state ("held", "at min" or "at max") if it has one."""
         return f"{self.name} ({self.state})" if self.state else self.name
 
 

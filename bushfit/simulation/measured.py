@@ -136,7 +136,16 @@ def _sweep(
     random: Generator,
     conditions: RubberConditions,
 ) -> Sweep:
-    """Add noise to all repeats of a sweep, whose exact complex stiffness is `clean`, (levels, steps).
+    """Add noise to all repeats of a sweep.
+
+    Args:
+        truth: true model.
+        test: settings of the sweep.
+        clean: exact complex stiffness [N/m or N m/rad], (levels, steps).
+        name: name of the sweep.
+        plan: settings [simulate] with the noise.
+        random: random number generator.
+        conditions: temperature and strain history of the rubber at the points.
 
     Notes:
         If the rig does not reach its amplitudes, amplitudes reached and requested have a lognormal ratio; half of its
@@ -178,7 +187,13 @@ def _sweep(
 
 
 def _filtered_noise(rows: int, plan: SimulateSettings, random: Generator) -> Array:
-    """Draw stationary noise of unit variance, (rows,), from a first-order autoregressive process."""
+    """Draw stationary noise of unit variance, (rows,), from a first-order autoregressive process, AR(1).
+
+    Args:
+        rows: number of rows.
+        plan: settings [simulate], with the correlation between successive rows.
+        random: random number generator.
+    """
     noise = random.standard_normal(rows)
     if not plan.force_correlation:
         return noise
@@ -189,7 +204,13 @@ def _filtered_noise(rows: int, plan: SimulateSettings, random: Generator) -> Arr
 
 
 def _with_noise(clean: Array, plan: SimulateSettings, random: Generator) -> Array:
-    """Add a gain and a phase error to each run, and noise to each point, of a complex stiffness, (runs, steps)."""
+    """Add a gain and a phase error to each run, and noise to each point, of a complex stiffness.
+
+    Args:
+        clean: exact complex stiffness [N/m or N m/rad], (runs, steps).
+        plan: settings [simulate] with the noise.
+        random: random number generator.
+    """
     runs = (clean.shape[0], 1)
     gain = plan.gain_error * random.standard_normal(runs)
     phase = plan.phase_error * random.standard_normal(runs)

@@ -117,8 +117,9 @@ def difference_sizes(comparison: ComparisonDocument, place: str) -> Iterator[dic
         place: name of the direction or specimen.
 
     Yields:
-        Texts of a result by key: `label`, `place`, range of the differences of `stiffness` and `loss` factor over the
-        operating points, and the number of significant points (`stiffness_sure`, `loss_sure`).
+        Texts of a result by key: `label`, `place`, range over the operating points of the relative difference of the
+        stiffness |K| [%] (`stiffness`) and of the absolute difference of the loss factor (`loss`), and the number of
+        significant points (`stiffness_sure`, `loss_sure`).
     """
     for label, table in comparison.differences_at(place).items():
         heads = ContrastHeaders.from_table(table)

@@ -159,12 +159,12 @@ class Curves:
 
     @cached_property
     def relative(self) -> Array:
-        """Relative deviation of each curve from the median of all curves, (n, k)."""
+        """Relative deviation of |K| of each part from the median |K| of all parts, at each operating point, (n, k)."""
         return np.asarray(self.values / np.nanmedian(self.values, axis=0) - 1.0)
 
     @cached_property
     def scale(self) -> float:
-        """Relative deviation at the upper and lower edge of a sparkline: 1.5 times the largest one of a usual part."""
+        """Relative deviation of |K| at the upper and lower edge of a sparkline: 1.5 times the largest of a usual part."""
         return max(_LEAST_SCALE, 1.5 * float(np.abs(self.relative[self.usual]).max()))
 
     def picture(self, parts: Sequence[PartTable]) -> Picture:

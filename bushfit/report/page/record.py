@@ -65,7 +65,7 @@ class ReportRecord:
 
     @property
     def tests(self) -> Sequence[TestTable]:
-        """Descriptions of the tests of the campaign; empty if the campaign is not known."""
+        """Description of each test of the campaign (ranges, file, conditions); empty if the campaign is not known."""
         return self.campaign.tests if self.campaign else ()
 
 
@@ -129,7 +129,13 @@ def _tests(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
 def _predictions(
     result: Result, tables: Mapping[str, pd.DataFrame], sweeps: pd.DataFrame | None
 ) -> dict[str, Prediction]:
-    """Predictions by file name, on the grid of each prediction table or, without one, of the measured sweeps."""
+    """Compute the predictions by file name, on the grid of each prediction table or, without one, of the sweeps.
+
+    Args:
+        result: final model.
+        tables: tables of the result by file name.
+        sweeps: table of the measured sweeps; None without sweeps.
+    """
     places: list[Place] = [*(Direction if result.model.bushing else ()), *result.specimens]
     predictions = {}
     for name, place in zip(place_names(places), places, strict=True):

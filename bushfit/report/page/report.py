@@ -173,7 +173,15 @@ def draw_figures(record: ReportRecord) -> tuple[list[Picture], list[Picture], bo
 
 
 def sweeps_beside(sweeps: pd.DataFrame | None, result: Result) -> pd.DataFrame | None:
-    """Sweeps to draw with a prediction: all, or only those at 23 °C if the model depends on temperature."""
+    """Measured sweeps to draw with a prediction: all, or only those at 23 °C if the model depends on temperature.
+
+    Args:
+        sweeps: table of sweeps; None without sweeps.
+        result: fitted model.
+
+    Returns:
+        Table of the sweeps to draw; None if there are none.
+    """
     if sweeps is None or "temperature [degC]" not in sweeps or not result.model.depends_on_temperature:
         return sweeps
     degrees = sweeps.groupby("sweep" if "sweep" in sweeps else "test")["temperature [degC]"].transform("mean")
@@ -181,7 +189,12 @@ def sweeps_beside(sweeps: pd.DataFrame | None, result: Result) -> pd.DataFrame |
 
 
 def gap_texts(diagnosis: DiagnosisFile, part: Literal["heldout", "calibration"]) -> list[str]:
-    """Texts of the root mean square gap before and after a diagnosis, in units of noise, of held-out or fitted data."""
+    """Texts of the root mean square residual before and after a diagnosis, in units of noise.
+
+    Args:
+        diagnosis: content of diagnosis.json.
+        part: "heldout" for held-out data, "calibration" for fitted data.
+    """
     gap = diagnosis["gap"][part]
     ends = (gap["before"], gap["after"]) if gap else (None, None)
     return ["not known" if end is None else f"{end:.2f}" for end in ends]

@@ -155,6 +155,11 @@ def _name_outliers(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     """Name at most four bushings that are outside the limits or the panel, without overlap of the names.
 
     The name of a bushing outside the panel is followed by its value.
+
+    Args:
+        axes: panel.
+        panel: quantity that the panel shows.
+        names: names of the n bushings.
     """
     low, high = panel.reach()
     middle = float(np.nanmedian(panel.values))

@@ -164,7 +164,17 @@ def points_note(table: pd.DataFrame) -> str:
 
 
 def _model_line(group: SweepGroup, curve: Curve, header: str, result: Result) -> tuple[Array, Array]:
-    """Points (x, y) of the model line of a curve: on a fine grid, or at the measured points if conditions vary."""
+    """Points (x, y) of the model line of a curve: on a fine grid, or at the measured points if conditions vary.
+
+    Args:
+        group: sweeps of one direction or specimen.
+        curve: points of the sweeps at one level.
+        header: header of the column along y.
+        result: fitted model, with the effects of the rig.
+
+    Returns:
+        x and y in the units of the table, (m,) each.
+    """
     if not group.shares_levels or result.model.depends_on_conditions:
         x, values = means(curve.rows, group.x_header, f"model {header}")
         return x, values
@@ -179,7 +189,12 @@ def _model_line(group: SweepGroup, curve: Curve, header: str, result: Result) ->
 
 
 def _draw_residuals(strips: Sequence[Axes], group: SweepGroup) -> None:
-    """Draw the residuals of stiffness (left) and loss (right) of a group of sweeps, in units of noise."""
+    """Draw the whitened residuals of storage and loss stiffness of a group of sweeps, measured minus model over noise.
+
+    Args:
+        strips: left and right panel, for stiffness and for loss.
+        group: sweeps of one direction or specimen.
+    """
     looks, rows = style.styles(len(group.curves), group.palette), pd.concat([curve.rows for curve in group.curves])
     x, outliers = rows[group.x_header].to_numpy(), rows[rows["outlier"] == "yes"]
     for strip, part in zip(strips, ("stiffness", "loss"), strict=True):
@@ -237,7 +252,14 @@ def loops_figure(result: Result, table: pd.DataFrame, title: str) -> style.Chart
 
 
 def _draw_forces(axes: Axes, place: Place, loops: dict[str, pd.DataFrame], looks: Sequence[style.Style]) -> None:
-    """Draw force over displacement of the loops of a direction, with lines of the model and crosses at outliers."""
+    """Draw force over displacement of the loops of a direction, with lines of the model and crosses at outliers.
+
+    Args:
+        axes: panel.
+        place: direction or specimen of the loops.
+        loops: rows of each loop by the name of its test.
+        looks: colour, line style and marker of each loop.
+    """
     motion, force = displacement_header(place), response_headers(place)[2]
     name, factor = place.display.force
     unit, to_figure = display_unit(name, factor, max(loop[force].abs().max() for loop in loops.values()) / factor)

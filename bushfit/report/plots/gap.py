@@ -209,7 +209,14 @@ def cell_edges(values: Array, *, logarithmic: bool) -> tuple[Array, Array]:
 
 
 def _label_maps(panels: Sequence[Axes], group: SweepGroup, rows: Sequence[Curve], part: str) -> None:
-    """Label a row of maps: levels at the left, and the quantity across below the maps of the loss part."""
+    """Label a row of maps: levels at the left, and the quantity across below the maps of the loss part.
+
+    Args:
+        panels: maps of the row.
+        group: sweeps of the maps.
+        rows: rows of each map, the lowest level first.
+        part: "storage" or "loss".
+    """
     names = [style.file_name(row.name, 24) for row in rows]
     ticks = np.arange(0, len(names), math.ceil(len(names) / 10))
     for axes in panels:
@@ -236,7 +243,14 @@ def _draw_scale(axes: Axes, edges: Array, colors: ScalarMappable) -> None:
 
 
 def _draw_loops(panels: Sequence[Axes], place: Place, loops: dict[str, pd.DataFrame], sides: Sequence[str]) -> None:
-    """Draw the gap [%] of the loops of a direction over the phase of the cycle, before and after on one y scale."""
+    """Draw measured minus model force of the loops of a direction over the phase of the cycle, before and after.
+
+    Args:
+        panels: one panel per side, with a common y scale.
+        place: direction or specimen of the loops.
+        loops: rows of each loop by the name of its test, with the gap in percent of half the force range.
+        sides: columns of the figure, "before" and "after".
+    """
     looks = style.styles(len(loops), "loop")
     for axes, side in zip(panels, sides, strict=True):
         style.label_axes(axes, "phase after upper turn [deg]", "")

@@ -83,7 +83,14 @@ def _scale_alike(panels: Sequence[Axes]) -> None:
 
 
 def _draw_history(figure: Figure, cell: SubplotSpec, history: Loop, loop: Axes | None) -> Axes:
-    """Draw displacement and force over time, and the hysteresis loop in `loop` if given; return the leftmost panel."""
+    """Draw displacement and force over time, and the hysteresis loop in `loop` if given; return the leftmost panel.
+
+    Args:
+        figure: figure to draw in.
+        cell: cell of the figure's grid for the panels over time.
+        history: record to draw.
+        loop: panel for the hysteresis loop; None for none.
+    """
     (length, to_length), unit_force, _ = history.direction.display
     force, to_force = display_unit(*unit_force, float(np.abs(history.force).max()))
     names = history.direction.motion.words
@@ -175,7 +182,14 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
 
 
 def _draw_strip(axes: Axes, history: Loop, reduction: Reduction, looks: dict[float, style.Style]) -> None:
-    """Draw displacement over time, with the cycles in use in the colour of their amplitude."""
+    """Draw displacement over time, with the cycles in use in the colour of their amplitude.
+
+    Args:
+        axes: panel.
+        history: record to draw.
+        reduction: operating points of the histories, which state the cycles in use.
+        looks: colour and marker by amplitude level.
+    """
     unit, factor = reduction.direction.display.displacement
     time, low, high = envelope_over_time(history.time, factor * history.displacement)
     axes.fill_between(time, low, high, color="#c8c8c8", lw=0.4, step="post")
@@ -195,7 +209,15 @@ def _draw_points(
     steps: pd.DataFrame,
     looks: dict[float, style.Style],
 ) -> None:
-    """Draw stiffness and loss factor with bars of two standard errors in `pair`, noise and distortion in `quality`."""
+    """Draw stiffness and loss factor of a reduction with bars of two standard errors, and below noise and distortion.
+
+    Args:
+        pair: panels of stiffness and of loss factor.
+        quality: panels of standard errors and of harmonic distortion.
+        reduction: operating points of the histories.
+        steps: table of the operating points.
+        looks: colour and marker by amplitude level.
+    """
     unit, length = reduction.direction.display.displacement
     to_table = reduction.direction.display.stiffness.factor
     factor, labels = stiffness_scale(reduction.direction, to_table * float(steps["stiffness"].abs().max()))

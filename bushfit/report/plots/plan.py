@@ -69,7 +69,14 @@ def plan_figure(plan: Plan) -> style.Chart:
 
 
 def _draw_errors(parameters: Axes, stiffness: Axes, plan: Plan, programmes: dict[str, Programme]) -> None:
-    """Draw the standard errors [%] of the parameters, and of the stiffness at the wanted points in ascending order."""
+    """Draw the standard errors [%] of the parameters, and of |K| at the wanted operating points in ascending order.
+
+    Args:
+        parameters: panel of the parameters' relative standard errors.
+        stiffness: panel of the relative standard errors of |K|.
+        plan: planned tests and present knowledge.
+        programmes: programmes to compare, by their label.
+    """
     errors = {name: programme.errors for name, programme in programmes.items()} | {"before": plan.knowledge.errors}
     rows = np.arange(len(plan.knowledge.names))
     for (name, values), marker in zip(errors.items(), "os^", strict=True):
