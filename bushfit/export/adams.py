@@ -76,17 +76,15 @@ class _Element(NamedTuple):
         """Damping coefficient [N s/m or N m s/rad] for Adams Car, or loss angle [rad] for Adams Car Ride.
 
         Args:
-            kind: which of the two property files.
+            kind: "car" for Adams Car, "ride" for Adams Car Ride.
         """
         return float(self.exact.imag / (2.0 * np.pi * self.frequency) if kind == "car" else np.angle(self.exact))
 
     def loss(self, kind: Kind) -> str:
-        """Sentence on the relative error of |K| and the absolute error of the loss factor over the grid.
-
-        The errors are due to a single static curve and a single damping.
+        """Sentence on the errors of |K| and loss factor over the grid due to a single static curve and a single damping.
 
         Args:
-            kind: which of the two property files, Adams Car or Adams Car Ride.
+            kind: "car" for Adams Car, "ride" for Adams Car Ride.
         """
         damping, written, exact = self.damping(kind), [], []
         for table in self.tables:

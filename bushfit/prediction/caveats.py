@@ -121,7 +121,7 @@ def rig_effects(result: Result) -> list[str]:
 
 
 def agrees_within_noise(result: Result, direction: Place) -> bool:
-    """True if a direction has measured sweeps that were not fitted, and none misses the model by more than its noise."""
+    """True if a direction has measured sweeps that were not fitted, and the model misses none by more than noise."""
     misfits = [test for test in result.tests if test.place == str(direction) and test.held is None and not test.fitted]
     return bool(misfits) and all(test.reduced_chi_square <= _AGREEMENT for test in misfits)
 

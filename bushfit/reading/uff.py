@@ -99,8 +99,8 @@ def _axis(
         function: function of the universal file (dataset 58).
         axis: prefix of the keys of the axis.
         values: values along the axis, (n,).
-        direction: number of the degree of freedom, which names the channel.
-        factors: factors to SI from dataset 164.
+        direction: number of the degree of freedom; without a label, the channel of a rotation has no unit.
+        factors: factors from SI by kind of unit, from dataset 164; empty without one.
     """
     name, si, factor = _QUANTITIES.get(function[f"{axis}_spec_data_type"], ("", "", ""))
     if label := _text(function, f"{axis}_axis_units_lab"):

@@ -186,7 +186,7 @@ class ComparisonDocument:
 
         Returns:
             Table of each result but the reference, by its label; a row per operating point. Columns: values of both
-            results; relative difference of |K| [%] and absolute difference of the loss factor (result minus reference),
+            results; relative difference of |K| [1] and absolute difference of the loss factor (result minus reference),
             with their 95 % bands; "yes" or "no" for a significant difference.
 
         Raises:

@@ -164,7 +164,7 @@ class Curves:
 
     @cached_property
     def scale(self) -> float:
-        """Relative deviation of |K| at the upper and lower edge of a sparkline: 1.5 times the largest of a usual part."""
+        """Relative deviation of |K| at both edges of a sparkline: 1.5 times the largest deviation of a usual part."""
         return max(_LEAST_SCALE, 1.5 * float(np.abs(self.relative[self.usual]).max()))
 
     def picture(self, parts: Sequence[PartTable]) -> Picture:

@@ -189,7 +189,7 @@ def _model_line(group: SweepGroup, curve: Curve, header: str, result: Result) ->
 
 
 def _draw_residuals(strips: Sequence[Axes], group: SweepGroup) -> None:
-    """Draw the whitened residuals of storage and loss stiffness of a group of sweeps, measured minus model over noise.
+    """Draw the residuals of stiffness and loss of a group of sweeps, measured minus model, in units of noise.
 
     Args:
         strips: left and right panel, for stiffness and for loss.
