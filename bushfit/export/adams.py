@@ -81,7 +81,7 @@ class _Element(NamedTuple):
         return float(self.exact.imag / (2.0 * np.pi * self.frequency) if kind == "car" else np.angle(self.exact))
 
     def loss(self, kind: Kind) -> str:
-        """Sentence on the errors of |K| and loss factor over the grid due to a single static curve and a single damping.
+        """Sentence on the errors of |K| and loss factor over the grid, due to a single static curve and damping.
 
         Args:
             kind: "car" for Adams Car, "ride" for Adams Car Ride.

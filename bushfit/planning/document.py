@@ -30,7 +30,7 @@ class PlannedRun(TypedDict):
 
 
 class ErrorComparison(TypedDict):
-    """Relative standard error of a parameter or of |K|: before further tests, with the plan, and with the standard tests."""
+    """Relative standard error or half width: before further tests, with the plan, and with the standard programme."""
 
     before: Annotated[float, Field(description="Standard error without further tests.")]
     planned: Annotated[float, Field(description="Standard error with the tests of the plan.")]

@@ -109,7 +109,13 @@ class Uncertainty:
     relative: Array
 
     def band(self, value: Array, slopes: Array) -> Band:
-        """95 % band of a quantity, (n,), from its changes by parameters and model errors, (k + e, n)."""
+        """95 % band of a quantity at n points.
+
+        Args:
+            value: the quantity, (n,).
+            slopes: derivatives by the k uncertain parameters, then changes by one standard deviation of each of the e
+                errors of the model, (k + e, n).
+        """
         count = len(self.covariance.names)
         half = np.hypot(
             self.scale * self.covariance.half_width(slopes[:count]), Z95 * np.linalg.norm(slopes[count:], axis=0)

@@ -339,7 +339,7 @@ def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
     """Phrase on the differences beyond chance with their points, and on an upper limit at the other points.
 
     Args:
-        band: differences with simultaneous 95 % bands, in ln |K| or in the loss factor, (n,).
+        band: relative differences of |K| [%], or differences of the loss factor, with simultaneous 95 % bands, (n,).
         unit: "%" for relative differences of |K|; "" for differences of the loss factor.
         contrast: the compared stiffness, with its operating points.
     """
