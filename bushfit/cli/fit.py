@@ -107,7 +107,15 @@ def fit(
 
 
 def _finish(output: Output, folder: Path, fitted: FitOutput, model: Path | None, max_nrmse: float | None) -> None:
-    """Print and write the result of a fit, and apply --max-nrmse; `model` is the model file that was read, if any."""
+    """Print and write the result of a fit, and exit with status 1 if its NRMSE exceeds the limit of --max-nrmse.
+
+    Args:
+        output: output of the command.
+        folder: results folder.
+        fitted: result of the fit.
+        model: model file that was read; None without one.
+        max_nrmse: largest allowed NRMSE; None without a limit.
+    """
     from bushfit.commands.provenance import input_files
 
     campaign, result, file = fitted.data.campaign, fitted.result, quote_path(fitted.data.campaign.path)

@@ -32,10 +32,14 @@ Written = Literal["tables", "pictures", "pages"]
 
 
 def _named(ctx: click.Context, tables: str, key: str) -> Iterator[str]:
-    """Names for shell completion: values of a key in the files on the command line.
+    """Yield names for shell completion: values of a key in the files on the command line.
 
-    `tables` is the name of an array of tables (such as "sweeps") in these campaigns or models. Files that cannot be
-    read are ignored.
+    Files that cannot be read are ignored.
+
+    Args:
+        ctx: context of the command line.
+        tables: name of an array of tables, such as "sweeps", in these campaigns or models.
+        key: key in these tables.
     """
     values = [path for value in ctx.params.values() for path in (value if isinstance(value, tuple) else [value])]
     for path in {Path(path) for path in (*values, *ctx.args) if isinstance(path, str | Path)}:

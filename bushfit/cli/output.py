@@ -262,9 +262,15 @@ def _trust(_: click.Context, __: click.Parameter, is_given: bool) -> None:
 
 
 def _column_widths(columns: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int, width: int) -> list[int]:
-    """Column widths [characters] at which a table fits `width`; empty if it does not fit.
+    """Column widths [characters] at which a table fits a width; empty if it does not fit.
 
-    Headers and the cells of the first `text_columns` columns are wrapped between words; numbers are never wrapped.
+    Headers and the cells of the text columns are wrapped between words; numbers are never wrapped.
+
+    Args:
+        columns: headers.
+        rows: cells of each row.
+        text_columns: number of leading columns with texts.
+        width: available width [characters].
     """
     widths, narrowest = [], []
     for index, (header, *cells) in enumerate(zip(columns, *rows, strict=True)):

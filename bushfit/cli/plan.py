@@ -251,7 +251,14 @@ def _print_effects(output: Output, document: PlanFile) -> None:
 
 
 def _simulate_plan(output: Output, outcome: PlanOutput, count: int, seed: int) -> Check:
-    """Simulate and fit the planned tests `count` times, and print predicted and observed standard errors."""
+    """Simulate and fit the planned tests several times, and print predicted and observed standard errors.
+
+    Args:
+        output: output of the command.
+        outcome: the plan.
+        count: number of simulated campaigns.
+        seed: seed of the first campaign.
+    """
     from bushfit.batch.executor import local_workers, run_rows
     from bushfit.planning.campaign import RelativeErrors, check
     from bushfit.progress import track

@@ -19,7 +19,13 @@ _MOST_TESTS = 8
 
 
 def print_validations(output: Output, validations: Sequence[Validation], before: Sequence[Validation] = ()) -> None:
-    """Print NRMSE, peak and energy error, and share of points in the band of validation records, if there are any."""
+    """Print NRMSE, peak and energy error, and share of points in the band of validation records, if there are any.
+
+    Args:
+        output: output of the command.
+        validations: comparisons of measured and predicted force with the model to use.
+        before: the same without the effects that a diagnosis added; empty if none were added.
+    """
     from bushfit.report.response import validation_table
 
     if validations:
@@ -59,7 +65,13 @@ def print_result(output: Output, title: str, result: Result) -> None:
 
 
 def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[ExpectedError]) -> None:
-    """Print the misfit of each test, with -v also of each run, and the expected error of the model."""
+    """Print the misfit of each test, with -v also of each run, and the expected error of the model.
+
+    Args:
+        output: output of the command.
+        misfits: NRMSE, reduced chi-square and mean error of |K| of each test and run.
+        usable: expected error of |K| and loss factor of each direction or specimen.
+    """
     from bushfit.report.tables import DISPLAYS
 
     tests = [test for test in misfits if output.verbose or test.held is None]

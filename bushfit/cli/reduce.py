@@ -115,7 +115,13 @@ def command(
 
 
 def _resonance_table(file: Path, test_options: Mapping[str, Any], shaker: Mapping[str, str | None]) -> Table | None:
-    """Table of a resonance test; None for other files, unless an option such as the mass states a resonance test."""
+    """Open a test file as a resonance test; None for other files, unless an option such as the mass states this kind.
+
+    Args:
+        file: test file.
+        test_options: metadata from the command line.
+        shaker: texts of the options of a resonance test, such as the mass.
+    """
     from bushfit.inspection.recognition import open_table
     from bushfit.reading.headers import RESONANCE_COLUMNS
     from bushfit.reading.resonance import is_resonance
@@ -138,7 +144,18 @@ def _reduce_resonance(
     shaker: Mapping[str, str | None],
     levels: str | None,
 ) -> tuple[Resonance, str, str]:
-    """Reduce a resonance test to a sweep; return it with its campaign key ("direction" or "specimen") and value."""
+    """Reduce a resonance test to a sweep.
+
+    Args:
+        files: the test file; more than one is an error.
+        table: table of the file.
+        test_options: metadata from the command line.
+        shaker: texts of the options of a resonance test, such as the mass.
+        levels: text of the option --levels, which is an error here; None if it is not given.
+
+    Returns:
+        The reduced test, and its campaign key ("direction" or "specimen") with the value of this key.
+    """
     from bushfit.geometry import Direction
     from bushfit.inspection.recognition import test_direction
     from bushfit.reading.resonance import read_resonance

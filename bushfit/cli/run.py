@@ -156,7 +156,14 @@ def two_step_line(two_step: TwoStep, joint: Result) -> str:
 
 
 def _print_two_steps(output: Output, name: str, two_step: TwoStep, joint: Result) -> None:
-    """Print the parameters after each pass of the two-step procedure, and its result compared with the joint fit."""
+    """Print the parameters after each pass of the two-step procedure, and its result compared with the joint fit.
+
+    Args:
+        output: output of the command.
+        name: name of the campaign.
+        two_step: result of the paper's two-step procedure.
+        joint: result of the joint fit.
+    """
     result, last = two_step.result, two_step.passes[-1]
     units = {name: display_unit(result.model.parameters[name].unit, 1.0, value) for name, value in last.items()}
     columns = [  # aligned from the last pass, whose decimals the others have

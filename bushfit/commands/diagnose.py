@@ -129,7 +129,13 @@ def diagnosis_files(diagnosis: Diagnosis, document: DiagnosisFile, title: str) -
 
 
 def _require_free_parameter(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> None:
-    """Raise a FitError if no parameter is free and no effect is to be added."""
+    """Raise a FitError if no parameter is free and no effect is to be added.
+
+    Args:
+        data: campaign, prepared for a fit.
+        model: starting model; None for the model of [fit].
+        settings: settings of the diagnosis, with the effects to add.
+    """
     model = model or Model.with_defaults(data.campaign.bushing, data.effects, {})
     if not (settings.adopt or data.free(tuple(model.parameters))):
         raise FitError(

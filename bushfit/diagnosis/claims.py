@@ -147,7 +147,13 @@ def _parse_claim(data: PreparedCampaign, name: str) -> Claim:
 
 
 def _is_possible(mistake: Mistake, data_set: MeasuredTest, data: PreparedCampaign) -> bool:
-    """True if a mistake is possible in a test, judged by the columns of its file and by the modulus it implies."""
+    """True if a mistake is possible in a test: it can occur there, and explains an implausible modulus or strain.
+
+    Args:
+        mistake: kind of mistake, such as a wrong unit.
+        data_set: the test.
+        data: campaign as it was read, with the bushing.
+    """
     bushing, place = data.campaign.bushing, data_set.direction
     modulus = float(np.median(np.abs(data_set.measured))) / stiffness_per_modulus(bushing, place)
     strain = float(np.max(data_set.amplitude)) * unit_strain(bushing, place)

@@ -31,7 +31,7 @@ class Group:
 
     @property
     def whole(self) -> Array:
-        """Changes of all residuals per unit amount of each column, (c, n); 0 outside the rows it covers."""
+        """Changes of all n residuals per unit amount of each of the c columns, (c, n); 0 in rows not covered."""
         if self.covered_rows is None:
             return self.columns
         rows, count = self.covered_rows

@@ -25,7 +25,13 @@ _WEIGHTS, _STRAINS = 2.0 / (_NODES + 1) * np.sin(_ANGLES) ** 2, np.sin(0.5 * _AN
 
 
 def _standardised(strain: Value, e_s: Value, spread: Value) -> Array:
-    """Return ln(strain/e_s)/spread, with strain and median yield strain e_s [1]; the ratio is at least 1e-30."""
+    """Return z = ln(strain/e_s)/spread, the argument of the normal distribution of the log yield strains.
+
+    Args:
+        strain: tensor shear strain [1], (..., n); its ratio to e_s is raised to at least 1e-30.
+        e_s: median yield strain [1].
+        spread: standard deviation of the natural log of the yield strains [1].
+    """
     return np.log(np.maximum(strain / e_s, 1e-30)) / spread
 
 

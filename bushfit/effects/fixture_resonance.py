@@ -65,7 +65,16 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
 
 
 def _mode(omega: float, damping: float, push: Array, step: float) -> Array:
-    """Solve y'' + 2 zeta w y' + w^2 y = w^2 push from rest, (n,) -> (n,), exact if push is linear between samples.
+    """Solve y'' + 2 zeta w y' + w^2 y = w^2 push from rest, exactly if the push is linear between samples.
+
+    Args:
+        omega: natural angular frequency w of the fixture [rad/s].
+        damping: damping ratio zeta [1].
+        push: acceleration of the motion [m/s^2], (n,).
+        step: time between samples [s].
+
+    Returns:
+        y, in the unit of the push, (n,).
 
     Notes: y = w^2/Im(p) Im z with z' = p z + push and the pole p above the real axis.
     """

@@ -47,10 +47,17 @@ def _circle(length: int) -> tuple[Array, Array]:
 
 
 def _kernel(alpha: Array, scaled: Array, count: int, step: Array, *, second_order: bool) -> Array:
-    """Weights of the past strains, (..., count), as in Eq. (3), for steps [s] and `scaled` relaxation times tau^alpha.
+    """Weights of past strains in the stress of the spring in series with the springpot, as in Eq. (3), (..., count).
 
     They are the coefficients of the power series in z of -k v^2/(1 + k v)/step^alpha, with v = (1 - z)^alpha and k =
     tau^alpha/step^alpha; v (1 + alpha/2 (1 - z)) replaces v in the second order of `springpot.fractional_derivative`.
+
+    Args:
+        alpha: order of the springpot [1], (..., 1).
+        scaled: relaxation time to the power alpha, tau^alpha [s^alpha], (..., 1).
+        count: number of weights.
+        step: time between samples [s], (..., 1).
+        second_order: True for weights of second order in the step.
 
     Notes: from the values of the series on a circle |z| < 1 (C. Lubich, Numer. Math. 52 (1988) 129).
     """

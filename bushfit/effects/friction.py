@@ -186,9 +186,15 @@ def _stroke_slopes(sign: Any, distance: Any, room: Any, reach: Any) -> tuple[Any
 
 
 def _strokes(senses: Sequence[Any], distances: Sequence[Any], u: Any) -> list[tuple[Any, Any, Any]]:
-    """Compute the relative stress u at the k + 1 turning points of k strokes, from a start value.
+    """Compute the friction stress u, relative to sigma_fmax, at the k + 1 turning points of k strokes.
 
-    Each u comes with du/d(ln eps_half) for a fixed start value, and with the derivative by the start value.
+    Args:
+        senses: +1 or -1, direction of each stroke, (k,).
+        distances: length of each stroke, relative to eps_half, (k,).
+        u: relative stress at the first turning point.
+
+    Returns:
+        For each turning point: u, du/d(ln eps_half) for a fixed start value, and the derivative by the start value.
     """
     path = [(u, 0.0 * u, 1.0 + 0.0 * u)]
     for sense, distance in zip(senses, distances, strict=True):

@@ -184,10 +184,18 @@ class _AndersonMixing:
 
 
 def _pulse_stiffness(below: ForceBelow, history: History, length: int) -> Array:
-    """Complex stiffness [N/m] at each harmonic of `length` samples: force over displacement of a single pulse.
+    """Complex stiffness [N/m] at each harmonic of a record: force over displacement of a single pulse.
 
     The pulse, some samples after the start, has the amplitude of the motion, but at least 1 nm. The force is relative
     to the initial force; the real part of the result is never negative.
+
+    Args:
+        below: force without the compliance, as a function of the displacement history.
+        history: displacement over time, which gives the amplitude of the pulse and the sampling.
+        length: number of samples of the Fourier transform.
+
+    Returns:
+        Stiffness, (..., length // 2 + 1).
     """
     pulse = np.zeros(history.value.shape)
     pulse[..., 4:5] = np.maximum(history.amplitude, 1e-9)

@@ -60,9 +60,11 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def _loaded(strain: Array, low: Value, high: Value) -> Array:
-    """Mean of min(strain/e_y, 1) over sliders whose slip strains e_y lie between `low` and `high`, log-uniform [1].
+    """Stress of the sliders on first loading over its maximum: mean of min(strain/e_y, 1) over slip strains e_y.
 
-    This mean is the stress on first loading, relative to its maximum.
+    Args:
+        strain: tensor shear strain reached from rest [1], (..., n).
+        low, high: smallest and largest slip strain e_y [1]; ln e_y is uniform between them.
     """
     slipped = np.clip(strain, low, high)
     return (np.log(slipped / low) + strain * (1.0 / slipped - 1.0 / high)) / np.log(high / low)

@@ -99,7 +99,16 @@ def fractional_derivative(alpha: Value, history: History) -> Array:
 
 @lru_cache(maxsize=8)
 def _weight_spectrum(alpha: float, count: int, length: int) -> Array:
-    """Spectrum of the weights of a fractional difference, padded with zeros to a length, (length // 2 + 1,)."""
+    """Fourier transform of the weights of a fractional difference, as numpy.fft.rfft gives it.
+
+    Args:
+        alpha: order of the derivative.
+        count: number of weights.
+        length: length to which the weights are padded with zeros.
+
+    Returns:
+        Spectrum, (length // 2 + 1,).
+    """
     return np.fft.rfft(grunwald_letnikov_weights(alpha, count), length)
 
 

@@ -143,6 +143,11 @@ def _values(
     """List the values of the FMU; and for each direction or specimen, the name of the FMU value of each parameter.
 
     If a parameter differs between places (directions or specimens), each place has a value `<parameter>.<place>`.
+
+    Args:
+        request: predictions and settings of the export.
+        model: model in the export, without effects of the rig.
+        arms: Maxwell arms that replace viscoelastic effects.
     """
     places = request.places
     local_values = [

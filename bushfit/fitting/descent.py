@@ -244,7 +244,16 @@ class Descent:
 
 
 def _solved(curvature: Array, pull: Array, free: Array) -> Array:
-    """Solve curvature @ step = pull for the free parameters (mask), with 0 in directions that are rounding errors."""
+    """Solve curvature @ step = pull for some parameters; directions that are rounding errors get a step of 0.
+
+    Args:
+        curvature: Gauss-Newton Hessian by coordinate, (k, k).
+        pull: negative gradient by coordinate, (k,).
+        free: mask of the parameters that move, (k,).
+
+    Returns:
+        Step of the free parameters only.
+    """
     scale = np.sqrt(np.diag(curvature)[free])
     scaled = curvature[np.ix_(free, free)] / np.outer(scale, scale)
     return np.linalg.lstsq(scaled, pull[free] / scale, rcond=ROUNDING)[0] / scale

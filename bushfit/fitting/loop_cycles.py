@@ -108,7 +108,12 @@ def _crossings(motion: Array) -> tuple[Array, Array, Array]:
 
 
 def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | None]:
-    """Return a loop without the rows before and after its steady cycles, and a note on these rows or None."""
+    """Return a loop without the rows before and after its steady cycles, and a note on these rows or None.
+
+    Args:
+        loop: the whole record.
+        time, motion: time [s] and displacement [m or rad] of the thinned rows, see `_thinned`, (n,) each.
+    """
     period = _period(time, motion)
     if period is None or time[-1] - time[0] <= period:
         return loop, None
@@ -168,7 +173,9 @@ def _period(time: Array, motion: Array) -> float | None:
 def _fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, float]:
     """Frequency [Hz] and number of cycles of a loop that consists of steady cycles.
 
-    The clock [s] and the displacement [m or rad], (n,) each, are those of the thinned rows, see `_thinned`.
+    Args:
+        loop: steady cycles of the record.
+        clock, displacement: time [s] and displacement [m or rad] of the thinned rows, see `_thinned`, (n,) each.
 
     Notes:
         Several cycles are counted by crossings of the middle in one direction, and their frequency is refined by
@@ -187,9 +194,12 @@ def _fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, 
 
 
 def _of_one_cycle(loop: Loop, clock: Array, x: Array, crossings: Array) -> tuple[float, float]:
-    """Frequency [Hz] and number of cycles of a loop that crosses its middle once each way, at times `crossings` [s].
+    """Frequency [Hz] and number of cycles of a loop that crosses its middle once each way.
 
-    The clock [s] and the motion x relative to its middle, (n,) each, are those of the thinned rows, see `_thinned`.
+    Args:
+        loop: steady cycles of the record.
+        clock, x: time [s] and motion relative to its middle of the thinned rows, see `_thinned`, (n,) each.
+        crossings: times of the two crossings [s].
     """
     rows, motion = loop.time.size, loop.displacement
     duration = float(loop.time[-1] - loop.time[0])
@@ -220,8 +230,12 @@ def _of_one_cycle(loop: Loop, clock: Array, x: Array, crossings: Array) -> tuple
 def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> float | None:
     """Period [s] of a motion whose last rows meet its first rows with the same slope; None if they do not.
 
-    Straight lines through both ends determine by how much the `duration` [s] of the record differs from one cycle; if
-    the difference is within its error, the period is `whole` [s].
+    Straight lines through both ends determine by how much the duration of the record differs from one cycle.
+
+    Args:
+        clock, x: time [s] and motion relative to its middle, (n,) each.
+        duration: duration of the record [s].
+        whole: period that is returned if the difference is within its error [s].
     """
     few, ends = max(3, int(0.02 * x.size)), []
     for rows, origin in ((slice(few), clock[0]), (slice(-few, None), clock[-1])):

@@ -88,7 +88,14 @@ class MeasuredBase(ABC):
         return {}
 
     def _keep(self, key: str, model: Model, names: Any, values: Array) -> Array:
-        """Cache an array, read-only, for the next call with this key, model and parameter names, and return it."""
+        """Cache an array, read-only, for the next call with the same key, model and parameter names, and return it.
+
+        Args:
+            key: name of the cached quantity, such as "force" or "jacobian".
+            model: model that the values belong to.
+            names: names of the parameters of a Jacobian; empty for a response.
+            values: array to cache.
+        """
         values.flags.writeable = False
         self._last[key] = model, names, values
         return values

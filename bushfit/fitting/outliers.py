@@ -199,7 +199,13 @@ def misfit_scale(distance: Array, parts: int) -> float:
 
 
 def _from_neighbours(values: Array, starts: Array, window: int) -> Array:
-    """Difference of each value, complex (n,), from the median of the `window` values around it in its block, (n,)."""
+    """Difference of each value from the median of the values around it in its block, complex (n,).
+
+    Args:
+        values: deviations, complex (n,).
+        starts: index of the first point of each block.
+        window: number of values in each median.
+    """
     sizes, local = np.diff(starts, append=values.size), np.zeros_like(values)
     for width in np.unique(np.minimum(sizes, window)).tolist():  # mostly one: blocks are longer
         chosen = np.minimum(sizes, window) == width
@@ -213,7 +219,9 @@ def _from_neighbours(values: Array, starts: Array, window: int) -> Array:
 def _from_repeats(values: Array, place: Array) -> tuple[Array, Array]:
     """Number of other repeats of each point, (n,), and its difference from their median, complex (n,); 0 without any.
 
-    Points with the same index in `place`, (n,), are repeats.
+    Args:
+        values: deviations, complex (n,).
+        place: index of the operating point of each point, (n,); points with equal indices are repeats.
     """
     counts = np.bincount(place)
     repeats, distances = counts[place] - 1, []

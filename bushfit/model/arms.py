@@ -232,7 +232,15 @@ def _basis(omega: Array, time: Array) -> Array:
 
 
 def _starts(omega: Array, target: Array, arms: int) -> Iterator[tuple[Array, Array]]:
-    """Start moduli [Pa] and relaxation times [s], (k,) each: times evenly in ln over the band, moduli from the loss.
+    """Yield start values of Maxwell arms: times evenly in ln over the band, moduli from the loss modulus.
+
+    Args:
+        omega: angular frequencies [rad/s], (n,).
+        target: complex moduli [Pa], (n,).
+        arms: number k of arms.
+
+    Yields:
+        Moduli [Pa] and relaxation times [s], (k,) each.
 
     Notes: arms d apart in ln tau have G = 2/pi G''(1/tau) d, where the loss modulus G'' changes little (J. D. Ferry,
     Viscoelastic Properties of Polymers, 3rd ed., 1980, ch. 4).

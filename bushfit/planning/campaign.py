@@ -116,7 +116,13 @@ def campaign_toml(plan: Plan, seed: int = 0) -> str:
 
 
 def _line(key: str, value: Any, test: Test | None = None) -> str:
-    """Write one TOML line, with a unit if the key needs one; `test` gives the unit of the amplitude."""
+    """Write one TOML line of a campaign file, with a unit if the key needs one.
+
+    Args:
+        key: key of the line.
+        value: value in SI.
+        test: test whose direction or specimen gives the unit of an amplitude; None if the value is no amplitude.
+    """
     if key not in _UNITS:
         share = isinstance(value, float)
         return f"{key} = {toml_value(f'{_number(100.0 * value)} %') if share else toml_value(value)}"

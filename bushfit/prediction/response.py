@@ -170,7 +170,14 @@ def _tested(result: Result) -> tuple[float, float] | None:
 
 
 def _warnings(result: Result, response: TimeResponse, left_out: list[str], temperature: float | None) -> list[str]:
-    """Sentences on a response: directions and ranges that were not fitted, effects left out, and coarse sampling."""
+    """Sentences on a response: directions and ranges that were not fitted, effects left out, and coarse sampling.
+
+    Args:
+        result: fitted result.
+        response: predicted force over time.
+        left_out: names of the effects that the response leaves out.
+        temperature: temperature of the rubber [K]; None for the reference temperature.
+    """
     place, history = response.direction, response.history
     warnings = [*result.undecided, *unfitted_warnings(result, place)]
     if result.measured:

@@ -38,18 +38,18 @@ class Validation:
 
     @property
     def peak_error(self) -> float:
-        """Relative error of the predicted largest magnitude of the force."""
+        """Relative error of the largest magnitude of the force: predicted over measured, minus 1."""
         return float(self.response.peak / np.abs(self.measured).max() - 1.0)
 
     @property
     def energy_error(self) -> float:
-        """Relative error of the predicted work of the motion on the bushing."""
+        """Relative error of the work of the motion on the bushing: predicted over measured, minus 1."""
         history = self.response.history
         return work(history, self.response.force.value) / work(history, self.measured) - 1.0
 
     @property
     def share_inside(self) -> float:
-        """Share of the measured points inside the 95 % band of the prediction."""
+        """Share of the measured points inside the 95 % band of the predicted force, 0 to 1."""
         force = self.response.force
         return float(np.mean((force.low <= self.measured) & (self.measured <= force.high)))
 

@@ -135,7 +135,15 @@ def _is_fitting(column: Column, *, stated: bool) -> bool:
 
 
 def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, str]) -> dict[int, str]:
-    """Role of each column that the user states by its number, by index; stated headers are only checked.
+    """Find the columns that the user states by their number; stated headers are only checked.
+
+    Args:
+        cells: header and rows of the table.
+        vocabulary: known column names, with those that the user states.
+        columns: header or number of a column as the user states it, by role.
+
+    Returns:
+        Role by index of the column.
 
     Raises:
         NoColumnError: a stated header or number that the file does not have.

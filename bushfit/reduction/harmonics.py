@@ -169,7 +169,15 @@ class HarmonicFit:
 
     @classmethod
     def _fit_at(cls, frequency: float, time: Floats, values: Floats, count: int, order: int) -> "HarmonicFit":
-        """Fit `count` cycles about time 0 with at most `order` harmonics, at a fixed frequency [Hz]."""
+        """Fit drift and harmonics to whole cycles of displacement and force at a fixed frequency.
+
+        Args:
+            frequency: fundamental frequency [Hz].
+            time: time of each row, 0 in the middle of the cycles [s], (n,).
+            values: displacement and force [m or rad, N or N m], (2, n).
+            count: number of cycles.
+            order: largest number of harmonics.
+        """
         order, solution, covariance = _drift_and_harmonics(time, values, frequency, order)
         squares, sums, rows_in = np.zeros((2, 2)), np.zeros((2, count), dtype=complex), np.zeros(count)
         for rows, columns in _chunks(time, frequency, order):

@@ -166,9 +166,14 @@ def join_broken_steps(timed_steps: Sequence[tuple[float, float, Step]]) -> list[
 
 
 def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: Complex, fewest: int) -> Step | None:
-    """Compute the operating point of the cycles `inside`, without their transient; None if they are not steady.
+    """Compute the operating point of one step, without its transient; None if its cycles are not steady.
 
-    Motion and force are the complex fundamentals of each of these cycles [m or rad, N or N m], (k,).
+    Args:
+        history: record of time, displacement and force.
+        cycles: all cycles of the record.
+        inside: slice of the k cycles of the step.
+        motion, force: complex fundamentals of each of these cycles [m or rad, N or N m], (k,) each.
+        fewest: smallest number of steady cycles.
     """
     steady = select_steady_cycles(motion, force / motion, fewest)
     used = slice(inside.start + steady.start, inside.start + steady.stop)

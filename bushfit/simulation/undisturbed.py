@@ -112,7 +112,13 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
 
 
 def _clean_loop(truth: Model, test: SimulatedLoop, conditions: RubberConditions) -> rig.Record:
-    """Simulate the record of a steady loop, or of a programme from rest, without noise, 1000 rows per cycle."""
+    """Simulate the record of a steady loop, or of a programme from rest, without noise, 1000 rows per cycle.
+
+    Args:
+        truth: true model, including effects of the rig.
+        test: settings of the loop.
+        conditions: temperature and earlier strains of the rubber.
+    """
     if len(test.parts) > 1:
         record = _clean_programme(truth, test, conditions)
     else:
@@ -136,10 +142,19 @@ def _clean_loop(truth: Model, test: SimulatedLoop, conditions: RubberConditions)
 
 
 def _run_in(truth: Model, place: Place, amplitude: float) -> tuple[int, tuple[int, float]]:
-    """Number of cycles before the record, and cycles and amplitude factor of a growing and decaying motion before them.
+    """Choose the motion before the record of a steady loop, so that the mean friction stress from the start decays.
 
-    The mean friction stress from the start must decay to a thousandth. One cycle at a strain of a tenth of eps_half
-    keeps 95 % of this stress, at a hundredth 99.96 %.
+    This stress must decay to a thousandth. One cycle at a strain of a tenth of eps_half keeps 95 % of it, at a
+    hundredth 99.96 %.
+
+    Args:
+        truth: true model.
+        place: direction or specimen.
+        amplitude: zero-to-peak amplitude of the loop [m or rad].
+
+    Returns:
+        Number of cycles at this amplitude before the record; and number of preceding cycles that grow and decay, with
+        their largest amplitude relative to that of the loop.
     """
     if truth.is_transient:
         return 0, (0, 1.0)
@@ -179,6 +194,11 @@ def _clean_record(truth: Model, test: SimulatedRecord, seed: list[int]) -> rig.R
     """Simulate a validation record from rest without noise, 40 rows and 400 time steps per cycle of its fastest sine.
 
     The motion fades in over the first twentieth of its duration, so that it begins without a step.
+
+    Args:
+        truth: true model, including effects of the rig.
+        test: settings of the record.
+        seed: seed of the random phases.
     """
     frequency, random = np.array(test.frequencies), np.random.default_rng(seed)
     step = 1.0 / (frequency[-1] * _ROWS_PER_RECORD_CYCLE * _STEPS_PER_RECORD_ROW)
