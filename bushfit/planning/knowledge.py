@@ -81,7 +81,7 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
     diagnosis = None if rivals is None else diagnose(data)
     noise = noise_of(data)
     data = PreparedCampaign.from_campaign(replace(data.campaign, rig=rig_of(data.campaign.rig, noise)))
-    data_sets = data.data_sets
+    data_sets = data.require_tests(data.data_sets, "there is nothing to fit", "add measured tests to the campaign")
     model = data.starting_model(data.effects, data_sets, {})
     fixed = [name for name in model.parameters if name not in data.free(tuple(model.parameters))]
     source = f"the tests of {data.campaign.name}"

@@ -42,6 +42,7 @@ ARGUMENTS = {
     "compare": ["model.json", CASE],
     "export": ["model.json", "--format", "csv"],
     "example": [],
+    "respond": ["model.json", "data/road/axial_radial.csv"],
     "reduce": ["data/cmp_15961_raw/stepped_sine_axial.csv"],
     "inspect": TESTS,
     "batch": shlex.split("data/practice/case_00[01]/bushing.toml --tables --plots --command fit --command predict"),
