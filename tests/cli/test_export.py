@@ -49,6 +49,8 @@ ARGUMENTS = {
 }
 
 
+#: Commands without pictures.
+UNDRAWN = ("simulate", "example")
 #: Commands that draw, each with a form of tables; a commit tries one, and sees the files of the others in their tests.
 COMMANDS = some([*zip(ARGUMENTS, cycle(("xlsx", "decimal-comma")), strict=False)], [("reduce", "xlsx")])
 
@@ -82,11 +84,11 @@ def test_tables_hold_the_same_in_every_form_and_pictures_are_of_every_form_asked
     plain = written(place, name, "-o", f"{name}-csv", "--no-plots")
     options = ["--format", "fmu"] if name == "export" else []  # of its formats, the one that draws
     options += ["--table-format", form] if name != "inspect" else []
-    options += ["--plot-format", "svg", "--plot-format", "pdf"] if name != "simulate" else []
+    options += ["--plot-format", "svg", "--plot-format", "pdf"] if name not in UNDRAWN else []
     files = written(place, name, "-o", f"{name}-other", *options)
     drawn = {end: {file.with_suffix("") for file in files if file.suffix == end} for end in (".svg", ".pdf", ".png")}
     assert drawn[".svg"] == drawn[".pdf"]
-    assert bool(drawn[".svg"]) is (name != "simulate")
+    assert bool(drawn[".svg"]) is (name not in UNDRAWN)
     assert drawn[".png"] == set()
     tables = {file: file.with_suffix(".xlsx" if form == "xlsx" else ".csv") for file in plain if file.suffix == ".csv"}
     assert bool(tables) is (name != "inspect")

@@ -298,7 +298,7 @@ def test_what_gives_way_in_one_direction_or_in_all_is_a_set_where_it_is_equal(
             "agrees with the joint fit within 1 standard error, mu 30 times less certain than in the joint fit (",
         ),
         (1e8, 0.0, {}, "agrees with the joint fit within 1 standard error, mu not determined ("),
-        (0.01, 0.98, {}, "does not agree with the joint fit, least in mu ("),
+        (0.01, 0.98, {}, "does not agree with the joint fit; largest difference: mu ("),
         (1e8, 0.5, {"mu": "min"}, "1 pass, ended at a bound: mu ("),
     ],
 )
