@@ -175,12 +175,19 @@ class RestrictedLikelihood:
         return cls(np.maximum(values, 0.0), np.square(vectors.T @ (columns @ residual)))
 
     def gains(self, sizes: Array) -> Array:
-        """Increase of the log likelihood for each size compared with size zero, (s,) -> (s,)."""
+        """Increase of the natural log of the likelihood for each size of the process, compared with size zero.
+
+        Args:
+            sizes: standard deviations of the process, (s,).
+
+        Returns:
+            Increases, (s,).
+        """
         grown = 1.0 + np.square(sizes)[:, None] * self.values
         return 0.5 * np.sum(np.square(sizes)[:, None] * self.squares / grown - np.log(grown), axis=-1)
 
     def log_evidence(self, sizes: Array) -> float:
-        """Natural log of the likelihood averaged over equally probable sizes, relative to size zero."""
+        """Natural log of the likelihood averaged over equally probable sizes of the process, relative to size zero."""
         return float(logsumexp(self.gains(sizes)) - np.log(sizes.size))
 
     def freedom(self, size: float) -> float:

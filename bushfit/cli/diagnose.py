@@ -97,7 +97,7 @@ def command(
 
 
 def print_diagnosis(output: Output, diagnosed: DiagnosisOutput) -> None:
-    """Print a diagnosis: verdict, misfit between model and tests (gap), next test, and details."""
+    """Print a diagnosis: verdict, gap (root mean square residual in units of noise), next test, and details."""
     from bushfit.effects import BASE
 
     diagnosis = diagnosed.diagnosis
@@ -132,7 +132,7 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") 
 
 
 def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
-    """Print the named effects with their sizes, the gap without and with them, its location, and the next test."""
+    """Print the named effects with their sizes, the gap (rms residual / noise), its location, and the next test."""
     console, diagnosis, document = output.console, diagnosed.diagnosis, diagnosed.document
     for effect in document["effects"]:
         _print_effect(output, effect)

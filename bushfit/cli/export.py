@@ -110,7 +110,7 @@ def command(
 
 
 def _cardanic(text: str | None) -> complex | None:
-    """Parse --cardanic, a stiffness and an optional loss factor, to a complex stiffness [N m/rad]."""
+    """Parse --cardanic, a stiffness and an optional loss factor, to a complex stiffness [N m/rad]; None without it."""
     if text is None:
         return None
     stiffness, comma, loss = text.partition(",")

@@ -45,7 +45,13 @@ def print_step(output: Output, title: str, result: Result) -> None:
 
 
 def print_result(output: Output, title: str, result: Result) -> None:
-    """Print the parameters of a fit result, its quality, the misfit of its tests, and strong correlations."""
+    """Print the parameters of a fit result, NRMSE and reduced chi-square (of each test too), strong correlations.
+
+    Args:
+        output: output of the command.
+        title: title above the parameters.
+        result: fit result.
+    """
     print_parameters(output, title, result)
     if quality := result.quality:
         gain = quality.loop_gain_error

@@ -52,7 +52,7 @@ class DiagnosisOutput:
 
     @property
     def headline(self) -> str:
-        """Verdict, and the parameters whose uncertainty is 100 % or more."""
+        """Sentence with the verdict, and the parameters whose 95 % half width is at least their value."""
         return "; ".join(filter(None, (self.diagnosis.verdict, self.result.unknown_parameters)))
 
     @property

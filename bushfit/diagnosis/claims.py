@@ -288,7 +288,11 @@ class Screen:
 
 
 def _paraboloid_minimum(misfit: Array) -> float:
-    """Minimum of a misfit given on a grid, (rows, columns), from a paraboloid about the smallest grid value."""
+    """Minimum of a sum of squared residuals given on a grid, from a paraboloid about the smallest grid value.
+
+    Args:
+        misfit: sum of squares in units of a coarse noise, (rows, columns).
+    """
     row, column = (
         int(np.clip(i, 1, n - 2))
         for i, n in zip(np.unravel_index(int(np.argmin(misfit)), misfit.shape), misfit.shape, strict=True)

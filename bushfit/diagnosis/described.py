@@ -134,7 +134,12 @@ def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
 
 
 def _form(correction: Unnamed, law: PowerLaw | None) -> str:
-    """Text on the size of the gap, its uncertainty and its form, from the correction and the nearest power law."""
+    """Text on the gap's largest size relative to |K|, the relative uncertainty of this size, and the form of the gap.
+
+    Args:
+        correction: smooth relative correction of the stiffness that closes the gap.
+        law: nearest power law; None without one.
+    """
     largest, band = (number(100.0 * share, 2) for share in (correction.largest, Z95 * correction.uncertainty))
     if law is None or not any(law.determined):
         form = "its form is unknown"

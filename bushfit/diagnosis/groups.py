@@ -72,7 +72,7 @@ class GroupEvidence:
 
     @property
     def total(self) -> float:
-        """Natural log of the evidence with and without a deviation of the compound from the model, added up."""
+        """Natural log of the marginal likelihood with the group, summed over compound with and without deviation."""
         if self.with_compound is None:
             return self.log_evidence
         return float(np.logaddexp(self.log_evidence, self.with_compound.log_evidence))

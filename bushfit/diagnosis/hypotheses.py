@@ -98,7 +98,7 @@ class Hypothesis:
 
     @property
     def p_value(self) -> float:
-        """Posterior predictive p-value: probability of a larger misfit than measured if the hypothesis is true."""
+        """Posterior predictive p-value: probability of a larger chi-square than measured if the hypothesis is true."""
         return self.state.linear.p_value(compound_deviates=self.compound_deviates)
 
 
@@ -228,7 +228,7 @@ class SearchState:
 
     @cached_property
     def log_posterior(self) -> float:
-        """Natural log of prior times evidence of this step's explanations, summed over compound deviation and none."""
+        """Natural log of prior times evidence of these explanations, summed over compound with and without deviation."""
         total = float(np.logaddexp(self.linear.log_evidence, self.linear.log_evidence_with_compound))
         return self.log_prior + self.log_density + total
 

@@ -58,7 +58,10 @@ class LinearModel:
 
     @cached_property
     def nodes(self) -> Array:
-        """Indices of the nodes to average over; only nodes without a deviation if `compound` is None."""
+        """Indices of the combinations of error sizes (nodes) to average over.
+
+        Without `compound`, only nodes in which the compound follows the model's laws.
+        """
         chosen = np.arange(len(self.rig.nodes)) if self.chosen_nodes is None else self.chosen_nodes
         return np.array([n for n in chosen.tolist() if self.compound or not self.rig.nodes[n].compound], dtype=int)
 
@@ -246,17 +249,17 @@ class LinearModel:
 
     @property
     def log_evidence(self) -> float:
-        """Log evidence of the tests if nothing is missing and rig errors are within the stated accuracy."""
+        """Natural log of the tests' marginal likelihood if nothing is missing and rig errors are as stated."""
         return self._log_evidence_over(self._plain)
 
     @property
     def log_evidence_with_compound(self) -> float:
-        """Log evidence of the tests if the compound deviates from the model's laws and nothing else is missing."""
+        """Natural log of the tests' marginal likelihood if only the compound deviates from the model's laws."""
         return self._log_evidence_over(self._deviation > 0.0)
 
     @property
     def log_evidence_with_level_errors(self) -> float:
-        """Log evidence of the tests if rig errors of levels exceed the stated accuracy and nothing else is missing."""
+        """Natural log of the tests' marginal likelihood if only rig errors of levels exceed the stated accuracy."""
         return self._log_evidence_over(~self._plain & (self._deviation == 0.0))
 
     @property

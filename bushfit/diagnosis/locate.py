@@ -132,7 +132,11 @@ def _trend(stepped: str, step: Array, misfit: Array) -> str:
 
 
 def _trend_word(first: float, last: float) -> str:
-    """Word for a misfit that grows, fades or changes sign from its first to its last value."""
+    """Word for a misfit that grows, fades or changes sign: "growing", "fading", "going from above to below".
+
+    Args:
+        first, last: measured minus model stiffness, relative to |K|, at both ends of a line.
+    """
     if first * last < 0.0 and min(abs(first), abs(last)) > _FLAT * max(abs(first), abs(last)):
         return f"going from {'above to below' if first > 0.0 else 'below to above'}"
     return "growing" if abs(last) > abs(first) else "fading"

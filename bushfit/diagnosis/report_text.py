@@ -60,7 +60,7 @@ class DiagnosisWriter:
 
     @property
     def first(self) -> Composition | None:
-        """Most probable reported explanation of the gap; None if nothing is missing."""
+        """Most probable of the explanations of the gap that are reported; None if nothing is missing."""
         return self.finding.reported[0] if self.finding.reported else None
 
     def diagnosis(self) -> Diagnosis:

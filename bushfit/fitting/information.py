@@ -72,7 +72,7 @@ class FisherInformation:
         return np.linalg.norm(vectors * errors, axis=1)
 
     def error(self, weights: Mapping[str, float]) -> float:
-        """Standard error of a weighted sum of relative parameter changes, from the weights by parameter name."""
+        """Relative standard error of a weighted sum of relative parameter changes; `weights` by parameter name."""
         errors, vectors = self.directions()
         row = np.array([weights.get(name, 0.0) for name in self.names])
         return float(np.linalg.norm(row @ vectors * errors))

@@ -78,7 +78,14 @@ def level_errors(
     added, most_added = np.zeros(2), np.maximum(np.square(maximum) - counted, 0.0)
 
     def likelihood(added: Array) -> tuple[Array, Array, float]:
-        """Gradient and Fisher information of ln(likelihood) by the added variances, and -2 ln(likelihood)."""
+        """Restricted likelihood of the residuals if the levels have additional gain and phase errors.
+
+        Args:
+            added: additional variance of the gain, and of the phase, (2,).
+
+        Returns:
+            Gradient, (2,), and Fisher information, (2, 2), of ln(likelihood), and the value of -2 ln(likelihood).
+        """
         covariance = np.eye(components.size) + np.tensordot(added, parts, 1)
         solved = np.linalg.solve(covariance, parts)
         white = np.linalg.solve(covariance, components)

@@ -224,7 +224,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
 
 
 def model_error_warning(error: Unnamed) -> str:
-    """Warning about the misfit of a model, with its typical size in per cent."""
+    """Warning that the model misses its tests, with the rms correction of the stiffness in per cent of |K|."""
     return (
         f"the model misses the tests by {number(100.0 * error.typical, 2)} %; parameters are the closest fit, and "
         "their intervals include this misfit"

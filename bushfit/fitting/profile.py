@@ -162,5 +162,5 @@ def limit95(best: FitResult, name: str) -> float | None:
 
 
 def _excess(best: FitResult) -> float:
-    """Reduced chi-square of a fit, at least 1: factor by which a misfit widens an allowed rise of chi-square."""
+    """Reduced chi-square of a fit, at least 1: factor on the allowed rise of chi-square if the model misses."""
     return max(reduced_chi_square(best.model, best.minimised, len(best.names))[0], 1.0)

@@ -42,7 +42,7 @@ class SharedError:
 
     @cached_property
     def group(self) -> Array:
-        """Index of the group (run, line or operating point) of each deviation, (m,)."""
+        """Index of the group (run, line or operating point) of each of the m gain or phase deviations, (m,)."""
         return np.repeat(np.arange(self.starts.size), np.diff(self.starts, append=self.unit.size))
 
     @cached_property

@@ -100,7 +100,7 @@ class _TestObject:
 
 
 class Direction(_TestObject, StrEnum):
-    """Direction in which a bushing is tested."""
+    """Direction in which a bushing is tested: axial or radial displacement, or torsion (rotation about the axis)."""
 
     AXIAL = "axial"
     RADIAL = "radial"

@@ -155,7 +155,11 @@ class PlanSearch:
         return next(unfitted_warnings(Result(knowledge.model, knowledge.names, measured=fitted), place), None)
 
     def less_visible_effects(self, counts: Array) -> list[str]:
-        """Names of the effects that these runs detect less well than the standard programme."""
+        """Names of the effects that these runs detect with a smaller expected chi-square than the standard programme.
+
+        Args:
+            counts: number of runs of each test, (tests,).
+        """
         reached = self.problem.models[0].total(counts).noncentralities()[0]
         short = np.sqrt(reached) < 0.995 * np.sqrt(self.minimum_noncentrality)  # numerical accuracy
         return list(dict.fromkeys(self.problem.effects[index].name for index in np.flatnonzero(short)))

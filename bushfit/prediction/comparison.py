@@ -131,7 +131,7 @@ class Comparison:
         return replace(band, low=low, high=high)
 
     def sentences(self) -> list[str]:
-        """Write sentences on the differences of stiffness and loss factor.
+        """Write sentences on the relative differences of |K| and the absolute differences of the loss factor.
 
         Returns:
             One sentence per direction: differences beyond chance, and an upper limit of the difference elsewhere.

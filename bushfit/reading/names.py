@@ -132,7 +132,7 @@ def labels_in_names(*names: str) -> Labels:
 
 
 def _labels_in_name(name: str) -> Labels:
-    """Labels in the name of a file, sheet or block."""
+    """Information on a test (quantities, direction, conditions) in the name of a file, sheet or block."""
     date, rest = _DATE.search(name), _DATE.sub(" ", name)
     number = _SPECIMEN_NUMBER.search(rest)
     quantities: list[StatedQuantity] = []

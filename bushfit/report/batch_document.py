@@ -41,7 +41,7 @@ class QuantityTable:
 
 @dataclass(frozen=True, kw_only=True)
 class PartTable:
-    """Entry of batch.json for one part: result by the limits, deviations from the other parts, and values."""
+    """Entry of batch.json for one part: result by the limits, values, and deviations in standard deviations."""
 
     name: Annotated[str, Field(description="Name of the part.")]
     folder: Annotated[str, Field(description="Folder with the results of the part; empty if the row failed.")]

@@ -48,7 +48,7 @@ class JointContrast(TypedDict):
 
 
 class ComparedPair(TypedDict):
-    """Entry of compare.json for one result and the reference: differences of parameters and of stiffness."""
+    """Entry of compare.json for one result and the reference: differences of parameters, |K| and loss factor."""
 
     reference: Annotated[str, Doc("letter of the reference.")]
     other: Annotated[str, Doc("letter of the result that is compared with the reference.")]

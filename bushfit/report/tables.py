@@ -279,7 +279,11 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
 
 
 def condition_columns(data_set: MeasuredSweep) -> dict[str, Any]:
-    """Columns of the stepped quantity of a sweep, and of temperature, preload, part and error if its test has them."""
+    """Columns of the stepped quantity of a sweep, and of temperature, preload, part and error if its test has them.
+
+    Returns:
+        Values by column header: one for all points of the sweep, or (n,).
+    """
     sweep, conditions = data_set.sweep, data_set.source.conditions if data_set.source else {}
     columns: dict[str, Any] = {"stepped": sweep.stepped or "neither"}
     if sweep.temperature is not None:

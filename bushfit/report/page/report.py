@@ -240,7 +240,7 @@ def conditions(test_conditions: Iterable[Mapping[str, str | float]]) -> Iterator
 
 
 def test_rows(record: ReportRecord) -> list[dict[str, str | int]]:
-    """Rows of the table of tests in a report: range, conditions and model misfit of the first twelve tests.
+    """Rows of the table of tests in a report: range, conditions and NRMSE of the model for the first twelve tests.
 
     Returns:
         Texts of each row, and its number of recorded rows, by the names that the template uses.
