@@ -129,7 +129,15 @@ def adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[PreparedCam
 
 
 def _parse_claim(data: PreparedCampaign, name: str) -> Claim:
-    """Convert one value of --adopt to a claim; a ModelError if the mistake is not possible in the test."""
+    """Convert one value of --adopt to a claim (hypothesis of a mistake in the record).
+
+    Args:
+        data: the campaign as it was read.
+        name: value of --adopt, "mistake:test" or "mistake".
+
+    Raises:
+        ModelError: no such test, or the mistake is not possible in the test.
+    """
     mistake, test = get_mistake(name), name.partition(SEPARATOR)[2]
     data_sets: list[MeasuredTest] = [*data.loops, *data.sweeps]
     possible = [place for place, one in enumerate(data_sets) if mistake and _is_possible(mistake, one, data)]

@@ -228,7 +228,10 @@ class SearchState:
 
     @cached_property
     def log_posterior(self) -> float:
-        """Natural log of prior times evidence of these explanations, summed over compound with and without deviation."""
+        """Natural log of prior times evidence of these explanations, with or without a deviation of the compound.
+
+        The probabilities of both cases are added.
+        """
         total = float(np.logaddexp(self.linear.log_evidence, self.linear.log_evidence_with_compound))
         return self.log_prior + self.log_density + total
 

@@ -28,8 +28,8 @@ class Node:
 
     Args:
         scatter: standard deviation of a sweep's point, relative to the estimated point-to-point noise.
-        errors: standard deviations of errors of a run, a level, drift along a run, and a loop, in units of the rig's
-            class.
+        errors: standard deviations of errors of a run, a level, drift along a run, and a loop, relative to those of
+            the rig's stated class.
         log_weight: natural log of the prior weight.
         wide: True if errors of levels are larger than the class of the rig allows.
         compound: standard deviation of the compound's deviation from the model's laws, relative to |K|.

@@ -281,7 +281,7 @@ class MeasuredLoop(MeasuredBase):
         return float(np.abs(sizes @ self._waves[:, self.weights > 0.0]).max())
 
     def gain_and_offset(self) -> Array:
-        """Change of the whitened residuals by a gain error of 100 % and by an offset of half the force range, (2, size)."""
+        """Change of the whitened residuals by a gain error of 100 %, and by an offset of half the range, (2, size)."""
         offset = np.full(self.drive.force.size, self.drive.half_range)
         return np.array([self._less_shared(self.unit_gain), self._whitened(offset * self._per_noise)])
 

@@ -47,7 +47,7 @@ class Information(NamedTuple):
 
     @property
     def parameters(self) -> Array:
-        """Fisher information of relative changes of the k parameters, one matrix per choice of tests, (choices, k, k)."""
+        """Fisher information of relative changes of the k parameters, a matrix per choice of tests, (choices, k, k)."""
         return self.products[..., : self.products.shape[-2]]
 
     def noncentralities(self) -> Array:

@@ -238,7 +238,11 @@ def point_warnings(
 
 
 def format_deviation(ratios: Array) -> str:
-    """Format the smallest and largest deviation of ratios (measured over model, (n,)) from 1: "+1.2 to +3.4 %"."""
+    """Format the smallest and largest value of ratio - 1 in percent, such as "+1.2 to +3.4 %".
+
+    Args:
+        ratios: ratios of two stiffnesses at the same points, such as model over measurement, (n,).
+    """
     ends = [number(100.0 * end - 100.0, 2, "+") for end in (np.nanmin(ratios), np.nanmax(ratios))]
     return f"{' to '.join(dict.fromkeys(ends))} %"
 

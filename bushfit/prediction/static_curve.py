@@ -31,8 +31,8 @@ class StaticCurve:
         displacement: displacements from the lowest to the highest [m, rad or 1], (n,).
         loading, unloading: force with rising and with falling displacement [N, N m or Pa].
         mean: mean of loading and unloading, the static curve.
-        slope: derivative of the mean by displacement, the static stiffness at each displacement [SI].
-        secant: static stiffness from end to end, (1,) [SI].
+        slope: derivative of the mean by displacement, the static stiffness at each displacement [N/m, N m/rad or Pa].
+        secant: static stiffness from end to end, (1,) [N/m, N m/rad or Pa].
         rate: rate of the motion [m/s, rad/s or 1/s].
         warnings: sentences on extrapolation.
     """
