@@ -129,7 +129,7 @@ def _plain_number(quantity: str, unit: str, example: str, largest: float, smalle
     pattern = re.compile(rf"\s*(\d{{1,4}}(?:\.\d{{1,6}})?)\s*(?:{unit})\s*", re.ASCII | re.IGNORECASE)
 
     def convert(raw: object, _: object) -> float:
-        """Return the number in a text, in the unit of the text."""
+        """Return the number in a text such as "60 Shore A", without conversion of the unit."""
         match = pattern.fullmatch(raw) if isinstance(raw, str) else None
         if not match:
             raise UnitError(f"this is not {quantity}", found=str(raw), expected=f'"{example}"')

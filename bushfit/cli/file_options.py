@@ -140,7 +140,10 @@ def metadata_options(*, sweeps: bool = True) -> Parameter:
 
 
 def history_options() -> Parameter:
-    """Decorator that adds the options on columns and format of a displacement history, received as `test_options`."""
+    """Decorator that adds the options on columns and format of a displacement history to a command.
+
+    The command receives their values in one argument `test_options`, by campaign key.
+    """
 
     def decorate(function: Function) -> Function:
         @wraps(function)
@@ -166,7 +169,16 @@ def history_options() -> Parameter:
 
 
 def _with_test_options(arguments: dict[str, Any], keys: Sequence[str], roles: Sequence[str]) -> dict[str, Any]:
-    """Gather the given arguments among `keys`, --column and --unit in one argument `test_options`."""
+    """Gather the values of the options that describe a test in one argument `test_options`.
+
+    Args:
+        arguments: arguments of the command by name.
+        keys: campaign keys among these arguments.
+        roles: valid roles of columns for --column and --unit, such as "force".
+
+    Returns:
+        The other arguments, and `test_options` with the given values by key, and columns and units by role.
+    """
     test_options = {key: arguments.pop(key) for key in keys}
     test_options["columns"] = _pairs(arguments.pop("columns"), "--column", "force=Kraft", roles)
     test_options["units"] = _pairs(arguments.pop("units"), "--unit", "force=kN", roles)

@@ -103,7 +103,13 @@ def option(names: str, metavar: str | None, words: str | None = None, **more: An
 
 
 def flag(names: str, words: str | None = None, **more: Any) -> Parameter:
-    """Create an option without a value (True if given); with the arguments of `option`."""
+    """Create an option without a value, which is True if given.
+
+    Args:
+        names: names separated by blanks; the last may be the name of the Python argument.
+        words: help text; None if the option shares the text of the next option.
+        **more: further arguments of click.option.
+    """
     return option(names, None, words, is_flag=True, **more)
 
 

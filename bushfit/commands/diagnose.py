@@ -148,7 +148,12 @@ def _require_free_parameter(data: PreparedCampaign, model: Model | None, setting
 
 
 def _with_plan(diagnosis: Diagnosis, campaign: Campaign) -> Diagnosis:
-    """Add the `bushfit plan` command that separates look-alike effects to the next test of an ambiguous diagnosis."""
+    """Add to the next test of an ambiguous diagnosis the command `bushfit plan` that distinguishes its effects.
+
+    Args:
+        diagnosis: the diagnosis; other verdicts are returned unchanged.
+        campaign: campaign of the diagnosis.
+    """
     path = campaign.path
     if diagnosis.verdict != "ambiguous" or path.suffix != ".toml" or not (sets := look_alikes(diagnosis)):
         return diagnosis

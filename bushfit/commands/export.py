@@ -67,7 +67,7 @@ class ExportOutput:
 
     @property
     def document(self) -> ExportDocument:
-        """Content of `export --json`."""
+        """Content of `export --json`: files of each format, and properties of the model that it cannot represent."""
         formats: dict[str, FormatEntry] = {
             name: {"files": list(exported.files), "left_out": list(exported.losses)}
             for name, exported in self.exported.items()

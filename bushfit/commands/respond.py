@@ -74,7 +74,7 @@ class ResponseOutput:
 
     @property
     def document(self) -> Mapping[str, Any]:
-        """Content of `respond --json`."""
+        """Content of `respond --json`: peak and rms force, energy, strain and strain rate of each direction."""
         figures = {str(response.direction): response_figures(response) for response in self.responses}
         return {"directions": figures, "warnings": self.warnings}
 

@@ -303,6 +303,6 @@ def _harmonics(evidence: Evidence, loops: Sequence[MeasuredLoop]) -> Array:
 
 
 def _temperature_step(sweep: MeasuredSweep) -> int | None:
-    """Mean temperature of a sweep in whole steps of `SAME_TEMPERATURE`, to group sweeps; None if unknown."""
+    """Mean temperature of a sweep in whole steps of 2 K, to group sweeps of equal temperature; None if unknown."""
     kelvin = sweep.sweep.temperature
     return None if kelvin is None else round(float(np.mean(kelvin)) / SAME_TEMPERATURE)

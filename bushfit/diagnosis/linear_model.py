@@ -202,7 +202,7 @@ class LinearModel:
 
     @cached_property
     def group_evidence(self) -> list[GroupEvidence]:
-        """Evidence of the tests for each group of columns in `groups`, with rig errors within the stated class."""
+        """Evidence of the tests for each possible explanation in `groups`, with rig errors within the stated class."""
         bent = self._deviation > 0.0
         return [
             self._over_nodes(gains, self._plain, self._over_nodes(gains, bent) if bent.any() else None)

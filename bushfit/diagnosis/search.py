@@ -104,7 +104,7 @@ class Search:
                 del self._known[linear.key]  # no response with it, or far behind
 
     def _log_prior(self, explanation: Explanation) -> float:
-        """Natural log of the prior odds of an explanation; the lowest of its kind if `prior_odds` does not list it."""
+        """Natural log of the prior odds of an explanation; if it is not listed, the lowest odds of its kind."""
         key = explanation.kind, explanation.name
         if key not in self._log_priors:
             self._log_priors[key] = min(odds for (kind, _), odds in self._log_priors.items() if kind == key[0])

@@ -98,7 +98,14 @@ def harmonic_slope(x: Array, shape: Array) -> Array:
 
 
 def _roots(x: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Terms s, D, p, q and z of the formulas in `harmonic_shape`, at the strain amplitude x relative to eps_half."""
+    """Terms of the closed form of the friction loop's first harmonic, see `harmonic_shape`.
+
+    Args:
+        x: strain amplitude over eps_half, not negative, any shape.
+
+    Returns:
+        s = sqrt(x^2 + 6x + 1), D = s + x + 1, p = 1 + 2x/D, q = sqrt(p (p + 2x)) and z = 2x/p, same shape.
+    """
     twice = 2.0 * x
     s = np.sqrt(x * (x + 6.0) + 1.0)
     big = s + x + 1.0

@@ -90,7 +90,7 @@ class History:
 
     @cached_property
     def harmonics(self) -> Array:
-        """Angular frequencies [rad/s] of the entries of `spectrum`, the Fourier transform of the motion."""
+        """Angular frequencies of the entries of the motion's Fourier transform [rad/s]."""
         return 2.0 * np.pi * np.fft.rfftfreq(self.value.shape[-1], self.step)
 
     @cached_property
@@ -176,7 +176,7 @@ class History:
 
     @cached_property
     def _by_factor(self) -> dict[float, History]:
-        """Cache of the histories that `scaled` returns, by factor."""
+        """Cache of the histories of this motion multiplied by a factor, by the factor."""
         return {}
 
 

@@ -91,5 +91,10 @@ def jacobian(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[st
 
 
 def whiten_together(data_sets: Sequence[MeasuredTest], rows: Array) -> Array:
-    """Whiten residuals or derivatives of all tests, (..., n), by the error that `CorrelatedTests` share, if any."""
+    """Whiten residuals or derivatives of all tests by an error that the tests share; unchanged if they share none.
+
+    Args:
+        data_sets: tests, each with its own noise already whitened.
+        rows: residuals or derivatives in units of noise, (..., n).
+    """
     return data_sets.error.whiten(rows) if isinstance(data_sets, CorrelatedTests) else rows

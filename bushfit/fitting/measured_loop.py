@@ -366,7 +366,7 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def _gain(self) -> CommonError | None:
-        """Gain error as a shared error, if the gain error is part of the noise (`gain_weighs`); else None."""
+        """Gain error of the record as an error that all its rows share; None if the weights of residuals exclude it."""
         return CommonError(self.gain_error * self.unit_gain[None]) if self.gain_weighs and self.gain_error else None
 
     @cached_property

@@ -271,7 +271,15 @@ def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
 
 
 def _in_noise(solution: FitResult, tests: Sequence[MeasuredTest]) -> FittedTests:
-    """Build `FittedTests` of a fit with reweighted or thinned tests, without errors of the rig."""
+    """Collect a fit and its tests, with other weights or fewer points, for the estimate of a smooth model error.
+
+    Args:
+        solution: result of the fit.
+        tests: reweighted or thinned tests.
+
+    Returns:
+        Fitted model and tests, without errors of the rig.
+    """
     return FittedTests(solution.moved_to(solution.model, tests), [np.empty((0, test.size)) for test in tests])
 
 

@@ -40,7 +40,7 @@ def outliers_at(
     Args:
         model: fitted model.
         data_sets: tests.
-        outlier_indices: indices of the outliers of each test, (k,) each; None to find them with the model.
+        outlying: indices of the outliers of each test, (k,) each; None to find them with the model.
     """
     numbers = outlying or [data_set.outlier_indices(model) for data_set in data_sets]
     pairs = zip(data_sets, numbers, strict=True)

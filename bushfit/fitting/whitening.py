@@ -52,15 +52,22 @@ class SharedError:
 
     @cached_property
     def share(self) -> Array:
-        """Share, 0 to 1, of the component along `unit` that whitening subtracts in each group, (g,)."""
+        """Share, 0 to 1, of each group's shared component that whitening subtracts, (g,)."""
         return 1.0 - 1.0 / np.sqrt(1.0 + self.variance * self.weight)
 
     def components(self, rows: Array) -> Array:
-        """Sum over each group of the products of its deviations with `unit`, (..., m) -> (..., g)."""
+        """Component of deviations along the shared error: per group, sum of the deviations times their change by it.
+
+        Args:
+            rows: deviations in units of noise, (..., m).
+
+        Returns:
+            Components, (..., g).
+        """
         return np.add.reduceat(rows * self.unit, self.starts, axis=-1)
 
     def whiten(self, rows: Array) -> Array:
-        """Whiten deviations in units of noise, (..., m), by subtracting the share of their component along `unit`."""
+        """Whiten deviations in units of noise, (..., m), by subtracting a share of each group's shared component."""
         if not self.variance.any():
             return rows
         return rows - (self.components(rows) / self.weight * self.share)[..., self.group] * self.unit
@@ -201,7 +208,7 @@ class Whitening:
 
     @cached_property
     def _point(self) -> SharedError:
-        """Model error shared by the repeats of an operating point, acting on deviations in the order of `_by_point`."""
+        """Model error shared by the repeats of an operating point, acting on deviations sorted by operating point."""
         order, starts = self._by_point
         return SharedError(starts, self._block.unit[order], np.full(starts.size, self.model_error**2))
 

@@ -55,7 +55,7 @@ class TestSource:
         return replace(self, test_options={key: value for key, value in self.test_options.items() if key not in keys})
 
     def inspect(self) -> Inspection:
-        """Inspect the test: its kind, contents and oddities, see `opening.inspect_file`."""
+        """Inspect the test: its kind (loop, sweep or raw history), its contents, and anything unusual in it."""
         return inspect_file(self.file, self.test_options, self.of_book)
 
 

@@ -66,7 +66,12 @@ def car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
 
 
 def alternative_models(result: Result, *, rig: bool) -> Iterator[Model]:
-    """Yield each model that the tests do not rule out, with the effects of the rig or as in the car (`car_models`)."""
+    """Yield each model that the tests do not rule out, with the effects of the rig or as in the car (`car_models`).
+
+    Args:
+        result: fitted result.
+        rig: True to keep the effects of the rig, as in the tests.
+    """
     resolved = {*result.model.effects} - {*result.unresolved}
     for model in (alternative.model for alternative in result.alternatives):
         twins = [effect.name for effect in model.records if effect.twins and effect.name not in resolved]

@@ -126,7 +126,11 @@ class Comparison:
         return max(float(np.quantile(largest, 1.0 - CHANCE)) / Z95, 1.0)
 
     def widened(self, band: Band) -> Band:
-        """Widen a pointwise 95 % band by the factor `widening`, to a simultaneous 95 % band."""
+        """Widen a pointwise 95 % band to a simultaneous one, which contains all points together with 95 % probability.
+
+        Args:
+            band: difference of one contrast with its pointwise band.
+        """
         low, high = (band.value + self.widening * (end - band.value) for end in (band.low, band.high))
         return replace(band, low=low, high=high)
 

@@ -142,7 +142,7 @@ class Table(Cells):
 
     @cached_property
     def row_labels(self) -> Mapping[str, tuple[int, Sequence[str]]]:
-        """Index and texts of the columns that state direction, specimen_number and run; see `find_labels`."""
+        """Columns that state direction, specimen_number and run of each row: index and texts, (n,), by these keys."""
         return find_labels(self)
 
     def column(self, role: str, expected: str, hint: str | None = None) -> Column:
@@ -250,7 +250,12 @@ class Table(Cells):
             raise self.header_error(problem, found=f'"{header}" for the {label}', expected=expected, hint=hint)
 
     def read(self, wanted: Mapping[str, Column], *, fewest_rows: int) -> dict[str, Floats]:
-        """Return the values of columns in SI by role, (n,) each; see `read_with_notes`."""
+        """Return the values of columns in SI by role, (n,) each.
+
+        Args:
+            wanted: columns by role, with their factors to SI.
+            fewest_rows: smallest number of rows that is accepted.
+        """
         return self.read_with_notes(wanted, fewest_rows=fewest_rows)[0]
 
     def read_with_notes(

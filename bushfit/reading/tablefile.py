@@ -116,7 +116,7 @@ def in_a_line(text: str) -> str:
 
 
 def unescape_formula(text: str) -> str:
-    """Restore a text from the result of `escape_formula`, except for its line ends and control characters."""
+    """Restore a text from the result of `escape_formula`; line ends and control characters remain escaped."""
     return text[1:] if text.startswith("'") and _FORMULA.match(text[1:]) else text
 
 

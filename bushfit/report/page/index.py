@@ -128,7 +128,7 @@ def index_page(files: Sequence[ResultFile], folder: Path, base: str = "") -> str
 
 
 def part_status(part: PartTable) -> str:
-    """Reason why a part needs attention, such as "fail" or "differs" (one of `_ORDER`); empty if there is none."""
+    """Reason why a part of a batch needs attention, such as "error", "fail" or "differs"; empty if there is none."""
     result = "" if part.result in ("pass", None) else str(part.result)
     if part.deviations and result in ("", "conditional pass"):
         return "differs"

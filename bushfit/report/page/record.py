@@ -111,7 +111,13 @@ def report_record(files: Sequence[ResultFile], folder: Path | None = None) -> Re
 
 
 def _tests(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
-    """Tables `gap`, `sweeps` and `loops` that are known; missing ones of sweeps and loops are taken from the gap."""
+    """Select the tables of measured and modelled tests: `gap`, `sweeps`, `loops`, and validation records.
+
+    Missing tables of sweeps and loops are taken from the table of the gap (measured minus model), if there is one.
+
+    Args:
+        tables: tables of a result by file name.
+    """
     tested = {name: tables[name] for name in ("gap", "sweeps", "loops") if name in tables}
     if "gap" in tested:
         gap = require_columns(tested["gap"], "test", "kind", "direction")

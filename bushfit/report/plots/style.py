@@ -213,7 +213,13 @@ def label_axes(axes: Axes, x_label: str, y_label: str, x: Array | None = None) -
 
 
 def label_left(axes: Axes, label: str, **options: Any) -> None:
-    """Set the label of the y axis of a panel, wrapped to the height of the panel; `options` are text properties."""
+    """Set the label of the y axis of a panel, wrapped to the height of the panel.
+
+    Args:
+        axes: panel.
+        label: text of the label.
+        **options: properties of the text, as matplotlib takes them.
+    """
     whole = re.sub(r"\[.*?\]", lambda unit: unit[0].replace(" ", "\u00a0"), printable(label, lines=True))
     lines = [part for line in whole.splitlines() for part in textwrap.wrap(line, _LABEL_LETTERS)]
     axes.set_ylabel("\n".join(lines), family=fonts(), parse_math=False, **options)
