@@ -33,7 +33,7 @@ _MOST_SHOWN = 10
         type=click.Choice(["run", "fit", "diagnose", "predict", "respond"]),
         multiple=True,
     ),
-    direction_option("Fit the tests in this direction, as in `bushfit fit`."),
+    direction_option("Fit only the tests in this direction (axial, radial, torsion) or of this specimen."),
     effect_option("Add this effect to each model, as in `bushfit fit`."),
     option(
         "--at operating_points",

@@ -71,7 +71,7 @@ def command(
     All tests in all directions are used. The verdict is consistent (nothing is missing), named (one explanation was
     found), ambiguous (several explanations are possible), described (no known effect, but a smooth correction fits),
     partly (a part of the difference stays unexplained) or unexplained. A named effect is added to the model. A mistake
-    in a test file is reported, and corrected only with --adopt.
+    in a test file, such as a wrong unit, is reported; with --adopt, the fit uses the corrected values.
 
     Writes diagnosis.json, model.json with the added effects, gap.csv, candidates.csv, gap.png, report.html.
     """
