@@ -132,7 +132,7 @@ class PowerLaw:
         return ", ".join(parts) + (f": acts like {like}" if like else "")
 
     def _known_law(self) -> str:
-        """Names of the nearest known laws; "" if none is near in phase and powers."""
+        """Names of the known laws (such as spring or damper) nearest in phase and powers; "" if none is near."""
         ends = np.array([self.phase_deg, self.frequency_power, self.amplitude_power])[:, 1:]
         errors = np.maximum(np.ptp(ends, axis=1) / 2.0 / Z95, 1e-9)
         distances = {}

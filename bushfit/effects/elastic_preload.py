@@ -10,6 +10,9 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
         p: parameter values by name, with mu [Pa], factor [1].
         condition: operating condition, not used.
 
+    Returns:
+        The changed values by parameter name.
+
     >>> adjust({"mu": 1e6, "m": 2e5, "factor": 1.1}, None)
     {'mu': 1100000.0}
     """

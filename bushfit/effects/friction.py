@@ -251,10 +251,15 @@ def _stress_at_turning_points(strides: Array, periodic: bool, eps_half: Array) -
 
 
 def _at_samples(eps_half: Array, history: History) -> tuple[Array, Array, Array, Array]:
-    """Relative stress u and du/d(ln eps_half) at the start of each stroke, and sign and length of the travel from it.
+    """Friction stress at the start of each of the k strokes of a motion, and the travel of each of the n samples.
 
-    The stress and its derivative are (..., k); the sign and the relative distance d from the start of the stroke to
-    each sample are (..., n).
+    Args:
+        eps_half: friction parameter [1], (..., 1).
+        history: tensor shear strain e = gamma/2 over time [1], (..., n).
+
+    Returns:
+        Stress u relative to sigma_fmax, and du/d(ln eps_half), at the start of each stroke, (..., k) each; sign of each
+        sample's stroke, and strain since the start of this stroke relative to eps_half, (..., n) each.
     """
     turning, eps_half = history.turning, np.atleast_1d(np.asarray(eps_half, dtype=float))
     sense, distance = np.sign(turning.travel), np.abs(turning.travel) / eps_half

@@ -12,6 +12,9 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
         p: parameter values by name, with m [Pa s^alpha], alpha [1], d [1].
         condition: operating condition, with the strain amplitude.
 
+    Returns:
+        The changed values by parameter name.
+
     Notes: the rate is relative to an intrinsic time z with dz/dt = 1 + d e0/0.01.
 
     >>> model = paper.with_effect("intrinsic_time", {"intrinsic_time.d": 1.0})

@@ -12,6 +12,9 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
         p: parameter values by name, with sigma_fmax [Pa], n [1].
         condition: operating condition, with the frequency.
 
+    Returns:
+        The changed values by parameter name.
+
     >>> model = paper.with_effect("rate_dependent_friction", {"rate_dependent_friction.n": 0.05})
     >>> [round(model.values_at("axial", f, 1e-3)["sigma_fmax"]) for f in (25.0, 155.0)]
     [14600, 15995]

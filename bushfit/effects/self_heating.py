@@ -14,6 +14,9 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
         p: parameter values by name, with all moduli and stresses [Pa], beta [1/W].
         condition: operating condition, with frequency, displacement amplitude and stiffness.
 
+    Returns:
+        The changed values by parameter name.
+
     >>> model = paper.with_effect("self_heating", {"self_heating.beta": 0.01})
     >>> [round(model.values_at("axial", 100.0, x)["mu"]) for x in (1e-4, 1e-3)]
     [1086921, 859815]

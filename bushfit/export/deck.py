@@ -78,7 +78,7 @@ def exported_directions(request: ExportRequest) -> list[Prediction]:
 
 
 def stiffness_tables(prediction: Prediction) -> list[StiffnessTable]:
-    """Split the prediction of one direction into a table for each amplitude, in increasing request."""
+    """Split the prediction of one direction into a table for each amplitude, in ascending order."""
     direction = Direction(str(prediction.direction))
     stiffness = prediction.storage_stiffness.value + 1j * prediction.loss_stiffness.value
     rows = [(amplitude, prediction.amplitude == amplitude) for amplitude in np.unique(prediction.amplitude)]

@@ -54,12 +54,12 @@ class PronySeries:
 
     @property
     def instantaneous(self) -> float:
-        """Instantaneous modulus G_0 [Pa]."""
+        """Instantaneous modulus G_0 [Pa]: long-term modulus plus the moduli of all terms."""
         return self.long_term + float(self.arms.modulus.sum())
 
     @property
     def relative_moduli(self) -> Array:
-        """Relative moduli g_i, (k,)."""
+        """Moduli of the k terms relative to the instantaneous modulus, g_i = G_i/G_0, (k,)."""
         return self.arms.modulus / self.instantaneous
 
 

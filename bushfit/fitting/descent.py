@@ -201,10 +201,16 @@ class Descent:
         return np.maximum(low, self.point - longest), np.minimum(high, self.point + longest)
 
     def _step(self, damping: float) -> tuple[Array, float]:
-        """Damped Gauss-Newton step within the bounds, (k,), and the fall of chi-square expected from the step.
+        """Damped Gauss-Newton step within the bounds, and the fall of chi-square expected from the step.
 
         A parameter that would pass a bound stops there, and the others are solved for again. A parameter at a bound
         whose gradient points outwards does not move, nor does one to which the residuals are insensitive.
+
+        Args:
+            damping: damping of the step, relative to the curvature.
+
+        Returns:
+            Step of the k parameter coordinates, (k,), and the expected fall.
         """
         curvature, slope = self._normal
         size = np.diag(curvature)
@@ -224,7 +230,15 @@ class Descent:
         return step, float(-(2.0 * slope + curvature @ step) @ step)
 
     def _bend(self, step: Array, damping: float) -> Array:
-        """Second-order correction of a damped step, along a curved valley, (k,); 0 if the last step went elsewhere."""
+        """Second-order correction of a damped step, along a curved valley; 0 if the last step went elsewhere.
+
+        Args:
+            step: damped step of the k parameter coordinates, (k,).
+            damping: damping of the step, relative to the curvature.
+
+        Returns:
+            Correction to add to the step, (k,).
+        """
         if self.last is None:
             return np.zeros_like(step)
         before, second = self.last

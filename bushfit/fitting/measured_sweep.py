@@ -243,13 +243,16 @@ class MeasuredSweep(MeasuredBase):
         return self._keep("jacobian", model, tuple(names), self.residual_change(self._slopes(model, names), model))
 
     def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
-        """Derivatives of the whitened residuals by parameter, with a stiffness added, (k, 2 n).
+        """Derivatives by k parameters of the whitened residuals, gains then phases, of a model with an added stiffness.
 
         Args:
-            added: stiffness added to the model's, complex (n,) [N/m or N m/rad].
+            added: stiffness added to the model's at the n points, complex (n,) [N/m or N m/rad].
             model: model at whose values the derivatives are taken.
             names: names of the k parameters.
             as_share: True if the added stiffness remains proportional to the model's; False if it is constant.
+
+        Returns:
+            Derivatives per SI unit of each parameter, (k, 2 n).
         """
         grown = 1.0 + added / self.stiffness(model) if as_share else 1.0
         return self.residual_change(grown * self._slopes(model, names), model, added)
@@ -411,7 +414,7 @@ class MeasuredSweep(MeasuredBase):
         return max(float(np.abs(line.smooth).max()) for line in self.lines(model))
 
     def line_words(self, point: int) -> str:
-        """Text that names the line to which the point with the given index belongs."""
+        """Text that names the line (runs at one held amplitude or frequency) of a point, given by its index."""
         if self.sweep.stepped == "frequency":
             return f"the {self.direction} level {shown_amplitude(self.direction, self.amplitude[point])}"
         if self.sweep.stepped == "amplitude":

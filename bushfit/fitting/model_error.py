@@ -284,5 +284,5 @@ def _in_noise(solution: FitResult, tests: Sequence[MeasuredTest]) -> FittedTests
 
 
 def _thinned(tests: Sequence[MeasuredTest]) -> list[MeasuredTest]:
-    """Reduce dense sweeps to at most 600 evenly chosen points, enough for a smooth discrepancy."""
+    """Reduce dense sweeps to at most 600 evenly chosen points, enough to estimate a smooth error of the model."""
     return [test if isinstance(test, MeasuredLoop) else test.thinned(_ENOUGH) for test in tests]

@@ -74,7 +74,12 @@ def _bound(values: int) -> None:
 
 
 def _in_struct(path: str, content: Mapping[str, Any]) -> Iterator[Group]:
-    """Yield the vectors and matrix columns of a struct as a group of channels, then the groups of structs inside it."""
+    """Yield the vectors and matrix columns of a struct as a group of channels, then the groups of structs inside it.
+
+    Args:
+        path: name of the struct, which names the group.
+        content: variables of the struct by name.
+    """
     channels: list[Channel] = []
     labels: list[tuple[str, str]] = []
     inner: dict[str, Mapping[str, Any]] = {}
