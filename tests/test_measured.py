@@ -53,7 +53,7 @@ def claimed(root: Path) -> re.Match[str]:
     """What the page says: of the campaign, and median and worst of the draws [%]."""
     page = (root / "bushfit/manual/model.md").read_text(encoding="utf-8")
     found = re.search(
-        r"within ([\d.]+) % of the independent.* median\s+error is ([\d.]+) % and the largest ([\d.]+) %",
+        r"within ([\d.]+) % of an? \[independent.*median\s+error is ([\d.]+) % and the largest ([\d.]+) %",
         page,
         re.DOTALL,
     )
