@@ -25,7 +25,7 @@ class SessionTest(NamedTuple):
         amplitude: zero-to-peak amplitudes [m or rad, or strain] of the points in measured order, (n,); one for a loop.
         temperature: temperature [K], a number or (n,); None if not stated.
         order: number of the test in the session, if the campaign states it; None for its position in the list.
-        preload: preload of the test; None if not stated.
+        preload: static displacement [m or rad] or force [N or N m] of the test; None if not stated.
     """
 
     place: Place

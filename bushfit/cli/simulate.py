@@ -45,7 +45,7 @@ if TYPE_CHECKING:
         "SHARE",
         'Gain error shared by all points of a run (one repeat of one amplitude), such as "0.4 %".',
     ),
-    option("--phase-error", "ANGLE", 'Phase error shared by all points of a run, such as "0.2 deg".'),
+    option("--phase-error", "ANGLE", 'Phase error that all points of a run share, drawn for each run: "0.2 deg".'),
 )
 @with_output("results/simulated <name>", "tables")
 def command(source: Path, effects: tuple[str, ...], output: Output, **settings: Any) -> None:

@@ -330,6 +330,11 @@ def _files(
     names = place_names(places)
 
     def draw(prediction: Prediction) -> Figure:
+        """Draw a prediction with the measured sweeps of its direction.
+
+        Returns:
+            Figure with the warnings below it.
+        """
         place = prediction.direction
         measured = [sweep for sweep in drawn_sweeps if sweep.direction == place]
         table = tables.sweeps_table(result.model, measured) if measured else None

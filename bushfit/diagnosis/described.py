@@ -60,7 +60,9 @@ class GapDescription:
 def describe(
     evidence: Evidence, rig: RigSettings, start: Mapping[str, float], fixed: Sequence[str], bounds: Bounds
 ) -> GapDescription | None:
-    """Describe the gap of a fitted model by a smooth correction and the nearest power law.
+    """Describe the gap (measured minus modelled stiffness) by a correction smooth in ln frequency and ln strain.
+
+    The description states the power law of frequency and amplitude that is nearest to the correction.
 
     The form of the gap within a cycle is unknown, so loops are represented by their first harmonic.
 

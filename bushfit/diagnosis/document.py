@@ -27,7 +27,7 @@ class SizeEntry(TypedDict):
 
 
 class EffectEntry(TypedDict):
-    """Effect or mistake in the record that was added, or the first of a set that the tests cannot distinguish."""
+    """Effect, or mistake in a test file, that the diagnosis adds to the model, or the first of an undecided set."""
 
     name: Annotated[str, Doc("name of the effect or mistake.")]
     level: Annotated[

@@ -75,7 +75,9 @@ class RigErrors:
 
     @cached_property
     def combinations(self) -> tuple[Array, Array]:
-        """Distinct combinations of error sizes among the nodes, which may differ in the compound's deviation only.
+        """Distinct combinations of the sizes of the rig's errors among the nodes of the numerical integration.
+
+        Several nodes may share a combination and differ in the size of the compound's deviation alone.
 
         Returns:
             Scatter and sizes of the errors of runs, levels, drift and loops, (combinations, 1 + kinds); and the index

@@ -128,7 +128,7 @@ class LeaveOut:
         return pull
 
     def _rest(self, rows: Array) -> Array:
-        """Fisher information of all rows but the given ones (indices or mask), along the m basis vectors, (m, m)."""
+        """Fisher information of the fit without the given rows (indices or mask), in the basis, (m, m)."""
         return np.eye(self.components.size) - self.basis[rows].T @ self.basis[rows]
 
     def _basis_step(self, rows: Array) -> Array:

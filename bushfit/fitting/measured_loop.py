@@ -101,7 +101,7 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def independent_count(self) -> float:
-        """Effective number of independent residuals for slowly varying errors; smaller if the noise is correlated."""
+        """Number of independent residuals, by which a mean over the loop is uncertain; smaller for correlated noise."""
         return self.residual_count / (1.0 if self.fundamental_only else self.drive.row_noise.rows_as_one)
 
     @property

@@ -205,7 +205,10 @@ def _refuse_complex(channels: Sequence[Channel]) -> None:
 
 
 def _real_channels(channel: Channel, several: bool) -> Iterator[Channel]:
-    """Convert a channel to real ones: dates to seconds, complex values to magnitude and phase, named if `several`."""
+    """Convert a channel to real ones: dates to seconds, complex values to magnitude and phase.
+
+    The two are named after the channel if the file has several.
+    """
     values = channel.values
     if values.dtype.kind == "c" and not np.any(values.imag):
         values = values.real

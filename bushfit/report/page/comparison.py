@@ -35,10 +35,13 @@ _CONDITIONS = ("Temperature", "Preload")
 
 
 def read_comparison(folder: Path) -> list[ResultFile]:
-    """Read and check the comparison in a folder, as the JSON result file `compare`.
+    """Read and check compare.json, the comparison in a folder.
+
+    Returns:
+        Result file of the comparison, as the only element of a list.
 
     Raises:
-        ModelError: a compare.json that is not as bushfit writes it.
+        ModelError: there is no compare.json, or it is not as bushfit writes it.
     """
     file = folder / "compare.json"
     document = read_document(file)
