@@ -220,6 +220,7 @@ def tried(command: str, seed: int, folder: Path) -> tuple[list[str], str]:
         return words, f"{type(error).__name__}: {error}"
     finally:
         gc.unfreeze()  # a command freezes its objects, since its process ends with it
+        gc.collect()
     said = done.stdout + done.stderr + "".join(file.read_text("utf-8") for file in folder.glob("x/batch.csv"))
     if "internal error" in said or "Traceback" in said:
         return words, said[-500:]
