@@ -66,6 +66,7 @@ def written(root: Path, folder: Path) -> Documents:
     run("batch", *batch, *asked, "--limits", "configs/limits.toml", "-o", "batch", status=1)
     run("simulation", "simulate", "run/model.json", "-o", "simulated")
     run("export", "export", "run/model.json", "--format", "nastran", "--format", "xlsx", "-o", "exported")
+    run("response", "respond", "data/arm_bushing/truth.json", "data/road/axial_radial.csv", "-o", "response")
     loop, sweep = ("data/cmp_15961/loop_axial_1.csv", "data/cmp_15961/sweep_axial.csv")
     run("inspection", "inspect", loop, sweep)
     run("reduction", "reduce", "data/cmp_15961_raw/stepped_sine_axial.csv", "-o", "reduced")

@@ -127,4 +127,4 @@ def test_a_million_rows(bushfit: Run, tmp_path: Path) -> None:
     motion = sum(np.sin(2.0 * np.pi * f * time + p) for f, p in random.uniform(0.5, 7.0, (20, 2)))
     road = write(tmp_path, time__s=time, axial_displacement__mm=0.05 * motion)
     bushfit("respond", "model", road, "-o", tmp_path / "out")
-    assert sum(1 for _ in (tmp_path / "out/response.csv").open()) == 1_000_001
+    assert (tmp_path / "out/response.csv").read_bytes().count(b"\n") == 1_000_001

@@ -273,6 +273,8 @@ def _noise_free_data(model: Model, plan: SimulateSettings) -> list[MeasuredTest]
 def hideable() -> list[str]:
     """Effects of the library of today that the rig can make and the tests of a hidden campaign can show."""
     out_of_reach = {
-        name for name, effect in LIBRARY.items() if effect.harmonic_only or effect.after not in (None, *BASE)
+        name
+        for name, effect in LIBRARY.items()
+        if effect.harmonic_only or effect.after not in (None, *BASE) or "preload" in effect.depends_on
     }
     return [name for name in LIBRARY if name not in {*BASE, *out_of_reach}]
