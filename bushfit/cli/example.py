@@ -17,13 +17,12 @@ def command(output: Output) -> None:
     """
     from bushfit import simulation
     from bushfit.campaign.campaign import load_campaign, model_of
-    from bushfit.campaign.schema import SimulateSettings
     from bushfit.commands.simulate import simulate_campaign
     from bushfit.errors import quote_path
 
     campaign = load_campaign(Path(simulation.__file__).with_name("example.toml"))
-    tests = campaign.simulate or SimulateSettings()
-    simulated = simulate_campaign(model_of(campaign), tests, output.formats.table_form)
+    assert campaign.simulate  # which the file has
+    simulated = simulate_campaign(model_of(campaign), campaign.simulate, output.formats.table_form)
     folder = output.output or Path("bushfit-example")
     output.write(folder, simulated.files, simulated.document)
     output.print(f"next: bushfit run {quote_path(folder / 'campaign.toml')}")

@@ -258,7 +258,9 @@ def with_output(folder: str, *written: Written) -> Parameter:
 def _trust(_: click.Context, __: click.Parameter, is_given: bool) -> None:
     """Permit to run the Python file of an effect, in this process and in those that it starts."""
     if is_given:
-        os.environ["BUSHFIT_TRUST"] = "1"
+        from bushfit.model.laws import TRUST
+
+        os.environ[TRUST] = "1"
 
 
 def _column_widths(columns: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int, width: int) -> list[int]:

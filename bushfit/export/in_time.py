@@ -211,7 +211,7 @@ def _steady_losses(model: Model, omitted: list[str], prediction: Prediction, con
         prediction: dynamic stiffness over the grid of the export.
         conditions: temperature of the rubber.
     """
-    fixed = [effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.shift_factor]
+    fixed = model.constant_modifiers
     if not (fixed or omitted):
         return []
     place, (frequency, amplitude) = prediction.direction, middle_point(prediction)

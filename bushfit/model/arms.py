@@ -11,7 +11,7 @@ from operator import itemgetter
 
 import numpy as np
 
-from bushfit.effects import Branch, Modifier, qualified_name
+from bushfit.effects import Branch, qualified_name
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Values
 from bushfit.errors import ModelError
 from bushfit.geometry import Specimen
@@ -219,10 +219,7 @@ def values_under(model: Model, conditions: RubberConditions) -> Values:
     """Parameter values [SI] of a model at the temperature of a test; unchanged if the temperature is unknown."""
     if conditions.temperature is None:
         return model.values
-    other_modifiers = [
-        effect.name for effect in model.records if isinstance(effect, Modifier) and not effect.shift_factor
-    ]
-    return model.without(*other_modifiers).values_at(Specimen("compound", "modulus"), 1.0, 0.0, conditions)
+    return model.without(*model.constant_modifiers).values_at(Specimen("compound", "modulus"), 1.0, 0.0, conditions)
 
 
 def _basis(omega: Array, time: Array) -> Array:

@@ -85,6 +85,16 @@ class Model:
         return self.structure.viscoelastic
 
     @property
+    def without_time_law(self) -> list[str]:
+        """Names of the effects of which only the steady first harmonic is known, and no law in time."""
+        return [effect.name for effect in self.records if effect.harmonic_only]
+
+    @property
+    def constant_modifiers(self) -> list[str]:
+        """Names of the modifiers, other than temperature shifts, which a motion through time uses at one amplitude."""
+        return [effect.name for effect in self.structure.modifiers if not effect.shift_factor]
+
+    @property
     def only_branches(self) -> bool:
         """True if the model consists of branches only: their stresses add up, and no modifier and no layer acts."""
         return len(self.structure.branches) == len(self.records)

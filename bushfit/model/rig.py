@@ -118,11 +118,10 @@ def imposed(
     Raises:
         ModelError: an effect of the model has no equation in time.
     """
-    untimed = [effect.name for effect in model.records if effect.harmonic_only]
-    if untimed:
+    if model.without_time_law:
         raise ModelError(
             "the rig follows a motion through time, for which this effect has no law",
-            place=untimed[0],
+            place=model.without_time_law[0],
             found="a law of the steady first harmonic alone",
             expected="effects with a law in time",
             hint="ask predict for the stiffness of the steady state",

@@ -6,7 +6,6 @@ import numpy as np
 from scipy.fft import next_fast_len
 from scipy.signal import hilbert
 
-from bushfit.effects import Modifier
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.effects.history import History
 from bushfit.effects.unnamed import NAME as UNNAMED
@@ -192,10 +191,7 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
         )
     if left_out:
         warnings.append(f"{place}: {' and '.join(left_out)} left out, without a law for this motion")
-    constant = [
-        effect.name for effect in result.model.records if isinstance(effect, Modifier) and not effect.shift_factor
-    ]
-    if constant:
+    if constant := result.model.constant_modifiers:
         unit, factor = place.display.displacement
         sine = f"{number(history.frequency, 3)} Hz and {number(factor * history.amplitude.item(), 3)} {unit}"
         warnings.append(f"{place}: {' and '.join(constant)} constant, as in a sine of {sine}")

@@ -123,16 +123,14 @@ def superposed_stiffness_and_slopes(
     return response[0], response[1:]
 
 
-def has_time_law(model: Model) -> bool:
-    """True if all effects of the bushing have a law in time; the correction without a name acts on its harmonic."""
-    effects = model.without(Level.INSTRUMENT).records
-    return not any(effect.harmonic_only and effect.name != UNNAMED for effect in effects)
+def untimed_effects(model: Model) -> list[str]:
+    """Names of the effects of the bushing without a law in time, except the correction without a name."""
+    return [name for name in model.without(Level.INSTRUMENT).without_time_law if name != UNNAMED]
 
 
 def require_time_law(model: Model) -> None:
     """Raise a ModelError if an effect of the bushing has no law in time."""
-    if not has_time_law(model):
-        names = [effect.name for effect in model.records if effect.harmonic_only]
+    if names := untimed_effects(model):
         raise ModelError(
             "this needs a law in time, which an effect of the model does not have",
             place=" and ".join(names),

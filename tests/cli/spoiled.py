@@ -9,6 +9,7 @@ from itertools import cycle
 from typing import Any
 
 import numpy as np
+from shell import RUBBER
 from spoiled_campaigns import IN_CAMPAIGN, IN_MORE, WHOLE_CAMPAIGNS
 from spoiled_models import IN_MODEL, IN_PREDICTED, WHOLE_MODELS
 from spoiled_tables import IN_LOOP, IN_RESONANCE, IN_SWEEP
@@ -30,7 +31,8 @@ file = "sweep.csv"
 direction = "axial"
 """
 #: As much again, for keys that the plain campaign does not use.
-MORE = """
+MORE = (
+    """
 [fit]
 dynamic_amplitudes = ["0.1 mm"]
 residuals = "complex"
@@ -57,12 +59,9 @@ repeats = 3
 noise = "0.5 %"
 phase_error = "0.15 deg"
 
-[simulate.parameters]
-mu = "1.09 MPa"
-m = "0.2 MPa*s^alpha"
-alpha = 0.24
-sigma_fmax = "14.6 kPa"
-eps_half = 0.013
+"""
+    + RUBBER
+    + """\
 
 [simulate.effects.inertia]
 mass = "0.1 kg"
@@ -90,6 +89,7 @@ mass = "0.25 kg"
 base_acceleration = "0.1 g"
 frequencies = { start = "50 Hz", stop = "500 Hz", step = "10 Hz" }
 """
+)
 MODEL: dict[str, Any] = {
     "schema": "bushfit/model/1",
     "bushing": {"name": "Test bushing", "inner_radius_m": 0.01, "outer_radius_m": 0.018, "length_m": 0.034},

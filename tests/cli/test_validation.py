@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from shell import BUSHING, Run
+from shell import BUSHING, RUBBER, Run
 
 SIMULATED = f"""{BUSHING}
 [simulate]
@@ -16,13 +16,7 @@ repeats = 3
 noise = "0.3 %"
 force_noise = "0.2 %"
 
-[simulate.parameters]
-mu = "1.09 MPa"
-m = "0.2 MPa*s^alpha"
-alpha = 0.24
-sigma_fmax = "14.6 kPa"
-eps_half = 0.013
-
+{RUBBER}
 [simulate.effects.inertia]
 mass = "0.2 kg"
 

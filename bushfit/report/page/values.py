@@ -11,7 +11,7 @@ from bushfit.prediction.bands import Band
 from bushfit.prediction.caveats import agrees_within_noise
 from bushfit.prediction.static_curve import static_curve, static_rate
 from bushfit.prediction.stiffness import Prediction, predict
-from bushfit.prediction.superposed import has_time_law
+from bushfit.prediction.superposed import untimed_effects
 from bushfit.report.page.record import ReportRecord
 from bushfit.report.tables import spread
 from bushfit.units import display_unit, format_aligned, format_range, number
@@ -63,7 +63,7 @@ def headline(record: ReportRecord, prediction: Prediction) -> dict[str, str]:
         "accuracy": "",
         "basis": basis(record, str(place)),
     }
-    if lowest < frequency and lowest <= _STATIC and has_time_law(result.model):
+    if lowest < frequency and lowest <= _STATIC and not untimed_effects(result.model):
         curve = static_curve(result, place, amplitude, static_rate(result, place))
         static, ratio = to_unit * float(curve.secant.value[0]), float(point.stiffness.value[0] / curve.secant.value[0])
         relative = [band.root[:, 0] / band.value[0] for band in (point.stiffness, curve.secant)]
