@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from bushfit.model.result import ExpectedError, Misfit, Result
     from bushfit.prediction.validation import Validation
 
-#: Correlation between two parameters above which it is shown without -v: the data determine only their combination.
-_STRONG_CORRELATION = 0.9
 #: Largest number of tests that are shown without -v, those with the largest misfit.
 _MOST_TESTS = 8
 
@@ -52,6 +50,8 @@ def print_result(output: Output, title: str, result: Result) -> None:
         title: title above the parameters.
         result: fit result.
     """
+    from bushfit.report.parameters import correlation_texts
+
     print_parameters(output, title, result)
     if quality := result.quality:
         gain = quality.loop_gain_error
@@ -61,13 +61,8 @@ def print_result(output: Output, title: str, result: Result) -> None:
             f"over {quality.points} points, noise {number(100 * quality.noise, 2)} % per point{loops}"
         )
     print_tests(output, result.tests, result.usable)
-    correlations = [
-        pair for pair in result.covariance.correlations() if output.verbose or abs(pair[2]) > _STRONG_CORRELATION
-    ]
-    if correlations:
-        output.print(
-            "correlation: " + ", ".join(f"{first}/{second} {value:+.2f}" for first, second, value in correlations)
-        )
+    if correlations := correlation_texts(result, 0.0) if output.verbose else correlation_texts(result):
+        output.print(f"correlation: {correlations}")
 
 
 def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[ExpectedError]) -> None:

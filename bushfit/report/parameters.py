@@ -14,6 +14,8 @@ _PLAIN_DIGITS = 4
 #: Smallest and largest number of significant digits of a value, whatever its standard error is.
 _FEWEST_DIGITS = 2
 _MOST_DIGITS = 6
+#: Correlation of two parameters above which it is reported: the data determine only their combination.
+_STRONG_CORRELATION = 0.9
 
 
 class ParameterRow(NamedTuple):
@@ -46,6 +48,12 @@ class ParameterRow(NamedTuple):
 def interval_kind(result: Result) -> str:
     """Column heading of the intervals of a result: by profile likelihood or from the standard errors."""
     return "95 % by profile" if result.profile else "95 % interval"
+
+
+def correlation_texts(result: Result, minimum: float = _STRONG_CORRELATION) -> str:
+    """Pairs of parameters whose correlation is at least `minimum` in size, the strongest first: "mu/m -0.96, ..."."""
+    pairs = [pair for pair in result.covariance.correlations() if abs(pair[2]) > minimum]
+    return ", ".join(f"{first}/{second} {value:+.2f}" for first, second, value in pairs)
 
 
 def parameter_rows(result: Result) -> Iterator[ParameterRow]:

@@ -21,7 +21,7 @@ from bushfit.report import plots
 from bushfit.report.page.record import ReportRecord
 from bushfit.report.page.svg import Picture, picture
 from bushfit.report.page.values import headline, value_rows
-from bushfit.report.parameters import interval_kind, parameter_rows
+from bushfit.report.parameters import correlation_texts, interval_kind, parameter_rows
 from bushfit.report.tables import DISPLAYS, missing_column
 from bushfit.units import CELSIUS, display_unit, format_aligned, format_range, number
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from bushfit.report.plots.style import Chart
 
 #: Functions that make the figures of a page, by file name of the figure and heading in the page.
-_Figures = dict[tuple[str, str], "Callable[[], Chart | None]"]
+_Figures = dict[tuple[str, str], "Callable[[], Chart]"]
 #: CSS class that colours each verdict; all others are "fair".
 _TONES = {"consistent": "good", "named": "good", "unexplained": "bad"}
 #: Consequence of each verdict for the use of the numbers.
@@ -79,7 +79,7 @@ def report_context(record: ReportRecord) -> dict[str, Any]:
     predictions = [*record.predictions.values()][:_MOST_PLACES]
     place_warnings = [prediction.warnings for prediction in record.predictions.values()]
     warnings = warnings_of(result, place_warnings, diagnosis["warnings"] if diagnosis else ())
-    pictures, appendix, left_out = draw_figures(record)
+    pictures, left_out = draw_figures(record)
     sizes = [p.stiffness.value for p in predictions if p.direction.motion is TRANSLATION]
     ends = [20.0 * math.log10(end) for end in (min(map(np.min, sizes)), max(map(np.max, sizes)))] if sizes else []
     named = [(file.file, file.sha256) for file in ([campaign] if campaign else []) + [*tests]]
@@ -99,12 +99,12 @@ def report_context(record: ReportRecord) -> dict[str, Any]:
         "effects": [(effect, [*effect_sizes(effect)]) for effect in diagnosis["effects"]] if diagnosis else [],
         "odds": format_odds(diagnosis) if diagnosis else [],
         "pictures": pictures,
-        "appendix": appendix,
         "left_out": left_out,
         "rows": list(parameter_rows(result)),
         "interval": interval_kind(result),
         "plain": {row.name: row.value for row in parameter_rows(record.joint)} if record.joint else {},
         "quality": result.quality,
+        "correlations": correlation_texts(result),
         "model_error": result.model_error is not None,
         "equation": result.model.equation().splitlines()[0],
         "tests": test_rows(record),
@@ -121,55 +121,48 @@ def report_context(record: ReportRecord) -> dict[str, Any]:
     }
 
 
-def draw_figures(record: ReportRecord) -> tuple[list[Picture], list[Picture], bool]:
-    """Draw the figures of a report and of its appendix, as many as fit the size limit of the page.
+def draw_figures(record: ReportRecord) -> tuple[list[Picture], bool]:
+    """Draw the figures of a report, as many as fit the size limit of the page.
 
-    The report shows predictions with measurements, measured minus model, and loops. The appendix shows the residuals of
-    the sweeps if there is no map of measured minus model, storage and loss stiffness, and confidence ellipses.
+    The figures are predictions with measurements, measured minus model (without a diagnosis: sweeps and their
+    residuals), loops, and validation records.
 
     Args:
         record: records of the result.
 
     Returns:
-        Figures of the report, figures of the appendix, and True if figures of the report are missing.
+        Figures of the report, and True if further figures are left out.
     """
     result, diagnosis = record.result, record.diagnosis
     sweeps, loops, gap = (record.tables.get(name) for name in ("sweeps", "loops", "gap"))
-    places = [*record.predictions.items()][:_MOST_PLACES]
-    drawn_sweeps = sweeps_beside(sweeps, result)
-    page, appendix = _Figures(), _Figures()
-    for name, prediction in places:
+    drawn_sweeps, figures = sweeps_beside(sweeps, result), _Figures()
+    for name, prediction in [*record.predictions.items()][:_MOST_PLACES]:
         title = f"{prediction.direction}: prediction and measurement"
-        page[name, title] = partial(plots.prediction.prediction_figure, result, prediction, drawn_sweeps, result.name)
+        draw = plots.prediction.prediction_figure
+        figures[name, title] = partial(draw, result, prediction, drawn_sweeps, result.name)
     if gap is not None and diagnosis is not None:
-        page["gap", "Measured minus model"] = partial(plots.gap.gap_figure, gap, result, diagnosis, result.name)
+        figures["gap", "Measured minus model"] = partial(plots.gap.gap_figure, gap, result, diagnosis, result.name)
+    elif sweeps is not None:
+        title = "Sweeps and their residuals"
+        figures["sweeps", title] = partial(plots.fits.sweeps_figure, result, sweeps, result.name)
     if loops is not None:
-        page["loops", "Hysteresis loops"] = partial(plots.fits.loops_figure, result, loops, result.name)
+        figures["loops", "Hysteresis loops"] = partial(plots.fits.loops_figure, result, loops, result.name)
     for name, table in record.tables.items():
         if name.startswith("validation_"):
             title = f"Validation record {name.removeprefix('validation_')}, never fitted"
-            page[name, title] = partial(plots.response.response_figure, result.name, table)
-    if sweeps is not None and gap is None:
-        title = "Sweeps and their residuals"
-        appendix["sweeps", title] = partial(plots.fits.sweeps_figure, result, sweeps, result.name)
-    for name, prediction in places:
-        if np.unique(prediction.frequency).size > 1:
-            title = f"{prediction.direction}: storage and loss stiffness, Cole-Cole diagram"
-            appendix[f"{name}, parts", title] = partial(plots.appendix.complex_figure, result, prediction, sweeps, "")
-    title = "Confidence regions of pairs of parameters"
-    appendix["ellipses", title] = partial(plots.appendix.ellipses_figure, result, "")
+            figures[name, title] = partial(plots.response.response_figure, result.name, table)
     pictures, room = list[Picture](), _LARGEST_FIGURES
-    for (name, title), make in (page | appendix).items():
+    for (name, title), make in figures.items():
         try:
             chart = record.charts[name].content if name in record.charts else make()
         except KeyError as error:  # of pandas, with the header
             raise missing_column(str(error.args[0])) from error
-        if chart is not None and room > 0:
-            drawing = picture(chart, f"f{len(pictures)}-", title)
-            room -= len(drawing.svg)
-            pictures += [drawing] * (room > 0)
-    left_out = len(pictures) < len(page) or len(record.predictions) > _MOST_PLACES
-    return pictures[: len(page)], pictures[len(page) :], left_out
+        drawing = picture(chart, f"f{len(pictures)}-", title)
+        room -= len(drawing.svg)
+        if room <= 0:
+            break
+        pictures.append(drawing)
+    return pictures, len(pictures) < len(figures) or len(record.predictions) > _MOST_PLACES
 
 
 def sweeps_beside(sweeps: pd.DataFrame | None, result: Result) -> pd.DataFrame | None:

@@ -54,27 +54,22 @@ def picture(chart: Chart, name: str, title: str) -> Picture:
     Returns:
         Title, caption and drawing for the template.
     """
-    width, height = 72.0 * chart.get_size_inches()
-    edges = chart.heading.get_window_extent().y0, chart.footer.get_window_extent().y1
-    top, bottom = (height * (1.0 - edge / chart.bbox.height) for edge in edges)
-    for text in (chart.heading, chart.footer):
-        text.set_visible(False)
-    image = plots.style.to_image(chart, "svg", outlines=False)
-    for text in (chart.heading, chart.footer):
-        text.set_visible(True)
+    with chart.panels_alone():
+        width, height = 72.0 * chart.get_size_inches()
+        image = plots.style.to_image(chart, "svg", outlines=False)
+        axes = list(panel_axes(chart))
     ElementTree.register_namespace("", _SVG.strip("{}"))
     root = ElementTree.parse(io.BytesIO(image)).getroot()
     _rewrite(root, name)
     _share_attributes(root)
-    _unwrap(root)
     root.attrib.clear()
     root.attrib |= {
-        "viewBox": f"0 {top:.1f} {width:.1f} {bottom - top:.1f}",
+        "viewBox": f"0 0 {width:.1f} {height:.1f}",
         "role": "img",
         "aria-label": f"{title}. {chart.caption}".strip(". "),
         "stroke-linejoin": "round",
         "font-family": _FAMILY,
-        "data-axes": json.dumps(list(panel_axes(chart)), separators=(",", ":")),
+        "data-axes": json.dumps(axes, separators=(",", ":")),
     }
     svg = ElementTree.tostring(root, encoding="unicode").replace("\n", "").replace(" />", "/>")
     return Picture(title, chart.caption, Markup(re.sub(r">\s+<", "><", svg)))
@@ -148,12 +143,3 @@ def _share_attributes(root: ElementTree.Element) -> None:
                 group.set(key, value)
                 for child in children:
                     del child.attrib[key]
-
-
-def _unwrap(parent: ElementTree.Element) -> None:
-    """Replace groups without attributes by their children."""
-    children = []
-    for child in list(parent):
-        _unwrap(child)
-        children += list(child) if child.tag == f"{_SVG}g" and not child.attrib else [child]
-    parent[:] = children

@@ -15,7 +15,6 @@ from bushfit.errors import BushfitError
 
 if TYPE_CHECKING:
     from bushfit.report.plots import (  # noqa: F401
-        appendix,
         batch,
         fits,
         gap,

@@ -28,8 +28,8 @@ from bushfit.report.plots.measured import (
     sweep_groups,
 )
 
-#: Heights [cm]: row of a map; smallest and largest map; colour bar; panel of loops.
-_LEVEL, _LEAST_MAP, _LARGEST_MAP, _SCALE, _LOOPS = 0.6, 1.9, 4.2, 0.5, 4.4
+#: Heights [cm]: row of a map; smallest and largest map; colour bar; panel of loops; labels of a row of panels.
+_LEVEL, _LEAST_MAP, _LARGEST_MAP, _SCALE, _LOOPS, _LABELS = 0.6, 1.9, 4.2, 0.5, 4.4, 0.85
 #: Largest number of rows of a map (each then 1.7 mm high) and of cells of a row (each then 1 mm wide).
 _MOST_ROWS, _MOST_COLUMNS = 24, 60
 #: Percentages at which the colour changes.
@@ -65,9 +65,8 @@ def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any]
     loops = list(loops_by_direction(table[table["kind"] == "loop"], result))
     heights = [2.0 * min(max(_LEVEL * len(rows), _LEAST_MAP), _LARGEST_MAP) for _, rows in maps]
     heights += [_SCALE] * bool(maps) + [_LOOPS] * len(loops)
-    figure = style.Chart(
-        f"{title}, {diagnosis['verdict']}: {diagnosis['summary']}", sum(heights) + 2.0 * len(heights) * style.LINE
-    )
+    whole_title = f"{title}, {diagnosis['verdict']}: {diagnosis['summary']}"
+    figure = style.Chart(whole_title, sum(heights) + _LABELS * len(heights))
     grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     first: list[Axes] = []
     if maps:

@@ -33,8 +33,8 @@ from bushfit.report.tables import shortened, spread
 _WIDTH = 16.0
 #: Height of a panel with its labels [cm]: two in a row are a little wider than high.
 ROW = 5.4
-#: Height of a title and an explanation of two lines, and of a further line [cm].
-_FRAME, LINE = 2.0, 0.42
+#: Heights [cm]: margin above a title and below an explanation, with the gap to the panels, and a line of each.
+_MARGIN, _TITLE_LINE, _NOTE_LINE = 0.4, 0.42, 0.33
 #: Sizes of the labels of axes, and of ticks, legends and explanations [point]: the smallest that is readable in print.
 TEXT, SMALL = 8.5, 7.5
 #: Marker options of a measured point, and of one of thousands of points.
@@ -135,12 +135,11 @@ class Chart(Figure):
     """
 
     def __init__(self, title: str, height: float) -> None:
-        self._lines = textwrap.wrap(printable(title, lines=True), _TITLE_LETTERS)
-        self._height = height + _FRAME + LINE * max(0, len(self._lines) - 1)
-        super().__init__(figsize=(_WIDTH / 2.54, self._height / 2.54), dpi=_DPI, facecolor="white")
+        self._title, self._panel_height = printable(title, lines=True), height
+        super().__init__(figsize=(_WIDTH / 2.54, height / 2.54), dpi=_DPI, facecolor="white")
 
     def explain(self, *sentences: str, note: str = "") -> Self:
-        """Add title and explanation to the figure, and compute the layout of its panels.
+        """Compute the layout of the panels, and add title and explanation above and below them.
 
         Args:
             sentences: explanation of lines, shaded bands and points; empty ones are omitted.
@@ -149,16 +148,38 @@ class Chart(Figure):
         Returns:
             The figure itself, ready to be written in any format.
         """
+        self.tight_layout(pad=0.5, h_pad=0.9, w_pad=1.2)
+        self._panel_ends = self.subplotpars.bottom, self.subplotpars.top
         self.caption = printable(" ".join(filter(None, sentences)), lines=True)
+        title = textwrap.wrap(self._title, _TITLE_LETTERS)
         lines = textwrap.wrap(f"{self.caption} {printable(note, lines=True)}", _NOTE_LETTERS)
-        height = self._height + LINE * max(0, len(lines) - 2)
-        self.set_figheight(height / 2.54)
+        self._margins = _MARGIN + _TITLE_LINE * len(title), _MARGIN + _NOTE_LINE * len(lines)
+        height = self._panel_height + sum(self._margins)
         bold: dict[str, Any] = {"fontsize": TEXT + 1.5, "weight": "bold", "family": fonts(), "parse_math": False}
-        self.heading = self.suptitle("\n".join(self._lines), y=1.0 - 0.25 / height, **bold)
+        self.heading = self.suptitle("\n".join(title), y=1.0 - 0.25 / height, **bold)
         small: dict[str, Any] = {"fontsize": SMALL, "color": GREY, "parse_math": False}
         self.footer = self.supxlabel("\n".join(lines), x=0.01, y=0.2 / height, ha="left", **small)
-        self.tight_layout(pad=0.5, h_pad=0.9, w_pad=1.2)
+        self._place_panels(*self._margins)
         return self
+
+    def _place_panels(self, above: float, below: float) -> None:
+        """Set the space above and below the panels [cm]; the panels keep their size and their distances."""
+        height = above + self._panel_height + below
+        ends = ((below + end * self._panel_height) / height for end in self._panel_ends)
+        self.set_figheight(height / 2.54)
+        self.subplots_adjust(**dict(zip(("bottom", "top"), ends, strict=True)))
+
+    @contextmanager
+    def panels_alone(self) -> Iterator[None]:
+        """Context in which the figure consists of its panels, whatever its title and explanation are."""
+        texts = self.heading, self.footer
+        for text in texts:
+            text.set_visible(False)
+        self._place_panels(0.0, 0.0)
+        yield
+        self._place_panels(*self._margins)
+        for text in texts:
+            text.set_visible(True)
 
 
 class Style(NamedTuple):

@@ -50,7 +50,7 @@ def test_run_writes_a_whole_page_that_loads_nothing_and_its_folder_gives_the_sam
     assert sections == ["result", "figures", "parameters", "tests", "appendix"]
     assert len(page.encode()) < LARGEST
     described = [value for tag, key, value in found.attributes if (tag, key) == ("svg", "aria-label")]
-    assert len(described) == found.counts["svg"] >= 6
+    assert len(described) == found.counts["svg"] >= 4
     assert min(map(len, described)) > 40
     assert not [key for _, key, _ in found.attributes if key == "style"], "a content policy would drop it"
     assert parsed(made_of(results(name))).text == found.text
@@ -167,18 +167,15 @@ def test_a_logo_that_cannot_be_shown_is_refused(root: Path, tmp_path: Path, cont
 
 
 def test_points_are_those_of_the_tables(results: Results) -> None:
-    """Means of the repeats over frequency and over amplitude, and their storage and loss, within half a point."""
+    """Means of the repeats over frequency and over amplitude, within half a point."""
     folder = results("cmp_15961")
     sweeps = pd.read_csv(folder / "sweeps.csv").query("direction == 'radial'")
     means = sweeps.groupby(["frequency [Hz]", "amplitude [mm]"])[["stiffness [N/mm]", "loss factor [-]"]].mean()
     points = means.reset_index().to_numpy().T
-    storage = points[2] / np.sqrt(1.0 + points[3] ** 2)
     over_frequency = drawn(page_of(folder), "radial: prediction and measurement")
-    complex_plane = drawn(page_of(folder), "radial: storage and loss stiffness, Cole-Cole diagram")
     for panels, quantities in (
         (over_frequency[:2], (points[[0, 2]], points[[0, 3]])),
         (over_frequency[2:], (points[[1, 2]], points[[1, 3]])),
-        (complex_plane, (np.stack([points[0], storage]), np.stack([points[0], points[3] * storage]))),
     ):
         for panel, expected in zip(panels, quantities, strict=False):
             scale = np.ptp(expected, axis=1, keepdims=True)
