@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import os
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +27,6 @@ from bushfit.units import display_unit, number
 
 if TYPE_CHECKING:
     from bushfit.commands.plan import PlanOutput
-    from bushfit.planning.campaign import Check
     from bushfit.planning.document import DetectableEntry, PlanFile
 
 #: Maximum of --hours; larger values are typing errors.
@@ -83,16 +80,6 @@ _MOST_VALUES = 6
     ),
 )
 @option_group("Range of later predictions", grid_options("from the campaign"))
-@option_group(
-    "Check by simulation",
-    option(
-        "--check count",
-        "N",
-        "Check the predicted accuracy: simulate and fit the planned tests N times.",
-        type=click.IntRange(2, 100_000),
-    ),
-    option("--seed", "N", "Seed of the random numbers [0].", type=click.IntRange(0), default=0),
-)
 @with_output("results/plan <name>", "tables", "pictures")
 def command(
     source: Path,
@@ -103,8 +90,6 @@ def command(
     rivals: str | None,
     targets: tuple[str, ...],
     campaign: Path | None,
-    count: int | None,
-    seed: int,
     output: Output,
     **grids: str | None,
 ) -> None:
@@ -143,8 +128,6 @@ def command(
     with error_location(source):
         outcome = plan(opened, settings_campaign, **settings)
     _print_plan(output, outcome)
-    if count and outcome.plan.planned.tests:
-        outcome = replace(outcome, check=_simulate_plan(output, outcome, count, seed))
     output.write(folder, outcome.files, outcome.document, [source, *([campaign] if campaign else [])])
     if outcome.plan.planned.tests:
         output.print(f"next: make the tests in the order of {folder / output.formats.table('plan')}")
@@ -248,32 +231,3 @@ def _print_effects(output: Output, document: PlanFile) -> None:
         words = ["none" if size is None else number(size * factor, 3) for size in sizes]
         rows.append((name, amounts["parameter"], *words, unit))
     output.print_table(title, ("effect", "amount", "plan", "standard", "unit"), rows, text_columns=2)
-
-
-def _simulate_plan(output: Output, outcome: PlanOutput, count: int, seed: int) -> Check:
-    """Simulate and fit the planned tests several times, and print predicted and observed standard errors.
-
-    Args:
-        output: output of the command.
-        outcome: the plan.
-        count: number of simulated campaigns.
-        seed: seed of the first campaign.
-    """
-    from bushfit.batch.executor import local_workers, run_rows
-    from bushfit.planning.campaign import RelativeErrors, check
-    from bushfit.progress import track
-
-    def run_all(seeds: Sequence[int], work: Callable[[int], RelativeErrors]) -> Iterator[tuple[int, RelativeErrors]]:
-        finished = run_rows(seeds, work, lambda _: None, local_workers(os.cpu_count() or 1))
-        return track("campaigns simulated and fitted", finished, count)
-
-    result = check(outcome.plan, count, seed, run_all)
-    title = f"{len(result.deviations)} simulated campaigns from seed {result.seed} on: standard errors [%]"
-    rows, (low, high) = [], result.interval
-    for name, *sizes in zip(result.names, result.predicted, result.observed, low, high, strict=True):
-        predicted, observed, *ends = (number(100.0 * size, 3) for size in sizes)
-        rows.append((name, predicted, observed, " to ".join(ends)))
-    output.print_table(title, ("of", "predicted", "found", "95 %"), rows)
-    if result.failed:
-        output.print(f"{result.failed} could not be fitted")
-    return result

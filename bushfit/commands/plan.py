@@ -17,7 +17,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.geometry import Direction, Place, get_place
 from bushfit.model.result import Result
-from bushfit.planning.campaign import Check, campaign_toml
+from bushfit.planning.campaign import campaign_toml
 from bushfit.planning.compound import guess_parameters
 from bushfit.planning.contract import Aim, Knowledge, Plan, PlanRequest, Points, Target, Test, operating_points
 from bushfit.planning.document import PlanFile, plan_document
@@ -41,15 +41,9 @@ _COLUMNS = (
 
 @dataclass(frozen=True, eq=False)
 class PlanOutput:
-    """Output of the command plan: planned tests, check by simulations, and result files.
-
-    Args:
-        plan: planned tests with their expected results.
-        check: result of simulations of the plan; None without simulations.
-    """
+    """Output of the command plan: planned tests with their expected results, and result files."""
 
     plan: Plan
-    check: Check | None = None
 
     @property
     def files(self) -> list[ResultFile]:
@@ -66,7 +60,7 @@ class PlanOutput:
     @cached_property
     def document(self) -> PlanFile:
         """Content of plan.json: planned tests and their expected results."""
-        return plan_document(self.plan, self.check)
+        return plan_document(self.plan)
 
 
 def plan(

@@ -1,34 +1,17 @@
-"""A plan on the virtual rig: the campaign that `bushfit simulate` runs, and a check of the predicted errors.
-
-Notes:
-    The check simulates the plan many times and fits each campaign. The fit estimates the noise from the repeats and its
-    start values from the data, as for a measured campaign; it receives only the class of the rig.
-"""
+"""A plan on the virtual rig: the campaign that `bushfit simulate` runs."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, fields, replace
-from functools import partial
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtri
-from threadpoolctl import threadpool_limits
 
-from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.campaign.toml import body_lines, place_line, toml_value
 from bushfit.effects import BASE, qualified_name
-from bushfit.effects.contract import Array
-from bushfit.errors import FitError
-from bushfit.fitting.coordinates import Coordinates
-from bushfit.fitting.information import relative_sizes
-from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Specimen
 from bushfit.planning.contract import Noise, Plan, Test
-from bushfit.simulation.measured import measure
-from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
 #: Settings of [simulate] that are written as they are, in the order of the file.
 _SETTINGS = (
@@ -44,10 +27,6 @@ _UNITS: Mapping[str, str | None] = {
     "amplitude": None,
     "amplitudes": None,
 }
-#: Relative errors of the k parameters fitted to one simulated campaign, (k,); None if no fit was possible.
-RelativeErrors = Array | None
-#: Calls a function for all seeds in any order; returns the number and the result of each.
-SeedRunner = Callable[[Sequence[int], Callable[[int], RelativeErrors]], Iterable[tuple[int, RelativeErrors]]]
 
 
 def settings_of(tests: Sequence[Test], noise: Noise, seed: int = 0) -> SimulateSettings:
@@ -137,91 +116,3 @@ def _line(key: str, value: Any, test: Test | None = None) -> str:
 def _number(value: float) -> str:
     """Format a number with twelve digits, which hides the rounding errors of unit conversions."""
     return f"{value:.12g}"
-
-
-@dataclass(frozen=True, eq=False)
-class Check:
-    """Comparison of the standard errors that a plan predicts with the scatter of fits to simulated campaigns.
-
-    Args:
-        names: names of the k parameters.
-        predicted: relative standard error of each parameter from the plan, (k,).
-        deviations: relative deviation of the fitted from the true parameters in each campaign, (campaigns, k).
-        failed: number of campaigns that could not be fitted.
-        seed: seed of the first campaign; each further campaign has the next integer.
-    """
-
-    names: tuple[str, ...]
-    predicted: Array
-    deviations: Array
-    failed: int
-    seed: int
-
-    @property
-    def observed(self) -> Array:
-        """Observed standard errors: root mean square relative deviation of fitted from true parameters, (k,)."""
-        return np.sqrt(np.mean(np.square(self.deviations), axis=0))
-
-    @property
-    def interval(self) -> tuple[Array, Array]:
-        """Lower and upper ends of the 95 % interval of each observed standard error, (k,) each.
-
-        Notes: observed * sqrt(n / chi-square quantile with n degrees of freedom), for n campaigns.
-        """
-        n = len(self.deviations)
-        low, high = (self.observed * np.sqrt(n / chdtri(n, p)) for p in (0.025, 0.975))
-        return low, high
-
-
-def check(plan: Plan, count: int, seed: int, run_all: SeedRunner) -> Check:
-    """Simulate a plan several times and fit each simulated campaign, to check the predicted standard errors.
-
-    A plan that continues a campaign is simulated with the tests of the campaign, because all tests are fitted together.
-
-    Args:
-        plan: plan to simulate.
-        count: number of simulated campaigns.
-        seed: seed of the first campaign; each further campaign has the next integer.
-        run_all: function that calls a function for all seeds, such as `batch.executor.run_rows` on all cores.
-
-    Returns:
-        Predicted and observed standard errors.
-
-    Raises:
-        FitError: none of the campaigns could be fitted.
-    """
-    knowledge = plan.knowledge
-    settings = settings_of((*knowledge.tests, *plan.planned.tests), knowledge.noise)
-    work = partial(fit_campaign, undisturbed(knowledge.model, settings), settings, plan.request.rig, knowledge.names)
-    errors = [row for _, row in sorted(run_all(range(seed, seed + count), work), key=lambda pair: pair[0])]
-    fitted = [row for row in errors if row is not None]
-    if not fitted:
-        raise FitError("no simulated campaign of this plan could be fitted", found=f"{count} campaigns")
-    predicted = plan.planned.errors if knowledge.tests else plan.planned.alone
-    return Check(knowledge.names, predicted, np.array(fitted), count - len(fitted), seed)
-
-
-def fit_campaign(
-    clean: Undisturbed, settings: SimulateSettings, rig: RigSettings, names: Sequence[str], seed: int
-) -> RelativeErrors:
-    """Simulate one campaign and fit it.
-
-    Args:
-        clean: simulated tests without noise.
-        settings: settings of the virtual rig, with its noise.
-        rig: settings [rig] that the fit receives, with the class of the rig.
-        names: names of the k parameters to compare.
-        seed: seed of the random numbers.
-
-    Returns:
-        Relative deviations of the fitted from the true parameters, (k,); None if no fit was possible.
-    """
-    truth = clean.truth
-    coordinates, sizes = Coordinates.of_parameters(truth, names), relative_sizes(truth, names)
-    with threadpool_limits(1), suppress(FitError):
-        campaign = replace(measure(clean, replace(settings, seed=seed)).campaign(), rig=rig)
-        data = PreparedCampaign.from_campaign(campaign)
-        places = list(dict.fromkeys(str(data_set.direction) for data_set in data.data_sets))
-        model = fit_joint(data, effects=truth.effects, directions=places).model
-        return np.asarray((coordinates.point(model.values) - coordinates.point(truth.values)) / sizes)
-    return None

@@ -201,26 +201,22 @@ class Programme:
         tests: runs of the rig, in the order in which they are made.
         minutes: duration of each test with the change of direction before it [min], (tests,).
         errors: standard error of each parameter's relative change, (k,).
-        alone: standard error of each parameter's relative change from these tests without the prior, (k,).
         stiffness: relative standard error of |K| at the wanted operating points of all directions, (n,).
         loss: standard error of the loss factor at these points, absolute, (n,).
         rival_chi_square: expected chi-square between the two nearest rivals that can be separated, after the best
             refit of either; None without rivals.
         half_widths: half width of the 95 % interval of each target, relative to the value, at its worst point.
         detectable: smallest detectable amount of each effect that the standard programme can show.
-        drift: largest shift of a parameter by a gain drift of 1 % over the session, in standard errors.
     """
 
     tests: tuple[Test, ...]
     minutes: Array
     errors: Array
-    alone: Array
     stiffness: Array
     loss: Array
     rival_chi_square: float | None
     half_widths: tuple[float, ...]
     detectable: tuple[DetectableAmount, ...]
-    drift: float
 
     @property
     def hours(self) -> float:

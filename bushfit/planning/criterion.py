@@ -14,9 +14,6 @@ from bushfit.progress import track
 
 #: Smallest useful decrease of the logarithm of the variance by a run or an exchange; chosen: 0.25 % of the error.
 _USEFUL_DECREASE = 5e-3
-#: Weight of the shift of the parameters by a drift beside the visibility of the drift; chosen: orders then keep the
-#: shift below a fifth of a standard error for a drift of 1 % over the session.
-_SHIFT_WEIGHT = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,101 +157,24 @@ def add_runs(
     return counts
 
 
-@dataclass(frozen=True, eq=False)
-class DriftEffect:
-    """Effect that a linear drift of the sensor gain over the test session has on the data and on the fit.
+def order_runs(counts: Array, places: Array) -> list[int]:
+    """Order the runs of a session so that a drift of the gain hardly shifts the parameters.
 
-    The effect depends on the order of the runs. A unit drift changes the gain by 100 % over the session.
-
-    Args:
-        gain_information: squared change of one run's data by a unit of gain, in units of noise, (tests,).
-        level_share: part of `gain_information` that an error shared by all runs of the test explains, (tests,).
-        shift_root: shift of the parameters by a unit of gain, in standard errors, (tests, k).
-
-    Notes:
-        With S1 and S2 the sums of t and t^2 over the runs of each test, where t is the position of a run from -1/2 to
-        1/2 in the session, the noncentrality of a unit drift after a refit of the parameters is
-        sum(gain_information S2 - level_share S1^2) - |sum(S1 shift_root)|^2.
-    """
-
-    gain_information: Array
-    level_share: Array
-    shift_root: Array
-
-    def position_sums(self, runs: Sequence[int] | Array) -> tuple[Array, Array, Array]:
-        """Position of each run in the session, -1/2 to 1/2, (runs,), its sum and its sum of squares by test, (tests,).
-
-        Args:
-            runs: index of the test of each run, in the order of the session.
-        """
-        tests = np.array(runs, dtype=int)
-        turn = np.arange(tests.size) / max(tests.size - 1, 1) - 0.5
-        first, second = (np.bincount(tests, turn**power, self.gain_information.size) for power in (1, 2))
-        return turn, first, second
-
-    def noncentrality(self, runs: Sequence[int] | Array) -> float:
-        """Noncentrality (expected chi-square) of a unit drift; `runs` are test indices in the order of the session."""
-        _, first, second = self.position_sums(runs)
-        shift = first @ self.shift_root
-        return float(self.gain_information @ second - self.level_share @ first**2 - shift @ shift)
-
-    def shift(self, runs: Sequence[int] | Array) -> Array:
-        """Shift of the parameters by a unit drift, in standard errors, (k,); `runs` are test indices in order."""
-        return self.position_sums(runs)[1] @ self.shift_root
-
-    def exchange_gains(self, runs: Array) -> Array:
-        """Compute how much the drift becomes more visible if two runs swap their positions in the session.
-
-        Args:
-            runs: test indices in the order of the session, (runs,).
-
-        Returns:
-            Growth of the noncentrality minus _SHIFT_WEIGHT times the growth of the squared parameter shift, for each
-            pair of runs, (runs, runs).
-        """
-        turn, first, _ = self.position_sums(runs)
-        step, squared = turn - turn[:, None], turn**2 - turn[:, None] ** 2  # of the run in the row
-        gain, shared, root = self.gain_information[runs], self.level_share[runs], self.shift_root[runs]
-        sums = first[runs]
-        levels = shared[:, None] * (2.0 * sums[:, None] + step) * step - shared * (2.0 * sums - step) * step
-        change = step[..., None] * (root[:, None] - root)
-        shifts = np.sum((2.0 * (first @ self.shift_root) + change) * change, axis=-1)
-        return np.where(runs[:, None] == runs, 0.0, (gain[:, None] - gain) * squared - levels - _SHIFT_WEIGHT * shifts)
-
-
-def order_runs(counts: Array, places: Array, drift: DriftEffect) -> list[int]:
-    """Order the runs of a session so that a drift of the gain is visible and hardly shifts the parameters.
-
-    Runs are grouped by direction; each direction begins and ends with the same test if a test is repeated.
+    Runs are grouped by direction. Each direction begins and ends with its most repeated test, and the runs between are
+    mirrored about the middle, so that the repeats of a test are spread over the session.
 
     Args:
         counts: number of runs of each test, (tests,).
         places: index of the direction of each test, in the order in which the directions are mounted, (tests,).
-        drift: effect of a drift on these runs.
 
     Returns:
         Test indices in the order of the runs.
-
-    Notes:
-        The inner runs are mirrored about the middle. Then pairs of runs of one direction are swapped, the pair with
-        the largest gain in visibility first, until no swap helps.
     """
-    order, ends = list[int](), list[int]()
+    order = list[int]()
     for place in np.unique(places[counts > 0]):
         chosen = np.where(places == place, counts, 0)
-        repeated = np.flatnonzero(chosen > 1)
-        outer = [int(repeated[np.argmax(drift.gain_information[repeated])])] if repeated.size else []
+        outer = [int(np.argmax(chosen))] if chosen.max() > 1 else []
         chosen[outer] -= 2
         inner = np.repeat(np.arange(chosen.size), chosen).tolist()
-        if outer:
-            ends += [len(order), len(order) + len(inner) + 1]
         order += [*outer, *inner[::2], *inner[1::2][::-1], *outer]
-    runs, free = np.array(order), ~np.isin(np.arange(len(order)), ends)
-    for _ in range(100):  # nearly all orders take twenty
-        exchangeable = (places[runs][:, None] == places[runs]) & free[:, None] & free
-        gains = np.where(exchangeable, drift.exchange_gains(runs), 0.0)
-        i, j = np.unravel_index(int(np.argmax(gains)), gains.shape)
-        if gains[i, j] <= 1e-9 * abs(drift.noncentrality(runs)):
-            break
-        runs[[i, j]] = runs[[j, i]]
-    return runs.tolist()
+    return order

@@ -8,7 +8,6 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from bushfit.campaign.schema import SimulatedLoop
-from bushfit.planning.campaign import Check
 from bushfit.planning.contract import Aim, Plan, motions
 from bushfit.planning.problem import RIVALS_APART
 
@@ -77,21 +76,6 @@ class Rivalry(TypedDict):
     enough: Annotated[float, Field(description="Chi-square above which nine of ten campaigns separate the models.")]
 
 
-class SimulationCheck(TypedDict):
-    """Standard errors that a plan predicts, and root mean square errors of fits to simulations of the plan."""
-
-    campaigns: Annotated[int, Field(description="Number of simulated campaigns.")]
-    failed: Annotated[int, Field(description="Number of campaigns that could not be fitted.")]
-    seed: Annotated[int, Field(description="Seed of the first campaign; each further campaign has the next integer.")]
-    predicted: Annotated[
-        dict[str, float], Field(description="Relative standard error of each parameter that the plan predicts.")
-    ]
-    found: Annotated[
-        dict[str, float], Field(description="Relative standard error of each parameter from the scatter of the fits.")
-    ]
-    ci95: Annotated[dict[str, list[float]], Field(description="Ends of the 95 % interval of each entry of `found`.")]
-
-
 class PlanFile(TypedDict):
     """plan.json: the tests of a plan and their expected results."""
 
@@ -117,24 +101,12 @@ class PlanFile(TypedDict):
         dict[str, ErrorComparison], Field(description="Root mean square standard error of the loss factor, likewise.")
     ]
     visible: Annotated[dict[str, DetectableEntry], Field(description="Smallest detectable amount of each effect.")]
-    drift: Annotated[
-        dict[str, float],
-        Field(
-            description="Largest shift of a parameter over its standard error if the gain drifts by 1 % over the "
-            "session, in the order of the plan and in that by direction and level."
-        ),
-    ]
     rivals: Annotated[Rivalry | None, Field(description="Models to separate; null if there are none.")]
-    check: Annotated[SimulationCheck | None, Field(description="Simulations of the plan; null if none were asked for.")]
     warnings: Annotated[list[str], Field(description="Warnings on the plan.")]
 
 
-def plan_document(plan: Plan, check: Check | None = None) -> PlanFile:
+def plan_document(plan: Plan) -> PlanFile:
     """Convert a plan to the content of plan.json.
-
-    Args:
-        plan: the plan.
-        check: result of the simulations of the plan; None if the plan was not simulated.
 
     Returns:
         Keys and values of the file, in SI units.
@@ -198,9 +170,7 @@ def plan_document(plan: Plan, check: Check | None = None) -> PlanFile:
         "stiffness": predicted["stiffness"],
         "loss_factor": predicted["loss"],
         "visible": visible,
-        "drift": {"planned": planned.drift, "standard": standard.drift},
         "rivals": rivals,
-        "check": _checked(check) if check else None,
         "warnings": list(plan.notes),
     }
 
@@ -208,16 +178,3 @@ def plan_document(plan: Plan, check: Check | None = None) -> PlanFile:
 def _reached(errors: Iterable[float]) -> ErrorComparison:
     before, planned, standard = map(float, errors)
     return {"before": before, "planned": planned, "standard": standard}
-
-
-def _checked(check: Check) -> SimulationCheck:
-    """Convert the result of the simulations to the entry "check" of plan.json."""
-    low, high = check.interval
-    return {
-        "campaigns": len(check.deviations) + check.failed,
-        "failed": check.failed,
-        "seed": check.seed,
-        "predicted": dict(zip(check.names, check.predicted.tolist(), strict=True)),
-        "found": dict(zip(check.names, check.observed.tolist(), strict=True)),
-        "ci95": {name: list(ends) for name, *ends in zip(check.names, low.tolist(), high.tolist(), strict=True)},
-    }

@@ -63,7 +63,7 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
             found=f"{number(request.hours, 3)} h",
             expected=f"at least {number(shortest, 2)} h",
         )
-    planned = search.programme(order_runs(counts, places, search.drift_effect(counts)) if counts.any() else [])
+    planned = search.programme(order_runs(counts, places))
     missed = tuple(explain_miss(search, goal) for goal in problem.goals)
     purposes = {problem.tests[test]: describe_purpose(search, test) for test in np.flatnonzero(counts).tolist()}
     return Plan(

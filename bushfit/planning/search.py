@@ -1,4 +1,4 @@
-"""Search for the tests of a plan within some hours: their number, repeats for drift and scatter, and the programme."""
+"""Search for the tests of a plan within some hours: their number, repeats that show the scatter, and the programme."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,8 +15,7 @@ from bushfit.geometry import Place, Specimen
 from bushfit.model.result import Range, Result
 from bushfit.planning.candidates import standard_tests
 from bushfit.planning.contract import DetectableAmount, Programme, Test
-from bushfit.planning.criterion import Budget, Criterion, DriftEffect, best_runs, order_runs
-from bushfit.planning.information import eliminate_line_errors
+from bushfit.planning.criterion import Budget, Criterion, best_runs
 from bushfit.planning.problem import DETECTABLE, RIVALS_APART, PlanningProblem
 from bushfit.planning.targets import TargetSensitivity
 from bushfit.prediction.caveats import unfitted_warnings
@@ -165,24 +164,18 @@ class PlanSearch:
         return list(dict.fromkeys(self.problem.effects[index].name for index in np.flatnonzero(short)))
 
     def with_repeats(self, counts: Array) -> Array:
-        """Add repeats so that each direction reveals a drift of the gain as well as the standard programme does.
-
-        In each direction with more than two tests, one test is repeated; the least useful runs make room.
+        """Repeat a test in each direction with more than two tests, so that a drift shows and noise is known.
 
         Args:
             counts: number of runs of each test, (tests,).
 
         Returns:
-            Number of runs of each test, (tests,).
+            Number of runs of each test, (tests,); the least useful runs make room for the repeats.
         """
-        standard = self.drift_effect(self.count(self.standard_runs)).noncentrality(self.standard_runs)
         for place in np.unique(self.budget.place[counts > 0]):
-            chosen, drift = np.flatnonzero((counts > 0) & (self.budget.place == place)), self.drift_effect(counts)
-            if chosen.size > 2 and (
-                counts[chosen].max() < 2 or drift.noncentrality(order_runs(counts, self.budget.place, drift)) < standard
-            ):
-                repeatable = chosen[self.budget.maximum_runs[chosen] > 1]
-                quickest = repeatable[np.argsort(self.budget.minutes[repeatable])][:4]
+            chosen = np.flatnonzero((counts > 0) & (self.budget.place == place))
+            if chosen.size > 2 and counts[chosen].max() < 2:
+                quickest = chosen[np.argsort(self.budget.minutes[chosen])][:4]
                 counts = min(self.repeated(counts, quickest), key=self.strict.value, default=counts)
         return counts
 
@@ -254,24 +247,6 @@ class PlanSearch:
         """True if repeats among `counts` runs, (tests,), determine the scatter of sweeps of each body well enough."""
         return self.scatter_freedom(counts) >= [_SCATTER_FREEDOM]
 
-    def drift_effect(self, counts: Array) -> DriftEffect:
-        """Compute the effect of a drift of the gain on the given runs and on the fit.
-
-        Args:
-            counts: number of runs of each test, (tests,).
-
-        Returns:
-            Effect of a unit drift, for any order of these runs.
-        """
-        model = self.problem.models[0]
-        errors_and_parameters = model.products[..., : model.products.shape[-2]]
-        by_gain = errors_and_parameters[..., :1]  # of one run
-        of_all_runs = errors_and_parameters * counts[:, None, None]
-        remaining, _ = eliminate_line_errors(np.concatenate((of_all_runs, by_gain), axis=-1), model.level)
-        gain, level = by_gain[:, 0, 0], np.square(model.level[:, 0])
-        root = covariance_root(model.total(counts).parameters[0])
-        return DriftEffect(gain, level * gain**2 / (1.0 + counts * level * gain), remaining[..., -1] @ root)
-
     def programme(self, runs: Sequence[int]) -> Programme:
         """Compute the expected results of a sequence of runs.
 
@@ -279,60 +254,46 @@ class PlanSearch:
             runs: test indices in the order of the runs.
 
         Returns:
-            The tests with their durations, standard errors, detectable amounts and parameter shift by a drift.
+            The tests with their durations, standard errors and detectable amounts.
         """
         problem, counts, places = self.problem, self.count(runs), self.budget.place[list(runs)]
-        model, k, drift = problem.models[0], len(problem.knowledge.names), self.drift_effect(counts)
+        model, k = problem.models[0], len(problem.knowledge.names)
         information = model.total(counts)
         covariance = model.error_covariance(information)[0]
-        free_variance = np.diag(np.linalg.inv(information.parameters[0]))
         errors = []
         for points in problem.wanted:
             gain, phase = np.sqrt(np.einsum("cnk,kl,cnl->cn", points.slopes, covariance, points.slopes))
             errors.append(np.hypot([gain, phase * (1.0 + np.square(points.loss_factor))], points.model_error))
         stiffness, loss = np.concatenate(errors, axis=1)
-        shift = covariance_root(information.parameters[0]) @ drift.shift(runs) / np.sqrt(free_variance)
-        # tests alone leave combinations open whose information is rounding; without tests no error is of use
-        values, vectors = np.linalg.eigh(information.parameters[0] - model.prior)
-        alone = vectors / np.sqrt(np.maximum(values, max(1e-14 * float(values.max()), 1e-12)))
         return Programme(
             tests=tuple(problem.tests[run] for run in runs),
             minutes=self.budget.minutes[list(runs)] + self.budget.setup_minutes * (np.diff(places, prepend=-1) != 0),
             errors=np.sqrt(np.diag(covariance))[:k],
-            alone=np.linalg.norm(alone, axis=1)[:k],
             stiffness=stiffness,
             loss=loss,
             rival_chi_square=problem.nearest_rivals(counts) if problem.knowledge.rivals else None,
             half_widths=tuple(goal.half_width(covariance) for goal in problem.goals),
-            detectable=tuple(self.detectable_amounts(information.noncentralities()[0], drift.noncentrality(runs))),
-            drift=0.01 * float(np.abs(shift[:k]).max()),
+            detectable=tuple(self.detectable_amounts(information.noncentralities()[0])),
         )
 
-    def detectable_amounts(self, reached: Array, drift: float) -> Iterator[DetectableAmount]:
+    def detectable_amounts(self, reached: Array) -> Iterator[DetectableAmount]:
         """Compute the smallest detectable amount of each effect that the standard programme can detect.
 
         Args:
             reached: noncentrality of a typical amount of each effect shape, (e,).
-            drift: noncentrality of a unit drift of the gain.
 
         Returns:
-            Iterator over the amounts in SI units, each for the effect's most visible shape, and last the gain drift.
+            Iterator over the amounts in SI units, each for the effect's most visible shape.
         """
         effects, visible = self.problem.effects, self.minimum_noncentrality
         with np.errstate(divide="ignore"):
-            smallest, smallest_drift = DETECTABLE / np.sqrt(reached), DETECTABLE / np.sqrt(max(drift, 0.0))
+            smallest = DETECTABLE / np.sqrt(reached)
         for effect in dict.fromkeys(effects):
             best = max((index for index in range(len(effects)) if effects[index] is effect), key=visible.__getitem__)
             if visible[best] > 0.0:
                 amount = effect.amount
                 size = amount.typical * float(smallest[best])
                 yield DetectableAmount(effect.name, qualified_name(effect, amount), amount.unit, size)
-        yield DetectableAmount("drift", "drift.gain", "1", float(smallest_drift))
-
-
-def covariance_root(information: Array) -> Array:
-    """Square root R, (k, k), of the covariance R R^T that is the inverse of an information matrix, (k, k)."""
-    return np.linalg.inv(np.linalg.cholesky(information)).T
 
 
 def scatter_differences(test: Test) -> int:

