@@ -9,7 +9,7 @@ of every hypothesis, with the sizes and weights of `priors.COMPOUND`, and no eff
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from math import log
 
@@ -39,8 +39,6 @@ _CURVE_LENGTHS = {"smooth": (1.5, 1.2), "rough": (0.5, 0.5)}
 _CURVE_PATTERNS = {"nodes": 150, "count": 16, "minimum": 1e-4}
 #: Number of phases of a cycle at which harmonics are summed: about six per period of the highest harmonic.
 _PHASES = 32
-#: Index of the first row of `MeasuredLoop.smooth_changes` that belongs to an overtone of the loop's frequency.
-_OVERTONES = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,15 +195,13 @@ def compound(evidence: Evidence) -> Group | None:
 
     Returns:
         Group with columns (c, n) and relative changes of stiffness (c, points), of unit variance at each operating
-        point; the h-th harmonic of a loop has 1/h of this deviation. None without tests.
+        point, and the deviations of the shape of each loop. None without tests.
     """
     if not evidence.data_sets:
         return None
     columns, share = _process(evidence, evidence.data_sets, _COMPOUND_LENGTHS, count=_COMPOUND_PATTERNS)
     for loops in group_repeats(split_by_kind(evidence.data_sets)[0]):
-        overtones = _harmonics(evidence, loops)[_OVERTONES:]
-        order = 2 + np.arange(len(overtones)) // 2
-        columns = np.concatenate((columns, overtones / order[:, None]))
+        columns = np.concatenate((columns, _shared_by(evidence, loops, MeasuredLoop.compound_shapes)))
     unit = np.zeros((len(columns), share.shape[-1]), dtype=complex)
     unit[: len(share)] = share
     return Group(columns, unit, act_together=True)
@@ -241,7 +237,7 @@ def unnamed_curves(evidence: Evidence) -> list[Explanation]:
     if loops:
         repeats = group_repeats(loops)
         shapes = block_diag(*[smooth_waves(np.arange(_PHASES) / _PHASES)] * len(repeats))
-        columns = np.concatenate([_harmonics(evidence, group) for group in repeats])
+        columns = np.concatenate([_shared_by(evidence, group, MeasuredLoop.smooth_changes) for group in repeats])
         groups["loops"] = Group(columns, shapes, act_together=True)
     return [Explanation("unnamed", "unnamed", name, group) for name, group in groups.items()]
 
@@ -294,11 +290,12 @@ def _restricted(
     return columns * rows, share * points
 
 
-def _harmonics(evidence: Evidence, loops: Sequence[MeasuredLoop]) -> Array:
-    """Change of the whitened residuals by unit amounts of c harmonics that repeated loops share, (c, n)."""
-    columns = np.zeros((len(loops[0].smooth_changes()), evidence.residual.size))
-    for loop in loops:
-        columns[:, evidence.residual_rows[loop]] = loop.smooth_changes()
+def _shared_by(evidence: Evidence, loops: Sequence[MeasuredLoop], changes: Callable[[MeasuredLoop], Array]) -> Array:
+    """Change of all whitened residuals by unit amounts of c changes of the force that repeated loops share, (c, n)."""
+    by_loop = [changes(loop) for loop in loops]
+    columns = np.zeros((len(by_loop[0]), evidence.residual.size))
+    for loop, of_loop in zip(loops, by_loop, strict=True):
+        columns[:, evidence.residual_rows[loop]] = of_loop
     return columns
 
 

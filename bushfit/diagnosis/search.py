@@ -180,8 +180,8 @@ class Search:
     def _with_effects(self, state: SearchState, names: Sequence[str], depth: int) -> list[SearchState]:
         """Extend a state of the search by each of the named effects, refitted with all parameters.
 
-        Each effect is refitted with the compound's likeliest deviation left free, and without a deviation if none
-        remains with the effect; the more probable fit is kept.
+        Each effect is refitted with the compound's likeliest deviation left free and without a deviation, because each
+        hypothesis is weighed around its own fit; the search goes on from the more probable fit.
 
         Args:
             state: fitted model with some explanations.
@@ -196,10 +196,7 @@ class Search:
         grown: dict[str, SearchState] = {}
         for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
             columns = state.free_columns(deviation)
-            remaining = [p for p in proposed if p.name not in grown or not grown[p.name].likeliest_deviation]
-            fits = (
-                refitted(state.evidence, remaining, start, request.fixed, request.bounds, columns) if remaining else {}
-            )
+            fits = refitted(state.evidence, proposed, start, request.fixed, request.bounds, columns)
             for name, evidence in fits.items():
                 candidate = self._register(self._with_effect(state, name, evidence, depth))
                 if name not in grown or candidate.log_posterior > grown[name].log_posterior:

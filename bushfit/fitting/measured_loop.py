@@ -23,6 +23,9 @@ _ERROR_HARMONICS = 25
 _ERROR_SIZES = 1.0 / np.maximum(np.arange(1.0, _ERROR_HARMONICS + 1.0), SMOOTH_HARMONICS)
 _ERROR_SIZES /= np.linalg.norm(_ERROR_SIZES)
 
+#: Last overtone of a compound's deviation in a steady cycle, and number of waves of its deviation in the first cycle.
+_LAST_OVERTONE, _TRANSIENT_WAVES = 13, 6
+
 
 @dataclass(frozen=True, eq=False)
 class MeasuredLoop(MeasuredBase):
@@ -267,10 +270,32 @@ class MeasuredLoop(MeasuredBase):
         These are a constant, and cosine and sine of five harmonics; with `fundamental_only` all but the first harmonic
         are 0.
         """
-        rows = self._whitened(self._waves * (self._per_noise * self.drive.half_range))
+        rows = self._force_changes(self._waves)
         if self.fundamental_only:
             rows[[0, *range(3, len(rows))]] = 0.0
         return rows
+
+    def compound_shapes(self) -> Array:
+        """Deviations of the force's shape from the model's laws, of a compound whose stiffness deviates by 100 %.
+
+        Returns:
+            Changes of the whitened residuals by independent amounts of unit variance, (c, size).
+
+        Notes:
+            An isotropic compound is symmetric, so a steady cycle has odd overtones only. The h-th falls as 1/h^2,
+            because the force is continuous with kinks where the motion turns back. The first cycle from rest may
+            deviate in addition by as much as a third overtone without this decrease.
+        """
+        if self.fundamental_only:
+            return np.empty((0, self.size))
+        order = np.arange(3, _LAST_OVERTONE + 1, 2)[:, None]
+        angle = 2.0 * np.pi * order * self.drive.phase
+        waves = np.concatenate([np.cos(angle) / order**2, np.sin(angle) / order**2])
+        if self.drive.from_rest:
+            order = np.arange(_TRANSIENT_WAVES)[:, None]
+            first = np.cos(np.pi * order * self.drive.phase) * (self.drive.phase < 1.0)
+            waves = np.concatenate([waves, first / (3.0 * (1.0 + order))])
+        return self._force_changes(waves)
 
     def smooth_misfit(self, model: Model) -> float:
         """Largest absolute difference between model and force in the first five harmonics, relative to half the range.
@@ -321,6 +346,10 @@ class MeasuredLoop(MeasuredBase):
             share = 1.0 - 1.0 / np.hypot(1.0, self.model_error * size)
             return white - (white @ directions * share) @ directions.T
         return self._gain.whiten(white) if self._gain else white
+
+    def _force_changes(self, waves: Array) -> Array:
+        """Changes of the whitened residuals, (c, size), by changes of the force relative to half its range, (c, n)."""
+        return self._whitened(waves * (self._per_noise * self.drive.half_range))
 
     def _whitened(self, rows: Array) -> Array:
         """Whiten rows of force in units of noise: remove the correlation of their noise, and errors shared by all rows.

@@ -20,6 +20,7 @@ from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.propose import proposals, scores
 from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
 from bushfit.effects import BASE, LIBRARY
+from bushfit.fitting.preparation import split_by_kind
 
 SHARED_RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
 
@@ -85,3 +86,20 @@ def test_scores_are_those_of_a_linear_refit(bare: Evidence) -> None:
         assert seen
         assert gain == pytest.approx(float((before - after)[0]), rel=1e-6)
         assert amount == pytest.approx(-answer[-1], rel=1e-6)
+
+
+def test_the_compound_bends_a_loop_in_odd_overtones_and_in_the_first_cycle(bare: Evidence) -> None:
+    """In steady cycles the h-th overtone has 1/h^2 of the deviation of the stiffness, and no even one occurs."""
+    loop = split_by_kind(bare.data_sets)[0][0]
+    unit = np.abs(loop.smooth_changes()[1]).max()
+    rows, phase = loop.compound_shapes() / unit, loop.drive.phase
+    waves = np.exp(2j * np.pi * np.arange(15)[:, None] * phase)
+    by_order = np.abs(rows @ waves.T) * 2.0 / phase.size
+    odd = np.arange(3, 14, 2)
+    expected = np.zeros((2, len(odd), 15))
+    expected[:, np.arange(len(odd)), odd] = 1.0 / odd**2
+    np.testing.assert_allclose(by_order.reshape(expected.shape), expected, atol=3e-3)
+    rested = replace(loop, drive=replace(loop.drive, from_rest=True)).compound_shapes()[len(rows) :] / unit
+    assert len(rested) == 6
+    assert not rested[:, phase >= 1.0].any()
+    np.testing.assert_allclose(np.abs(rested).max(axis=1), 1.0 / (3.0 * np.arange(1, 7)), rtol=0.01)
