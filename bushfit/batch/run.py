@@ -187,7 +187,7 @@ def make_panels(result: BatchResult) -> list[Panel]:
         if is_known.sum() < (1 if allowed else 3):
             continue
         displayed = quantity.displayed(float(np.median(values[is_known])))
-        missed = {k for k, part in enumerate(result.document.parts) if name in part.misses and is_known[k]}
+        missed = [k for k, part in enumerate(result.document.parts) if name in part.misses and is_known[k]]
         limits, ends = tuple(limit * displayed.factor for limit in allowed), np.stack((low, high)) * displayed.factor
         interval = ends if np.isfinite(ends).all(axis=0).any() else None
         panels.append(Panel(displayed.header, values * displayed.factor, limits, missed, interval))

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,14 +17,10 @@ from bushfit.units import number
 
 #: Colours of limits and of values outside the limits, and of values within the limits.
 _OUT, _GOOD = "#c1272d", "#31688e"
-#: Largest number of bushings drawn as single points; more are drawn as a cloud with a histogram.
-_CLOUD = 200
-#: Largest number of bushings whose names are ticks along x, and of letters of a name: more do not fit.
-_MOST_ALONG, _MOST_LETTERS_ALONG = 40, 32
-#: Largest number of bushings that a panel names, and of letters of a name: half the width of the panel.
-_MOST_NAMED, _MOST_LETTERS = 4, 24
-#: Width of a letter in a panel, as a share of the panel's, and height of a line [point].
-_LETTER, _LINE = 0.021, 8.5
+#: Largest number of bushings whose 95 % intervals are drawn, and whose names are ticks along x; of letters of a tick.
+_MOST_INTERVALS, _MOST_ALONG, _MOST_LETTERS_ALONG = 200, 40, 32
+#: Largest number of bushings outside the limits that the title of a panel names, and of letters of their names.
+_MOST_NAMED, _MOST_LETTERS = 3, 60
 #: Distance from the median, in robust standard deviations, from which a value is drawn at the edge of the panel.
 _FURTHEST = 12.0
 #: Columns of panels, and largest number of panels of a figure, which is then one metre high.
@@ -54,7 +50,7 @@ class Panel:
     title: str
     values: Array
     allowed: tuple[float, ...] = ()
-    missed: Collection[int] = ()
+    missed: Sequence[int] = ()
     intervals: Array | None = None
 
     def reach(self) -> tuple[float, float]:
@@ -87,54 +83,50 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> s
     """
     drawn = panels[:_MOST_PANELS]
     tick_names = [shortened(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
-    lines = math.ceil(len(drawn) / _COLUMNS)
-    height = style.ROW * (0.9 + 0.1 * bool(tick_names)) * lines
-    height += 0.12 * max(0, max(map(len, tick_names), default=0) - 16)  # 16 letters fit without more height
-    figure = style.Chart(f"{title}: {len(names)} bushings", height)
-    grid = figure.subplots(lines, _COLUMNS, sharex=True, squeeze=False)
+    rows = math.ceil(len(drawn) / _COLUMNS)
+    letters = max(map(len, tick_names), default=0)
+    figure = style.Chart(f"{title}: {len(names)} bushings", style.ROW * rows + 0.12 * letters)
+    grid = figure.subplots(rows, _COLUMNS, sharex=True, squeeze=False)
     for axes in grid.flat[len(drawn) :]:
         axes.remove()
     for index, (axes, panel) in enumerate(zip(grid.flat, drawn, strict=False)):
-        _draw_panel(axes, panel)
-        _name_outliers(axes, panel, names)
+        _draw_panel(axes, panel, names)
         lowest = index + _COLUMNS >= len(drawn)
         axes.tick_params(labelbottom=lowest)
-        axes.xaxis.set_in_layout(index // _COLUMNS == lines - 1)  # its labels may extend into the empty cell below
+        axes.xaxis.set_in_layout(index // _COLUMNS == rows - 1)  # its labels may extend into the empty cell below
         if tick_names:
             look = {"rotation": 90, "fontsize": style.SMALL - 1, "family": style.fonts(), "parse_math": False}
             axes.set_xticks(range(1, len(tick_names) + 1), tick_names, **look)
         elif lowest:
             axes.set_xlabel("bushing, in the manifest's order", **style.WORDS)
         axes.set_xlim(0.5, len(names) + 0.5)
-    few = len(names) <= _CLOUD and any(panel.intervals is not None for panel in drawn)
     return figure.explain(
         "Grey line: median of the batch.",
-        "Bars: 95 % intervals." * few,
-        "Dashed: limits; red: outside the limits, the worst with its name." * any(panel.allowed for panel in drawn),
-        "Triangles: outside the panel; the farthest has its name and value.",
+        "Bars: 95 % intervals." * (len(names) <= _MOST_INTERVALS),
+        "Dashed: limits; red: outside the limits." * any(panel.allowed for panel in drawn),
+        "Triangles: outside the panel.",
         f"The first {len(drawn)} of {len(panels)} quantities." * (len(panels) > len(drawn)),
     )
 
 
-def _draw_panel(axes: Axes, panel: Panel) -> None:
-    """Draw one quantity of all bushings, with its median, its limits, and bushings outside the limits in red."""
-    index = np.flatnonzero(np.isfinite(panel.values))
-    values, (low, high) = panel.values[index], panel.reach()
-    clipped, bad, cloud = np.clip(values, low, high), np.isin(index, list(panel.missed)), values.size > _CLOUD
-    if panel.intervals is not None and not cloud:
-        ends = panel.intervals[:, index]
-        axes.vlines(index + 1, *ends, color=np.where(bad, _OUT, _GOOD), lw=0.8, alpha=0.6, zorder=2)
-    good_look = style.POINT
-    if cloud:
-        good_look = {**style.DOT, "ms": 1.6, "alpha": max(0.15, min(1.0, 1500 / values.size))}
-    for chosen, color, look, order in (
-        (~bad, _GOOD, good_look, 2),
-        (bad, _OUT, style.DOT if cloud else style.POINT, 4),
-    ):
-        for marker, mask in (("o", clipped == values), ("^", clipped < values), ("v", clipped > values)):
-            subset, marked = chosen & mask, look if marker == "o" else style.POINT
-            axes.plot(index[subset] + 1, clipped[subset], marker, color=color, zorder=order, rasterized=cloud, **marked)
-    axes.axhline(float(np.median(values)), color=style.GREY, lw=0.9, zorder=1)
+def _draw_panel(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
+    """Draw one quantity of all bushings, with its median and limits; the title names bushings outside the limits.
+
+    Args:
+        axes: panel.
+        panel: quantity of the n bushings.
+        names: names of the bushings, (n,).
+    """
+    x, (low, high), bad = np.arange(1, len(names) + 1), panel.reach(), np.isin(range(len(names)), list(panel.missed))
+    values = np.clip(panel.values, low, high)
+    if panel.intervals is not None and len(names) <= _MOST_INTERVALS:
+        axes.vlines(x, *panel.intervals, color=np.where(bad, _OUT, _GOOD), lw=0.8, alpha=0.6, zorder=2)
+    look = style.POINT if len(names) <= _MOST_INTERVALS else style.DOT
+    markers = (("o", values == panel.values), ("^", values < panel.values), ("v", values > panel.values))
+    for marker, mask in markers:
+        for color, chosen in ((_GOOD, mask & ~bad), (_OUT, mask & bad)):
+            axes.plot(x[chosen], values[chosen], marker, color=color, zorder=3, rasterized=True, **look)
+    axes.axhline(float(np.nanmedian(panel.values)), color=style.GREY, lw=0.9, zorder=1)
     for limit in filter(math.isfinite, panel.allowed):
         axes.axhline(limit, color=_OUT, lw=0.9, ls=(0, (5, 2)), zorder=3)
     style.label_axes(axes, "", "")
@@ -142,56 +134,15 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     axes.set_ylim(low - margin, high + margin)
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.yaxis.get_offset_text().set_fontsize(style.SMALL)
-    count = f": {len(panel.missed)} out" if panel.missed else ""
-    axes.set_title(panel.title + count, fontsize=style.SMALL, loc="left", color=_OUT if count else style.INK, pad=3)
-    if cloud:  # histogram of the values at the right edge
-        counts, edges = np.histogram(clipped, bins=60, range=axes.get_ylim())
-        side = axes.inset_axes((1.005, 0.0, 0.13, 1.0), sharey=axes)
-        side.barh(edges[:-1], counts, height=np.diff(edges), align="edge", color=_GOOD, alpha=0.5, lw=0)
-        side.set_axis_off()
-
-
-def _name_outliers(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
-    """Name at most four bushings that are outside the limits or the panel, without overlap of the names.
-
-    The name of a bushing outside the panel is followed by its value.
-
-    Args:
-        axes: panel.
-        panel: quantity that the panel shows.
-        names: names of the n bushings.
-    """
-    low, high = panel.reach()
-    middle = float(np.nanmedian(panel.values))
-    outside = set(np.flatnonzero((panel.values < low) | (panel.values > high)).tolist())
-    chosen = sorted(outside.union(panel.missed), key=lambda k: (k not in panel.missed, -abs(panel.values[k] - middle)))
-    occupied: list[tuple[float, float, int, bool]] = []
-    for k in chosen[:_MOST_NAMED]:
-        value = float(np.clip(panel.values[k], low, high))
-        text = shortened(names[k], _MOST_LETTERS) + (f": {number(panel.values[k], 3)}" if k in outside else "")
-        half, above, line = 0.5 * _LETTER * len(text), value < (low + high) / 2.0, 1
-        center = min(max((k + 0.5) / panel.values.size, half), 1.0 - half)
-        while any(
-            abs(center - other_center) < half + room and other_line == line and side == above
-            for other_center, room, other_line, side in occupied
-        ):
-            line += 1
-        occupied.append((center, half, line, above))
-        axes.annotate(
-            text,
-            (center, value),
-            xycoords=("axes fraction", "data"),
-            xytext=(0, (1 if above else -1) * _LINE * line),
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            bbox={"facecolor": "white", "alpha": 0.7, "lw": 0, "pad": 0.3},
-            fontsize=style.SMALL - 1,
-            color=_OUT if k in panel.missed else style.GREY,
-            family=style.fonts(),
-            parse_math=False,
-            zorder=1.5,
+    title, color = panel.title, style.INK
+    if missed := [names[index] for index in panel.missed]:
+        more = f" and {len(missed) - _MOST_NAMED} more" if len(missed) > _MOST_NAMED else ""
+        title, color = (
+            f"{title}: {len(missed)} out\n{shortened(', '.join(missed[:_MOST_NAMED]), _MOST_LETTERS)}{more}",
+            _OUT,
         )
+    look = {"fontsize": style.SMALL, "color": color, "family": style.fonts(), "parse_math": False}
+    axes.set_title(title, loc="left", pad=3, **look)
 
 
 @style.in_own_style

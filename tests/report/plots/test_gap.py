@@ -119,7 +119,6 @@ def test_medians_limits_and_names(count: int) -> None:
     assert low < 1.0 < 1.2 < high
     assert high < 2.0, "one far out must not squash the rest"
     assert f"{len(one.missed)} out" in titles(figure)[0]
-    named = {text.get_text().partition(":")[0] for text in axes.texts}
-    assert named == {f"$name {k}" for k in one.missed}
+    assert titles(figure)[0].endswith(", ".join(f"$name {k}" for k in one.missed[:3]))
     assert sum(len(line.get_xdata()) for line in points(axes)) == count - 1, "each bushing that has a value, once"
     assert other.get_ylim()[0] < 0.24 < other.get_ylim()[1]
