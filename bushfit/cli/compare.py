@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.options import FILE, command_called, direction_option, effect_lists, option, option_group
+from bushfit.cli.options import FILE, command_called, direction_option, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import grid_options, grid_values
 from bushfit.errors import error_location, quote_path
@@ -42,7 +42,6 @@ _CHANCE = 0.05
         ),
         is_flag=False,
         flag_value=_ALL,
-        shell_complete=effect_lists,
     ),
 )
 @with_output("results/<names>", "tables", "pictures", "pages")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from rich.markup import escape
 
-from bushfit.cli.options import command_called, explanations, file_option, option, option_group
+from bushfit.cli.options import command_called, file_option, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.printing import print_parameters, print_validations
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
@@ -38,14 +38,12 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
             "peak_to_peak:sweep_axial; may be given again. An unknown EFFECT prints the list."
         ),
         multiple=True,
-        shell_complete=explanations,
     ),
     option(
         "--without",
         "EFFECT",
         "Exclude this effect or mistake from the search; may be given again.",
         multiple=True,
-        shell_complete=explanations,
     ),
     option(
         "--tolerance",

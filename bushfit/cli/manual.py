@@ -10,14 +10,8 @@ from bushfit.cli.options import command_called
 from bushfit.cli.output import Output, with_output
 
 
-def _pages(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
-    from bushfit.report.page.manual import page_names
-
-    return [name for name in page_names() if name.startswith(incomplete)]
-
-
 @command_called("manual", "diagnosis -o results/manual")
-@click.argument("page", required=False, shell_complete=_pages)
+@click.argument("page", required=False)
 @with_output("a temporary folder, opened in the browser")
 def command(page: str | None, output: Output) -> None:
     """Open the manual in the browser, at PAGE if it is given, such as `diagnosis`.

@@ -1,25 +1,17 @@
-"""Option types, options shared by several commands, shell completion, and commands with examples."""
+"""Option types, options shared by several commands, and commands with examples."""
 
-import json
-import re
-import tomllib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
 
 import click
-from click.shell_completion import CompletionItem
 
 from bushfit.reading.tablefile import Form
 from bushfit.report.results import Picture
 
 #: Names of the directions of a bushing test; copied from `geometry`, which is slow to import.
 DIRECTIONS = ("axial", "radial", "torsion")
-#: Type of click's shell-completion functions: (context, parameter, typed text) -> suggestions.
-Offer = Callable[[click.Context, click.Parameter, str], list[str]]
-#: Parsers by file extension.
-_READ: dict[str, Callable[[str], Any]] = {".toml": tomllib.loads, ".json": json.loads}
 Function = Callable[..., Any]
 #: Decorator that adds an option or an argument to the function of a command.
 Parameter = Callable[[Function], Function]
@@ -29,56 +21,6 @@ FILE = click.Path(path_type=Path)
 _NAMES = 26
 #: Kinds of result files whose format can be chosen by an option.
 Written = Literal["tables", "pictures", "pages"]
-
-
-def _named(ctx: click.Context, tables: str, key: str) -> Iterator[str]:
-    """Yield names for shell completion: values of a key in the files on the command line.
-
-    Files that cannot be read are ignored.
-
-    Args:
-        ctx: context of the command line.
-        tables: name of an array of tables, such as "sweeps", in these campaigns or models.
-        key: key in these tables.
-    """
-    values = [path for value in ctx.params.values() for path in (value if isinstance(value, tuple) else [value])]
-    for path in {Path(path) for path in (*values, *ctx.args) if isinstance(path, str | Path)}:
-        with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
-            for entry in _READ[path.suffix](path.read_text(encoding="utf-8")).get(tables, ()):
-                with suppress(KeyError, TypeError):
-                    yield str(entry[key])
-
-
-def _offered(list_names: Callable[[click.Context], Iterable[str]], between: str = "") -> Offer:
-    """Create a shell completion from a function that lists names; `between` are separators of several names."""
-
-    def offer(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[str]:
-        typed = re.match(f"(?:.*[{between}])?", incomplete) if between else None
-        before = typed[0] if typed else ""
-        return [before + name for name in list_names(ctx) if name.startswith(incomplete[len(before) :])]
-
-    return offer
-
-
-def _effects(_: click.Context) -> list[str]:
-    from bushfit.effects import BASE, LIBRARY
-
-    return [name for name in LIBRARY if name not in BASE]
-
-
-def _explanations(ctx: click.Context) -> Iterator[str]:
-    """Names for shell completion: effects, and mistakes with the names of the tests in which they may occur."""
-    from bushfit.effects.mistakes import MISTAKES, labelled
-
-    yield from _effects(ctx)
-    for name, mistake in MISTAKES.items():
-        yield from (
-            labelled(name, Path(file).stem) for kind in mistake.kinds for file in _named(ctx, f"{kind}s", "file")
-        )
-
-
-#: Shell completions: an effect or mistake; several effects separated by commas or plus signs.
-explanations, effect_lists = _offered(_explanations), _offered(_effects, ",+")
 
 
 class Option(click.Option):
@@ -148,9 +90,6 @@ else:
 class Folder(click.Path):
     """Option type for a results folder; an empty text is an error."""
 
-    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        return [CompletionItem(incomplete, type="dir")]
-
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         return (
             super().convert(value, param, ctx) if value else self.fail("this is no folder: an empty text", param, ctx)
@@ -217,15 +156,17 @@ def direction_option(words: str) -> Parameter:
             raise click.BadParameter("this is no direction: an empty text", ctx, parameter)
         return places
 
-    names = _offered(lambda ctx: (*DIRECTIONS, *_named(ctx, "specimens", "name")))
-    return option(
-        "--direction directions", "PLACE", words, type=str, multiple=True, callback=check, shell_complete=names
-    )
+    return option("--direction directions", "PLACE", words, type=str, multiple=True, callback=check)
 
 
 def effect_option(words: str) -> Parameter:
     """Create the option --effect for names of effects to add, with the help text `words`."""
-    return option("--effect effects", "NAME", words, multiple=True, shell_complete=_offered(_effects))
+    return option(
+        "--effect effects",
+        "NAME",
+        words,
+        multiple=True,
+    )
 
 
 def file_option(name: str, words: str) -> Parameter:

@@ -15,7 +15,6 @@ from bushfit.cli.options import (
     Size,
     command_called,
     direction_option,
-    effect_lists,
     file_option,
     option,
     option_group,
@@ -72,7 +71,6 @@ _MOST_VALUES = 6
         "--rivals",
         "NAME,...",
         "With --for rivals: the effects to distinguish [those that diagnose cannot distinguish].",
-        shell_complete=effect_lists,
     ),
     file_option(
         "--campaign",

@@ -9,14 +9,8 @@ from bushfit.cli.options import command_called
 from bushfit.cli.output import Output, with_output
 
 
-def _names(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
-    from bushfit.schemas import DESCRIBED
-
-    return [name for name in DESCRIBED if name.startswith(incomplete)]
-
-
 @command_called("schema", "", "model")
-@click.argument("name", required=False, shell_complete=_names)
+@click.argument("name", required=False)
 @with_output("nothing is written")
 def command(name: str | None, output: Output) -> None:
     """Print the JSON Schema (draft 2020-12) of NAME on standard output; without NAME, list all names.

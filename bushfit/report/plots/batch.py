@@ -137,10 +137,8 @@ def _draw_panel(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     title, color = panel.title, style.INK
     if missed := [names[index] for index in panel.missed]:
         more = f" and {len(missed) - _MOST_NAMED} more" if len(missed) > _MOST_NAMED else ""
-        title, color = (
-            f"{title}: {len(missed)} out\n{shortened(', '.join(missed[:_MOST_NAMED]), _MOST_LETTERS)}{more}",
-            _OUT,
-        )
+        named = shortened(", ".join(missed[:_MOST_NAMED]), _MOST_LETTERS)
+        title, color = f"{title}: {len(missed)} out\n{named}{more}", _OUT
     look = {"fontsize": style.SMALL, "color": color, "family": style.fonts(), "parse_math": False}
     axes.set_title(title, loc="left", pad=3, **look)
 
