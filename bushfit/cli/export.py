@@ -77,7 +77,7 @@ def command(
     of the bushing is z.
 
     Writes bushing.bdf, .fem, .inp or .xlsx; bushing_car.bus and bushing_ride.bus (adams); one CSV file for each
-    table; prony.csv, a row per term; or an .fmu, with its Maxwell arms in arms.csv and arms.png.
+    table; prony.csv, a row per term; or an .fmu, with its Maxwell arms in arms.csv.
     """
     from bushfit.campaign.campaign import load_campaign
     from bushfit.commands.export import export

@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from functools import wraps
 from pathlib import Path
-from threading import Timer
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
@@ -292,45 +291,26 @@ def _progress(console: Console) -> Iterator[None]:
     if console.quiet or not (console.is_interactive and console.file.isatty()):
         yield
         return
-    from rich.progress import BarColumn, Progress, TextColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-    columns = TextColumn("{task.description}"), BarColumn(20), TextColumn("{task.fields[state]}")
-    bar = Progress(*columns, console=console, transient=True, redirect_stdout=False)
-    lines, patient = dict[str, tuple[float, Any]](), True
+    columns = BarColumn(20), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("[red]{task.fields[remark]}")
+    bar = Progress(TextColumn("{task.description}"), *columns, console=console, transient=True, redirect_stdout=False)
+    tasks, start = dict[str, TaskID](), monotonic()
 
     def update(description: str, done: int | None, total: int, remark: str) -> None:
         if done is None:
-            bar.remove_task(lines.pop(description)[1])
+            bar.remove_task(tasks.pop(description))
         else:
-            if description not in lines:
-                lines[description] = monotonic(), bar.add_task(description, total=total, state="")
-            start, line = lines[description]
-            state = f"{done} of {total}"
-            if done:
-                pace = (monotonic() - start) / done
-                speed = f"{1.0 / pace:.3g} a second" if 0.0 < pace <= 1.0 else f"{pace:.2g} s each"
-                state += f", {speed}, {pace * (total - done):.0f} s left"
-            bar.update(line, completed=done, state=f"{state} [red]{remark}")
-        show()
-
-    def show() -> None:
-        """Show the progress bars if there is work in progress, and hide them otherwise."""
-        if lines and not patient:
+            if description not in tasks:
+                tasks[description] = bar.add_task(description, total=total, remark="")
+            bar.update(tasks[description], completed=done, remark=remark)
+        if tasks and monotonic() > start + _PATIENCE:
             bar.start()
-        elif bar.live.is_started:
+        elif not tasks:
             bar.stop()
 
-    def end_patience() -> None:
-        nonlocal patient
-        patient = False
-        show()
-
-    timer = Timer(_PATIENCE, end_patience)
-    timer.start()
     try:
         with report_progress_to(update):
             yield
     finally:
-        timer.cancel()
-        timer.join()
         bar.stop()

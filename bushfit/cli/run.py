@@ -12,7 +12,7 @@ from bushfit.cli.output import Output, with_output
 from bushfit.cli.predict import print_predictions
 from bushfit.cli.printing import print_origin, print_result, print_step, print_validations
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
-from bushfit.units import display_unit, format_aligned, number
+from bushfit.units import number
 
 if TYPE_CHECKING:
     from bushfit.campaign.schema import Loss
@@ -22,10 +22,6 @@ if TYPE_CHECKING:
 
 #: Largest difference between two fits that agree, in standard errors.
 _AGREED = 2
-#: Largest difference that is printed as a number, in standard errors; chosen.
-_COUNTED = 10.0
-#: Ratio of the standard errors of two-step and joint fit above which a parameter is not determined; chosen.
-_OPEN = 100.0
 
 
 @command_called("run", "configs/cmp_15961.toml")
@@ -82,7 +78,7 @@ def print_run(output: Output, name: str, outcome: RunOutput, action: str) -> Non
         for title, step in outcome.static.steps if outcome.static else ():
             print_step(output, f"{name}: {title}", step)
         if two_step:
-            _print_two_steps(output, name, two_step, joint)
+            print_step(output, f"{name}: static and dynamic fit in turn", two_step.result)
         if outcome.added:
             print_step(output, f"{name}: joint fit", joint)
     left_out = f"{outcome.reason_left_out}: the two-step procedure is skipped"
@@ -121,68 +117,24 @@ def _print_range(output: Output, outcome: RunOutput) -> None:
 
 
 def two_step_line(two_step: TwoStep, joint: Result) -> str:
-    """Sentence that compares the paper's two-step procedure with the joint fit, in standard errors.
+    """Sentence that compares the paper's two-step procedure with the joint fit, in standard errors of the former.
 
     Args:
         two_step: result of the two-step procedure, with its passes.
         joint: result of the joint fit.
     """
-    found, difference, ratio = two_step.result, dict[str, float](), dict[str, float]()
+    found, differences = two_step.result, dict[str, float]()
     for name in joint.fitted:
-        errors = found.covariance.stderr(name), joint.covariance.stderr(name)
-        if errors[0] and errors[1]:
-            difference[name] = abs(found.model.values[name] - joint.model.values[name]) / errors[0]
-            ratio[name] = errors[0] / errors[1]
+        if error := found.covariance.stderr(name):
+            differences[name] = abs(found.model.values[name] - joint.model.values[name]) / error
     passes = len(two_step.passes)
     parts = [f"{passes} pass{'es' * (passes > 1)}"]
     if found.at_bound:
         parts.append(f"ended at a bound: {', '.join(found.at_bound)}")
-    elif difference:
-        far, unsure = (max(sizes, key=sizes.__getitem__) for sizes in (difference, ratio))
-        count = max(1, math.ceil(round(difference[far], 1)))
-        parts.append(
-            f"agrees with the joint fit within {count} standard error{'s' * (count > 1)}"
-            if count <= _AGREED
-            else f"{far} is {difference[far]:.1f} standard errors from the joint fit"
-            if difference[far] <= _COUNTED
-            else f"does not agree with the joint fit; largest difference: {far}"
-        )
-        times = number(ratio[unsure], 2)
-        if float(times) > _OPEN:
-            parts.append(f"{unsure} not determined")
-        elif float(times) > 1.0:
-            parts.append(f"{unsure} {times} times less certain than in the joint fit")
+    elif differences:
+        count = max(1, math.ceil(round(max(differences.values()), 1)))
+        agrees = f"agrees with the joint fit within {count} standard error{'s' * (count > 1)}"
+        farthest = max(differences, key=differences.__getitem__)
+        differs = f"does not agree with the joint fit; largest difference: {farthest}"
+        parts.append(agrees if count <= _AGREED else differs)
     return f"two-step procedure (the paper's): {', '.join(parts)} (static.json, dynamic.json; -v shows it)"
-
-
-def _print_two_steps(output: Output, name: str, two_step: TwoStep, joint: Result) -> None:
-    """Print the parameters after each pass of the two-step procedure, and its result compared with the joint fit.
-
-    Args:
-        output: output of the command.
-        name: name of the campaign.
-        two_step: result of the paper's two-step procedure.
-        joint: result of the joint fit.
-    """
-    result, last = two_step.result, two_step.passes[-1]
-    units = {name: display_unit(result.model.parameters[name].unit, 1.0, value) for name, value in last.items()}
-    columns = [  # aligned from the last pass, whose decimals the others have
-        format_aligned([values[name] * factor for values in two_step.passes[::-1]], 5, 2)[::-1]
-        for name, (_, factor) in units.items()
-    ]
-    headers = ["pass", *(f"{name} [{unit}]" for name, (unit, _) in units.items())]
-    rows = [(str(count), *row) for count, row in enumerate(zip(*columns, strict=True), start=1)]
-    output.print_table("static and dynamic fit in turn, by pass", headers, rows)
-    print_step(output, f"{name}: static and dynamic fit in turn", result)
-    rows = []
-    for name in (name for name in joint.fitted if name in result.model.values):
-        value, joint_value = result.model.values[name], joint.model.values[name]
-        errors = result.covariance.stderr(name), joint.covariance.stderr(name)
-        unit, factor = display_unit(joint.model.parameters[name].unit, 1.0, joint_value)
-        error, joint_error = ("" if error is None else format_aligned([error * factor], 2)[0] for error in errors)
-        joint_text, text = format_aligned([joint_value * factor, value * factor], 4, minimum_digits=2)
-        difference = f"{100 * (value / joint_value - 1):+.1f} %"
-        ratio = f"{errors[0] / errors[1]:.1f}" if errors[0] and errors[1] else ""
-        rows.append((name, text, error, joint_text, joint_error, unit, difference, ratio))
-    headers = ["parameter", "two-step", "std error", "joint", "std error", "unit", "difference", "error ratio"]
-    output.print_table("two-step procedure compared with the joint fit", headers, rows)

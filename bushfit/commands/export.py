@@ -58,7 +58,7 @@ class ExportOutput:
     Args:
         predicted: prediction over the exported grid.
         exported: files and limitations of each format, by its name.
-        files: files of all formats, and table and figure of the Maxwell arms.
+        files: files of all formats, and table of the Maxwell arms.
     """
 
     predicted: PredictionOutput

@@ -177,10 +177,10 @@ def temperature_files(data: PreparedCampaign, result: Result, title: str) -> lis
     Args:
         data: campaign, prepared for a fit.
         result: fit of the campaign with the effect of temperature.
-        title: title of the figures.
+        title: title of the figure.
 
     Returns:
-        Two tables and two figures, not yet rendered.
+        Two tables and a figure, not yet rendered.
     """
     sweeps, model = data.without(result.outliers).sweeps, result.model
     shifted = cache(partial(master_curve, result, sweeps))
@@ -188,5 +188,4 @@ def temperature_files(data: PreparedCampaign, result: Result, title: str) -> lis
         table_file("master_curve", lambda: tables.master_curve_table(shifted())),
         figure_file("master_curve", lambda: plots.master_curve.master_curve_figure(model, shifted(), title)),
         table_file("shift_factors", lambda: tables.shift_factors_table(shifted())),
-        figure_file("shift_factors", lambda: plots.master_curve.shift_factors_figure(result, shifted(), title)),
     ]

@@ -375,7 +375,7 @@ def _files(
 
 
 def arms_files(result: Result, arms: Sequence[Arms], places: Sequence[Place]) -> list[ResultFile]:
-    """Table of Maxwell arms, and figure of their modulus and its error; nothing without arms.
+    """Table of Maxwell arms; nothing without arms.
 
     Args:
         result: fitted result.
@@ -383,14 +383,9 @@ def arms_files(result: Result, arms: Sequence[Arms], places: Sequence[Place]) ->
         places: directions or specimens of the table.
 
     Returns:
-        Files arms.csv and arms.png, not yet rendered.
+        File arms.csv, not yet rendered.
     """
-    if not arms:
-        return []
-    return [
-        table_file("arms", lambda: tables.arms_table(result.model, arms, places)),
-        figure_file("arms", lambda: plots.master_curve.arms_figure(result.model, arms, result.name)),
-    ]
+    return [table_file("arms", lambda: tables.arms_table(result.model, arms, places))] if arms else []
 
 
 def joined_table(predictions: Sequence[Prediction]) -> pd.DataFrame:

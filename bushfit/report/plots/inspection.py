@@ -26,8 +26,6 @@ _COLOR = "#3b528b"
 _MOST_ROWS = 6000
 #: Number of time bins of a long record in a figure: more than its width in pixels.
 _TIME_BINS = 1500
-#: Largest ratio of a common axis range to the range of a panel: each panel fills a third of its axis or more.
-_ALIKE = 3
 #: Height of a history, and of the panels of noise and distortion [cm].
 _STRIP, _NOISE_ROW = 2.7, 4.2
 #: Largest number of histories that are drawn in one figure.
@@ -61,25 +59,10 @@ def inspection_figure(files: Sequence[Inspection], first: int = 0, count: int = 
             loop = figure.add_subplot(grid[row, 0]) if file.kind == "loop" else None
             panel = _draw_history(figure, grid[row, 1] if loop else grid[row, :], file.measured, loop)
         panel.set_title(title, fontsize=style.TEXT, loc="left", color=style.GREY)
-    _scale_alike(figure.axes)
     swept = any(isinstance(file.measured, Sweep) for file in drawn_files)
     return figure.explain(
         "Sweeps: points as measured, lines through the means of the repeats." * swept,
-        "Panels of one direction share their scales if each fills a third of them." * (len(drawn_files) > 1),
     )
-
-
-def _scale_alike(panels: Sequence[Axes]) -> None:
-    """Set common axis limits for panels of the same direction and quantity, if each panel fills a third of them."""
-    groups: dict[tuple[object, ...], list[Axes]] = {}
-    for axes in panels:
-        groups.setdefault((axes.get_label(), axes.get_xlabel(), axes.get_ylabel()), []).append(axes)
-    for group in groups.values():
-        ends = np.array([(axes.get_xlim(), axes.get_ylim()) for axes in group])  # (panels, axes, ends)
-        low, high = ends[..., 0].min(axis=0), ends[..., 1].max(axis=0)
-        if np.all(high - low <= _ALIKE * np.ptp(ends, axis=-1)):
-            for axes in group:
-                axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
 
 
 def _draw_history(figure: Figure, cell: SubplotSpec, history: Loop, loop: Axes | None) -> Axes:
@@ -102,13 +85,11 @@ def _draw_history(figure: Figure, cell: SubplotSpec, history: Loop, loop: Axes |
             axes.plot(history.time, values, lw=0.8, color=_COLOR)
         else:
             axes.fill_between(*envelope_over_time(history.time, values), step="post", color=_COLOR, lw=0.6)
-        axes.set_label(str(history.direction))
         style.label_axes(axes, "time [s]" if history.has_recorded_time else "time rebuilt [s]", label)
     figure.align_ylabels(over_time)
     over_time[0].set_xlabel("")
     if loop is None:
         return over_time[0]
-    loop.set_label(str(history.direction))
     step = max(1, -(-history.time.size // _MOST_ROWS))
     loop.plot(motion[::step], load[::step], ".", ms=1.2, mew=0, color=_COLOR, alpha=0.7)
     style.label_axes(loop, f"{names[0]} [{length}]", f"{names[1]} [{force}]")
@@ -137,7 +118,6 @@ def _draw_sweep(pair: Sequence[Axes], sweep: Sweep) -> Axes:
             means = rows.groupby("x")[quantity].mean()
             axes.plot(means.index, means, color=look.color, ls=look.dashes, lw=0.8)
             axes.plot(rows["x"], rows[quantity], look.marker, color=look.color, alpha=0.75, **style.POINT)
-        axes.set_label(str(place))
         style.label_axes(axes, header_of(place, "amplitude" if by_amplitude else "frequency"), label, x)
     if sweep.stepped:
         names = [format_range(unit, scale * level) for level in levels]
