@@ -46,7 +46,7 @@ class Explanation:
     """One possible explanation of a gap between model and tests, with the change of the residuals that it would cause.
 
     Args:
-        kind: "effect", "place" (a faulty part of the tests), "unnamed" (a curve) or "record" (a mistake); each kind
+        kind: "effect", "part" (of the tests that is faulty), "unnamed" (a curve) or "record" (a mistake); each kind
             has a prior probability.
         family: explanations that share a prior probability: an effect in all directions, or a kind of faulty part.
         name: name of the explanation.
@@ -128,12 +128,12 @@ class OutlierCluster(FaultyPart):
         return self.outlier_distance
 
 
-def is_pattern(places: Sequence[FaultyPart]) -> bool:
+def is_pattern(faulty_parts: Sequence[FaultyPart]) -> bool:
     """Return True if suspected faults of the tests may be physics that the model lacks.
 
     These are faults at several frequencies, as of a resonance, or at the smallest or largest level, as of a contact.
     """
-    return sum(place.family == "frequency" for place in places) > 1 or any(place.extreme for place in places)
+    return sum(part.family == "frequency" for part in faulty_parts) > 1 or any(part.extreme for part in faulty_parts)
 
 
 def outlier_clusters(
@@ -170,7 +170,7 @@ def outlier_clusters(
         amplitudes = [float(sweep.amplitude[point]) for sweep, point, _ in points]
         found.append(
             OutlierCluster(
-                "place",
+                "part",
                 "frequency",
                 f"{frequency:.4g} Hz in {location} ({len(points)} points left out)",
                 None,

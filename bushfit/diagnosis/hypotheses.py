@@ -12,7 +12,7 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.claims import Claim
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart, OutlierCluster, compound, unnamed_curves
-from bushfit.diagnosis.faulty_places import faulty_places
+from bushfit.diagnosis.faulty_parts import find_faulty_parts
 from bushfit.diagnosis.groups import Group, GroupEvidence
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import LEVELS
@@ -64,7 +64,7 @@ class Hypothesis:
     Args:
         effects: names of the effects, in the order in which they were added.
         claim: mistake in the record; None without a mistake.
-        places: faulty parts of the tests: frequencies, levels, repeats or loops.
+        faulty_parts: faulty parts of the tests: frequencies, levels, repeats or loops.
         unnamed: name of the smooth curve or compound deviation that stands for an unknown effect; "" without one.
         levels: True if errors of amplitude levels are larger than the class of the rig allows.
         log_posterior: natural log of prior times evidence, not normalised.
@@ -76,7 +76,7 @@ class Hypothesis:
 
     effects: tuple[str, ...]
     claim: Claim | None
-    places: tuple[FaultyPart, ...]
+    faulty_parts: tuple[FaultyPart, ...]
     unnamed: str
     levels: bool
     log_posterior: float
@@ -89,7 +89,7 @@ class Hypothesis:
     def key(self) -> frozenset[Hashable]:
         """Names that identify this set of explanations; empty for the hypothesis that nothing is missing."""
         marks = [self.unnamed, "levels" if self.levels else "", self.claim and self.claim.key]
-        return frozenset((*self.effects, *(place.name for place in self.places), *filter(None, marks)))
+        return frozenset((*self.effects, *(part.name for part in self.faulty_parts), *filter(None, marks)))
 
     @property
     def refitted(self) -> bool:
@@ -151,22 +151,22 @@ class Tests:
         return compound(self.base)
 
     @cached_property
-    def _places_in_fits(self) -> dict[str, FaultyPart]:
-        return {place.name: place for place in faulty_places(self.base)}
+    def _faulty_parts_in_fits(self) -> dict[str, FaultyPart]:
+        return {part.name: part for part in find_faulty_parts(self.base)}
 
-    def in_fits(self, place: FaultyPart) -> FaultyPart:
+    def in_fits(self, part: FaultyPart) -> FaultyPart:
         """Convert a faulty test part from residuals in units of the scatter to the residuals that a fit minimises.
 
         Args:
-            place: frequency, level, repeat or loop whose points deviate together.
+            part: frequency, level, repeat or loop whose points deviate together.
         """
-        fitted = self._places_in_fits[place.name]
-        return fitted if len(fitted.columns) == len(place.columns) else fitted.point_by_point()
+        fitted = self._faulty_parts_in_fits[part.name]
+        return fitted if len(fitted.columns) == len(part.columns) else fitted.point_by_point()
 
     @cached_property
     def explanations(self) -> list[Explanation]:
         """Explanations of the gap that are independent of the model's effects: faulty test parts, and smooth curves."""
-        return [*faulty_places(self.bare), *unnamed_curves(self.bare)]
+        return [*find_faulty_parts(self.bare), *unnamed_curves(self.bare)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,11 +181,11 @@ class SearchState:
         evidence: fit of the model with the added effects.
         log_prior: natural log of the prior probability of the set of explanations.
         effects: names of the effects that were added.
-        places: faulty parts of the tests, whose points may deviate together.
+        faulty_parts: faulty parts of the tests, whose points may deviate together.
         precision: prior precision by fitting coordinate of the effects; infinite for a shape at an end of its range.
         log_density: natural log of the prior density of these coordinates, with the factor of Laplace's method.
-        amounts: prior standard deviation of each faulty place's deviation, relative to |K|.
-        change: largest relative change of |K| by the effects and places.
+        amounts: prior standard deviation of each faulty part's deviation, relative to |K|.
+        change: largest relative change of |K| by the effects and faulty parts.
     """
 
     tests: Tests
@@ -193,7 +193,7 @@ class SearchState:
     evidence: Evidence
     log_prior: float
     effects: tuple[str, ...] = ()
-    places: tuple[FaultyPart, ...] = ()
+    faulty_parts: tuple[FaultyPart, ...] = ()
     precision: Mapping[str, float] = field(default_factory=dict)
     log_density: float = 0.0
     amounts: tuple[float, ...] = ()
@@ -208,7 +208,7 @@ class SearchState:
     def key(self) -> frozenset[Hashable]:
         """Names that identify this step of the search: effects, faulty parts of the tests, and corrected mistake."""
         claim = self.tests.claim
-        return frozenset((*self.effects, *(place.name for place in self.places), *([claim.key] if claim else [])))
+        return frozenset((*self.effects, *(part.name for part in self.faulty_parts), *([claim.key] if claim else [])))
 
     @cached_property
     def bare(self) -> Evidence:
@@ -221,9 +221,9 @@ class SearchState:
         tests, solution = self.tests, self.bare.solution
         precision = np.array([self.precision.get(name, 0.0) for name in solution.coordinates.names])
         moves = np.isfinite(precision)
-        of_places = [np.full(len(p.columns), x**-2) for p, x in zip(self.places, self.amounts, strict=True)]
-        rows = np.concatenate([solution.jacobian[moves], *(place.columns for place in self.places)])
-        precision = np.concatenate([precision[moves], *of_places])
+        of_faulty_parts = [np.full(len(p.columns), x**-2) for p, x in zip(self.faulty_parts, self.amounts, strict=True)]
+        rows = np.concatenate([solution.jacobian[moves], *(part.columns for part in self.faulty_parts)])
+        precision = np.concatenate([precision[moves], *of_faulty_parts])
         return LinearModel(self.bare.residual, rows, precision, tests.errors, compound=tests.compound)
 
     @cached_property
@@ -250,9 +250,11 @@ class SearchState:
             deviation: standard deviation of the compound's deviation, relative to |K|; 0 for no deviation.
 
         Returns:
-            Change of the whitened residuals per standard deviation, (c, n); None without faulty places and deviation.
+            Change of the whitened residuals per standard deviation, (c, n); None without faulty parts and deviation.
         """
-        columns = [x * self.tests.in_fits(place).columns for place, x in zip(self.places, self.amounts, strict=True)]
+        columns = [
+            x * self.tests.in_fits(part).columns for part, x in zip(self.faulty_parts, self.amounts, strict=True)
+        ]
         compound = self.tests.compound_in_fits if deviation else None
         columns += [deviation * compound.whole] if compound else []
         return np.concatenate(columns) if columns else None
@@ -302,7 +304,7 @@ class SearchState:
         if explanation.kind == "effect":
             plain = replace(plain, effects=(*plain.effects, explanation.name))
         elif isinstance(explanation, FaultyPart):
-            plain = replace(plain, places=(*plain.places, explanation))
+            plain = replace(plain, faulty_parts=(*plain.faulty_parts, explanation))
         else:
             plain = replace(plain, unnamed=explanation.name)
         log_prior = self.log_prior + self.log_density + log_odds
@@ -338,7 +340,7 @@ class SearchState:
         plain = Hypothesis(
             self.effects,
             tests.claim,
-            self.places,
+            self.faulty_parts,
             unnamed="",
             levels=False,
             log_posterior=log_prior + linear.log_evidence,

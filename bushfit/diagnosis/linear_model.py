@@ -40,7 +40,7 @@ class LinearModel:
 
     Args:
         residual: residuals in units of the scatter from point to point, (n,).
-        jacobian: derivatives of the residuals by the parameters and by the deviations of faulty places, (k, n).
+        jacobian: derivatives of the residuals by the parameters and by the deviations of faulty parts, (k, n).
         precision: prior precision of each row of the Jacobian, 0 for a flat prior, (k,).
         rig: errors of the rig, with the nodes.
         groups: candidate explanations, each a group of residual columns.

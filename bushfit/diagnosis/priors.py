@@ -4,7 +4,7 @@ import numpy as np
 
 #: Prior probability of each kind of explanation; the rest to 1 is the prior probability that nothing is missing. One
 #: bushing in two meets its model; for most others the library has the missing effect.
-ODDS = {"effect": 0.22, "place": 0.15, "record": 0.03, "unnamed": 0.10}
+ODDS = {"effect": 0.22, "part": 0.15, "record": 0.03, "unnamed": 0.10}
 #: Sizes of missing effects and faults, relative to |K|, of equal prior probability: from invisible to obvious.
 SIZES = np.geomspace(0.004, 0.4, 7)
 #: Largest relative change of |K| by a refitted effect: some effects make a bushing several times as stiff.

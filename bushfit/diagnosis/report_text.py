@@ -101,7 +101,7 @@ class DiagnosisWriter:
         ]
         share = number(100.0 * (1.0 - excess[1] / excess[0] if excess[0] else 1.0), 2)
         summary = f"{' and '.join(names)} {'explains' if len(names) == 1 else 'explain'} {share} % of the gap"
-        rest = [place.name for place in first.places] + [_LEVELS] * first.best.levels
+        rest = [part.name for part in first.faulty_parts] + [_LEVELS] * first.best.levels
         gap = self._described(after) if not first.best.levels else None
         if gap:
             entries.append(NamedCause(UNNAMED, gap.evidence))
@@ -127,7 +127,7 @@ class DiagnosisWriter:
         command = " ".join(["bushfit diagnose CAMPAIGN", *(f"--adopt {name}" for name in claim.labels(data))])
         corrections = "; ".join(claim.corrections(data))
         advice = f"if the records of the tests confirm this mistake, state {corrections} (or {command})"
-        companions = " and ".join([*best.effects, *(place.name for place in best.places)])
+        companions = " and ".join([*best.effects, *(part.name for part in best.faulty_parts)])
         summary = f"these tests agree if {claim.words(data)}" + (f", and with {companions}" if companions else "")
         entries = self._claim_entries(first)
         diagnosis = self._finished(
@@ -177,14 +177,14 @@ class DiagnosisWriter:
             entries = [NamedCause(name, self._probability(leader), alternatives) for name in leader.names]
         *labels, last = map(self.label, compositions)
         summary = f"these tests cannot distinguish between {', '.join(labels)} and {last}"
-        places = next((composition.best for composition in compositions if composition.places), None)
+        places = next((composition.best for composition in compositions if composition.faulty_parts), None)
         return self._finished("ambiguous", summary, request.base, entries, places=places, next_test=advice)
 
     def _without_name(self) -> Diagnosis:
         """Diagnosis without a named effect: described by a correction, or unexplained, or with a faulty test."""
         finding, best = self.finding, self.first.best if self.first else None
         leads = f"; leads: {' and '.join(finding.leads)}" if finding.leads else ""
-        at_fault = " and ".join(place.name for place in best.places) if best else ""
+        at_fault = " and ".join(part.name for part in best.faulty_parts) if best else ""
         is_fault = best is not None and finding.verdict == "unexplained"
         if not is_fault and (gap := self._described(self.request.base)):
             summary = f"no known effect closes the gap: {gap.sentence}{leads}"
@@ -203,7 +203,9 @@ class DiagnosisWriter:
         """Name of an explanation: its mistakes, effects, faulty parts of the tests and other parts, joined by " + "."""
         claim = composition.best.claim
         names = [*(claim.labels(self.request.data) if claim else ()), *composition.names]
-        return " + ".join((*names, *(f"fault: {place.name}" for place in composition.places), *_nameless(composition)))
+        return " + ".join(
+            (*names, *(f"fault: {part.name}" for part in composition.faulty_parts), *_nameless(composition))
+        )
 
     @cached_property
     def odds(self) -> Odds:
@@ -214,7 +216,7 @@ class DiagnosisWriter:
             claim = composition.best.claim
             parts = [claim.words(self.request.data)] if claim else []
             parts += [f"{get_effect(name).phrase} ({name})" for name in composition.names]
-            parts += [f"a faulty test: {place.name}" for place in composition.places]
+            parts += [f"a faulty test: {part.name}" for part in composition.faulty_parts]
             *parts, last = (*parts, *_nameless(composition))
             sentences.append(", and ".join(filter(None, (", ".join(parts), last))))
             models.append(composition.best.state.evidence.model if composition.best.refitted else None)
@@ -259,15 +261,15 @@ class DiagnosisWriter:
         if not next_test and entries:
             next_test = get_effect(entries[0].name).confirmed_by
         at_fault = list[MisfitRegion]()
-        for place in places.places if places else ():
-            kind, component = ("loop", "force") if place.family == "loop" else ("sweep", "storage")
-            reading = f"{place.name} deviates by {number(100 * places.change, 2)} % from all other tests"  # type: ignore[union-attr]
-            excess = place.distance(base.residual)
+        for part in places.faulty_parts if places else ():
+            kind, component = ("loop", "force") if part.family == "loop" else ("sweep", "storage")
+            reading = f"{part.name} deviates by {number(100 * places.change, 2)} % from all other tests"  # type: ignore[union-attr]
+            excess = part.distance(base.residual)
             at_fault.append(
-                MisfitRegion(place.direction, kind, place.frequency, place.amplitude, component, excess, reading)
+                MisfitRegion(part.direction, kind, part.frequency, part.amplitude, component, excess, reading)
             )
-        if places and places.places:
-            next_test = f"measure again: {places.places[0].name}"
+        if places and places.faulty_parts:
+            next_test = f"measure again: {places.faulty_parts[0].name}"
         lacking = verdict in ("partly", "ambiguous", "unexplained") and not (self.first and self.first.best.claim)
         resolved, corrected = {*base.model.effects} - {*self.unresolved}, gap.fitted if gap else None
         regions = (*at_fault, *find_regions(base))

@@ -1,6 +1,6 @@
 """Sets of explanations, grown one at a time from the most probable: each weighed by the evidence of the tests.
 
-The evidence of effects comes from refits of all parameters, by Laplace's method; that of faulty places and of curves
+The evidence of effects comes from refits of all parameters, by Laplace's method; that of faulty parts and of curves
 without a name comes from a linear model.
 """
 
@@ -28,8 +28,8 @@ from bushfit.progress import track
 
 #: Maximum number of refits of hypotheses that are probable by the linear model alone; for time.
 _SETTLED = 8
-#: Number of mistakes that are fitted, the most promising first; number of faulty places added to a state; for time.
-_CLAIMS, _PLACES = 4, 2
+#: Number of mistakes that are fitted, the most promising first; number of faulty parts added to a state; for time.
+_CLAIMS, _FAULTY_PARTS = 4, 2
 #: Natural log of the odds below its state within which an effect is refitted; for time.
 _SLIGHT = 3.0
 #: Attributes of a test that a record determines at each point.
@@ -48,8 +48,8 @@ class Search:
         tests = Tests(request.base, request.data.campaign.rig, log(1.0 - sum(ODDS.values())))
         self.root = SearchState.of_tests(tests, request)
         self._log_priors = prior_odds([*self.root.proposals, *tests.explanations])
-        families = {e.family for e in (*request.outlier_clusters, *tests.explanations) if e.kind == "place"}
-        self._meeting_odds = log(ODDS["place"] / max(len(families), 1)) - tests.log_prior
+        families = {e.family for e in (*request.outlier_clusters, *tests.explanations) if e.kind == "part"}
+        self._meeting_odds = log(ODDS["part"] / max(len(families), 1)) - tests.log_prior
 
     def run(self) -> list[Hypothesis]:
         """Run the search: extend the most probable sets of explanations by one more, for a few rounds.
@@ -124,22 +124,24 @@ class Search:
         """
         for candidate in (
             hypothesis,
-            *(self._with_outlier_cluster(hypothesis, place) for place in self.request.outlier_clusters),
+            *(self._with_outlier_cluster(hypothesis, part) for part in self.request.outlier_clusters),
         ):
             before = self._known.get(candidate.key)
             rank = candidate.refitted, candidate.log_posterior
             if before is None or rank > (before.refitted, before.log_posterior):
                 self._known[candidate.key] = candidate
 
-    def _with_outlier_cluster(self, hypothesis: Hypothesis, place: OutlierCluster) -> Hypothesis:
+    def _with_outlier_cluster(self, hypothesis: Hypothesis, part: OutlierCluster) -> Hypothesis:
         """Add to a hypothesis a disturbance at a frequency where several outliers were left out."""
-        log_posterior = hypothesis.log_posterior + self._meeting_odds + place.log_odds
+        log_posterior = hypothesis.log_posterior + self._meeting_odds + part.log_odds
         if hypothesis.change > self.request.tolerance:
-            change = max(hypothesis.change, place.size)
-            places = (*hypothesis.places, place)
-            return replace(hypothesis, places=places, log_posterior=log_posterior, change=change)
+            change = max(hypothesis.change, part.size)
+            faulty_parts = (*hypothesis.faulty_parts, part)
+            return replace(hypothesis, faulty_parts=faulty_parts, log_posterior=log_posterior, change=change)
         plain = self.root.hypotheses[0]  # what is smaller than the tolerance is no part of an explanation
-        return replace(plain, places=(place,), log_posterior=log_posterior, change=place.size, last_change=place.size)
+        return replace(
+            plain, faulty_parts=(part,), log_posterior=log_posterior, change=part.size, last_change=part.size
+        )
 
     def _grow(self, state: SearchState, depth: int) -> Iterator[SearchState]:
         """Extend a state of the search by each of its most promising effects (refitted) and faulty parts of the tests.
@@ -154,7 +156,7 @@ class Search:
         for grown in self._with_effects(state, self._promising(state, by_evidence, by_score), depth):
             yield grown
             yield from self._without_earlier(grown)
-        yield from self._with_places(state, depth)
+        yield from self._with_faulty_parts(state, depth)
 
     def _promising(self, state: SearchState, by_evidence: int, by_score: int) -> list[str]:
         """Names of the effects to refit next to a state.
@@ -223,26 +225,26 @@ class Search:
             change=max(state.change, change),
         )
 
-    def _with_places(self, state: SearchState, depth: int) -> Iterator[SearchState]:
-        """Extend a state by each of its likeliest faulty places, with a common shift or an error of every point."""
-        places = [(e, evidence) for e, evidence in state.explanation_evidence if isinstance(e, FaultyPart)]
-        places.sort(key=lambda pair: -(self._log_prior(pair[0]) + pair[1].total))
-        for place, shifted in places[:_PLACES]:
-            scattered_place = place.point_by_point()
-            (scattered,) = state.weigh([scattered_place])
-            better, worth = (scattered_place, scattered) if scattered.total > shifted.total else (place, shifted)
-            log_prior = state.log_prior + self._log_prior(place) - log(depth + 1)
+    def _with_faulty_parts(self, state: SearchState, depth: int) -> Iterator[SearchState]:
+        """Extend a state by each of its likeliest faulty parts, with a common shift or an error of every point."""
+        faulty_parts = [(e, evidence) for e, evidence in state.explanation_evidence if isinstance(e, FaultyPart)]
+        faulty_parts.sort(key=lambda pair: -(self._log_prior(pair[0]) + pair[1].total))
+        for part, shifted in faulty_parts[:_FAULTY_PARTS]:
+            scattered_part = part.point_by_point()
+            (scattered,) = state.weigh([scattered_part])
+            better, worth = (scattered_part, scattered) if scattered.total > shifted.total else (part, shifted)
+            log_prior = state.log_prior + self._log_prior(part) - log(depth + 1)
             improves = log_prior + state.log_density + worth.total > state.log_posterior
-            if not improves or state.key | {place.name} in self._visited:
+            if not improves or state.key | {part.name} in self._visited:
                 continue
             evidence = state.evidence
-            if evidence.reduced_chi_square > _BENT:  # perhaps by the place
+            if evidence.reduced_chi_square > _BENT:  # perhaps by the part
                 start = {} if state.effects else self.request.start
                 evidence = refit_with_free_columns(evidence, state.bare, better.columns, start, self.request.bounds)
             grown = replace(
                 state,
                 evidence=evidence,
-                places=(*state.places, better),
+                faulty_parts=(*state.faulty_parts, better),
                 log_prior=log_prior,
                 amounts=(*state.amounts, worth.likeliest),
                 change=max(state.change, worth.size),
@@ -251,7 +253,7 @@ class Search:
 
     def _without_earlier(self, state: SearchState) -> Iterator[SearchState]:
         """Yield the refitted state without each earlier effect, which the last effect may make unnecessary."""
-        if state.places:
+        if state.faulty_parts:
             return
         data_sets, request = state.evidence.data_sets, self.request
         for name in state.effects[:-1]:
@@ -303,7 +305,7 @@ def prior_odds(explanations: Sequence[Explanation]) -> dict[tuple[str, str], flo
 
     The odds of a kind, in `priors.ODDS`, are divided equally among its families. In a family of effects, the effect
     that acts in all directions has half, and those in single directions share the other half; in a family of faulty
-    places, all have equal odds.
+    parts, all have equal odds.
 
     Args:
         explanations: all explanations considered.

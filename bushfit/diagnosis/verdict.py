@@ -37,15 +37,15 @@ class Composition:
     unnamed: bool = False
 
     @property
-    def places(self) -> tuple[FaultyPart, ...]:
+    def faulty_parts(self) -> tuple[FaultyPart, ...]:
         """Faulty parts of the tests; empty if they form a pattern that may be physics without a name."""
-        return () if is_pattern(self.best.places) else self.best.places
+        return () if is_pattern(self.best.faulty_parts) else self.best.faulty_parts
 
     @property
     def parts(self) -> frozenset[str]:
         """Names of the effects, kinds of faulty test parts and other parts of the explanation."""
         best = self.best
-        marks = [f"place: {place.family}" for place in self.places] + ["levels"] * best.levels
+        marks = [f"part: {part.family}" for part in self.faulty_parts] + ["levels"] * best.levels
         marks += ["unnamed"] * self.unnamed + ([str(best.claim.mistake.name)] if best.claim else [])
         return frozenset((*self.names, *marks))
 
@@ -55,8 +55,8 @@ class Composition:
 
         A faulty loop is a separate test, and points that were left out have no weight, so they distort no effect.
         """
-        faults = [place for place in self.places if not isinstance(place, OutlierCluster)]
-        return bool(self.places) and (not self.names or any(place.family != "loop" for place in faults))
+        faults = [part for part in self.faulty_parts if not isinstance(part, OutlierCluster)]
+        return bool(self.faulty_parts) and (not self.names or any(part.family != "loop" for part in faults))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +109,7 @@ def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float) -> Findin
         rivals = (composition for composition in likely if composition is not alone)
         return replace(_single(alone, nothing, leads), reported=(alone, *rivals))
     reported = tuple(likely[:MOST_REPORTED])
-    if common and all(part.startswith("place: ") for part in common):  # whatever else there is, this has to go first
+    if common and all(part.startswith("part: ") for part in common):  # whatever else there is, this has to go first
         return Finding("unexplained", nothing, reported, leads)
     nameless = sum(composition.probability for composition in likely if composition.parts == {"unnamed"})
     fits = first.best.claim is not None or first.best.p_value >= DOES_NOT_FIT
@@ -137,7 +137,7 @@ def _single(first: Composition, nothing: float, leads: Sequence[str]) -> Finding
     curve = best.unnamed not in ("", COMPOUND) and best.last_change >= (1.0 - LEAST_NAMED_SHARE) * best.change
     if not best.claim and (not names or curve or best.p_value < DOES_NOT_FIT):
         return Finding("described", nothing, (first,), leads)
-    partly = first.unnamed or best.levels or first.places
+    partly = first.unnamed or best.levels or first.faulty_parts
     return Finding("partly" if partly else "named", nothing, (first,), names=names)
 
 
@@ -160,19 +160,19 @@ class _Parts(NamedTuple):
 
     Args:
         effects: names of the effects.
-        places: faulty places as "kind:name".
-        only_unnamed: True if a curve without a name, or a pattern of places, is the only part.
+        faulty_parts: faulty parts as "kind:name".
+        only_unnamed: True if a curve without a name, or a pattern of faulty parts, is the only part.
         claim: key of the mistake in the record; None without a mistake.
     """
 
     effects: frozenset[str]
-    places: frozenset[str]
+    faulty_parts: frozenset[str]
     only_unnamed: bool
     claim: Hashable
 
     @classmethod
     def of_hypothesis(cls, hypothesis: Hypothesis) -> _Parts:
-        """Effects, faulty places and mistake that a hypothesis names.
+        """Effects, faulty parts and mistake that a hypothesis names.
 
         Effects of the rubber are not named if the hypothesis includes a smooth deviation of the compound, because the
         deviation could imitate them.
@@ -182,16 +182,18 @@ class _Parts(NamedTuple):
             for name in hypothesis.effects
             if not (hypothesis.compound_deviates and get_effect(name).level == Level.MATERIAL)
         )
-        pattern = is_pattern(hypothesis.places)
-        places = [f"{place.family}:{place.name}" for place in hypothesis.places] + ["levels:"] * hypothesis.levels
-        places = [] if pattern else places
+        pattern = is_pattern(hypothesis.faulty_parts)
+        faulty_parts = [f"{part.family}:{part.name}" for part in hypothesis.faulty_parts] + [
+            "levels:"
+        ] * hypothesis.levels
+        faulty_parts = [] if pattern else faulty_parts
         claim = hypothesis.claim and hypothesis.claim.key
-        only_unnamed = (pattern or bool(hypothesis.unnamed)) and not (effects or places or claim)
-        return cls(effects, frozenset(places), only_unnamed, claim)
+        only_unnamed = (pattern or bool(hypothesis.unnamed)) and not (effects or faulty_parts or claim)
+        return cls(effects, frozenset(faulty_parts), only_unnamed, claim)
 
     def simpler(self) -> set[_Parts]:
         """All simpler sets of parts: non-empty subsets, and the set with each effect replaced by its simpler limit."""
-        reduced = product(_subsets(self.effects), _subsets(self.places), [False], {None, self.claim})
+        reduced = product(_subsets(self.effects), _subsets(self.faulty_parts), [False], {None, self.claim})
         limit = self._replace(effects=frozenset(get_effect(name).limit or name for name in self.effects))
         return {parts for parts in (*map(_Parts._make, reduced), limit) if any(parts)} - {self}
 
@@ -205,7 +207,7 @@ def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
     """Merge hypotheses with the same parts, with or without a deviation of the compound, to compositions.
 
     A set of parts that is less probable than a simpler set is merged with the simpler set; so is an effect with the
-    effect that is its limit. Faulty places of the same kinds are merged.
+    effect that is its limit. Faulty parts of the same kinds are merged.
 
     Args:
         pairs: hypotheses and their posterior weights, the most probable first.
@@ -221,7 +223,7 @@ def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
         if parts not in best or (hypothesis.refitted and not best[parts].refitted):
             best[parts] = hypothesis
         total[parts] += weight
-        unnamed[parts] += weight * (bool(hypothesis.unnamed) or is_pattern(hypothesis.places))
+        unnamed[parts] += weight * (bool(hypothesis.unnamed) or is_pattern(hypothesis.faulty_parts))
     merged: dict[_Parts, float] = defaultdict(float)
     order = {parts: rank for rank, parts in enumerate(sorted(total, key=lambda parts: -total[parts]))}
     for parts in order:
@@ -229,8 +231,8 @@ def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
         merged[min(simpler, key=order.__getitem__) if simpler else parts] += total[parts]
     kinds: dict[Hashable, list[_Parts]] = defaultdict(list)
     for parts in sorted(merged, key=lambda parts: -merged[parts]):
-        families = frozenset(place.partition(":")[0] for place in parts.places)
-        kinds[parts._replace(places=families)].append(parts)
+        families = frozenset(part.partition(":")[0] for part in parts.faulty_parts)
+        kinds[parts._replace(faulty_parts=families)].append(parts)
     whole = sum(merged.values())
     compositions = [
         Composition(

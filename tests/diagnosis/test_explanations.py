@@ -15,7 +15,7 @@ from rigged import LEVELS, SHARED, Fitted, Measured, Tamper, both, loop_too_stro
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import Explanation
-from bushfit.diagnosis.faulty_places import faulty_places
+from bushfit.diagnosis.faulty_parts import find_faulty_parts
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.propose import proposals, scores
 from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
@@ -58,8 +58,8 @@ def test_the_place_that_went_wrong_is_the_likeliest(
 ) -> None:
     """Errors of the rig, of all sizes, are counted beside it."""
     evidence = in_scatter_units(fitted(tamper(measured(plan=SHARED))))
-    found = best(evidence, faulty_places(evidence))
-    assert (found.kind, found.family) == ("place", kind)
+    found = best(evidence, find_faulty_parts(evidence))
+    assert (found.kind, found.family) == ("part", kind)
     assert found.name == words
 
 

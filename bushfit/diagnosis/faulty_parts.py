@@ -20,7 +20,7 @@ _FEWEST_FREQUENCIES = 5
 _MOST_FREQUENCIES = 100
 
 
-def faulty_places(evidence: Evidence) -> list[FaultyPart]:
+def find_faulty_parts(evidence: Evidence) -> list[FaultyPart]:
     """List the parts of the tests whose points may all be wrong together: the suspects of a faulty measurement.
 
     The points of a part share an error of gain and phase; levels and repeats also share a slope of both.
@@ -32,7 +32,7 @@ def faulty_places(evidence: Evidence) -> list[FaultyPart]:
         Frequencies, levels, repeats and, if there are sweeps too, loops. Their columns do not depend on the model.
     """
     loops, sweeps = split_by_kind(evidence.data_sets)
-    places = [*_frequencies(evidence, sweeps), *_levels(evidence, sweeps), *_repeats(evidence, sweeps)]
+    faulty_parts = [*_frequencies(evidence, sweeps), *_levels(evidence, sweeps), *_repeats(evidence, sweeps)]
     for loop in loops if sweeps else ():  # wrong as a whole, in gain or offset
         group = Group(
             np.array(loop.gain_and_offset()),
@@ -41,8 +41,8 @@ def faulty_places(evidence: Evidence) -> list[FaultyPart]:
             covered_rows=(evidence.residual_rows[loop], evidence.residual.size),
         )
         ends = (loop.drive.frequency,) * 2, (loop.drive.amplitude,) * 2
-        places.append(FaultyPart("place", "loop", f"the loop {loop.name}", group, loop.direction, *ends))
-    return places
+        faulty_parts.append(FaultyPart("part", "loop", f"the loop {loop.name}", group, loop.direction, *ends))
+    return faulty_parts
 
 
 def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
@@ -54,8 +54,8 @@ def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fau
             mask = sweep.held_value == level
             label = sweep.line_words(int(np.argmax(mask)))
             if levels.size > 1:  # in this file or in others
-                place = _shifted(evidence, "level", label, [sweep], [mask], sloping=True)
-                yield replace(place, extreme=levels.size > 2 and level in (levels.min(), levels.max()))
+                part = _shifted(evidence, "level", label, [sweep], [mask], sloping=True)
+                yield replace(part, extreme=levels.size > 2 and level in (levels.min(), levels.max()))
             numbers = np.unique(sweep.repeat[mask])
             for number in numbers if numbers.size > 2 else ():
                 repeat = mask & (sweep.repeat == number)
@@ -91,7 +91,7 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterato
                 name = f"{' to '.join(f'{end:.4g}' for end in ends)} Hz in {location}, at every amplitude"
                 chosen = [np.any(of_sweep, axis=0) for of_sweep in zip(*masks[window], strict=True)]
                 unit = np.kron(np.eye(width), np.array([[1.0], [1.0j]]))
-                yield _place(evidence, "frequency", name, members, chosen, np.concatenate(columns[window]), unit)
+                yield _part(evidence, "frequency", name, members, chosen, np.concatenate(columns[window]), unit)
 
 
 def _scopes(sweeps: Sequence[MeasuredSweep]) -> Iterator[tuple[str, str, Sequence[MeasuredSweep]]]:
@@ -137,10 +137,10 @@ def _shifted(
     """
     ends = np.array([[1.0, 1.0], [1.0, -1.0]])[: 1 + sloping]
     unit = np.kron(ends, np.array([[1.0], [1.0j]]))
-    return _place(evidence, family, name, sweeps, chosen, _shift_columns(evidence, sweeps, chosen, sloping), unit)
+    return _part(evidence, family, name, sweeps, chosen, _shift_columns(evidence, sweeps, chosen, sloping), unit)
 
 
-def _place(
+def _part(
     evidence: Evidence,
     family: str,
     name: str,
@@ -166,7 +166,7 @@ def _place(
     )
     ends = (float(frequency.min()), float(frequency.max())), (float(amplitude.min()), float(amplitude.max()))
     group = Group(columns, unit, act_together=True, covered_rows=(_rows(evidence, sweeps), evidence.residual.size))
-    return FaultyPart("place", family, name, group, sweeps[0].direction, *ends)
+    return FaultyPart("part", family, name, group, sweeps[0].direction, *ends)
 
 
 def _shift_columns(
@@ -186,8 +186,8 @@ def _shift_columns(
         log_step = np.log(sweep.step)
         slope = 2.0 * (log_step - log_step.mean()) / max(float(np.ptp(log_step)), 1e-9)
         shapes = [mask.astype(float), *([mask * slope] if sloping else [])]
-        place = evidence.residual_rows[sweep]
-        columns[:, place.start - rows.start : place.stop - rows.start] = [
+        sweep_rows = evidence.residual_rows[sweep]
+        columns[:, sweep_rows.start - rows.start : sweep_rows.stop - rows.start] = [
             column for shape in shapes for column in sweep.shared_error_columns(shape)
         ]
     return columns
@@ -195,5 +195,5 @@ def _shift_columns(
 
 def _rows(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> slice:
     """Slice of the residual vector from the first to the last row of the given sweeps."""
-    places = [evidence.residual_rows[sweep] for sweep in sweeps]
-    return slice(min(place.start for place in places), max(place.stop for place in places))
+    slices = [evidence.residual_rows[sweep] for sweep in sweeps]
+    return slice(min(rows.start for rows in slices), max(rows.stop for rows in slices))
