@@ -1,7 +1,7 @@
 """Options of the commands on test files for metadata that the files do not contain, and errors that name them."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
@@ -94,49 +94,22 @@ def metadata_options(*, sweeps: bool = True) -> Parameter:
         sweeps: True for loops and sweeps, with the metadata of a campaign; False for histories and resonance tests.
     """
     keys = _OF_TESTS if sweeps else {}
-    option_keys = ("direction", "force_sign", *keys, *_AS_WRITTEN)
 
-    def column_roles() -> tuple[str, ...]:
+    def column_roles() -> Iterable[str]:
         from bushfit.reading.headers import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
 
-        return tuple(dict.fromkeys((*LOOP_COLUMNS, *(SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS))))
+        return {**LOOP_COLUMNS, **(SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS)}
 
-    def decorate(function: Function) -> Function:
-        @wraps(function)
-        def wrapped(**arguments: Any) -> Any:
-            return function(**_with_test_options(arguments, option_keys, column_roles()))
-
-        return add_parameters(
-            wrapped,
-            click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_tests_alone),
-            option_group(
-                "Information that is missing in the files",
-                _metadata_option(
-                    "direction",
-                    "DIRECTION",
-                    "Direction: axial, radial or torsion [from file names].",
-                ),
-                option("--unit units", "ROLE=UNIT", 'Unit of a column, such as "force=kN".', multiple=True),
-                option(
-                    "--column columns",
-                    "ROLE=HEADER",
-                    'Header of a column, such as "force=Fz"; an unknown ROLE prints the list of roles.',
-                    multiple=True,
-                ),
-                _metadata_option(
-                    "force_sign",
-                    "-1",
-                    "Reverse the sign of the force: use -1 if the force falls where the displacement rises.",
-                ),
-                *(_metadata_option(key, metavar, words) for key, (metavar, words) in keys.items()),
-            ),
-            option_group(
-                "File format, if it is not detected",
-                *(_metadata_option(key, metavar) for key, metavar in _AS_WRITTEN.items()),
-            ),
-        )
-
-    return decorate
+    files = click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_tests_alone)
+    direction = _metadata_option("direction", "DIRECTION", "Direction: axial, radial or torsion [from file names].")
+    unit = option("--unit units", "ROLE=UNIT", 'Unit of a column, such as "force=kN".', multiple=True)
+    words = 'Header of a column, such as "force=Fz"; an unknown ROLE prints the list of roles.'
+    column = option("--column columns", "ROLE=HEADER", words, multiple=True)
+    words = "Reverse the sign of the force: use -1 if the force falls where the displacement rises."
+    sign = _metadata_option("force_sign", "-1", words)
+    further = [_metadata_option(key, *texts) for key, texts in keys.items()]
+    missing = option_group("Information that is missing in the files", direction, unit, column, sign, *further)
+    return _gathered(("direction", "force_sign", *keys), column_roles, files, missing)
 
 
 def history_options() -> Parameter:
@@ -145,44 +118,39 @@ def history_options() -> Parameter:
     The command receives their values in one argument `test_options`, by campaign key.
     """
 
+    def column_roles() -> Iterable[str]:
+        from bushfit.reading.displacements import DISPLACEMENT_COLUMNS
+
+        return DISPLACEMENT_COLUMNS
+
+    unit = option("--unit units", "ROLE=UNIT", 'Unit of a column: "axial=mm".', multiple=True)
+    column = option("--column columns", "ROLE=HEADER", 'Header of a column: "radial=Sy".', multiple=True)
+    return _gathered((), column_roles, option_group("Information that is missing in the file", unit, column))
+
+
+def _gathered(keys: Sequence[str], column_roles: Callable[[], Iterable[str]], *parameters: Parameter) -> Parameter:
+    """Decorator that adds options to a command, and passes their values in one argument `test_options`.
+
+    Args:
+        keys: campaign keys of the options, except those of the file format, which are added.
+        column_roles: function that returns the valid roles of columns for --column and --unit, such as "force".
+        parameters: options and arguments to add.
+    """
+    written = [_metadata_option(key, metavar) for key, metavar in _AS_WRITTEN.items()]
+
     def decorate(function: Function) -> Function:
         @wraps(function)
         def wrapped(**arguments: Any) -> Any:
-            from bushfit.reading.displacements import DISPLACEMENT_COLUMNS
+            roles = tuple(column_roles())
+            test_options = {key: arguments.pop(key) for key in (*keys, *_AS_WRITTEN)}
+            test_options["columns"] = _pairs(arguments.pop("columns"), "--column", "force=Kraft", roles)
+            test_options["units"] = _pairs(arguments.pop("units"), "--unit", "force=kN", roles)
+            given = {key: value for key, value in test_options.items() if value not in (None, {})}
+            return function(test_options=given, **arguments)
 
-            return function(**_with_test_options(arguments, (*_AS_WRITTEN,), (*DISPLACEMENT_COLUMNS,)))
-
-        return add_parameters(
-            wrapped,
-            option_group(
-                "Information that is missing in the file",
-                option("--unit units", "ROLE=UNIT", 'Unit of a column: "axial=mm".', multiple=True),
-                option("--column columns", "ROLE=HEADER", 'Header of a column: "radial=Sy".', multiple=True),
-            ),
-            option_group(
-                "File format, if it is not detected",
-                *(_metadata_option(key, metavar) for key, metavar in _AS_WRITTEN.items()),
-            ),
-        )
+        return add_parameters(wrapped, *parameters, option_group("File format, if it is not detected", *written))
 
     return decorate
-
-
-def _with_test_options(arguments: dict[str, Any], keys: Sequence[str], roles: Sequence[str]) -> dict[str, Any]:
-    """Gather the values of the options that describe a test in one argument `test_options`.
-
-    Args:
-        arguments: arguments of the command by name.
-        keys: campaign keys among these arguments.
-        roles: valid roles of columns for --column and --unit, such as "force".
-
-    Returns:
-        The other arguments, and `test_options` with the given values by key, and columns and units by role.
-    """
-    test_options = {key: arguments.pop(key) for key in keys}
-    test_options["columns"] = _pairs(arguments.pop("columns"), "--column", "force=Kraft", roles)
-    test_options["units"] = _pairs(arguments.pop("units"), "--unit", "force=kN", roles)
-    return {"test_options": {key: value for key, value in test_options.items() if value not in (None, {})}, **arguments}
 
 
 def _metadata_option(key: str, metavar: str, words: str | None = None) -> Parameter:

@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
-from bushfit.effects.contract import Array
 from bushfit.geometry import TRANSLATION
 from bushfit.inspection.record import Inspection
 from bushfit.reading.measurement import Loop, Sweep, loss_factor
@@ -18,14 +17,15 @@ from bushfit.reduction.result import Reduction
 from bushfit.report.plots import style
 from bushfit.report.plots.fits import stiffness_scale
 from bushfit.report.plots.measured import header_of
+from bushfit.report.plots.response import turning_rows
 from bushfit.units import display_unit, format_range
 
 #: Colour of a history.
 _COLOR = "#3b528b"
 #: Largest number of rows of a loop that are drawn over the displacement.
 _MOST_ROWS = 6000
-#: Number of time bins of a long record in a figure: more than its width in pixels.
-_TIME_BINS = 1500
+#: Largest number of rows of a record that are drawn over time; a figure has fewer pixels.
+_MOST_OVER_TIME = 3000
 #: Height of a history, and of the panels of noise and distortion [cm].
 _STRIP, _NOISE_ROW = 2.7, 4.2
 #: Largest number of histories that are drawn in one figure.
@@ -81,10 +81,8 @@ def _draw_history(figure: Figure, cell: SubplotSpec, history: Loop, loop: Axes |
     motion, load = to_length * history.displacement, to_force * history.force
     labels = f"{names[0]}\n[{length}]", f"{names[1]}\n[{force}]"
     for axes, values, label in zip(over_time, (motion, load), labels, strict=True):
-        if history.time.size <= 2 * _TIME_BINS:
-            axes.plot(history.time, values, lw=0.8, color=_COLOR)
-        else:
-            axes.fill_between(*envelope_over_time(history.time, values), step="post", color=_COLOR, lw=0.6)
+        rows = turning_rows(values, _MOST_OVER_TIME)
+        axes.plot(history.time[rows], values[rows], lw=0.8, color=_COLOR)
         style.label_axes(axes, "time [s]" if history.has_recorded_time else "time rebuilt [s]", label)
     figure.align_ylabels(over_time)
     over_time[0].set_xlabel("")
@@ -94,12 +92,6 @@ def _draw_history(figure: Figure, cell: SubplotSpec, history: Loop, loop: Axes |
     loop.plot(motion[::step], load[::step], ".", ms=1.2, mew=0, color=_COLOR, alpha=0.7)
     style.label_axes(loop, f"{names[0]} [{length}]", f"{names[1]} [{force}]")
     return loop
-
-
-def envelope_over_time(time: Array, values: Array) -> tuple[Array, Array, Array]:
-    """Start time, smallest and largest value of each of 1500 equal time bins that contain rows, (k,) each."""
-    first = np.unique(np.searchsorted(time, np.linspace(time[0], time[-1], _TIME_BINS + 1)[:-1]))
-    return time[first], np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
 
 
 def _draw_sweep(pair: Sequence[Axes], sweep: Sweep) -> Axes:
@@ -171,13 +163,14 @@ def _draw_strip(axes: Axes, history: Loop, reduction: Reduction, looks: dict[flo
         looks: colour and marker by amplitude level.
     """
     unit, factor = reduction.direction.display.displacement
-    time, low, high = envelope_over_time(history.time, factor * history.displacement)
-    axes.fill_between(time, low, high, color="#c8c8c8", lw=0.4, step="post")
+    rows = turning_rows(history.displacement, _MOST_OVER_TIME)
+    time, motion = history.time[rows], factor * history.displacement[rows]
+    axes.plot(time, motion, color="#c8c8c8", lw=0.4)
     for level, look in looks.items():
         steps = [step for step in reduction.steps if step.name == history.name and step.level == level]
         inside = [(time >= step.start) & (time <= step.end) for step in steps]
         used = np.any([np.zeros(time.shape, dtype=bool), *inside], axis=0)
-        axes.fill_between(time, low, high, where=used, color=look.color, lw=0.4, step="post")
+        axes.plot(time, np.where(used, motion, np.nan), color=look.color, lw=0.4)
     style.label_axes(axes, "time [s]", f"{reduction.direction.motion.words[0]}\n[{unit}]")
     axes.margins(x=0.01)
 
