@@ -6,7 +6,6 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,10 +24,12 @@ if TYPE_CHECKING:
     from bushfit.reading.measurement import Loop
     from bushfit.reading.table import Table
     from bushfit.reduction.resonance import Resonance
-    from bushfit.reduction.result import Reduction, Step
+    from bushfit.reduction.result import Reduction
 
 #: Number of printed lines per octave of a resonance test; chosen: a dozen lines for most tests.
 _LINES_AN_OCTAVE = 3
+#: Quantities whose display units are printed.
+_DISPLAYED = ("displacement", "stiffness")
 
 
 @command_called(
@@ -220,74 +221,68 @@ def _read(files: Sequence[Path], test_options: Mapping[str, Any]) -> list[Loop]:
 
 
 def _print_steps(output: Output, reduction: Reduction) -> None:
-    """Print the reduced points: one line per amplitude level and repeat, or with -v one line per point."""
-    units = reduction.direction.display
-    (unit, length), (stiffness_unit, factor) = units.displacement, units.stiffness
+    """Print the reduced points, one line per amplitude level and repeat; with -v also the stretches without a point."""
+    import pandas as pd
 
-    def line(step: Step) -> tuple[float, ...]:
-        return (step.level, step.repeat, *((step.nominal_frequency,) if output.verbose else ()))
+    from bushfit.reading.measurement import loss_factor
 
-    count, rows = len(reduction.steps), []
-    for (level, repeat, *_), group in groupby(sorted(reduction.steps, key=line), line):
-        steps = list(group)
-        cells = (
-            number(length * level, 4),
-            f"{repeat:.0f}",
-            f"{len(steps)}",
-            _span([number(frequency, 4) for frequency in sorted(step.nominal_frequency for step in steps)]),
-            _span(
-                format_aligned(
-                    sorted((factor * abs(step.stiffness) for step in steps), reverse=True), 4, minimum_digits=2
-                )[::-1]
-            ),
-            _span(
-                format_aligned(sorted((step.loss_factor for step in steps), reverse=True), 3, minimum_digits=2)[::-1]
-            ),
-            number(100 * max(step.gain_error for step in steps), 1),
-            number(100 * max(step.force_distortion for step in steps), 2),
+    (unit, length), (stiffness_unit, factor) = (getattr(reduction.direction.display, key) for key in _DISPLAYED)
+    steps, rows = pd.DataFrame([vars(step) for step in reduction.steps]), []
+    for (level, repeat), line in steps.groupby(["level", "repeat"]):
+        spans = (
+            format_hertz(line["nominal_frequency"]),
+            _span(factor * line["stiffness"].abs(), 4),
+            _span(loss_factor(line["stiffness"].to_numpy()), 3),
         )
-        rows.append(cells)
-    title = f"{count} point{'s' * (count > 1)} found; noise and distortion: largest of each line"
+        errors = number(100 * line["gain_error"].max(), 1), number(100 * line["force_distortion"].max(), 2)
+        rows.append((number(length * level, 4), f"{repeat}", f"{len(line)}", *spans, *errors))
+    title = f"{len(steps)} point{'s' * (len(steps) > 1)} found; noise and distortion: largest of each line"
     heads = ("repeat", "points", "f [Hz]", f"|K| [{stiffness_unit}]", "loss factor", "noise [%]", "THD [%]")
     output.print_table(title, (f"level [{unit}]", *heads), rows)
     output.warn(reduction.warnings)
-    if output.verbose:
-        for skip in reduction.skipped:
-            output.print(f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s gives no point: {skip.why}")
+    for skip in reduction.skipped if output.verbose else ():
+        output.print(f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s gives no point: {skip.why}")
 
 
 def _print_resonance(output: Output, resonance: Resonance) -> None:
-    """Print a reduced resonance test: one line per third of an octave, or with -v one line per point."""
+    """Print a reduced resonance test, one line per third of an octave."""
     import numpy as np
+    import pandas as pd
 
     from bushfit.geometry import TRANSLATION
     from bushfit.reading.measurement import loss_factor
 
-    (unit, length), _, (stiffness_unit, factor) = TRANSLATION.display
-    frequency, largest = resonance.peak
-    count, cells = resonance.frequency.size, []
-    lines = range(count) if output.verbose else (_LINES_AN_OCTAVE * np.log2(resonance.frequency)).round().tolist()
-    for _, group in groupby(range(count), lambda point: lines[point]):
-        rows = list(group)
-        amplitudes, ratios = (
-            _span(format_aligned(sorted(values[rows].tolist(), reverse=True), 3, minimum_digits=3)[::-1])
-            for values in (length * resonance.amplitude, np.abs(resonance.transmissibility))
-        )
-        figures = (
-            number(factor * float(np.median(np.abs(resonance.stiffness[rows]))), 4),
-            number(float(np.median(loss_factor(resonance.stiffness[rows]))), 3),
-            number(100 * float(resonance.relative_error[rows].max()), 2),
-        )
-        ends = _span([number(float(end), 4) for end in resonance.frequency[rows]])
-        cells.append((ends, f"{len(rows)}", amplitudes, ratios, *figures))
-    title = (
-        f"{count} point{'s' * (count > 1)} of {resonance.test.frequency.size} rows; resonance at {frequency:.1f} Hz, "
-        f"|T| {largest:.2f}\n|K| and loss factor: median of each line; error: largest"
+    (unit, length), (stiffness_unit, factor) = (getattr(TRANSLATION.display, key) for key in _DISPLAYED)
+    points = pd.DataFrame(
+        {
+            "frequency": resonance.frequency,
+            "amplitude": length * resonance.amplitude,
+            "ratio": np.abs(resonance.transmissibility),
+            "stiffness": factor * np.abs(resonance.stiffness),
+            "loss": loss_factor(resonance.stiffness),
+            "error": 100 * resonance.relative_error,
+        }
     )
+    rows = []
+    for _, line in points.groupby((_LINES_AN_OCTAVE * np.log2(points["frequency"])).round()):
+        spans = _span(line["amplitude"], 3), _span(line["ratio"], 3)
+        values = number(line["stiffness"].median(), 4), number(line["loss"].median(), 3), number(line["error"].max(), 2)
+        rows.append((format_hertz(line["frequency"]), f"{len(line)}", *spans, *values))
+    frequency, largest = resonance.peak
+    count = f"{len(points)} point{'s' * (len(points) > 1)} of {resonance.test.frequency.size} rows"
+    title = f"{count}; resonance at {frequency:.1f} Hz, |T| {largest:.2f}"
+    title += "\n|K| and loss factor: median of each line; error: largest"
     heads = ("f [Hz]", "points", f"amplitude [{unit}]", "|T|", f"|K| [{stiffness_unit}]", "loss factor", "error [%]")
-    output.print_table(title, heads, cells)
+    output.print_table(title, heads, rows)
     output.warn(resonance.warnings)
 
 
-def _span(rising: Sequence[str]) -> str:
-    return "-".join(dict.fromkeys((rising[0], rising[-1])))
+def format_hertz(frequencies: Any) -> str:
+    """Format the lowest and the highest of some frequencies [Hz], such as "5-155"."""
+    return "-".join(dict.fromkeys(f"{end:.4g}" for end in (min(frequencies), max(frequencies))))
+
+
+def _span(values: Any, digits: int) -> str:
+    """Format the smallest and the largest of some numbers with common decimals, such as "537.2-693.0"."""
+    high, low = format_aligned([float(max(values)), float(min(values))], digits, minimum_digits=2)
+    return "-".join(dict.fromkeys((low, high)))

@@ -77,11 +77,6 @@ class Step:
     mean_displacement: float = 0.0
     mean_force: float = 0.0
 
-    @property
-    def loss_factor(self) -> float:
-        """Loss factor K''/K' [1]."""
-        return self.stiffness.imag / self.stiffness.real
-
 
 @dataclass(frozen=True, eq=False)
 class SkippedStretch:

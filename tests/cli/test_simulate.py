@@ -79,11 +79,10 @@ def test_options_that_do_not_fit(typed: Run, root: Path, tmp_path: Path, options
 
 
 def test_a_measured_test_becomes_a_sweep(typed: Run, root: Path, tmp_path: Path) -> None:
-    done = typed("reduce", root / RESONANCE, *MASS, "--direction", "axial", "-o", "x", "--json", "-v")
+    done = typed("reduce", root / RESONANCE, *MASS, "--direction", "axial", "-o", "x", "--json")
     assert names(tmp_path / "x") == {"sweep.csv", "reduce.png"}
     document = json.loads(done.stdout)
     assert (document["mass_kg"], document["resonance_Hz"]) == pytest.approx((0.5878, 230.465))
-    assert len([line for line in done.stderr.splitlines() if line.split()[1:2] == ["1"]]) == 100, "a line a point"
     assert "100 points of 2000 rows; resonance at 230.5 Hz, |T| 8.03" in done.stderr
     table = pd.read_csv(tmp_path / "x/sweep.csv")
     columns = ["frequency [Hz]", "amplitude [mm]", "stiffness [N/mm]", "loss factor [-]", "relative error [-]"]
