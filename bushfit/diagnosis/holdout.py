@@ -11,7 +11,7 @@ Notes:
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from bushfit.effects import effect_name_of
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.agreement import LeaveOut
-from bushfit.fitting.coordinates import Bounds, jacobian, residual
+from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, split_by_kind
 from bushfit.fitting.problem import FitResult
 from bushfit.progress import track
@@ -212,7 +212,8 @@ def _predict(
         squares by the noise of each row, (all rows,); or the part as skipped, with the reason.
     """
     solution, data_sets = evidence.solution, evidence.data_sets
-    rows, names = part.rows(data_sets), solution.coordinates.names
+    names, of_tests = solution.coordinates.names, part.rows(data_sets)
+    rows = np.pad(of_tests, (0, solution.residual.size - of_tests.size))  # priors are not held out
     if left_open := [names[solution.moving[i]] for i in np.flatnonzero(leave_out.undetermined(rows))]:
         reason = f"the other tests do not determine {', '.join(left_open)}"
         return Skipped(part.name, reason, tuple(dict.fromkeys(map(effect_name_of, left_open))))
@@ -224,16 +225,15 @@ def _predict(
             rest = fit(evidence.model, part.rest(data_sets), fixed, bounds).solution
         except (FitError, ModelError):
             return failed
-        slopes = jacobian(rest.model, data_sets, names)
-        leave_out = _leave_out(replace(rest, residual=residual(rest.model, data_sets), jacobian=slopes))
+        leave_out = _leave_out(rest.moved_to(rest.model, data_sets))
         if rest.stopped or leave_out.undetermined(rows).any():
             return failed
-    residuals = np.array(leave_out.predicted(rows, _clusters(data_sets), stepped=is_step))
-    return residuals, leave_out.noise_gradient(rows, residuals[0])
+    residuals = np.array(leave_out.predicted(rows, _clusters(data_sets, rows.size), stepped=is_step))
+    return residuals, leave_out.noise_gradient(rows, residuals[0])[: of_tests.size]
 
 
-def _clusters(data_sets: Sequence[MeasuredTest]) -> Array:
-    """Index of the sweep line or loop that each residual belongs to, (n,)."""
+def _clusters(data_sets: Sequence[MeasuredTest], count: int) -> Array:
+    """Index of the sweep line or loop that each of `count` residuals belongs to; further ones, of priors, are alone."""
     numbers, first = list[Array](), 0
     for data_set in data_sets:
         line = np.zeros(data_set.size // data_set.residuals_per_point, dtype=int)
@@ -241,7 +241,8 @@ def _clusters(data_sets: Sequence[MeasuredTest]) -> Array:
             line = np.unique(data_set.held_value, return_inverse=True)[1]
         numbers.append(np.tile(first + line, data_set.residuals_per_point))
         first += int(line.max()) + 1
-    return np.concatenate(numbers)
+    of_tests = np.concatenate(numbers)
+    return np.concatenate([of_tests, first + np.arange(count - of_tests.size)])
 
 
 def parts(data_sets: Sequence[MeasuredTest]) -> Iterator[HoldOutPart]:

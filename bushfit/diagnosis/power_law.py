@@ -27,7 +27,7 @@ from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import DECISIVE_CHI_SQUARE
 from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
 from bushfit.effects.contract import Array
-from bushfit.fitting.coordinates import Bounds, Coordinates, coordinate_bounds, jacobian, residual
+from bushfit.fitting.coordinates import Bounds, Coordinates, coordinate_bounds
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.geometry import STRAINING
 from bushfit.model.covariance import Z95
@@ -208,7 +208,7 @@ class Term:
             value: complex values of the added stiffness at the p operating points, in the unit of the term, (p,).
             model: model without the added stiffness.
         """
-        residuals, added = residual(model, self.evidence.data_sets), value * self.unit(model)
+        residuals, added = self.evidence.solution.problem.residual(model), value * self.unit(model)
         for test, points in self.tests:
             residuals[self.evidence.residual_rows[test]] = test.residual_with(added[points], model)
         return residuals
@@ -227,7 +227,7 @@ class Term:
         """
         names, place = self.evidence.solution.coordinates.names, self.evidence.residual_rows
         added, changes = value * self.unit(model), np.concatenate((shapes, 1j * shapes)) * self.unit(model)
-        residuals, rows = self.residual(value, model), np.array(jacobian(model, self.evidence.data_sets, names))
+        residuals, rows = self.residual(value, model), np.array(self.evidence.solution.problem.jacobian(model))
         slopes = Coordinates.of_parameters(model, names).slopes(model.values)[:, None]
         columns = np.zeros((len(changes), residuals.size))
         for test, points in self.tests:

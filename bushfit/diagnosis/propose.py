@@ -59,7 +59,7 @@ def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str
     Returns:
         One proposal for each effect, at its best shape parameters, the highest score first.
     """
-    relative_noise = np.empty(evidence.residual.size)
+    relative_noise = np.zeros(evidence.residual.size)
     for test, place in evidence.residual_rows.items():
         relative_noise[place] = test.relative_noise
     ranked = []
@@ -72,6 +72,7 @@ def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str
         shapes, columns = sensitivity(evidence.model, evidence.data_sets, effect)
         if not shapes:
             continue
+        columns = np.pad(columns, ((0, 0), (0, evidence.residual.size - columns.shape[1])))  # rows of priors
         gains, amounts, visible = scores(evidence, columns)
         amount = effect.amount
         sense = 1 if amount.neutral == amount.bounds[0] else 0

@@ -136,7 +136,7 @@ def _initial_fit(data: PreparedCampaign, model: Model | None, settings: Diagnosi
     data_sets = data.require_tests(data.data_sets, "there is nothing to diagnose", hint)
     fixed = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
     start = data.start_values(data_sets, {})
-    model = model or data.starting_model(data.effects, data_sets, {})
+    model = replace(model or data.starting_model(data.effects, data_sets, {}), constraints=data.constraints)
     start = {name: value for name, value in start.items() if name in model.values and name not in fixed}
     for name in settings.adopt:
         if get_mistake(name) is None and name not in (model := model.with_twin(name)).effects:

@@ -89,14 +89,17 @@ def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | Non
     bases = []
     for stage in stages:
         equations = slice(begin, begin + len(stage.names))
-        slope = jacobian(model, stage.data_sets, names)
+        slope = jacobian(model, stage.data_sets, names, with_priors=True)
         basis = np.linalg.qr(slope[equations].T)[0]
         system[equations] = basis.T @ slope.T
         excess = [1.0] * len(stage.data_sets)
         if not stage.smooth_error:
             of_all = lack_of_fit(model, stage.data_sets, len(stage.names)) or 1.0
             excess = [max(of_all, lack_of_fit(model, [test], 0) or 1.0) for test in stage.data_sets]
-        share = basis.T * np.sqrt(np.repeat(excess, [test.size for test in stage.data_sets]))
+        row_excess = np.ones(len(basis))  # 1 in the rows of priors
+        sizes = [test.size for test in stage.data_sets]
+        row_excess[: sum(sizes)] = np.repeat(excess, sizes)
+        share = basis.T * np.sqrt(row_excess)
         root[equations, equations] = np.linalg.qr(share.T)[1].T
         bases.append((equations, share))
         begin = equations.stop

@@ -72,22 +72,59 @@ def coordinate_bounds(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, 
     return low, high
 
 
-def residual(model: Model, data_sets: Sequence[MeasuredTest]) -> Array:
-    """Whitened residuals of all tests in order, modelled minus measured in units of noise, (n,)."""
-    return whiten_together(data_sets, np.concatenate(list(map(methodcaller("residual", model), data_sets))))
+def residual(model: Model, data_sets: Sequence[MeasuredTest], *, with_priors: bool = False) -> Array:
+    """Whitened residuals of all tests in order, modelled minus measured in units of noise, (n,).
+
+    Args:
+        model: model to compare.
+        data_sets: tests.
+        with_priors: True to append the residuals of the model's priors, (n + p,).
+    """
+    of_tests = list(map(methodcaller("residual", model), data_sets))
+    return whiten_together(data_sets, np.concatenate([*of_tests, *([prior_rows(model, ())[0]] * with_priors)]))
 
 
-def jacobian(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> Array:
+def jacobian(
+    model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str], *, with_priors: bool = False
+) -> Array:
     """Derivatives of the whitened residuals of all tests by parameter coordinate, (len(names), n).
 
     Args:
         model: model at whose values the derivatives are taken.
         data_sets: tests.
         names: names of the parameters.
+        with_priors: True to append the derivatives of the residuals of the model's priors, (len(names), n + p).
     """
     slopes = Coordinates.of_parameters(model, names).slopes(model.values)
     by_value = np.concatenate(list(map(methodcaller("jacobian", model, names), data_sets)), axis=-1)
-    return whiten_together(data_sets, by_value * slopes[:, None])
+    of_priors = [prior_rows(model, names)[1]] * with_priors
+    return whiten_together(data_sets, np.concatenate([by_value * slopes[:, None], *of_priors], axis=-1))
+
+
+def prior_rows(model: Model, names: Sequence[str]) -> tuple[Array, Array]:
+    """Whitened residuals of a model's priors, and their derivatives by parameter coordinate.
+
+    A prior is normal in the coordinates, so a strictly positive parameter has a log-normal prior.
+
+    Args:
+        model: model with its priors.
+        names: names of the parameters of the derivatives.
+
+    Returns:
+        Value minus prior mean in standard errors of the prior, (p,), and derivatives, (len(names), p).
+    """
+    residuals, slopes = [np.empty(0)], [np.empty((len(names), 0))]
+    for prior in model.constraints.priors:
+        indices = [i for i, name in enumerate(prior.names) if name in model.values]
+        coordinates = Coordinates.of_parameters(model, [prior.names[i] for i in indices])
+        mean = dict(zip(prior.names, prior.mean.tolist(), strict=True))
+        size = coordinates.slopes(mean)
+        root = np.linalg.cholesky(prior.covariance[np.ix_(indices, indices)] / np.outer(size, size))
+        whitening = np.linalg.inv(root)
+        residuals.append(whitening @ (coordinates.point(model.values) - coordinates.point(mean)))
+        moved = np.array([[name == moving for name in coordinates.names] for moving in names], dtype=float)
+        slopes.append(moved.reshape(len(names), len(indices)) @ whitening.T)
+    return np.concatenate(residuals), np.concatenate(slopes, axis=-1)
 
 
 def whiten_together(data_sets: Sequence[MeasuredTest], rows: Array) -> Array:

@@ -20,7 +20,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.coordinates import ROUNDING, jacobian, residual
+from bushfit.fitting.coordinates import ROUNDING
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.model.model import Model
 
@@ -95,8 +95,8 @@ class Descent:
         """
         point = problem.start
         model = problem.model.with_values(problem.coordinates.values(point))
-        slopes = jacobian(model, problem.tests, problem.names)
-        misfit = residual(model, problem.tests)  # which mostly came with the derivatives
+        slopes = problem.jacobian(model)
+        misfit = problem.residual(model)  # which mostly came with the derivatives
         if not np.all(np.isfinite(misfit)) or not np.all(np.isfinite(slopes)):
             raise FitError(
                 "the model has no finite response to these tests",
@@ -137,7 +137,7 @@ class Descent:
         Returns:
             The fit after these steps.
         """
-        fit, tests, names = self, self.problem.tests, self.problem.names
+        fit, problem = self, self.problem
         while not fit.converged and fit.evaluations < evaluations:
             damping = fit.damping
             step, expected = fit._step(damping)
@@ -165,13 +165,13 @@ class Descent:
                 with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
                     # derivatives bring the response along; after a step that failed the response is asked for alone
                     # first, and what is left of a last step is too short for them to change
-                    slopes = None if converged or before.growth > _FIRST_GROWTH else jacobian(model, tests, names)
-                    reached = residual(model, tests)
+                    slopes = None if converged or before.growth > _FIRST_GROWTH else problem.jacobian(model)
+                    reached = problem.residual(model)
                     fall = fit.chi_square - float(reached @ reached)
                     if expected <= 0.0 or not fall > _LEAST_GAIN_RATIO * expected:
                         continue
                     if slopes is None:
-                        slopes = fit.jacobian if converged else jacobian(model, tests, names)
+                        slopes = fit.jacobian if converged else problem.jacobian(model)
             except ModelError:  # no response there
                 continue
             if np.all(np.isfinite(slopes)):

@@ -42,7 +42,7 @@ def level_errors(
 
     Args:
         data_sets: fitted tests.
-        residual: whitened residuals at the end of the fit, (n,).
+        residual: whitened residuals at the end of the fit, with the rows of priors, (n,).
         absorbed: directions of the whitened residuals that fitted parameters, or a fault, can produce, (k, n).
         maximum: largest standard deviation of gain and of phase [rad] that the rig may have.
 
@@ -54,7 +54,7 @@ def level_errors(
         of the level and v its variance. The directions in `absorbed` are projected out (Patterson and Thompson, 1971).
         The likelihood is maximised by Fisher scoring, in the space of the levels.
     """
-    rows, kinds, before, size = list[Array](), np.empty(0), (0.0, 0.0), sum(test.size for test in data_sets)
+    rows, kinds, before, size = list[Array](), np.empty(0), (0.0, 0.0), residual.size
     for sweep, block in zip(data_sets, rows_of(data_sets), strict=True):
         if isinstance(sweep, MeasuredSweep):
             units = level_errors_of(sweep)

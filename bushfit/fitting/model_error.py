@@ -31,7 +31,7 @@ from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import excess_chi_square
 from bushfit.fitting.common_error import CommonError
-from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates
+from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, prior_rows
 from bushfit.fitting.discrepancy import (
     OVER_FREQUENCY,
     OVER_STRAIN,
@@ -159,7 +159,8 @@ def likeliest_size(model: Model, data_sets: Sequence[MeasuredTest], names: Seque
     """
     parts = [data_set.error_products(model, names) for data_set in data_sets]
     scale = np.append(1.0, Coordinates.of_parameters(model, names).slopes(model.values))
-    products = np.sum([part.products for part in parts], axis=0) * np.outer(scale, scale)
+    of_priors = np.vstack(prior_rows(model, names))
+    products = np.sum([part.products for part in parts], axis=0) * np.outer(scale, scale) + of_priors @ of_priors.T
     components = np.concatenate([part.components for part in parts], axis=1) * scale[:, None]
     variance = np.concatenate([part.variance for part in parts])
 

@@ -27,6 +27,7 @@ from bushfit.fitting.preparation import (
 from bushfit.fitting.rig_class import describe_class
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction, Specimen, get_place
+from bushfit.model.constraints import UNCONSTRAINED, Constraints
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.reading.measurement import Sweep
@@ -47,6 +48,7 @@ class PreparedCampaign:
         sweeps: measured sweeps with their noise.
         bounds: limits of parameters from [fit] [SI], by name.
         preload_notes: sentences on the influence of the preload that the tests show.
+        constraints: priors of parameters, for every model that is fitted.
     """
 
     campaign: Campaign
@@ -54,6 +56,7 @@ class PreparedCampaign:
     sweeps: tuple[MeasuredSweep, ...]
     bounds: Bounds = field(default_factory=dict)
     preload_notes: tuple[str, ...] = ()
+    constraints: Constraints = UNCONSTRAINED
 
     @classmethod
     def from_campaign(cls, campaign: Campaign) -> "PreparedCampaign":
@@ -181,7 +184,7 @@ class PreparedCampaign:
         fixed = {name: value for name, value in given_values.items() if not self.free((name,))}
         with error_location(self.campaign.path):
             starts = [start_values(bushing, data_sets, {**values, **stage_fixed}) for values in (given_values, fixed)]
-        models = [Model.with_defaults(bushing, effects, values) for values in starts]
+        models = [Model.with_defaults(bushing, effects, values, constraints=self.constraints) for values in starts]
         best = 0 if fixed == given_values else int(np.argmin([_chi_square(model, data_sets) for model in models]))
         named = {effect_name_of(name) for name in given_values}
         added = [name for name in effects if name not in BASE and name not in named]
@@ -190,7 +193,7 @@ class PreparedCampaign:
             return models[best]
         replaced = {get_effect(name).replaces for name in added}
         before = [name for name in (*BASE, *effects) if name in replaced or (name in effects and name not in added)]
-        plain = Model.with_defaults(bushing, [*dict.fromkeys(before)], starts[best])
+        plain = Model.with_defaults(bushing, [*dict.fromkeys(before)], starts[best], constraints=self.constraints)
         names = [*models[best].parameters, *plain.parameters]
         still = [name for name in names if name in stage_fixed or not self.free((name,))]
         return designed(models[best], plain, data_sets, still, self.bounds)

@@ -10,7 +10,15 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, coordinate_bounds, jacobian, residual
+from bushfit.fitting.coordinates import (
+    ROUNDING,
+    Bounds,
+    Coordinates,
+    coordinate_bounds,
+    jacobian,
+    prior_rows,
+    residual,
+)
 from bushfit.fitting.preparation import MeasuredTest, rows_of
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
@@ -65,6 +73,14 @@ class FitProblem:
         inside = _INSIDE * (high - low)
         return low + inside, high - inside
 
+    def residual(self, model: Model) -> Array:
+        """Whitened residuals of the tests, then of the priors of the model, (n,)."""
+        return residual(model, self.tests, with_priors=True)
+
+    def jacobian(self, model: Model) -> Array:
+        """Derivatives of the whitened residuals of tests and priors by coordinate, (k, n)."""
+        return jacobian(model, self.tests, self.names, with_priors=True)
+
     @property
     def start(self) -> Array:
         """Coordinates of the start values, moved inside the bounds, (k,).
@@ -72,7 +88,7 @@ class FitProblem:
         Raises:
             FitError: there are not more residuals than parameters.
         """
-        points = sum(test.size for test in self.tests)
+        points = sum(test.size for test in self.tests) + prior_rows(self.model, ())[0].size
         if points <= len(self.names):
             raise FitError("too few points for the fit", found=f"{points} points for {len(self.names)} parameters")
         positive = {name: part.bounds[0] for name, part in self.model.parameters.items() if part.log}
@@ -133,7 +149,7 @@ class FitResult:
     Args:
         problem: least-squares problem; its tests have the weights at which the sum of squares is minimal.
         model: fitted model.
-        residual: whitened residuals, model minus measured, (n,).
+        residual: whitened residuals of the tests, model minus measured, then of the priors of the model, (n,).
         jacobian: derivatives of the residuals by coordinate, (k, n).
         evaluations: number of model evaluations.
         at_bound: names of the parameters that ended at a bound, with the bound ("min" or "max").
@@ -210,10 +226,5 @@ class FitResult:
             Result with the new residuals and Jacobian; outliers and bounds are those of this result.
         """
         problem = replace(self.problem, tests=tests)
-        return replace(
-            self,
-            problem=problem,
-            model=model,
-            residual=residual(model, tests),
-            jacobian=jacobian(model, tests, self.names),
-        )
+        slopes = problem.jacobian(model)
+        return replace(self, problem=problem, model=model, residual=problem.residual(model), jacobian=slopes)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bushfit.errors import FitError
-from bushfit.fitting.coordinates import jacobian, residual
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.model.model import Model
@@ -40,7 +39,7 @@ def solve(
         FitError: there are fewer data than parameters, the response is not finite, or the fit does not converge.
     """
     if not problem.names:
-        misfit = residual(problem.model, problem.tests)
+        misfit = problem.residual(problem.model)
         return FitResult(problem, problem.model, misfit, np.empty((0, misfit.size)))
     found = Descent.start(problem, tolerance).finished(evaluations).solution
     if found.stopped and strict and not found.flat:
@@ -76,7 +75,7 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
         return solve(problem)
     import lmfit
 
-    start, (low, high), tests = problem.start, problem.limits, problem.tests
+    start, (low, high) = problem.start, problem.limits
     free = _blank_parameters(start.size)
     for parameter, value in zip(free.values(), start.tolist(), strict=True):
         parameter.set(value=value)
@@ -93,10 +92,10 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
     # a residual that is not finite is a ValueError of lmfit, which takes roots of a covariance nobody asked for
     with suppress(_OutOfBoundsError, ValueError), np.errstate(invalid="ignore", divide="ignore"):
         fit = lmfit.minimize(
-            lambda parameters: residual(model_of(parameters), tests),
+            lambda parameters: problem.residual(model_of(parameters)),
             list(free.values()),  # which lmfit takes as they are, without a copy
             "leastsq",
-            Dfun=lambda parameters: jacobian(model_of(parameters), tests, problem.names),
+            Dfun=lambda parameters: problem.jacobian(model_of(parameters)),
             col_deriv=True,
             gtol=0.0,
             ftol=_TOLERANCE,
@@ -106,9 +105,8 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
         )
         if not fit.aborted:
             best = model_of(fit.params)
-            slopes = jacobian(best, tests, problem.names)
             at_bound = problem.at_bound(problem.coordinates.point(best.values))
-            return FitResult(problem, best, residual(best, tests), slopes, int(fit.nfev), at_bound)
+            return FitResult(problem, best, problem.residual(best), problem.jacobian(best), int(fit.nfev), at_bound)
     return solve(problem)
 
 

@@ -1,7 +1,7 @@
 """The model of a bushing: its geometry, the effects that its response is made of, and their values."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import prod
 from types import MappingProxyType
@@ -17,6 +17,7 @@ from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import STRAINING, Bushing, Direction, Place
+from bushfit.model.constraints import UNCONSTRAINED, Constraints
 from bushfit.model.stack import adjusted_values, branch_stiffness, layered_stiffness, rubber_stiffness, stack_force
 from bushfit.model.structure import Structure, values_for_effect
 from bushfit.units import display_unit
@@ -37,6 +38,7 @@ class Model:
         effects: names of effects from the library, in any order.
         values: SI value of every parameter, by its name in files and reports.
         unnamed: data of the smooth correction `unnamed`; None if `effects` does not include it.
+        constraints: priors of its parameters, which all fits of the model use.
 
     Raises:
         ModelError: an effect is unknown, listed twice or without its data, or a value is missing, unknown, not finite
@@ -47,6 +49,7 @@ class Model:
     effects: tuple[str, ...]
     values: Mapping[str, float]
     unnamed: Unnamed | None = None
+    constraints: Constraints = field(default=UNCONSTRAINED, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", tuple(self.effects))
@@ -63,7 +66,7 @@ class Model:
             _check(name, self.values[name], parameters[name])
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Model, (self.bushing, self.effects, dict(self.values), self.unnamed)
+        return Model, (self.bushing, self.effects, dict(self.values), self.unnamed, self.constraints)
 
     @cached_property
     def structure(self) -> Structure:
@@ -143,6 +146,7 @@ class Model:
         effects: Sequence[str],
         values: Mapping[str, float],
         unnamed: Unnamed | None = None,
+        constraints: Constraints = UNCONSTRAINED,
     ) -> "Model":
         """Create a model; parameters without a given value have their neutral value, or else a typical value.
 
@@ -151,6 +155,7 @@ class Model:
             effects: names of the effects.
             values: parameter values [SI] by name in files; values of other effects are ignored.
             unnamed: data of the smooth correction `unnamed`, if it is among the effects.
+            constraints: priors of its parameters.
 
         Returns:
             The model.
@@ -164,7 +169,7 @@ class Model:
             for parameter in effect.parameters
         }
         found = {name: values.get(name, default) for name, default in defaults.items()}
-        return cls(bushing, tuple(effects), found, unnamed)
+        return cls(bushing, tuple(effects), found, unnamed, constraints)
 
     def with_effect(self, name: str, values: Mapping[str, float] | None = None) -> "Model":
         """Create a model with one more effect, without the branch that the effect replaces, if any.
@@ -179,7 +184,7 @@ class Model:
         effect = get_effect(name)
         names = [present for present in self.effects if present != effect.replaces]
         start = {**self.values, **self.start_values_for(effect)[0], **(values or {})}
-        return Model.with_defaults(self.bushing, (*names, name), start, self.unnamed)
+        return Model.with_defaults(self.bushing, (*names, name), start, self.unnamed, self.constraints)
 
     def start_values_for(self, effect: Effect) -> list[dict[str, float]]:
         """Compute start values of an effect that is added to the model, from the branch that the effect replaces.
@@ -211,7 +216,8 @@ class Model:
         added = [name] if twins and name not in effects else []
         if not twins:
             return self
-        return Model.with_defaults(self.bushing, [*effects, *added], {**self.values, **twin_values}, self.unnamed)
+        values = {**self.values, **twin_values}
+        return Model.with_defaults(self.bushing, [*effects, *added], values, self.unnamed, self.constraints)
 
     def without(self, *left: Level | str) -> "Model":
         """Create a model without the effects of the given levels (such as the rig's) or names.
@@ -220,7 +226,8 @@ class Model:
         ('elastic', 'springpot', 'friction')
         """
         names = [effect.name for effect in self.records if not {effect.level, effect.name} & {*left}]
-        return Model.with_defaults(self.bushing, names, self.values, self.unnamed if UNNAMED in names else None)
+        unnamed = self.unnamed if UNNAMED in names else None
+        return Model.with_defaults(self.bushing, names, self.values, unnamed, self.constraints)
 
     def equation(self) -> str:
         """Describe the model as text: formula of the first-harmonic stiffness, other effects, and parameter values.
