@@ -2,16 +2,17 @@
 
 import csv
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from bushfit.errors import MeasurementError
-from bushfit.reading.headers import WORDS, Column, plain
+from bushfit.reading.headers import WORDS, Column
 from bushfit.reading.instruments import word_for_part
-from bushfit.reading.layout import FileFormat, Layout, Line, is_comment, is_row, is_summary_row, is_units_row
+from bushfit.reading.layout import FileFormat, Layout, is_comment, is_row, is_summary_row
+from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, consistent_notations, is_like_number
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 from bushfit.reading.times import clock
@@ -29,6 +30,8 @@ _MISSING = frozenset(WORDS["rows_of"]["missing"])
 
 #: Line number and cells of a row of a table.
 Row = tuple[int, Sequence[str | float]]
+#: Line number and cells of a row that is not data, and the reason, see `Cells.fault`.
+FaultyRow = tuple[int, Sequence[str | float], str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +63,25 @@ class Cells:
         """Texts of the header cells of the table."""
         return self.layout.headers
 
-    def rows(self) -> Iterator[Row]:
+    def blocks(self) -> Iterator[RowSource]:
+        """Yield the source of the rows in blocks that can be read one by one; one block if rows are selected."""
+        if isinstance(self.source, Text) and self.selected is None:
+            return self.source.blocks(self.layout.lines_before_data)
+        return iter([self.source])
+
+    def rows(self, block: RowSource | None = None, left_out: list[FaultyRow] | None = None) -> Iterator[Row]:
         """Yield the line number and the cells of each row of data; other rows, such as remarks and means, are left out.
+
+        Args:
+            block: block of the source; default the whole source.
+            left_out: list to which the other rows are added.
 
         Raises:
             MeasurementError: a line or a quoted cell is far too long.
         """
-        for position, (line, cells, fault) in enumerate(self.all_rows()):
+        for position, (line, cells, fault) in enumerate(self.all_rows(block)):
+            if fault is not None and left_out is not None:
+                left_out.append((line, cells, fault))
             if fault is None and (self.selected is None or position in self.selected):
                 yield line, cells
 
@@ -80,14 +95,17 @@ class Cells:
         """Cells of each of the first thousand rows of data; one row of empty cells if there are none."""
         return [cells for _, cells in islice(self.rows(), _FIRST)] or [[""] * len(self.headers)]
 
-    def all_rows(self) -> Iterator[tuple[int, Sequence[str | float], str | None]]:
+    def all_rows(self, block: RowSource | None = None) -> Iterator[tuple[int, Sequence[str | float], str | None]]:
         """Yield line number, cells and fault of each non-empty row below the header, whether it is data or not.
+
+        Args:
+            block: block of the source; default the whole source.
 
         Yields:
             Line number, cells, and the reason why the row is not data (see `fault`); None for a row of data.
         """
         try:
-            for line in self.source.lines(self.layout.lines_before_data):
+            for line in (block or self.source).lines(self.layout.lines_before_data):
                 if self.layout.numbered or not is_comment(line.content, self.layout.delimiter):
                     cells = cells_of(line, self.layout)
                     if any(cell != "" for cell in cells):
@@ -122,29 +140,60 @@ class Cells:
                 return "doubtful" if not is_word else "missing" if word in _MISSING else "word"
         return None
 
-    def without_faults(self) -> tuple[Self, list[Row]]:
-        """Take lines that are not data out of a text; only lines with letters, dashes or empty cells are tested.
+    @cached_property
+    def first_decimal(self) -> str | None:
+        """Decimal mark of the first thousand rows; None if they leave it open, or the first row is not complete."""
+        ways = consistent_notations(islice(self.number_texts(), _FIRST), self.possible_numerals()).ways
+        is_settled = len({way.decimal for way in ways}) == 1 and len(self.first_row) == len(self.headers)
+        return ways[0].decimal if is_settled else None
+
+    def parse(self, block: RowSource, indices: frozenset[int]) -> Mapping[int, Floats] | None:
+        """Read columns of a block at once, in units of the file.
+
+        Args:
+            block: block of the source.
+            indices: indices of the columns.
 
         Returns:
-            Table without these lines, and the line number and cells of each of them.
-        """
-        source, layout, faulty = self.source, self.layout, list[Row]()
-        if not isinstance(source, Text) or layout.numbered:
-            return self, faulty
-        chunks, chunk_start = list[bytes](), 0
-        for number, start, end in source.suspicious(layout, _MOST_LEFT_OUT) or ():
-            line = Line(number, source.data[start:end].decode("utf-8", "replace").rstrip())
-            cells = [] if is_comment(line.content, layout.delimiter) else cells_of(line, layout)
-            cells = [*cells, *[""] * (len(self.headers) - len(cells))]
-            if any(cells) and self.fault(cells):
-                faulty.append((number, cells))
-                chunks.append(source.data[chunk_start:start])
-                chunk_start = end
-        data = b"".join([*chunks, source.data[chunk_start:]])
-        return (replace(self, source=Text(data, source.encoding)) if faulty else self), faulty
+            Numbers by column index, (n,) each; None if the block has to be read row by row, because it has rows without
+            data or numbers in another notation.
 
-    def note_left_out(self, rows: Sequence[Row] | None = None) -> Iterator[str]:
-        """Describe the rows that are left out because they are not data; `rows` are candidates, by default all rows.
+        Notes:
+            All columns that begin with a number are parsed as numbers: a summary row such as "Mean" then fails, as it
+            must.
+        """
+        if self.selected is not None or self.clocks & indices:
+            return None
+        if isinstance(block, Channels) and block.numeric >= indices:
+            return {index: block.arrays[index] for index in indices}
+        if not isinstance(block, Text) or not indices or self.first_decimal is None:
+            return None
+        notation, first = Numerals(self.first_decimal), [str(cell) for cell in self.first_row]
+        numeric = [index for index, cell in enumerate(first) if notation.allows(cell)]
+        if not indices <= {*numeric}:
+            return None  # pandas takes TRUE for 1
+        frame = block.frame(self.layout, dict.fromkeys(numeric, float), len(first), notation.decimal)
+        if frame is None:
+            return None
+        block.clean.add((block.before, indices))
+        return {index: frame[index].to_numpy() for index in indices}
+
+    def distinct_texts(self, block: RowSource, index: int) -> tuple[Sequence[str | float], Any]:
+        """Return texts or numbers of a column in a block, and the index among them of each row of data, (n,)."""
+        if isinstance(block, Text) and self.layout.delimiter != " " and b'"' not in block.data:
+            is_clean = (block.before, self.needed) in block.clean or self.parse(block, self.needed) is not None
+            frame = block.frame(self.layout, {index: "category"}, len(self.headers), ".") if is_clean else None
+            if frame is not None:
+                codes, texts = frame[index].factorize()
+                return list(texts), codes
+        return [row[index] for _, row in self.rows(block)], slice(None)
+
+    def note_left_out(self, rows: Sequence[FaultyRow], count: int) -> Iterator[str]:
+        """Describe rows that are left out because they are not data, except headers and units that are repeated.
+
+        Args:
+            rows: the rows that are left out.
+            count: number of rows of data.
 
         Yields:
             One sentence if there are such rows.
@@ -152,23 +201,16 @@ class Cells:
         Raises:
             MeasurementError: so many of these rows look like data that the meaning of the table is in doubt.
         """
-        header, left_out, in_doubt = [plain(cell) for cell in self.headers], list[Row](), list[Row]()
-        digits = 0
-        for line, cells in ((row[0], row[1]) for row in self.all_rows()) if rows is None else rows:
-            texts = [str(cell) for cell in cells]
-            repeats_header = [plain(text) for text in texts[: len(header)]] == header or is_units_row(texts)
-            if not repeats_header and (fault := self.fault(cells)):
-                left_out.append((line, cells))
-                in_doubt += [(line, cells)] * (fault in ("doubtful", "word"))
-                digits += fault == "doubtful"
-        is_much = digits > 1 or len(in_doubt) > _MOST_WORDS
-        if is_much and len(in_doubt) > _MOST_LEFT_OUT * sum(1 for _ in self.rows()):
-            raise self.bad_row(*in_doubt[0], len(in_doubt))
+        left_out = [row for row in rows if not self.layout.is_repeated([str(cell) for cell in row[1]])]
+        in_doubt = [row for row in left_out if row[2] in ("doubtful", "word")]
+        is_much = len(in_doubt) > _MOST_WORDS or sum(fault == "doubtful" for *_, fault in in_doubt) > 1
+        if is_much and len(in_doubt) > _MOST_LEFT_OUT * count:
+            raise self.bad_row(*in_doubt[0][:2], len(in_doubt))
         if left_out:
             listed = [
                 f"{'row' if isinstance(self.source, Sheet) else 'line'} {line} "
                 f"({', '.join(str(cell) for cell in cells if cell != '')[:40]})"
-                for line, cells in left_out[:_MOST_LISTED]
+                for line, cells, _ in left_out[:_MOST_LISTED]
             ]
             more = ", ..." if len(left_out) > _MOST_LISTED else ""
             yield f"{len(left_out)} row{'s' * (len(left_out) > 1)} left out, without data: {', '.join(listed)}{more}"

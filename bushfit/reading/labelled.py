@@ -11,12 +11,9 @@ from bushfit.reading.headers import ROW_COLUMNS, Vocabulary
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import named_direction
 from bushfit.reading.runs import group_rows
-from bushfit.reading.source import Text
 
 #: Smallest mean number of rows per distinct text in a column that assigns rows to tests; chosen: a row counter has one.
 _FEWEST_ROWS = 3
-#: Smallest text whose label columns are read with pandas [bytes]; chosen: shorter ones take a moment anyway.
-_LARGE = 1 << 20
 #: Known names of columns that assign rows to tests.
 _LABELS = Vocabulary(ROW_COLUMNS, {})
 
@@ -61,14 +58,12 @@ def same_text(text: str, reference: str) -> bool:
 
 def column_texts(cells: Cells, index: int) -> ColumnTexts:
     """Return the texts of a column by its index; an empty or merged cell gets the text of the cell above."""
-    raw = _large_texts(cells).get(index)
-    if raw is None:
-        column = [row[index] for _, row in cells.rows()]
-        values = {text: code for code, text in enumerate(dict.fromkeys(column))}
-        raw = ColumnTexts([_text(cell) for cell in values], np.array([values[cell] for cell in column], dtype=np.intp))
-    stripped = [text.strip(" #") for text in raw.values]
-    words = {text: code for code, text in enumerate(dict.fromkeys(stripped))}
-    codes = np.array([words[text] for text in stripped], dtype=np.intp)[raw.codes]
+    words, parts = dict[str, int](), [np.empty(0, dtype=np.intp)]
+    for block in cells.blocks():
+        texts, rows = cells.distinct_texts(block, index)
+        numbers = [words.setdefault(_text(cell).strip(" #"), len(words)) for cell in texts]
+        parts.append(np.array(numbers, dtype=np.intp)[rows])
+    codes = np.concatenate(parts)
     if "" in words:
         codes = codes[np.maximum.accumulate(np.where(codes == words[""], 0, np.arange(codes.size)))]
     return ColumnTexts(list(words), codes)
@@ -76,20 +71,6 @@ def column_texts(cells: Cells, index: int) -> ColumnTexts:
 
 def _text(cell: str | float) -> str:
     return cell if isinstance(cell, str) else f"{cell:.12g}"
-
-
-def _large_texts(cells: Cells) -> Mapping[int, ColumnTexts]:
-    """Texts of columns without a role, by index, if the table is a large text with rows of data only; else empty."""
-    first, source = [_text(cell) for cell in cells.first_row], cells.source
-    if not isinstance(source, Text) or len(source.data) < _LARGE or cells.selected is not None:
-        return {}
-    if len(first) != len(cells.headers) or not cells.needed or cells.needed & cells.clocks:
-        return {}
-    if source.columns(cells.layout, first, cells.needed, cells.numerals) is None:
-        return {}
-    free = set(range(len(first))) - {column.index for column in cells.roles.values()}
-    frame = source.texts(cells.layout, sorted(index for index in free if _may_distinguish_tests(cells, index)))
-    return {index: ColumnTexts(*texts) for index, texts in (frame or {}).items()}
 
 
 def _may_distinguish_tests(cells: Cells, index: int) -> bool:

@@ -105,6 +105,11 @@ class Layout:
         """Number of the last line before the first row of data: its units row, or else its header."""
         return self.units_line or self.header_line - self.headerless
 
+    def is_repeated(self, cells: Sequence[str]) -> bool:
+        """Return True if a row repeats the header or the row of units."""
+        texts = [plain(cell) for cell in cells]
+        return any(texts) and any(texts == list(map(plain, row)) for row in (self.headers, self.units))
+
 
 def split(content: Content, delimiter: str) -> list[str]:
     """Return the texts of the cells of a line, stripped of blanks and without empty cells at the end.

@@ -6,25 +6,22 @@ import csv
 import io
 import re
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any, NamedTuple
 
-import numpy as np
 from numpy.typing import NDArray
 
-from bushfit.reading.files import HEAD_BYTES
+from bushfit.reading.files import CHUNK_BYTES, HEAD_BYTES
 from bushfit.reading.layout import MOST_HEAD_LINES, Layout, Line, is_comment, split
-from bushfit.reading.measurement import Floats
-from bushfit.reading.numerals import Numerals
 from bushfit.units import SIZES
 
 #: Smallest positive value and largest magnitude of a number in a table [SI unit].
 LEAST_VALUE, LARGEST_VALUE = SIZES
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 #: Thousands separators that cannot also be delimiters or decimal marks.
-_SEPARATORS = ("'", "\u2019", "\u00a0", "\u2009", "\u202f")
+_SEPARATORS = "'\u2019\u00a0\u2009\u202f"
 #: Rows of channels that are converted at a time; chosen: they take a few MiB.
 _CHUNK_ROWS = 1 << 14
 #: Thousands separated by a blank.
@@ -33,36 +30,51 @@ _GROUP_BY_BLANK = re.compile(rb"\d \d{3}(?!\d)")
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """Delimited text in UTF-8, with the original encoding of its file; parsed columns are cached."""
+    """Delimited text in UTF-8, or a block of its lines.
+
+    Args:
+        data: bytes of the text.
+        encoding: original encoding of its file.
+        before: number of lines of the file before the text.
+        clean: blocks without faulty rows, as line numbers before them and the columns that were read.
+    """
 
     data: bytes
     encoding: str | None
+    before: int = 0
+    clean: set[tuple[int, frozenset[int]]] = field(default_factory=set, repr=False)
     sheet: None = None
     layout: None = None
     numeric: frozenset[int] = frozenset()
-    _parsed: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False)
 
     def head(self) -> list[Line]:
         """Return the first non-empty lines of the text, which can contain the header."""
         return list(islice(_lines(io.BytesIO(self.data[:HEAD_BYTES]), 0), MOST_HEAD_LINES))
 
     def lines(self, after: int) -> Iterator[Line]:
-        """Yield the non-empty lines of the text below the line with number `after`."""
+        """Yield the non-empty lines of the text below the line of the file with number `after`."""
         stream = io.BytesIO(self.data)
         stream.seek(self.offset(after))
-        return _lines(stream, after)
+        return _lines(stream, max(after, self.before))
 
     def offset(self, after: int) -> int:
-        """Return the index of the first byte after line number `after`."""
-        ends = [0, *(end.end() for end in islice(_LINE_END.finditer(self.data), after))]
-        return ends[after] if len(ends) > after else len(self.data)
+        """Return the index of the first byte after the line of the file with number `after`."""
+        ends = [0, *(end.end() for end in islice(_LINE_END.finditer(self.data), max(after - self.before, 0)))]
+        return ends[-1] if len(ends) > after - self.before else len(self.data)
 
-    def has(self, sign: str, layout: Layout) -> bool:
-        """Return True if the text below the header contains the character `sign`."""
+    def blocks(self, after: int) -> Iterator[Text]:
+        """Yield the text below the line with number `after` in blocks of a few MiB."""
+        start = self.offset(after)
+        while start < len(self.data):
+            end = self.data.find(b"\n", start + CHUNK_BYTES) + 1 or len(self.data)
+            block = Text(self.data[start:end], self.encoding, after, self.clean)
+            yield block
+            start, after = end, after + block.data.count(b"\n")
+
+    def has(self, signs: str, layout: Layout) -> bool:
+        """Return True if the text below the header contains one of some characters."""
         start = self.offset(layout.lines_before_data)
-        if (start, sign) not in self._parsed:
-            self._parsed[start, sign] = self.data.find(sign.encode(), start) >= 0
-        return bool(self._parsed[start, sign])
+        return any(self.data.find(sign.encode(), start) >= 0 for sign in signs)
 
     def may_have_comma(self, layout: Layout) -> bool:
         """Return True if cells below the header can contain a comma."""
@@ -70,115 +82,57 @@ class Text:
 
     def may_have_thousands_separators(self, layout: Layout, decimal: str) -> bool:
         """Return True if numbers below the header can have thousands separators, given their decimal mark."""
-        signs = _SEPARATORS if decimal == "." else (*_SEPARATORS, ".")
-        if any(self.has(sign, layout) for sign in signs) or (decimal == "." and self.may_have_comma(layout)):
+        if self.has(_SEPARATORS if decimal == "." else _SEPARATORS + ".", layout):
             return True
-        has_blanks = layout.delimiter != " " and self.has(" ", layout)
-        return has_blanks and bool(_GROUP_BY_BLANK.search(self.data, self.offset(layout.lines_before_data)))
+        if decimal == "." and self.may_have_comma(layout):
+            return True
+        return layout.delimiter != " " and bool(
+            _GROUP_BY_BLANK.search(self.data, self.offset(layout.lines_before_data))
+        )
 
-    def columns(
-        self, layout: Layout, first: Sequence[str], indices: frozenset[int], numerals: Numerals
-    ) -> dict[int, Floats] | None:
-        """Read columns of numbers with pandas.
+    def frame(self, layout: Layout, types: Mapping[int, Any], width: int, decimal: str) -> Any:
+        """Read columns of a block with pandas.
 
         Args:
             layout: location of the table.
-            first: cells of the first row of data.
-            indices: indices of the columns to read, from 0.
-            numerals: notation of the numbers.
+            types: data type of each column to read, as pandas takes it, by index.
+            width: number of columns of the table.
+            decimal: decimal mark.
 
         Returns:
-            Numbers as in the file by column index, (n,) each; None if rows differ in length or a cell is not a number.
+            Data frame with these columns; None if pandas cannot parse the block, or rows differ in length.
 
         Notes:
-            All columns that begin with a number are parsed as numbers: a summary row such as "Mean" then fails, as it
-            must. pandas does not check the length of rows if some columns are skipped; the delimiters are counted
-            instead. pandas rounds correctly from 3.1 on.
-        """
-        width, start = len(first), self.offset(layout.lines_before_data)
-        numbers = [index for index in range(width) if index in indices or numerals.allows(first[index])]
-        key = (start, layout.delimiter, numerals.decimal, *numbers)
-        if key not in self._parsed:
-            has_quotes = self.has('"', layout)
-            skips = len(numbers) < width and layout.delimiter != " " and not has_quotes
-            types: Any = float if len(numbers) == width else {i: float if i in numbers else str for i in range(width)}
-            frame = self._frame(layout, width, numbers if skips else None, types, numerals.decimal)
-            if frame is not None and has_quotes:  # an unclosed quote swallows line ends
-                frame = frame if len(frame) == sum(1 for _ in self.lines(layout.lines_before_data)) else None
-            self._parsed[key] = frame
-        frame = self._parsed[key]
-        return None if frame is None else {index: frame[index].to_numpy() for index in indices}
-
-    def texts(self, layout: Layout, indices: Sequence[int]) -> dict[int, tuple[list[str], NDArray[np.intp]]] | None:
-        """Read columns of texts: by column index, the distinct texts, and the index of each row's text in them, (n,).
-
-        Returns None if rows differ in length, or cells may contain delimiters.
-        """
-        if layout.delimiter == " " or self.has('"', layout):
-            return None
-        key = (self.offset(layout.lines_before_data), layout.delimiter, "texts", *indices)
-        if key not in self._parsed:
-            self._parsed[key] = self._frame(layout, len(layout.headers), list(indices), "category", ".")
-        frame = self._parsed[key]
-        if frame is None:
-            return None
-        return {n: (list(frame[n].cat.categories), frame[n].cat.codes.to_numpy().astype(np.intp)) for n in indices}
-
-    def _frame(self, layout: Layout, width: int, used: list[int] | None, types: Any, decimal: str) -> Any:
-        """Data frame of some columns; None if pandas cannot parse the text.
-
-        Args:
-            layout: location of the table.
-            width: number of columns of the table.
-            used: indices of the columns to read; None for all.
-            types: data types of the columns, as pandas takes them.
-            decimal: decimal mark.
+            pandas does not check the length of rows if some columns are skipped; the delimiters are counted instead. An
+            unclosed quote swallows line ends. pandas rounds correctly from 3.1 on.
         """
         import pandas as pd
 
-        start, mark = self.offset(layout.lines_before_data), layout.delimiter
-        stream = io.BytesIO(self.data)
-        stream.seek(start)
+        mark, quoted = layout.delimiter, b'"' in self.data
+        skips = len(types) < width and mark != " " and not quoted
+        if not skips:
+            types = {index: types.get(index, str) for index in range(width)}
+        is_float = set(types.values()) == {float}
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error", pd.errors.ParserWarning)
                 frame = pd.read_csv(
-                    stream,
+                    io.BytesIO(self.data),
                     sep=r"\s+" if mark == " " else mark,
                     header=None,
                     names=list(range(width)),
-                    usecols=used,
+                    usecols=list(types) if skips else None,
                     index_col=False,
                     decimal=decimal,
-                    dtype=types,  # one type for all columns spares pandas a copy
+                    dtype=float if is_float else dict(types),  # one type for all columns spares pandas a copy
                     na_filter=False,
                     compression=None,
                 )
         except (ValueError, pd.errors.ParserWarning):
             return None
-        is_skipping = used is not None and self.data.count(mark.encode(), start) != len(frame) * (width - 1)
-        return None if is_skipping else frame
-
-    def suspicious(self, layout: Layout, largest_share: float) -> list[tuple[int, int, int]] | None:
-        """Find lines below the header with letters, dashes or an empty cell, which may not be rows of data.
-
-        Returns line number, first byte and end of each; None if they are more than a share of all lines.
-        """
-        mark = re.escape(layout.delimiter.encode())
-        pattern = re.compile(
-            rb"[A-DF-Za-df-z#]|--" + (rb"|%s\s*%s|%s[ \t]*\r?\n" % (mark, mark, mark) if mark.strip() else b"")
-        )
-        place = counted = self.offset(layout.lines_before_data)
-        number, lines = layout.lines_before_data + 1, list[tuple[int, int, int]]()
-        limit = largest_share * self.data.count(b"\n", place) + 20
-        while (match := pattern.search(self.data, place)) and len(lines) <= limit:
-            start = self.data.rfind(b"\n", 0, match.start()) + 1
-            end = self.data.find(b"\n", match.start())
-            end = len(self.data) if end < 0 else end
-            number += self.data.count(b"\n", counted, start)
-            counted, place = start, end
-            lines.append((number, start, end))
-        return lines if len(lines) <= limit else None
+        has_lost_cells = skips and self.data.count(mark.encode()) != len(frame) * (width - 1)
+        has_lost_rows = quoted and len(frame) != sum(1 for _ in self.lines(0))
+        return None if has_lost_cells or has_lost_rows else frame
 
 
 def _lines(data: io.BytesIO, after: int) -> Iterator[Line]:

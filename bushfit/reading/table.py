@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -16,7 +16,7 @@ from bushfit import units
 from bushfit.errors import MeasurementError, UnitError, error_location
 from bushfit.geometry import STRAINING, TRANSLATION, Motion
 from bushfit.reading.blocks import combined
-from bushfit.reading.cells import Cells
+from bushfit.reading.cells import Cells, FaultyRow
 from bushfit.reading.classification import classify
 from bushfit.reading.headers import (
     LOOP_COLUMNS,
@@ -32,17 +32,14 @@ from bushfit.reading.headers import (
 from bushfit.reading.labelled import Rows, find_labels, select_rows
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.measurement import Floats
-from bushfit.reading.numerals import Numerals, consistent_notations
 from bushfit.reading.parts import OpenedFile, open_file
-from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, Channels, RowSource, Sheet, Text
+from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, RowSource, Sheet
 from bushfit.reading.times import clock
 from bushfit.reading.wide import unpivot
 
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
 #: Rows that are converted at a time if pandas cannot read them; chosen: their texts take a few MiB.
 _CHUNK_ROWS = 1 << 16
-#: Number of first cells that determine the decimal mark; chosen: a long record need not be read completely.
-_FIRST = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,7 +258,7 @@ class Table(Cells):
     def read_with_notes(
         self, wanted: Mapping[str, Column], *, fewest_rows: int
     ) -> tuple[dict[str, Floats], tuple[str, ...]]:
-        """Read columns, with pandas if all rows are data in one notation, else row by row.
+        """Read columns, and list the rows that are left out.
 
         Args:
             wanted: columns by role, with their factors to SI.
@@ -274,19 +271,17 @@ class Table(Cells):
             MeasurementError: ambiguous numbers, too few rows, or so many rows without data that the meaning of the
                 table is in doubt.
         """
-        table, left_out = self.needing(wanted), None
-        values = table._read_with_pandas(wanted)
-        if values is None:
-            cleaned, left_out = table.without_faults()
-            values = cleaned._read_with_pandas(wanted) if left_out else None
-            if values is None:
-                cleaned, left_out, values = table, None, table._row_by_row(wanted)
-            notes = (*self.notes, *cleaned.note_left_out(left_out))
-        else:
-            notes = self.notes
+        table, left_out = self.needing(wanted), list[FaultyRow]()
+        parts: dict[str, list[Floats]] = {role: [np.empty(0)] for role in wanted}
+        for block in table.blocks():
+            for values in table._read_block(block, wanted, left_out):
+                for role, numbers in values.items():
+                    parts[role].append(numbers)
+        values = {role: np.concatenate(parts.pop(role)) for role in wanted}
         count = len(next(iter(values.values())))
+        notes = (*self.notes, *table.note_left_out(left_out, count))
         if count < fewest_rows:
-            faulty = ((line, cells) for line, cells, fault in table.all_rows() if fault in ("doubtful", "missing"))
+            faulty = ((line, cells) for line, cells, fault in left_out if fault in ("doubtful", "missing"))
             if row := next(faulty, None):
                 raise table.bad_row(*row)
             problem, hint = "too few rows", None
@@ -342,41 +337,28 @@ class Table(Cells):
             found = f'"{cells[column.index]}"'
             raise self.error(problem, line=line, column=column, found=found, expected=expected, hint=hint)
 
-    def _read_with_pandas(self, wanted: Mapping[str, Column]) -> dict[str, Floats] | None:
-        """Values in SI by role, (n,) each, as read by pandas; None if the table has to be read row by row.
+    def _read_block(
+        self, block: RowSource, wanted: Mapping[str, Column], left_out: list[FaultyRow]
+    ) -> Iterator[dict[str, Floats]]:
+        """Yield values in SI by role, (n,) each, of a block: at once if all its rows are data, else row by row.
 
-        pandas is used without thousands separators, with the decimal mark of the first cells.
-        """
-        indices, source = frozenset(column.index for column in wanted.values()), self.source
-        if self.selected is not None or self.clocks & indices:
-            return None
-        arrays: Mapping[int, Floats] | None = None
-        if isinstance(source, Channels) and source.numeric >= indices:
-            arrays = {index: source.arrays[index] for index in indices}
-        elif isinstance(source, Text):
-            ways = consistent_notations(islice(self.number_texts(), _FIRST), self.possible_numerals()).ways
-            first = [str(cell) for cell in self.first_row]
-            numerals = Numerals(ways[0].decimal)
-            are_settled = len({way.decimal for way in ways}) == 1 and len(first) == len(self.headers)
-            if are_settled and all(numerals.allows(first[index]) for index in indices):  # pandas takes TRUE for 1
-                arrays = source.columns(self.layout, first, indices, numerals)
-        if arrays is None:
-            return None
-        values = {role: column.scale * arrays[column.index] for role, column in wanted.items()}
-        fits = all(
-            x.min(initial=0.0) >= -LARGEST_VALUE and x.max(initial=0.0) <= LARGEST_VALUE for x in values.values()
-        )
-        return values if fits else None  # so are numbers that are not finite
-
-    def _row_by_row(self, wanted: Mapping[str, Column]) -> dict[str, Floats]:
-        """Values in SI by role, (n,) each, of a table that pandas cannot read.
+        Args:
+            block: block of the source.
+            wanted: columns by role, with their factors to SI.
+            left_out: list to which rows without data are added.
 
         Raises:
             MeasurementError: a cell without a finite number, or with one above LARGEST_VALUE.
         """
-        parts: dict[str, list[Floats]] = {role: [np.empty(0)] for role in wanted}
-        remaining = self.rows()
-        while chunk := list(islice(remaining, _CHUNK_ROWS)):
+        if (arrays := self.parse(block, frozenset(column.index for column in wanted.values()))) is not None:
+            values = {role: column.scale * arrays[column.index] for role, column in wanted.items()}
+            extremes = [(x.min(initial=0.0), x.max(initial=0.0)) for x in values.values()]
+            if all(low >= -LARGEST_VALUE and high <= LARGEST_VALUE for low, high in extremes):  # not if NaN
+                yield values
+                return
+        rows = self.rows(block, left_out)
+        while chunk := list(islice(rows, _CHUNK_ROWS)):
+            values = {}
             for role, column in wanted.items():
                 number_in = clock if column.index in self.clocks else self.numerals.value
                 numbers = []
@@ -386,5 +368,5 @@ class Table(Cells):
                     if number is None or not abs(number * column.scale) <= LARGEST_VALUE:
                         raise self.bad_row(line, cells, column=column)
                     numbers.append(number * column.scale)
-                parts[role].append(np.array(numbers, dtype=float))
-        return {role: np.concatenate(chunks) for role, chunks in parts.items()}
+                values[role] = np.array(numbers, dtype=float)
+            yield values
