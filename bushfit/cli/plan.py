@@ -78,7 +78,7 @@ _MOST_VALUES = 6
     ),
 )
 @option_group("Range of later predictions", grid_options("from the campaign"))
-@with_output("results/plan <name>", "tables", "pictures")
+@with_output("results/plan <name>", "tables")
 def command(
     source: Path,
     aim: str | None,
@@ -97,7 +97,7 @@ def command(
     plan starts from the hardness and filler in its [compound] table. If the plan misses a --target, the command states
     why, and the exit status is 1.
 
-    Writes plan.csv (the sheet for the rig operator), plan.png, plan.json, and campaign.toml for `bushfit simulate`.
+    Writes plan.csv (the sheet for the rig operator), plan.json, and campaign.toml for `bushfit simulate`.
     """
     from bushfit.campaign.campaign import Campaign, load_campaign
     from bushfit.commands.loading import load_source

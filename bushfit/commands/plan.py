@@ -24,8 +24,7 @@ from bushfit.planning.document import PlanFile, plan_document
 from bushfit.planning.knowledge import from_campaign, from_result, rig_of
 from bushfit.planning.plan import plan as choose_tests
 from bushfit.prediction.grid import default_grid, grid_settings, requested_grid
-from bushfit.report import plots
-from bushfit.report.results import ResultFile, figure_file, json_file, raw_file, table_file
+from bushfit.report.results import ResultFile, json_file, raw_file, table_file
 from bushfit.units import number
 
 #: Predicted quantities that may be targets.
@@ -47,11 +46,10 @@ class PlanOutput:
 
     @property
     def files(self) -> list[ResultFile]:
-        """Document, table of tests and figure; and a campaign file, if the plan has tests."""
+        """Document and table of tests; and a campaign file, if the plan has tests."""
         files = [
             json_file("plan", self.document),
             table_file("plan", partial(plan_sheet, self.plan)),
-            figure_file("plan", lambda: plots.plan.plan_figure(self.plan)),
         ]
         if self.plan.planned.tests:
             files.append(raw_file(CAMPAIGN_FILE, campaign_toml(self.plan).encode()))

@@ -66,10 +66,6 @@ class Arms:
     error: float
     conditions: RubberConditions = UNKNOWN
 
-    def complex_modulus(self, omega: Array) -> Array:
-        """Complex shear modulus mu^ of the arms [Pa], (n,), at angular frequencies [rad/s], (n,)."""
-        return _basis(omega, self.time) @ self.modulus
-
     @property
     def sentence(self) -> str:
         """Sentence with the number of arms, the effects that they replace, and their error."""

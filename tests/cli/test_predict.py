@@ -204,7 +204,7 @@ def planned(root: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path,
 def test_sheet_document_and_screen_tell_the_same_plan(planned: tuple[Path, dict, str]) -> None:
     folder, plan, said = planned
     sheet = pd.read_csv(folder / "plan.csv")
-    assert names(folder) == {"plan.json", "plan.csv", "plan.png", "campaign.toml"}
+    assert names(folder) == {"plan.json", "plan.csv", "campaign.toml"}
     assert document(folder / "plan.json") == plan
     assert sheet["direction"].tolist() == [run["place"] for run in plan["tests"]]
     assert f"{len(sheet)} runs" in said
@@ -233,7 +233,6 @@ def test_a_plan_after_tests_counts_them(bushfit: Run, tmp_path: Path) -> None:
     assert {run["place"] for run in found["tests"]} == {"axial"}
     for reached in found["parameters"].values():
         assert reached["planned"] < reached["before"] < 0.05
-    assert not (tmp_path / "plan.png").exists()
 
 
 SPECIMENS = """
@@ -323,7 +322,7 @@ def test_what_keeps_a_target_from_being_met_is_named(
 def test_no_test_is_planned_for_what_is_known(bushfit: Run, tmp_path: Path) -> None:
     done = bushfit("plan", CAMPAIGN, "--target", "mu=20 %", "-o", tmp_path)
     assert "no test is needed" in done.stderr
-    assert names(tmp_path) == {"plan.json", "plan.csv", "plan.png"}
+    assert names(tmp_path) == {"plan.json", "plan.csv"}
     assert pd.read_csv(tmp_path / "plan.csv").empty
 
 

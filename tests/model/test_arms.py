@@ -7,6 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
 from bushfit.model.arms import Arms, fitted_arms, model_arms, part_modulus
@@ -17,10 +18,15 @@ def springpot(alpha: float, band: tuple[float, float], accuracy: float) -> Arms:
     return fitted_arms(lambda omega: 0.5 * (1j * omega) ** alpha, band, accuracy)
 
 
+def modulus_of(arms: Arms, omega: Array) -> Array:
+    """Complex modulus of springs and dashpots in series."""
+    return sum(g * 1j * omega * t / (1.0 + 1j * omega * t) for g, t in zip(arms.modulus, arms.time, strict=True))
+
+
 def error_of(arms: Arms, alpha: float) -> float:
     """Largest relative error, worked out apart from the fit, between its frequencies too."""
     omega = 2.0 * np.pi * np.geomspace(*arms.band, 3001)
-    made = sum(g * 1j * omega * t / (1.0 + 1j * omega * t) for g, t in zip(arms.modulus, arms.time, strict=True))
+    made = modulus_of(arms, omega)
     return float(np.abs(made / (0.5 * (1j * omega) ** alpha) - 1.0).max())
 
 
@@ -42,7 +48,7 @@ def test_arms_keep_within_their_error_and_give_off_no_energy(alpha: float, decad
     arms = springpot(alpha, (1.0, 10.0**decades), accuracy)
     assert np.all(arms.modulus > 0.0)
     assert np.all(arms.time > 0.0)
-    assert np.all(arms.complex_modulus(np.geomspace(1e-6, 1e9, 200)).imag > 0.0)
+    assert np.all(modulus_of(arms, np.geomspace(1e-6, 1e9, 200)).imag > 0.0)
     assert error_of(arms, alpha) <= accuracy * 1.03
 
 
@@ -55,7 +61,7 @@ def test_the_springpot_and_the_spring_in_series_are_one_part(paper_model: Model)
     whole = model.stiffness(Direction.AXIAL, omega / (2.0 * np.pi), 1.0) / shape
     rest = paper_model.without("springpot").stiffness(Direction.AXIAL, 1.0, 1.0) / shape
     np.testing.assert_allclose(part_modulus(model, "m", omega), whole - rest, rtol=1e-6)
-    assert np.abs(part.complex_modulus(omega) / (whole - rest) - 1.0).max() <= 0.005
+    assert np.abs(modulus_of(part, omega) / (whole - rest) - 1.0).max() <= 0.005
 
 
 def test_what_no_passive_arms_can_do_is_refused() -> None:

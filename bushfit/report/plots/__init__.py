@@ -20,7 +20,6 @@ if TYPE_CHECKING:
         gap,
         inspection,
         master_curve,
-        plan,
         prediction,
         preload,
         response,
