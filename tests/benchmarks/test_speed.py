@@ -155,10 +155,7 @@ def test_whole_commands(benchmark: BenchmarkFixture, root: Path, tmp_path: Path,
                 "import bushfit.cli.fit, bushfit.commands.fit, pandas, scipy.optimize, scipy.ndimage",
             ),
         ),
-        ("bushfit --help over import click", "<= 3"): (
-            (program, "--help"),
-            (sys.executable, "-c", "import click"),
-        ),
+        ("bushfit --help over import click", "<= 3"): ((program, "--help"), (sys.executable, "-c", "import click")),
     }
     for (what, target), (command, imports) in pairs.items():
         turns = [(command_seconds(*command), command_seconds(*imports)) for _ in range(9 if benchmark.enabled else 1)]

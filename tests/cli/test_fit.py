@@ -78,8 +78,7 @@ def test_repeats_that_disagree_do_not_excuse_themselves(own: Path, off: float, t
 
 
 @pytest.mark.parametrize(
-    ("kind", "file", "column"),
-    [("loops", "loop_axial_1", "force [N]"), ("sweeps", "sweep_axial", "stiffness [N/mm]")],
+    ("kind", "file", "column"), [("loops", "loop_axial_1", "force [N]"), ("sweeps", "sweep_axial", "stiffness [N/mm]")]
 )
 def test_a_test_that_repeats_another_and_lies_far_off_is_told(own: Path, kind: str, file: str, column: str) -> None:
     table = pd.read_csv(own / f"data/cmp_15961/{file}.csv")
@@ -227,11 +226,7 @@ def test_run_and_diagnose_write_the_model_that_fit_writes_where_nothing_is_missi
     )
     places = [ran.stderr.index(word) for word in words]
     assert places == sorted(places), "the result first"
-    for word in (
-        "static and dynamic fit in turn",
-        "springpot was left out",
-        "held out",
-    ):
+    for word in ("static and dynamic fit in turn", "springpot was left out", "held out"):
         assert word not in ran.stderr
     fitted, diagnosed = document(work / "model/model.json"), document(tmp_path / "diagnose/model.json")
     assert {**fitted, "campaign": None} == {**diagnosed, "campaign": None}

@@ -105,13 +105,10 @@ TWO = {"delay": {"tau": 1e-4}, "strain_stiffening": {"c3": 20.0}}
 
 def asked(campaign: Campaign, model: Model | None = None, **settings: object) -> Diagnosis:
     diagnosis = diagnose(PreparedCampaign.from_campaign(campaign), model, DiagnosisSettings(**settings))  # type: ignore[arg-type]
-    odds = [
+    [
         f"{label} {share:.3f}"
         for label, (_, share) in zip(diagnosis.odds.labels, diagnosis.odds.explanations, strict=True)
     ]
-    print(
-        said(diagnosis), diagnosis.summary, f"nothing {diagnosis.odds.nothing:.3g}", *odds, *diagnosis.notes, sep=" | "
-    )
     return diagnosis
 
 

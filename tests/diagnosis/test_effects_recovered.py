@@ -40,7 +40,6 @@ def test_known_effects_are_recovered(name: str) -> None:
     near = {key: ParameterSetting(0.95 * sealed.values[key]) for key in NEAR if key in sealed.values}
     campaign = replace(simulated.campaign(), fit=FitSettings(parameters=near))
     result = fit_joint(PreparedCampaign.from_campaign(campaign), effects=with_base([name]), directions=BOTH)
-    print(f"{name}: {100 * sealed.visible:.1f} % visible")
     reduced = agrees(result, sealed.values)
     # softening from cycle to cycle passes for scatter from cycle to cycle, and so for noise
     assert (0.5 if name == "mullins_softening" else 0.9) < reduced < 1.1
@@ -62,7 +61,6 @@ def test_a_second_relaxation_is_no_other_effect(diagnosed: Diagnosed) -> None:
     one = {"maxwell": {"mu1": 3e5, "tau": 2e-2}}
     two = {**one, "second_maxwell": {"mu1": 6e5, "tau": 8e-4}}
     found = [[effect.name for effect in diagnosed(effects, seed=3).effects] for effects in (two, one)]
-    print(found)
     assert found[0] in (["maxwell", "second_maxwell"], ["unnamed"])
     assert found[1] == ["maxwell"]
 
@@ -71,12 +69,10 @@ def agrees(result: Result, truths: Mapping[str, float]) -> float:
     """Reduced chi-square of a fit whose values have to be the true ones."""
     assert result.quality is not None
     reduced = result.quality.reduced_chi_square
-    print(f"reduced chi-square {reduced:.3f}")
     for parameter, truth in truths.items():
         value, stderr = result.model.values[parameter], result.covariance.stderr(parameter)
         assert stderr is not None, parameter
         z = (value - truth) / stderr
-        print(f"  {parameter} = {value:.5g} +- {stderr:.2g}, truth {truth:.5g}, z {z:+.2f}")
         assert abs(z) < 4.0 or abs(value / truth - 1.0) < 0.03
     return reduced
 
@@ -91,7 +87,6 @@ def test_a_small_effect_is_not_taken_for_one_at_rest_on_its_bound(measured: Meas
     campaign = measured({effect: {key: SMALL[name]}}, seed=1)
     result = fit_joint(PreparedCampaign.from_campaign(campaign), effects=(*BASE, effect), directions=BOTH)
     interval = result.interval(name)
-    print(f"{name} = {result.model.values[name]:.3g}, 95 % {interval}")
     assert not any("edge" in line for line in result.warnings)
     assert interval is not None
     assert interval[0] <= SMALL[name] <= interval[1]
@@ -165,7 +160,6 @@ def test_the_interval_of_the_gain_is_that_of_noise(paper_model: Model) -> None:
         gains.append(other.gain)
     value, low, high = np.array(gains).T
     said, real = float(np.mean(high - low)) / 3.92, float(value.std(ddof=1))
-    print(f"standard error of the gain: said {said:.4f}, real {real:.4f}, gain {value.mean():.4f}")
     assert 0.4 < said / real < 2.5
 
 

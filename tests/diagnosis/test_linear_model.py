@@ -175,6 +175,5 @@ def test_the_chance_of_clean_tests_is_even(node: int) -> None:
     drawn = [noise @ random.normal(size=of.residual.size) for _ in range(200)]
     alone = [replace(of, residual=row, chosen_nodes=np.array([node])).p_value() for row in drawn]
     every = [replace(of, residual=row).p_value() for row in drawn]
-    print(f"p {kstest(alone, 'uniform').pvalue:.3f}; below 5 %: {np.mean(np.array(every) < 0.05):.3f}")
     assert kstest(alone, "uniform").pvalue > 1e-3
     assert np.mean(np.array(every) < 0.05) < 0.09

@@ -20,7 +20,6 @@ DELAY = {"delay": {"tau": 1e-4}}
 def one(found: tuple[MisfitRegion, ...], direction: str, component: str) -> MisfitRegion:
     """The region of a direction and a part."""
     (where,) = [where for where in found if (where.direction, where.component) == (direction, component)]
-    print(f"{where.excess:.1f} x noise: {where.reading}")
     return where
 
 
@@ -108,7 +107,6 @@ def test_the_gap_is_that_of_a_refit(
     refitted = fit(evidence.model, part.rest(evidence.data_sets), (), {}).model
     expected = np.sqrt(np.mean(residual(refitted, evidence.data_sets)[part.rows(evidence.data_sets)] ** 2))
     as_fitted = np.sqrt(np.mean(evidence.residual[part.rows(evidence.data_sets)] ** 2))
-    print(f"{which}: {found.after:.4f}, refitted {expected:.4f}; as fitted {as_fitted:.4f}")
     # the parts of a block that is cut in two share an error, which whitening then treats apart
     assert found.after == pytest.approx(expected, rel=0.05)
     assert effects or "third" not in which or found.after > 1.05 * as_fitted
@@ -134,5 +132,4 @@ def test_the_prediction_s_own_error_is_that_of_a_sandwich_of_runs_and_loops(meas
     error = slopes[:, rows].T @ root.T @ vectors * np.sqrt(np.maximum(size, 1.0))
     whole = np.eye(int(rows.sum())) + error @ error.T
     expected = np.sqrt(left[rows] @ np.linalg.solve(whole, left[rows]) / len(whole))
-    print(f"{which}: {found.after:.3f}, in units of its own error too {expected:.3f}")
     assert found.whitened == pytest.approx((expected, expected), rel=1e-6)

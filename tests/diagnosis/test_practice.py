@@ -102,7 +102,6 @@ def test_at_most_one_of_sixteen_is_wrong_and_plain_effects_are_named_alone(truth
     for case, truth in truths.items():
         diagnosis = found[case]
         names = {effect.name for effect in diagnosis.effects}
-        print(case, truth["truth"] or truth["out_of_library"], said(diagnosis), diagnosis.calibration)
         wrong += [case] * (not right(truth, diagnosis))
         if diagnosis.verdict == "named":
             assert names <= set(truth["truth"]), case

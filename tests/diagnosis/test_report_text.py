@@ -132,7 +132,6 @@ def test_what_stays_open_is_bounded_from_above(odds: tuple[float, float]) -> Non
         share = weighed / weighed.sum(axis=0)
         left = -float(np.trapezoid((weighed * np.log(np.maximum(share, 1e-300))).sum(axis=0), x))
         bound = float(remaining_entropy(odds, distance**2 * (1.0 - np.eye(2))))
-        print(f"{distance:g} apart: {left:.4f} nats stay open, at most {bound:.4f}")
         assert left - 1e-6 <= bound <= left + 0.2
     assert remaining_entropy(odds, np.zeros((2, 2))) == pytest.approx(-float(p @ np.log(p)))
     far = [float(remaining_entropy((*odds, 0.0), d * (1.0 - np.eye(3)))) for d in (300.0, 1000.0, 3000.0)]

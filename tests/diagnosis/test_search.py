@@ -56,10 +56,7 @@ def test_what_is_there_is_all_but_sure(diagnosed: Diagnosed, truth: Effects) -> 
 
 @pytest.mark.parametrize(
     ("tamper", "place"),
-    [
-        (level_too_stiff, "the axial level 0.2 mm"),
-        (loop_too_strong, "the loop loop_axial_2"),
-    ],
+    [(level_too_stiff, "the axial level 0.2 mm"), (loop_too_strong, "the loop loop_axial_2")],
     ids=["level", "loop"],
 )
 def test_what_one_place_alone_shows_is_to_be_measured_again(measured: Measured, tamper: Tamper, place: str) -> None:
@@ -91,11 +88,7 @@ def test_errors_of_every_level_within_the_class_are_nothing(measured: Measured) 
 
 @pytest.mark.parametrize(
     ("effects", "factor", "loss"),
-    [
-        ({}, 1.04, "linear"),
-        ({}, 1.04, "soft_l1"),
-        pytest.param(SLIP, 1.15, "linear", marks=pytest.mark.slow),
-    ],
+    [({}, 1.04, "linear"), ({}, 1.04, "soft_l1"), pytest.param(SLIP, 1.15, "linear", marks=pytest.mark.slow)],
 )
 def test_a_wild_row_is_a_warning(measured: Measured, effects: Effects, factor: float, loss: Loss) -> None:
     """One row of 288 is left out and named by its number; it neither makes a gap nor hides one."""

@@ -58,7 +58,6 @@ def test_a_radial_stiffness_off_the_formula_is_not_blamed_on_the_rig(
         return
     assert said(diagnosis) == "named stiffness_factor.radial"
     low, high = diagnosis.result.interval("stiffness_factor.radial") or (0.0, 0.0)
-    print(f"{shape}: finite elements {ratio:.4f}, found {low:.4f} to {high:.4f}")
     assert low - 0.003 < ratio < high + 0.003
 
 

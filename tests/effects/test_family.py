@@ -122,7 +122,6 @@ def test_the_rig_from_rest_finds_the_frequency_face(name: str, rng: np.random.Ge
         )
         closed = np.ravel(each.stiffness(direction, frequency, amplitude, conditions=CONDITIONS))[0]
         errors.append(lock_in(measured, frequency) / closed - 1.0)
-    print(f"{name}: from rest {abs(errors[1]):.1e}, without it {abs(errors[0]):.1e}")
     assert abs(errors[1] - errors[0]) <= LIBRARY[name].harmonic_error + 3e-4
 
 
@@ -206,7 +205,6 @@ def test_sensitivities_match_finite_differences(effect: Effect, rng: np.random.G
             (looped[i][smooth], force[smooth], largest),
         ):
             worst = max(worst, float(np.max(np.abs(found - expected)) * size / largest_of_all))
-    print(f"{effect.name}: sensitivities within {worst:.1e} of the response per relative change")
     assert worst < 2e-6
 
 

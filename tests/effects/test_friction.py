@@ -8,13 +8,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from bushfit.effects.friction import (
-    _strokes,
-    harmonic_shape,
-    harmonic_slope,
-    mean_stress_decay,
-    modulus,
-)
+from bushfit.effects.friction import _strokes, harmonic_shape, harmonic_slope, mean_stress_decay, modulus
 
 VALUES = {"sigma_fmax": 1.46e4, "eps_half": 1.3e-2}
 X = np.concatenate([np.logspace(-8, 6, 561), [0.025, 0.02565, 0.026, 1.0]])

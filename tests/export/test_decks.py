@@ -72,7 +72,6 @@ def test_every_value_of_the_grid_is_read_back(
                     direction, frequency, amplitude_of(known, direction, rank)
                 )
                 apart = max(apart, np.abs(k / scale / exact - 1.0).max())
-    print(f"{name}, {units}: {len(found)} curves, off the kept computation {worst:.1e}, off the model {apart:.1e}")
     assert worst < MODEL
     assert apart < DIGITS
 
@@ -142,7 +141,6 @@ def test_the_prony_series_of_abaqus_and_of_the_table_is_the_model_within_the_sta
         axial = paper_model.stiffness("axial", frequency, amplitude / 1e3)  # Eq. 10: K = 2 pi L G/ln(b/a)
         error = np.abs(written / (axial * np.log(1.8) / (2.0 * np.pi * 0.034)) - 1.0).max()
         stated = rows["largest error of the modulus [%]"].iloc[0] / 100.0
-        print(f"{amplitude} mm: {relative.size} terms, error {error:.2%}, stated {stated:.2%}")
         assert error == pytest.approx(stated, rel=0.03)
         assert stated < 0.025
         np.testing.assert_allclose(rows["g_i [-]"], relative, rtol=DIGITS)
@@ -261,7 +259,6 @@ def test_the_curve_of_adams_is_the_law_to_half_a_percent(
     scale = newton * model.stiffness_per_modulus(place) * modulus / model.unit_strain(place)
     fine = np.linspace(moved[0], moved[-1], 776)
     error = Akima1DInterpolator(moved, force)(fine) / (scale * law(per_displacement * fine)) - 1.0
-    print(f"{effect}, {place}: {np.abs(error).max():.2%}")
     assert np.abs(error).max() < 0.005
 
 
@@ -315,7 +312,6 @@ def test_the_error_between_frequencies_that_is_told_is_the_one_there_is(
         amplitude = np.unique(export_request.predictions[0].amplitude)[rank - 1]
         off = drawn(name, f, k, fine) * 1e3 / export_request.result.model.stiffness("axial", fine, amplitude) - 1.0
         worst = max(worst, float(np.abs(off).max()))
-    print(f"{name}: told {claimed:.2%}, found {worst:.2%}")
     assert worst <= at_most
     assert worst == pytest.approx(claimed, rel=0.15)
 

@@ -58,7 +58,6 @@ def worst(running: Running, model: Model, what: str, level: int = 1, values: dic
     motion, step, frequency = motions(what, level)
     pairs = zip(running.run(motion, step, values).T, on_the_rig(model, motion, step, frequency).T, strict=True)
     errors = [off(*pair) for pair in pairs]
-    print(f"{what}, level {level}:", ", ".join(f"{100.0 * error:.2f} %" for error in errors), "rms")
     return max(errors)
 
 
@@ -93,8 +92,6 @@ def test_each_effect_follows_the_rig(every: tuple[Model, Running], name: str) ->
     expected, plain = (on_the_rig(each, motion, step, frequency)[counted] for each in (model, neutral))
     errors = [off(*pair) for pair in zip(running.run(motion, step, values)[counted].T, expected.T, strict=True)]
     changed = max(off(*pair) for pair in zip(plain.T, expected.T, strict=True))
-    shown = ", ".join(f"{100.0 * error:.2f} %" for error in errors)
-    print(f"{name}: off by {shown}; it changes {100.0 * changed:.1f} %; {counted.mean():.3f} of the samples count")
     assert max(errors) < LARGEST
     assert changed > 1e-3
     assert counted.mean() > 0.98
@@ -125,7 +122,6 @@ def test_an_fmu_is_of_the_temperature_asked_for(paper_model: Model, tmp_path: Pa
     force = running.run(motion, 1.0 / (64 * frequency))[-64:, 0]
     found = 2.0 * np.mean(force * np.exp(-2j * np.pi * phase[-64:])) / (-1j * amplitude)
     warm = model.stiffness("axial", frequency, amplitude, conditions=RubberConditions(at))
-    print(abs(found / warm - 1.0), abs(found / model.stiffness("axial", frequency, amplitude) - 1.0))
     assert abs(found / warm - 1.0) < LARGEST < 0.2 * abs(found / model.stiffness("axial", frequency, amplitude) - 1.0)
 
 

@@ -146,7 +146,6 @@ def test_effects_of_the_rig_are_left_out_and_what_is_held_is_said_with_its_error
     whole = model.stiffness("axial", frequency, np.array(LEVELS[Direction.AXIAL])[:, None])
     springpot = 0.5 * 2e5 * (2j * np.pi * frequency) ** 0.24 * model.stiffness_per_modulus(Direction.AXIAL)
     error = np.abs(springpot * ((middle / 0.01) ** -0.3 - (strain / 0.01) ** -0.3) / whole).max()
-    print(line)
     assert f"off by up to {100.0 * error:.2g} %" in line
     held = next(value for value in found.values if value.name == "m")
     assert held.value == pytest.approx(2e5 * (middle.item() / 0.01) ** -0.3)

@@ -111,10 +111,7 @@ def held(result: Result, truth: Model, off: Off) -> tuple[list[float], np.ndarra
 
 @pytest.mark.parametrize(
     ("size", "seeds"),
-    [
-        (0.02, 8),
-        *(pytest.param(size, SEEDS // 5, marks=pytest.mark.slow) for size in (0.005, 0.02, 0.05)),
-    ],
+    [(0.02, 8), *(pytest.param(size, SEEDS // 5, marks=pytest.mark.slow) for size in (0.005, 0.02, 0.05))],
 )
 @pytest.mark.parametrize("loops", [True, False], ids=["loop and sweeps", "sweeps"])
 def test_bands_hold_a_rubber_that_is_not_quite_the_model(

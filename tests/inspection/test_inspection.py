@@ -314,11 +314,7 @@ def test_the_data_of_the_repository_raise_only_what_is_there(root: Path) -> None
 
 @pytest.mark.parametrize(
     ("frequency", "amplitudes", "said"),
-    [
-        (1.0, (1.0,), None),
-        (5.0, (1.0,), "a motion at 5 Hz is read as a loop"),
-        (0.1, (0.2, 0.6, 1.0), None),
-    ],
+    [(1.0, (1.0,), None), (5.0, (1.0,), "a motion at 5 Hz is read as a loop"), (0.1, (0.2, 0.6, 1.0), None)],
 )
 def test_one_sine_is_a_loop_however_fast(
     tmp_path: Path, frequency: float, amplitudes: tuple[float, ...], said: str | None

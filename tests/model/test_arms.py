@@ -36,7 +36,6 @@ def error_of(arms: Arms, alpha: float) -> float:
 def test_so_many_arms_leave_so_much(band: tuple[float, float], count: int, largest: float) -> None:
     """No more arms than others found for these errors, alpha 0.24."""
     arms = springpot(0.24, band, largest)
-    print(f"{band[0]:g} to {band[1]:g} Hz, {100 * largest:g} %: {arms.time.size} arms leave {100 * arms.error:.3f} %")
     assert arms.time.size <= count
     assert arms.error <= largest
     assert error_of(arms, 0.24) == pytest.approx(arms.error, rel=0.03)

@@ -31,7 +31,6 @@ def test_the_whole_reference_table(paper_model: Model, root: Path) -> None:
         frequency, amplitude, magnitude, loss = table[table[:, 0] == direction, 1:].astype(float).T
         found = paper_model.stiffness(direction, frequency, amplitude)
         gaps = np.abs(np.abs(found) / magnitude - 1.0), np.abs(found.imag / found.real / loss - 1.0)
-        print(f"{direction}: |k| within {gaps[0].max():.1e}, loss factor within {gaps[1].max():.1e}")
         assert np.max(gaps) < 2e-4
 
 
@@ -45,7 +44,6 @@ def test_extrapolated_to_no_step_and_no_transient_it_is_the_closed_form(paper_mo
     errors = [measured(paper_model, (Direction.RADIAL, 5.0, 2e-4), steps, 200) for steps in (256, 512, 1024)]
     first = [2.0 * fine - coarse for coarse, fine in pairwise(errors)]
     gap = abs(4.0 * first[1] - first[0]) / 3.0
-    print(f"extrapolated: {gap:.1e} from the closed form")
     assert gap < 2e-6
 
 
@@ -123,5 +121,4 @@ def test_slopes_under_a_compliant_rig_hold_however_near_the_last_model_was(
     for name, slope in zip(names, slopes, strict=True):
         expected = differences(model, [name], lambda values: model.force("axial", exact, kind="loop", values=values))[1]
         off = np.abs(slope - expected[0]).max() / np.abs(expected).max() if np.any(expected) else np.abs(slope).max()
-        print(f"{name}: off by {off:.1e}")
         assert off < 1e-3

@@ -47,7 +47,6 @@ def test_simulated_campaigns_show_the_errors_promised(small: Plan) -> None:
         fitted = fit_joint(PreparedCampaign.from_campaign(campaign), directions=["axial"]).model
         found.append([fitted.values[name] / truth.values[name] - 1.0 for name in names])
     ratio = np.sqrt(np.mean(np.square(found), axis=0)) / planned.errors
-    print("found over predicted", ratio.round(2))
     assert np.all((ratio > 0.6) & (ratio < 1.45))
 
 
@@ -100,7 +99,6 @@ def test_gents_relation(shore: float, megapascal: float) -> None:
 
 def test_the_guess_holds_the_papers_and_a_measured_rubber(root: Path) -> None:
     found = off(guess_parameters(BUSHING, Compound(61, 27)), TABLE_1)
-    print("paper, in standard errors", found.round(2))
     assert np.abs(found).max() < Z95
     # An EPDM of 70 Shore A whose filler nobody states; its strain sweeps alone, which the five parameters can meet.
     fitted = fit_joint(
@@ -108,7 +106,6 @@ def test_the_guess_holds_the_papers_and_a_measured_rubber(root: Path) -> None:
     ).model
     for phr in (40.0, 50.0, 60.0):
         found = off(guess_parameters(BUSHING, Compound(70, phr, "EPDM")), dict(fitted.values))
-        print(f"coupon, taken for {phr:g} phr, in standard errors", found.round(2))
         assert np.abs(found).max() < Z95
 
 

@@ -156,7 +156,6 @@ def test_rivals_are_as_far_apart_as_the_best_refit_of_either_leaves_them(known: 
         solve(FitProblem(own, [_noise_free(known.model, truth, run) for run in runs], tuple(own.parameters))).chi_square
         for own, truth in ((one, other), (other, one))
     ]
-    print("linear", linear, "fits", fits)
     assert linear == pytest.approx(min(fits), rel=0.1)
 
 
@@ -165,7 +164,6 @@ def test_a_plan_is_better_than_the_standard_programme_and_errors_before_are_thos
 ) -> None:
     """At equal hours: errors of the stiffness at most 70 %, every effect found as small."""
     better, worst = mean_error(planned.planned) / mean_error(planned.standard), amounts_found(planned)
-    print(f"stiffness {better:.2f}", max(worst.items(), key=lambda item: item[1]), len(worst))
     assert planned.planned.hours <= 2.5
     assert better < 0.7
     assert len(worst) > 20

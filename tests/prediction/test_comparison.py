@@ -78,7 +78,6 @@ def test_equal_bushings_differ_no_oftener_than_said(fits: list[tuple[Result, Res
         "all together": sum(f.joint is not None and f.joint[0] < 0.05 for f in found),
         "words": sum(any("higher" in line or "lower" in line for line in f.sentences()) for f in found),
     }
-    print(f"false alarms of {len(fits)} pairs: {alarms}")
     assert max(alarms.values()) <= binom.isf(3e-3, len(fits), 0.05)  # more in 3 of a thousand
 
 
@@ -101,10 +100,6 @@ def test_known_differences_are_found_and_covered(fits: list[tuple[Result, Result
         curves.append(float(np.mean(inside)))
         everywhere.append(all(((b.low <= t) & (t <= b.high)).all() for b, t in zip(wide, (ratio, loss), strict=True)))
         seen.append((rows(found)["mu"].holm or 0.0) < 0.05)
-    print(
-        f"of {len(fits)} pairs: intervals of parameters cover {np.mean(covered):.1%}, bands {np.mean(curves):.1%}, at "
-        f"all points at once {np.mean(everywhere):.1%}; mu 8 % higher seen in {np.mean(seen):.0%}"
-    )
     assert np.mean(covered) >= 0.90
     assert np.mean(curves) >= 0.88
     assert np.mean(everywhere) >= 0.85

@@ -45,7 +45,6 @@ def test_the_curve_is_that_of_the_virtual_rig(paper_model: Model, law: str) -> N
     largest = np.abs(record.force).max()
     for name, force in (("loading", loading), ("unloading", unloading), ("mean", 0.5 * (loading + unloading))):
         error = np.abs(getattr(curve, name).value - force).max() / largest
-        print(f"{law}, {name}: {error:.2%}")
         assert error < 1e-3
     if law == "asymmetry":
         assert curve.mean.value[-1] > -1.05 * curve.mean.value[0] > 0.0

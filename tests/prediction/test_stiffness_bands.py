@@ -48,7 +48,6 @@ def test_bands_of_an_open_model_are_narrow_where_it_was_measured_and_only_there(
 
     there = [width(frequency, amplitude) for frequency in frequencies for amplitude in amplitudes]
     elsewhere = width(2.0 * frequencies[-1], 3.0 * amplitudes[-1])
-    print(f"widths {min(there):.3g} to {max(there):.3g}, elsewhere {elsewhere:.3g}")
     assert max(there) < 0.04
     assert elsewhere > 0.2
 
@@ -168,13 +167,7 @@ OFF = "+4.9 % in stiffness and +36 % in strain compared with finite elements"
             ["up to 1 % in stiffness and 3 % in strain compared with finite elements"],
         ),
         ("radial", "axial", 0.016, "paper", ["+7.3 % in stiffness and +47 % in strain", "2 GPa would lower"]),
-        (
-            "radial",
-            "axial",
-            0.017,
-            "paper",
-            ["radial formula, which was not compared with finite elements of this"],
-        ),
+        ("radial", "axial", 0.017, "paper", ["radial formula, which was not compared with finite elements of this"]),
     ],
 )
 def test_a_band_that_lacks_the_error_of_a_formula_says_so(

@@ -58,7 +58,6 @@ def test_it_is_that_of_the_virtual_rig_within_a_percent(
     stiffness = complex(found.storage_stiffness.value[0], found.loss_stiffness.value[0])
     expected = on_the_rig(model, motion)
     alone = model.stiffness("axial", FREQUENCY, AMPLITUDE)
-    print(f"{law}, {motion}: {abs(stiffness / expected - 1.0):.2%}, alone {abs(alone / expected - 1.0):.1%}")
     assert abs(stiffness / expected - 1.0) < 2e-3
     if motion.frequency or law in ("strain_stiffening", "asymmetry"):
         assert abs(alone / expected - 1.0) > 0.02

@@ -53,10 +53,7 @@ def slow(*sizes: float) -> list[tuple[float, float]]:
 PROGRAMMES: dict[str, tuple[Sequence[Array], Sequence[tuple[float, float]]]] = {
     "two cycles": ([cycles(2, x) for x in (0.2, 0.5, 1)], slow(0.2, 0.5, 1)),
     "up and down": ([cycles(3, x) for x in (0.2, 0.5, 1, 0.5, 0.2)], slow(0.2, 0.5, 1, 0.5, 0.2)),
-    "pauses": (
-        [hold(5), cycles(5, 0.2), hold(10), cycles(5, 0.5), hold(20), cycles(5, 1), hold(5)],
-        slow(0.2, 0.5, 1),
-    ),
+    "pauses": ([hold(5), cycles(5, 0.2), hold(10), cycles(5, 0.5), hold(20), cycles(5, 1), hold(5)], slow(0.2, 0.5, 1)),
     "ramps between peaks": (
         [cycles(4, 0.2, start=0.25), ramp(0.2, 1, 3), cycles(4, 1, start=0.25), ramp(1, 0, 9)],
         slow(0.2, 1),

@@ -18,13 +18,7 @@ from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.measurement import Source
 from bushfit.reading.resonance import ResonanceTest, read_resonance
 from bushfit.reading.table import Table
-from bushfit.reduction.resonance import (
-    MOST_POINTS,
-    Resonance,
-    reduce_resonance,
-    response,
-    transmissibility,
-)
+from bushfit.reduction.resonance import MOST_POINTS, Resonance, reduce_resonance, response, transmissibility
 
 #: [kg] and [m/s^2]: the paper's bushing then has its resonance near 165 Hz, at some 0.1 mm.
 MASS, BASE = 0.6, 20.0
@@ -66,7 +60,6 @@ def test_a_response_solves_its_equation(stiffness: float, loss: float, softer: f
 def test_a_clean_test_gives_the_stiffness_back(paper_model: Model, rows: int) -> None:
     found = reduce_resonance(shaken(paper_model, rows), MASS)
     off = np.abs(misses(found, paper_model))
-    print(f"{rows} rows without noise: |K| and phase of {off.size} points within {off.max():.1e} of K")
     assert off.size == min(rows, MOST_POINTS)
     assert off.max() < (1e-12 if rows < MOST_POINTS else 1e-3)
     assert found.rows.sum() == rows
@@ -106,8 +99,6 @@ def test_standard_errors_cover_what_points_miss(
         missed = misses(found, paper_model) / found.relative_error
         off += [missed.real, missed.imag]
     covered = float(np.mean(np.abs(np.concatenate(off)) < 1.96))
-    kind = "shared by neighbours" if shared else "of each row by itself"
-    print(f"{rows} rows, {100 * sigma:g} % noise {kind}: 95 % intervals cover {100 * covered:.1f} % over 40 seeds")
     assert least < covered < most
 
 
@@ -128,15 +119,11 @@ def test_the_measured_mount(root: Path) -> None:
         )
         for found in (low, high):
             known = found.frequency[found.relative_error < 0.02]
-            print(
-                f"{mass} g: {found.frequency.size} points, K within 2 % from {known.min():.0f} to {known.max():.0f} Hz"
-            )
             assert not found.turned
             assert known.min() < 0.8 * found.peak[0] < 1.2 * found.peak[0] < known.max()
             assert 0.05 < np.median(found.stiffness.imag / found.stiffness.real) < 0.2
         changes.append(high.peak[0] / low.peak[0] - 1.0)
         near.append(low.stiffness[np.argmin(np.abs(low.frequency - 450.0))])
-    print("resonance from 0.1 to 1 g:", ", ".join(f"{100 * change:+.1f} %" for change in changes))
     assert changes == sorted(changes, reverse=True)
     assert changes[-1] == pytest.approx(-0.074, abs=0.001)
     assert np.ptp(np.abs(near[:3])) < 0.03 * np.mean(np.abs(near[:3]))

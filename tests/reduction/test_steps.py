@@ -54,7 +54,6 @@ def test_every_step_has_the_stiffness_of_the_closed_form(
     }[kind]
     reduction = reduce([clean if rows is None else clean.select(rows)])
     off = np.abs(off_truth(reduction, paper_model)).max()
-    print(f"{kind}: {len(reduction.steps)} points, off by at most {off:.1e} of |K|, without noise")
     assert off < limit
     assert any("rows per cycle" in line for line in reduction.warnings) == kind.startswith("coarse")
     frequency, amplitude = np.array(POINTS).T
@@ -76,8 +75,6 @@ def test_stated_errors_are_those_made(clean: Loop, paper_model: Model, seeds: in
         gain.append(off.real / column(reduction, "gain_error"))
         phase.append(off.imag / column(reduction, "phase_error"))
     held = [float(np.mean(np.abs(errors) < 1.96)) for errors in (gain, phase)]
-    typical = float(np.median(column(reduction, "gain_error")))
-    print(f"|K| within 1.96 standard errors: {held[0]:.1%}, phase {held[1]:.1%}, of {np.size(gain)} ({typical:.1e})")
     assert min(held) > 0.92
     assert max(held) < 0.98
 
@@ -93,7 +90,6 @@ def test_noise_that_is_not_white_is_told_by_the_cycles() -> None:
         (step,) = reduce([Loop("x", Direction.AXIAL, time, motion, force)]).steps
         errors.append(abs(step.stiffness) / 1e3 - 1.0)
         stated.append(step.gain_error)
-    print(f"scatter of |K| {np.std(errors):.2e}, stated {np.median(stated):.2e}")
     assert np.median(stated) == pytest.approx(np.std(errors), rel=0.3)
 
 
@@ -132,7 +128,6 @@ def test_whatever_controller_and_logger_do(controller: str, logger: str) -> None
     reduction = reduce([Loop("x", Direction.AXIAL, np.arange(motion.size) / rate, motion, force)])
     assert [(round(step.frequency), float(f"{step.amplitude:.1g}")) for step in reduction.steps] == points
     off = column(reduction, "stiffness") / stiffness - 1.0
-    print(f"{controller}, {logger}: off by at most {np.abs(off).max():.1e}")
     assert np.abs(off).max() < 1e-3
 
 

@@ -26,14 +26,7 @@ from bushfit.errors import CONTROL, OutputError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.model import Model
 from bushfit.report.plots.style import to_image
-from bushfit.report.results import (
-    Formats,
-    Picture,
-    ResultFile,
-    encode_all,
-    raw_file,
-    write_results,
-)
+from bushfit.report.results import Formats, Picture, ResultFile, encode_all, raw_file, write_results
 from bushfit.report.tables import loops_table, sweeps_table
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are forked and killed")

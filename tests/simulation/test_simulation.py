@@ -59,7 +59,6 @@ def test_a_small_loop_is_that_of_the_closed_form_with_any_effect(paper_model: Mo
     small = SimulatedLoop(Direction.AXIAL, 2e-6, 1.0, cycles=1)
     ((_, record),) = undisturbed(model, SimulateSettings(loops=(small,))).loops
     closed = model.stiffness(Direction.AXIAL, 1.0, 2e-6, kind="loop")
-    print(f"{name:28} {abs(rig.lock_in(record, 1.0) / closed - 1.0):.1e}")
     assert rig.lock_in(record, 1.0) == pytest.approx(closed, rel=5e-4)
 
 
@@ -108,7 +107,6 @@ def test_an_amplitude_sweep_has_the_stiffness_at_the_amplitudes_reached(coupon: 
     points = sweep.frequency[some], sweep.amplitude_reached[some]
     itself = rig.dynamic_stiffness(coupon.truth, COUPON, *points)
     off = np.abs(sweep.stiffness[some] / itself - 1.0).max()
-    print(f"stiffness carried to the amplitude reached: off the rig by {off:.1e}")
     assert off < 2e-5
     closed = coupon.truth.stiffness(COUPON, sweep.frequency, sweep.amplitude_reached)
     np.testing.assert_allclose(sweep.stiffness, closed, rtol=2e-3)

@@ -15,17 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from commandline import call
-from reading_html import (
-    HARMFUL,
-    LARGEST,
-    assert_harmless,
-    drawn,
-    loads,
-    made_of,
-    page_of,
-    parsed,
-    spoiled,
-)
+from reading_html import HARMFUL, LARGEST, assert_harmless, drawn, loads, made_of, page_of, parsed, spoiled
 
 from bushfit.effects.history import History
 from bushfit.geometry import Direction

@@ -103,10 +103,7 @@ OF_RESULTS = [
     (written("model.json", "[]"), ("model.json: not a result", "a list")),
     (changed("model.json", schema="bushfit/model/9"), ("model.json, schema",)),
     (changed("model.json", campaign={"name": 3}), ("model.json, campaign.",)),
-    (
-        changed("diagnosis.json", schema="bushfit/diagnosis/1"),
-        ("diagnosis.json, schema", "bushfit/diagnosis/3"),
-    ),
+    (changed("diagnosis.json", schema="bushfit/diagnosis/1"), ("diagnosis.json, schema", "bushfit/diagnosis/3")),
     (changed("diagnosis.json", gap=7), ("diagnosis.json, gap", "a table")),
     (written("sweeps.csv", "sweep,direction\na,axial\n"), ("a column of a table is missing", "stepped")),
     *(
