@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
+#: Tolerance of implicit equations for any motion, relative to its maximum: far below the error of its sampling.
+_SAMPLED_ACCURACY = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +78,7 @@ class History:
         moving, resting = float(np.std(np.diff(value))) / step, float(np.std(value))
         lowest = 1.0 / (step * value.size)
         frequency = max(moving / (2.0 * np.pi * resting), lowest) if resting else lowest
-        return cls(value, step, periodic, frequency, second_order=True)
+        return cls(value, step, periodic, frequency, accuracy=_SAMPLED_ACCURACY, second_order=True)
 
     @property
     def omega(self) -> float:

@@ -146,6 +146,8 @@ def _force(result: Result, model: Model, place: Place, history: History, conditi
     amplitude = np.array([np.abs(history.value).max(), np.sqrt(2.0) * np.std(history.value)])
     amplitude = np.maximum(amplitude, np.finfo(float).eps)
     errors = uncertainty(result, model, place, np.full(2, history.frequency), amplitude, conditions)
+    if not model.only_branches:  # one model's solution of implicit equations is the start for its derivatives
+        model.force(place, history, kind="loop", conditions=conditions)
     force, slopes = force_and_slopes(model, place, history, errors.covariance.names, conditions)
     half = errors.scale.max() * errors.covariance.half_width(slopes)
     if errors.relative.size:

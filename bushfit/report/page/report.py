@@ -155,7 +155,9 @@ def draw_figures(record: ReportRecord) -> tuple[list[Picture], bool]:
     for (name, title), make in figures.items():
         try:
             chart = record.charts[name].content if name in record.charts else make()
-        except KeyError as error:  # of pandas, with the header
+        except KeyError as error:
+            if not isinstance(error.__cause__, KeyError):  # pandas chains the error of a missing header
+                raise
             raise missing_column(str(error.args[0])) from error
         drawing = picture(chart, f"f{len(pictures)}-", title)
         room -= len(drawing.svg)
