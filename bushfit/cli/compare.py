@@ -33,6 +33,7 @@ _CHANCE = 0.05
         "were fitted in every result]."
     ),
     grid_options("as measured"),
+    option("--preload", "LOAD", 'Preload such as "500 N" or "1.5 mm", within the tests of each result [none].'),
     option(
         "--families",
         "[NAME,...]",
@@ -46,7 +47,12 @@ _CHANCE = 0.05
 )
 @with_output("results/<names>", "tables", "pictures", "pages")
 def command(
-    sources: tuple[Path, ...], families: str | None, directions: tuple[str, ...], output: Output, **grids: str | None
+    sources: tuple[Path, ...],
+    families: str | None,
+    directions: tuple[str, ...],
+    preload: str | None,
+    output: Output,
+    **grids: str | None,
 ) -> None:
     """Compare results with A, the reference: differences in parameters, stiffness and loss factor.
 
@@ -66,8 +72,8 @@ def command(
         raise click.UsageError(f"2 to {MOST} results are compared; one campaign alone with '--families' after it.")
     if families is not None and len(sources) > 1:
         raise click.UsageError("'--families' is of one campaign.")
-    words = option_words(families=families, direction=directions, **grids)
-    settings: dict[str, Any] = grid_values(directions, grids)
+    words = option_words(families=families, direction=directions, preload=preload, **grids)
+    settings: dict[str, Any] = {**grid_values(directions, grids), "preload": preload}
     settings["command"] = command_line("compare", *map(str, sources), *words)
     if families is not None:
         names = () if families == _ALL else tuple(name.replace(" ", "") for name in families.split(","))

@@ -12,7 +12,7 @@ import click
 from bushfit.cli.file_options import history_options, options_named
 from bushfit.cli.options import FILE, command_called, direction_option, flag, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.shared_options import kelvin
+from bushfit.cli.shared_options import kelvin, positive
 
 if TYPE_CHECKING:
     from bushfit.commands.respond import ResponseOutput
@@ -26,6 +26,11 @@ if TYPE_CHECKING:
     direction_option("Direction of the motion (axial, radial, torsion) or specimen [from headers or the file name]."),
     flag("--steady", "The history is whole cycles of a steady motion [it starts from rest]."),
     option(
+        "--lowpass",
+        "FREQUENCY",
+        'Low-pass the displacement, such as at "200 Hz", against its noise, which friction follows [no filter].',
+    ),
+    option(
         "--temperature",
         "TEMP",
         'Temperature, such as "40 degC", if the model was fitted with --effect temperature [23 degC].',
@@ -38,6 +43,7 @@ def command(
     history: Path,
     directions: tuple[str, ...],
     steady: bool,
+    lowpass: str | None,
     temperature: str | None,
     test_options: Mapping[str, Any],
     output: Output,
@@ -70,6 +76,7 @@ def command(
             units=test_options.get("units"),
             file_format=file_format,
             steady=steady,
+            lowpass=positive(lowpass, "--lowpass", "Hz"),
             temperature=kelvin(temperature),
         )
     print_response(output, response)

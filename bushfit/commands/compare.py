@@ -12,7 +12,7 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
 from bushfit.commands.fit import fit, prepare_tests
 from bushfit.commands.loading import HasResult, as_result
-from bushfit.commands.predict import Numbers, grid_of, table_columns
+from bushfit.commands.predict import Numbers, grid_of, requested_preloads, table_columns
 from bushfit.diagnosis.evidence import result_of
 from bushfit.diagnosis.families import FittedFamily, fit_families
 from bushfit.effects import Level
@@ -114,6 +114,7 @@ def compare(
     amplitudes: Numbers | None = None,
     torsion_amplitudes: Numbers | None = None,
     strain_amplitudes: Numbers | None = None,
+    preload: str | None = None,
     command: str = "",
 ) -> ComparisonOutput:
     """Compare parameters and predicted stiffness of results with a reference, and test the differences for chance.
@@ -127,6 +128,7 @@ def compare(
         amplitudes: zero-to-peak displacements [m].
         torsion_amplitudes: zero-to-peak rotations [rad].
         strain_amplitudes: zero-to-peak strains of specimens that give a modulus.
+        preload: preload with its unit, such as "500 N", within the tested range of each result; default none.
         command: command line for the document.
 
     Returns:
@@ -138,7 +140,7 @@ def compare(
     grid = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
     if families is not None and isinstance(reference, Campaign) and not others:
         entries, fitted, notes = _fit_families(reference, families, directions)
-        return _compared(entries, grid, families=fitted, notes=notes, command=command)
+        return _compared(entries, grid, families=fitted, notes=notes, preload=preload, command=command)
     if families is not None or not 1 <= len(others) < MOST:
         raise BushfitError(
             "this cannot be compared",
@@ -146,7 +148,7 @@ def compare(
             expected=f"2 to {MOST} results, or one campaign and families",
         )
     entries = [compared_result(source, directions=directions or ()) for source in (reference, *others)]
-    return _compared(entries, grid, command=command)
+    return _compared(entries, grid, preload=preload, command=command)
 
 
 def compared_result(
@@ -178,6 +180,7 @@ def _compared(
     *,
     families: Sequence[FittedFamily] = (),
     notes: Sequence[str] = (),
+    preload: str | None = None,
     command: str = "",
 ) -> ComparisonOutput:
     """Compare each result with the first, in the directions and at the operating points of a grid.
@@ -187,6 +190,7 @@ def _compared(
         grid: directions, frequencies and amplitudes; None for the default of an axis.
         families: model families to which the entries belong; empty for other results.
         notes: further warnings.
+        preload: preload with its unit; None for none, or the tested preload nearest to none.
         command: command line for the document.
     """
     results, labels = [entry.result for entry in entries], list(ascii_uppercase[: len(entries)])
@@ -196,9 +200,11 @@ def _compared(
             found = ", ".join(f"{place}: {place.motion.words[0]}" for place in places)
             raise ModelError("a place that is not one kind of motion in all", found=found, expected="one kind")
         grids.append(requested_grid(common_grid(results, places, entries[0].sweeps), grid, places[0]))
+    texts = [preload] if preload else []
+    preloads = [requested_preloads(results[0], places[0], texts)[0] if texts else None for places in columns]
     comparisons = with_holm(
         [
-            compare_two(results[0], result, [(places[0], places[index]) for places in columns], grids)
+            compare_two(results[0], result, [(places[0], places[index]) for places in columns], grids, preloads)
             for index, result in enumerate(results[1:], start=1)
         ]
     )

@@ -184,8 +184,8 @@ def predict(
             expected="a model with the effect of temperature",
             hint="fit tests at several temperatures with --effect temperature",
         )
-    if (len(preloads) > 1 and (wide or mass)) or (preloads and (static or static_rates)):
-        problem = "wide tables and resonances are of one preload, and static curves are about none"
+    if len(preloads) > 1 and (wide or mass or static or static_rates):
+        problem = "wide tables, resonances and static curves are of one preload"
         raise ModelError(problem, found=", ".join(preloads), expected="one, or none")
     if preloads and directions is None and result.measured:
         directions = [stated.place for stated in result.measured.preloads] or None
@@ -202,7 +202,7 @@ def predict(
         or (tested := sweep.conditions.temperature) is None
         or abs(np.mean(tested) - (temperature or REFERENCE)) <= SAME_TEMPERATURE
     ]
-    loads = [(place, preload) for place in places for preload in _preloads(result, place, preloads)]
+    loads = [(place, preload) for place in places for preload in requested_preloads(result, place, preloads)]
     predictions = [
         predict_stiffness(
             result,
@@ -229,6 +229,7 @@ def predict(
             static_reach(result, prediction.direction, prediction.amplitude, settings),
             static_rate(result, prediction.direction, static_rates),
             temperature=temperature,
+            preload=prediction.preload if preloads else None,
         )
         for prediction in (predictions if static or static_rates else ())
     ]
@@ -248,7 +249,7 @@ def predict(
     return replace(output, files=_files(output, drawn_sweeps, temperature, wide=wide))
 
 
-def _preloads(result: Result, place: Place, preloads: Sequence[str]) -> list[Preload | None]:
+def requested_preloads(result: Result, place: Place, preloads: Sequence[str]) -> list[Preload | None]:
     """Preloads of a prediction in a direction: those of the texts, or else the default.
 
     Args:
@@ -369,7 +370,7 @@ def _files(
                 stem += "_"
             files.append(table_file(stem, partial(make, part)))
             if isinstance(part, StaticCurve):
-                title = f"{result.name}: {part.direction}, static curve"
+                title = f"{result.name}: {part.label}, static curve"
                 files.append(figure_file(stem, partial(plots.prediction.static_figure, part, title)))
     return [*files, *([table_file("measured", measured_table)] if output.measured else [])]
 

@@ -24,6 +24,7 @@ from bushfit.prediction.validation import Validation
 from bushfit.reading.displacements import DisplacementHistory, read_displacements
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.tablefile import folder_name
+from bushfit.reduction.lowpass import low_pass
 from bushfit.report import plots
 from bushfit.report.response import record_table, response_figures, response_table, validation_table
 from bushfit.report.results import ResultFile, figure_file, table_file
@@ -101,6 +102,7 @@ def respond(
     units: Mapping[str, str] | None = None,
     file_format: FileFormat | None = None,
     steady: bool = False,
+    lowpass: float | None = None,
     temperature: float | None = None,
 ) -> ResponseOutput:
     """Compute the force over time for a displacement history, with 95 % bands.
@@ -114,6 +116,7 @@ def respond(
         columns, units: headers and units of unusual columns by role: time, displacement, axial, radial, torsion.
         file_format: format of the file; default detected.
         steady: True for whole cycles of a steady state, False for a motion from rest.
+        lowpass: cut-off frequency of a low-pass for the displacement [Hz], against noise; None for no filter.
         temperature: temperature of the rubber [K]; None for the reference temperature.
 
     Returns:
@@ -137,6 +140,8 @@ def respond(
     channels = tuple(_without_offset(channel, steady=steady) for channel in channels)
     if steady:
         channels = tuple(_one_cycle(channel) for channel in channels)
+    if lowpass:
+        channels = tuple(_smoothed(channel, lowpass, steady=steady) for channel in channels)
     responses = [
         time_response(
             result,
@@ -182,6 +187,22 @@ def _one_cycle(channel: DisplacementHistory) -> DisplacementHistory:
         )
     is_repeated = abs(motion[-1] - motion[0]) < 0.5 * abs(motion[1] - motion[0])
     return replace(channel, displacement=motion[:-1]) if is_repeated else channel
+
+
+def _smoothed(channel: DisplacementHistory, frequency: float, *, steady: bool) -> DisplacementHistory:
+    """Remove frequencies of a displacement above a cut-off frequency [Hz], and note the size of what is removed."""
+    nyquist = 0.5 / channel.step
+    if not 0.0 < frequency < nyquist:
+        found, expected = f"{number(frequency, 4)} Hz", f"below {number(nyquist, 4)} Hz, half of the sampling rate"
+        raise MeasurementError(
+            "the low-pass does not suit the history", place="lowpass", found=found, expected=expected
+        )
+    smooth = low_pass(channel.displacement, channel.step, frequency, periodic=steady)
+    unit, factor = channel.direction.display.displacement
+    removed = number(factor * float(np.std(channel.displacement - smooth)), 2)
+    cut_off = f"{channel.direction}: low-passed at {number(frequency, 3)} Hz without delay"
+    notes = (*channel.notes, f"{cut_off}, which removes {removed} {unit} rms")
+    return replace(channel, displacement=smooth, notes=notes)
 
 
 def validation_files(validations: Sequence[Validation], before: Sequence[Validation], title: str) -> list[ResultFile]:

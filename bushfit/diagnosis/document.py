@@ -136,6 +136,18 @@ class Description:
     words: str
 
 
+class ValidationEntry(TypedDict):
+    """Entry of diagnosis.json on one validation record, which no fit used: predicted compared with measured force."""
+
+    test: Annotated[str, Doc("name of the record.")]
+    direction: Annotated[str, Doc("direction of the bushing, or name of a specimen.")]
+    nrmse: Annotated[float, Doc("rms error of the force with model.json, relative to half the range of the force.")]
+    nrmse_before: Annotated[float | None, Doc("the same without the added effects; null if none were added.")]
+    peak_error: Annotated[float, Doc("relative error of the largest force.")]
+    energy_error: Annotated[float, Doc("relative error of the work.")]
+    share_inside: Annotated[float, Doc("share of the measured points inside the 95 % band, 0 to 1.")]
+
+
 class DiagnosisFile(TypedDict):
     """Content of diagnosis.json, the result of a diagnosis."""
 
@@ -165,6 +177,9 @@ class DiagnosisFile(TypedDict):
         Description | None, Doc("power law nearest to a gap that no known effect explains; null without such a gap.")
     ]
     gap: Annotated[GapEntry, Doc("misfit between model and tests, before and after the additions.")]
+    validation: NotRequired[
+        Annotated[list[ValidationEntry], Doc("validation records of the campaign; missing without any.")]
+    ]
     usable: Annotated[ExpectedErrorEntry | None, Doc("expected error of model.json; null if nothing was fitted.")]
     next_test: Annotated[
         str, Doc("test that would decide between the explanations or confirm the verdict; empty without one.")

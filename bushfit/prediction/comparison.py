@@ -21,6 +21,7 @@ from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.result import Result
 from bushfit.prediction.bands import Band
 from bushfit.prediction.stiffness import Prediction, predict
+from bushfit.reading.preload import Preload
 from bushfit.units import format_aligned, format_range, number
 
 #: Probability that chance alone causes a reported difference.
@@ -144,10 +145,10 @@ class Comparison:
         for contrast in self.contrasts:
             stiffness, loss = self.widened(contrast.stiffness), self.widened(contrast.loss_factor)
             percent = replace(stiffness, **{end: 100.0 * relative_difference(getattr(stiffness, end)) for end in _ENDS})
-            quantity, place = contrast.place.motion.words[2], contrast.place
+            quantity, label = contrast.place.motion.words[2], contrast.reference.label
             differences = _describe_difference(percent, " %", contrast)
             losses = _describe_difference(loss, "", contrast)
-            sentences.append(f"{place}: {quantity} {differences}; loss factor {losses}")
+            sentences.append(f"{label}: {quantity} {differences}; loss factor {losses}")
         return sentences
 
 
@@ -156,7 +157,11 @@ _ENDS = ("value", "low", "high")
 
 
 def compare(
-    reference: Result, compared: Result, places: Sequence[tuple[Place, Place]], grids: Sequence[tuple[Array, Array]]
+    reference: Result,
+    compared: Result,
+    places: Sequence[tuple[Place, Place]],
+    grids: Sequence[tuple[Array, Array]],
+    preloads: Sequence[Preload | None] | None = None,
 ) -> Comparison:
     """Compare a result with a reference: parameters that both have, and stiffness over operating points.
 
@@ -165,6 +170,7 @@ def compare(
         places: pairs of directions or specimens to compare: of the reference, and of the compared result. Both have the
             same kind of motion.
         grids: frequencies [Hz] and zero-to-peak amplitudes [m, rad or 1] of each pair.
+        preloads: preload of each pair; None for none, or the tested preload nearest to none.
 
     Returns:
         Comparison over the common parameters and the grids.
@@ -173,8 +179,9 @@ def compare(
     middle = float(np.sqrt(frequencies.min() * frequencies.max()))
     parameters, joint = compare_parameters(reference, compared, middle)
     contrasts = []
-    for (place, compared_place), grid in zip(places, grids, strict=True):
-        one, two = predict(reference, place, *grid), predict(compared, compared_place, *grid)
+    for (place, compared_place), grid, preload in zip(places, grids, preloads or [None] * len(places), strict=True):
+        one = predict(reference, place, *grid, preload=preload)
+        two = predict(compared, compared_place, *grid, preload=preload)
         stiffness = two.stiffness.logarithm().minus(one.stiffness.logarithm())
         contrasts.append(Contrast(one, two, stiffness, two.loss_factor.minus(one.loss_factor)))
     files = {source.sha256 for source in compared.inputs}

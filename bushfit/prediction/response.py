@@ -14,14 +14,17 @@ from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
-from bushfit.prediction.bands import Band, candidates, envelope, uncertainty
+from bushfit.prediction.bands import Band, envelope, uncertainty
 from bushfit.prediction.caveats import BEYOND, MARGIN, extrapolations, unfitted_warnings
-from bushfit.prediction.superposed import require_time_law
+from bushfit.prediction.superposed import timed_candidates
+from bushfit.reduction.lowpass import noise_and_highest_frequency
 from bushfit.units import number
 
 #: Largest stroke, relative to the range, that noise of the displacement may cause, and largest share of such strokes
 #: without a warning; chosen.
 _NOISE, _MOST_NOISE = 2e-3, 0.2
+#: Largest share of the travel in strokes shorter than any in the tests without a warning; chosen.
+_MOST_SHORT = 0.2
 #: Smallest number of samples per mean cycle without a warning: with 20 the springpot errs by 0.7 % of its force.
 _FEWEST_PER_CYCLE = 20.0
 
@@ -103,7 +106,7 @@ def time_response(
     Returns:
         Force with a band that spans all models that agree with the tests. Effects of the rig (unless `rig`), a
         correction without a name and, in a steady state, effects of the first cycles are left out; the band includes
-        the correction.
+        the correction, and excludes alternatives without a law in time.
 
     Raises:
         ModelError: an effect of the model has no law in time.
@@ -122,12 +125,10 @@ def time_response(
             replace(alternative, model=alternative.model.without(*left_out)) for alternative in result.alternatives
         ),
     )
-    models = candidates(timed, rig=rig)
-    for _, model in models:
-        require_time_law(model)
+    models, untimed = timed_candidates(timed, str(place), rig=rig)
     force = envelope([_force(source, model, place, history, conditions) for source, model in models])
     response = TimeResponse(place, history, force, result.model.unit_strain(place), _tested(result))
-    return replace(response, warnings=tuple(_warnings(result, response, sorted(left_out), temperature)))
+    return replace(response, warnings=(*_warnings(result, response, sorted(left_out), temperature), *untimed))
 
 
 def _force(result: Result, model: Model, place: Place, history: History, conditions: RubberConditions) -> Band:
@@ -197,11 +198,20 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
         unit, factor = place.display.displacement
         sine = f"{number(history.frequency, 3)} Hz and {number(factor * history.amplitude.item(), 3)} {unit}"
         warnings.append(f"{place}: {' and '.join(constant)} constant, as in a sine of {sine}")
-    strokes = np.abs(history.turning.strides)
+    strokes, (unit, factor) = np.abs(history.turning.strides), place.display.displacement
+    shortest = 2.0 * (1.0 - MARGIN) * result.measured.strain[0] / response.unit_strain if result.measured else 0.0
+    short = strokes[strokes < shortest].sum() / max(strokes.sum(), np.finfo(float).tiny)
     if np.mean(strokes < _NOISE * np.ptp(history.value)) > _MOST_NOISE:
+        noise, highest = noise_and_highest_frequency(history.value, history.step)
         warnings.append(
-            f"{place}: most reversals of the displacement are as small as noise, and friction follows each of them: "
-            "smooth the displacement"
+            f"{place}: most reversals of the displacement are as small as its noise, {number(factor * noise, 2)} "
+            f"{unit} rms, and friction follows each of them: smooth the displacement, --lowpass "
+            f'"{number(2.0 * highest, 2)} Hz" keeps the motion'
+        )
+    elif short > _MOST_SHORT:
+        warnings.append(
+            f"{place}: {number(100.0 * short, 2)} % of the travel is in strokes shorter than the shortest tested, "
+            f"{number(factor * shortest / (1.0 - MARGIN), 3)} {unit}: {BEYOND}"
         )
     if not history.periodic and (samples := 1.0 / (history.frequency * history.step)) < _FEWEST_PER_CYCLE:
         warnings.append(

@@ -11,9 +11,11 @@ from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
-from bushfit.prediction.bands import Band, candidates, envelope, uncertainty
+from bushfit.prediction.bands import Band, envelope, uncertainty
 from bushfit.prediction.caveats import extrapolations
-from bushfit.prediction.superposed import require_time_law
+from bushfit.prediction.stiffness import tested_preload
+from bushfit.prediction.superposed import timed_candidates
+from bushfit.reading.preload import Preload
 from bushfit.units import number
 
 #: Default rate of a model without loops, in display units per minute (10 mm/min): common in static tests of rubber.
@@ -34,7 +36,9 @@ class StaticCurve:
         slope: derivative of the mean by displacement, the static stiffness at each displacement [N/m, N m/rad or Pa].
         secant: static stiffness from end to end, (1,) [N/m, N m/rad or Pa].
         rate: rate of the motion [m/s, rad/s or 1/s].
-        warnings: sentences on extrapolation.
+        warnings: sentences on extrapolation, and on alternatives without a law in time.
+        preload: preload from which displacement and force are counted; None if the tests of this direction did not have
+            several.
     """
 
     direction: Place
@@ -46,6 +50,16 @@ class StaticCurve:
     secant: Band
     rate: float
     warnings: tuple[str, ...] = ()
+    preload: Preload | None = None
+
+    @property
+    def label(self) -> str:
+        """Direction or specimen for users, with the preload: "axial at a preload of 500 N"."""
+        return (
+            f"{self.direction} at a preload of {self.preload.text(self.direction)}"
+            if self.preload
+            else str(self.direction)
+        )
 
     @property
     def rate_text(self) -> str:
@@ -80,7 +94,13 @@ def static_rate(result: Result, place: Place, stated: Mapping[str, float] | None
 
 
 def static_curve(
-    result: Result, place: Place, reach: float, rate: float, *, temperature: float | None = None
+    result: Result,
+    place: Place,
+    reach: float,
+    rate: float,
+    *,
+    temperature: float | None = None,
+    preload: Preload | None = None,
 ) -> StaticCurve:
     """Compute the static curve of a fitted model, as the bushing has it in the car.
 
@@ -90,20 +110,23 @@ def static_curve(
         reach: largest displacement, in both senses [m, rad or 1].
         rate: rate of the motion [m/s, rad/s or 1/s].
         temperature: temperature of the rubber [K]; None for the reference temperature.
+        preload: preload about which the motion takes place, within the tested range; None for none, or the tested
+            preload nearest to none.
 
     Returns:
         Curve at even displacements from -reach to reach.
 
     Raises:
-        ModelError: an effect of the model has no law in time.
+        ModelError: an effect of the model has no law in time, or the preload is outside the tested range.
     """
-    require_time_law(result.model)
-    displacement, conditions = np.linspace(-reach, reach, _POINTS), RubberConditions(temperature)
-    parts = [_forces(source, model, place, displacement, rate, conditions) for source, model in candidates(result)]
+    models, untimed = timed_candidates(result, f"{place}, static curve")
+    displacement, preload = np.linspace(-reach, reach, _POINTS), tested_preload(result, place, preload)
+    conditions = RubberConditions(temperature, preload=preload)
+    parts = [_forces(source, model, place, displacement, rate, conditions) for source, model in models]
     loading, unloading, mean, slope, secant = (envelope(bands) for bands in zip(*parts, strict=True))
     point = np.array([rate / (4.0 * reach)]), np.array([reach])
-    warnings = tuple(extrapolations(result, place, *point, temperature, f"{place}, static curve"))
-    return StaticCurve(place, displacement, loading, unloading, mean, slope, secant, rate, warnings)
+    warnings = (*extrapolations(result, place, *point, temperature, f"{place}, static curve"), *untimed)
+    return StaticCurve(place, displacement, loading, unloading, mean, slope, secant, rate, warnings, preload)
 
 
 def _forces(
@@ -117,7 +140,7 @@ def _forces(
         place: direction or specimen.
         displacement: even displacements from -reach to reach [m, rad or 1], (n,).
         rate: rate of the motion [m/s, rad/s or 1/s].
-        conditions: temperature of the rubber.
+        conditions: temperature and preload of the rubber.
 
     Returns:
         Loading force, unloading force, their mean, its slope (derivative by displacement), (n,) each, and secant, (1,).

@@ -24,7 +24,7 @@ from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.prediction.bands import Band, candidates, envelope, uncertainty
 from bushfit.prediction.caveats import MARGIN, extrapolations, point_warnings
-from bushfit.prediction.superposed import LargeMotion, superposed_stiffness_and_slopes
+from bushfit.prediction.superposed import LargeMotion, superposed_stiffness_and_slopes, timed_candidates
 from bushfit.reading.preload import SAME_PRELOAD, Preload
 from bushfit.reading.runs import nominal
 
@@ -116,9 +116,11 @@ def predict(
     )
     conditions = RubberConditions(temperature, preload=tested_preload(result, direction, preload))
     points = direction, frequency, amplitude, conditions, over
+    models, untimed = candidates(result, rig=rig), list[str]()
     if over:
         over.require(direction, frequency, result.model.without(Level.INSTRUMENT))
-    predictions = [predict_with_model(source, model, *points) for source, model in candidates(result, rig=rig)]
+        models, untimed = timed_candidates(result, f"{direction}, with the large motion", rig=rig)
+    predictions = [predict_with_model(source, model, *points) for source, model in models]
     bushings = predictions[0]
     rigs = predictions[2 ** len(result.unresolved) - 1] if result.unresolved and not rig else None
     measured = None if sweeps is None else measured_stiffness(direction, frequency, amplitude, sweeps)
@@ -147,7 +149,7 @@ def predict(
         if over
         else ()
     )
-    return replace(bushings, **bands, warnings=(*warnings, *together))
+    return replace(bushings, **bands, warnings=(*warnings, *together, *untimed))
 
 
 def tested_preload(result: Result, place: Place, preload: Preload | None) -> Preload | None:

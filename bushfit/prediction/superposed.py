@@ -12,7 +12,9 @@ from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError
 from bushfit.geometry import Place
 from bushfit.model.model import Model
+from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
+from bushfit.prediction.bands import candidates
 from bushfit.units import format_range, number
 
 #: Samples per cycle of the small harmonic: friction, which turns at samples, has an error of 0.01 %.
@@ -126,6 +128,29 @@ def superposed_stiffness_and_slopes(
 def untimed_effects(model: Model) -> list[str]:
     """Names of the effects of the bushing without a law in time, except the correction without a name."""
     return [name for name in model.without(Level.INSTRUMENT).without_time_law if name != UNNAMED]
+
+
+def timed_candidates(
+    result: Result, subject: str, *, rig: bool = False
+) -> tuple[list[tuple[Result, Model]], list[str]]:
+    """List the models that agree with the tests and have laws in time, the predicted one first.
+
+    Args:
+        result: fitted result.
+        subject: beginning of the sentence, such as the direction.
+        rig: True to include the effects of the rig, as in the tests.
+
+    Returns:
+        Models with the result that gives their errors, and a sentence on alternatives that are left out, if any are.
+
+    Raises:
+        ModelError: an effect of the fitted model has no law in time.
+    """
+    require_time_law(result.model)
+    models = candidates(result, rig=rig)
+    untimed = sorted({name for _, model in models for name in untimed_effects(model)})
+    sentence = f"{subject}: the band excludes the alternative with {' or '.join(untimed)}, which has no law in time"
+    return [pair for pair in models if not untimed_effects(pair[1])], [sentence] if untimed else []
 
 
 def require_time_law(model: Model) -> None:

@@ -162,7 +162,7 @@ def static_table(curve: StaticCurve) -> pd.DataFrame:
 
     Returns:
         Columns: displacement, rate; mean, loading and unloading force, and stiffness (slope of the mean), each with
-        its "low" and "high" ends.
+        its "low" and "high" ends; preload, if the tests have several.
     """
     (length, to_length), (_, to_force), (_, to_stiffness) = curve.direction.display
     _, stiffness, force = response_headers(curve.direction)
@@ -178,6 +178,9 @@ def static_table(curve: StaticCurve) -> pd.DataFrame:
     ):
         ends = {"": band.value, ", low": band.low, ", high": band.high}
         columns |= {f"{header}{end}": values * scale for end, values in ends.items()}
+    if curve.preload is not None:
+        value, unit = curve.preload.in_display_unit(curve.direction)
+        columns[f"preload [{unit}]"] = value
     return pd.DataFrame(columns)
 
 

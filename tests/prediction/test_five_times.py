@@ -58,7 +58,9 @@ def of_library(random: np.random.Generator, effect: str | None, values: dict[str
 def other_rubber(random: np.random.Generator) -> Truth:
     modulus, power, delta = 2e6 * random.uniform(0.6, 1.6, 3) * (0.5, 0.02, 0.5)
     alpha = random.uniform(0.2, 0.4)
-    yields = np.exp(np.log(random.uniform(2e-3, 2e-2)) + random.uniform(0.7, 1.5) * norm.ppf((np.arange(40) + 0.5) / 40))
+    yields = np.exp(
+        np.log(random.uniform(2e-3, 2e-2)) + random.uniform(0.7, 1.5) * norm.ppf((np.arange(40) + 0.5) / 40)
+    )
 
     def sliders(strain: Array) -> Array:
         stretch, stress, last = np.zeros(40), np.empty(strain.size), 0.0
