@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import islice
 
 from bushfit import units
-from bushfit.reading.headers import AmplitudeConvention, Vocabulary, plain
+from bushfit.reading.headers import AmplitudeConvention, Vocabulary
 from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row, is_units_row, split
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names, named_direction
 from bushfit.reading.source import Channels, Combined, RowSource, Text, cells_of
@@ -101,7 +101,6 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
         layout: location and headers of the first block.
         vocabulary: known column names.
     """
-    header = [plain(text) for text in layout.headers]
     above = [line for line in source.head() if line.number < layout.header_line]
     between: list[Line] = []
     groups, repeated, parts = [above], False, list[_BlockRow]()
@@ -110,12 +109,10 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
         is_note = not layout.numbered and is_comment(line.content, layout.delimiter)
         if is_note or any(map(_LETTER.search, texts)):
             cells = [str(cell) for cell in cells_of(line, layout)]
-            if [plain(cell) for cell in cells] == header:
+            if layout.is_repeated(cells):
                 repeated = True
                 continue
-            if is_units_row(cells):
-                continue
-            if parts and is_summary_row(cells):  # left out later, with a note
+            if parts and (is_summary_row(cells) or is_units_row(cells)):  # left out later, with a note
                 parts.append((line.number, cells, len(groups) - 1))
                 continue
             if is_note or not is_row(cells):

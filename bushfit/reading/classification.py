@@ -27,7 +27,7 @@ from bushfit.reading.headers import (
     split_convention,
     split_unit,
 )
-from bushfit.reading.numerals import is_like_number
+from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.times import clock
 
 #: Smallest similarity, from 0 to 1, of a header that is suggested for a missing one; chosen: one word of two suffices.
@@ -205,9 +205,8 @@ def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | No
 
 def _first_numbers(cells: Cells, columns: Sequence[Column]) -> NDArray[np.float64]:
     """First numbers of columns, (rows, columns), in units of the file; no rows if any of the cells is not a number."""
-    texts = [[str(row[column.index]).replace(",", ".") for column in columns] for row in cells.first_rows[:_FIRST]]
-    are_numbers = all(units.is_number(text) for row in texts for text in row)
-    return np.array(texts, dtype=float) if are_numbers else np.empty((0, len(columns)))
+    rows = [[plainest_value(str(row[column.index])) for column in columns] for row in cells.first_rows[:_FIRST]]
+    return np.empty((0, len(columns))) if np.isnan(rows).any() else np.array(rows)
 
 
 def _preferred(cells: Cells, first: Column, second: Column) -> Column:

@@ -4,6 +4,7 @@
 all of them can be read both ways, that is an error.
 """
 
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -85,6 +86,11 @@ class NumeralEvidence:
 def is_like_number(text: str) -> bool:
     """Return True if a cell is a number in any notation."""
     return _LIKE_NUMBER.fullmatch(text) is not None and any(way.allows(text) for way in ALL_NUMERALS)
+
+
+def plainest_value(text: str) -> float:
+    """Return the number in a cell in the plainest notation that allows it; NaN if there is none."""
+    return next((value for way in ALL_NUMERALS if (value := way.value(text)) is not None), math.nan)
 
 
 def consistent_notations(

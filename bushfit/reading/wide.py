@@ -8,7 +8,6 @@ cell ("K* 0.1 mm [N/mm]") or in several. Of merged header cells only the leftmos
     5        ;1520  ;1390        f [Hz];K*    ;tan d  ;K*    ;tan d         5     ;1520           ;0.101      ;...
 """
 
-import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -20,8 +19,8 @@ from bushfit import units
 from bushfit.errors import MeasurementError
 from bushfit.reading.blocks import COUNTED
 from bushfit.reading.headers import AmplitudeConvention, Vocabulary, split_convention
-from bushfit.reading.layout import DELIMITERS, Layout, is_comment, split
-from bushfit.reading.numerals import is_like_number
+from bushfit.reading.layout import DELIMITERS, Layout, is_comment, is_row, split
+from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.source import Combined, RowSource
 
 #: Roles of the two stepped quantities: one varies down the rows and the other across the columns.
@@ -121,13 +120,11 @@ def unpivot(
 def _find_blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple[list[list[str]], list[_Row]]]:
     """Yield header rows and rows of numbers of each possible block, without the columns to its left and right."""
 
-    def first_number(cells: Sequence[str | float]) -> int | None:
-        """Index of the first non-empty cell of a row of numbers; None if the row is not one."""
-        numbers = {index: is_like_number(str(cell)) for index, cell in enumerate(cells) if cell != ""}
-        first = next(iter(numbers), 0)
-        return first if sum(numbers.values()) > max(1, len(numbers) / 2 - 1) and numbers[first] else None
-
-    starts = [first_number(cells) for _, cells in rows]
+    starts: list[int | None] = []
+    for _, cells in rows:
+        first = next((index for index, cell in enumerate(cells) if cell != ""), 0)
+        texts = [str(cell) for cell in cells]
+        starts.append(first if is_row(texts) and is_like_number(texts[first]) else None)
     end = 0
     for start, run in groupby(range(len(rows)), key=starts.__getitem__):
         numbers = list(run)
@@ -249,13 +246,16 @@ def _long_table(
             quantity has two units.
     """
     by_role: dict[str | None, list[_WideColumn]] = {meaning.role: [] for meaning, *_ in series}
-    for one in sorted(series, key=lambda one: _number(one[0].level)):
+    for one in sorted(series, key=lambda one: plainest_value(one[0].level or "")):
         by_role[one[0].role].append(one)
     down = {(first.stepped, first.level_unit, first.convention) for _, first, _ in series}
     across = {(meaning.stepped, meaning.level_unit, meaning.convention) for meaning, *_ in series}
     quantities = dict.fromkeys((meaning.role, meaning.unit, None) for meaning, *_ in series)
     levels = [
-        [(_number(meaning.level), [_number(text) for _, text, _ in points]) for meaning, _, points in columns]
+        [
+            (plainest_value(meaning.level or ""), [plainest_value(str(text)) for _, text, _ in points])
+            for meaning, _, points in columns
+        ]
         for columns in by_role.values()
     ]
     problem = None
@@ -290,17 +290,9 @@ def _long_table(
     rows: list[list[str | float]] = []
     for columns in zip(*by_role.values(), strict=True):
         text = columns[0][0].level or ""
-        level = text if _GROUPED.fullmatch(text) else _number(text)
+        level = text if _GROUPED.fullmatch(text) else plainest_value(text)
         for points in zip(*(points for *_, points in columns), strict=True):
             numbers.append(points[0][0])
             rows.append([points[0][1], level, *(cell for _, _, cell in points)])
     sheet = Combined(source.sheet or "", rows, numbers=numbers)
     return sheet, Layout("", tuple(headers), min(numbers) - 1, ("",) * len(headers), None)
-
-
-def _number(text: str | float | None) -> float:
-    """Number in a header, with decimal point or comma; NaN if the text is not such a number."""
-    try:
-        return float(str(text).replace(",", "."))
-    except ValueError:
-        return math.nan
