@@ -84,11 +84,9 @@ class PredictionOutput:
             for place in dict.fromkeys(prediction.direction for prediction in self.predictions)
         }
         for resonance in self.resonances:
-            document[f"{resonance.place}_resonance"] = tables.predicted_resonance_table(resonance).to_dict(
-                orient="list"
-            )
+            document[f"{resonance.place}_resonance"] = table_columns(tables.predicted_resonance_table(resonance))
         for curve in self.static:
-            document[f"{curve.direction}_static"] = tables.static_table(curve).to_dict(orient="list")
+            document[f"{curve.direction}_static"] = table_columns(tables.static_table(curve))
         if self.arms:
             document["arms"] = [
                 {
@@ -358,7 +356,7 @@ def _files(
             over_preload = partial(plots.preload.preload_figure, result, predictions, result.name, temperature)
             files.append(figure_file(f"{name}_preload", over_preload))
     files += arms_files(result, output.arms, places)
-    suffixes: list[tuple[str, Callable[[Any], pd.DataFrame], Sequence[Any]]] = [
+    suffixes: Sequence[tuple[str, Callable[[Any], pd.DataFrame], Sequence[Any]]] = [
         ("wide", tables.wide_table, output.predictions if wide else ()),
         ("static", tables.static_table, output.static),
         ("resonance", tables.predicted_resonance_table, output.resonances),

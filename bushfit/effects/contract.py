@@ -5,13 +5,11 @@ Around them lie *layers*: each takes the response below it and returns the respo
 values that the branches use, by operating condition, and is asked before them. Layers are ordered by level (material,
 component, instrument), never by the order in which they were added.
 
-Each effect answers in two ways: as complex stiffness over frequency and amplitude (the frequency face), and as force
-over time (the time face).
+Each effect has a complex stiffness over frequency and amplitude, and a force over time.
 
 Notes:
-    Every face broadcasts. The last axis holds operating points (frequency face) or samples (time face). Parameter
-    values are numbers, or arrays whose last axis has length 1: a Jacobian by differences or a bootstrap is then one
-    call with the values along a leading axis.
+    Both broadcast. The last axis holds operating points or samples. Parameter values are numbers, or arrays whose last
+    axis has length 1: a Jacobian by differences or a bootstrap is one call with the values along a leading axis.
 
     In the examples of the laws `paper` is the model of the paper's bushing, `spring` the response below a layer, of 500
     N/mm, and `sweep` and `loop` are axial tests of that bushing.

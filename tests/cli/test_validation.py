@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -96,6 +97,16 @@ def test_run_compares_measured_and_predicted_force(campaign: Path, bushfit: Run,
     assert table["NRMSE [%]"][0] == pytest.approx(nrmse, rel=1e-3)
     inside = record["measured force [N]"].between(record["force [N], low"], record["force [N], high"])
     assert table["points in band [%]"][0] == pytest.approx(100.0 * inside.mean(), abs=0.1)
+    entry = json.loads((tmp_path / "run/diagnosis.json").read_text())["validation"][0]
+    assert (entry["test"], entry["direction"]) == ("record_axial_1", "axial")
+    assert 100.0 * entry["nrmse"] == pytest.approx(nrmse, rel=1e-3)
+    for key, header in (
+        ("nrmse_before", "NRMSE before [%]"),
+        ("peak_error", "peak error [%]"),
+        ("energy_error", "energy error [%]"),
+        ("share_inside", "points in band [%]"),
+    ):
+        assert 100.0 * entry[key] == pytest.approx(table[header][0], rel=1e-3, abs=1e-3)
     page = (tmp_path / "run/report.html").read_text()
     assert "Validation record record_axial_1, never fitted" in page
     bushfit("report", tmp_path / "run", "-o", tmp_path / "page")

@@ -19,15 +19,21 @@ from tries import SEEDS
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings
+from bushfit.commands.compare import compare
 from bushfit.diagnosis.workflow import diagnose
+from bushfit.effects.contract import RubberConditions
 from bushfit.errors import ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.file import from_document, to_document
+from bushfit.model.model import FIVE
+from bushfit.model.result import Result
+from bushfit.prediction.static_curve import static_curve
 from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Sweep
 from bushfit.reading.preload import Preload, distinct_preloads, parse_preload
+from bushfit.report.tables import static_table
 
 BUSHING = Bushing("arm", 10e-3, 18e-3, 34e-3)
 STRAIN, SIZE = unit_strain(BUSHING, Direction.AXIAL), stiffness_per_modulus(BUSHING, Direction.AXIAL)
@@ -188,6 +194,28 @@ def test_only_tested_preloads_are_predicted_also_from_the_model_file() -> None:
     for problem, (direction, preload) in refused.items():
         with pytest.raises(ModelError, match=problem):
             predict(result, direction, [20.0], [1e-4], preload=preload)
+
+
+def test_static_curves_and_comparisons_are_about_a_preload() -> None:
+    result = fit_joint(PreparedCampaign.from_campaign(campaign(STIFF, newtons(0.0, 500.0, 1000.0), seed=3)))
+    preload, reach, rate = Preload(700.0, "N"), 2e-4, 1e-4
+    curve = static_curve(result, Direction.AXIAL, reach, rate, preload=preload)
+    loaded = result.model.values_at(Direction.AXIAL, 1.0, reach, RubberConditions(preload=preload))
+    plain = static_curve(
+        Result(result.model.without("preload").with_values({name: loaded[name] for name in FIVE})),
+        Direction.AXIAL,
+        reach,
+        rate,
+    )
+    np.testing.assert_allclose(curve.mean.value, plain.mean.value, atol=1e-9 * plain.mean.value.max())
+    assert curve.secant.value > 1.1 * static_curve(result, Direction.AXIAL, reach, rate).secant.value
+    assert (curve.label, set(static_table(curve)["preload [N]"])) == ("axial at a preload of 700 N", {700.0})
+    compared = compare(result, result, preload="700 N")
+    (contrast,) = compared.comparisons[0].contrasts
+    assert contrast.reference.preload == contrast.other.preload == preload
+    assert "axial at a preload of 700 N: stiffness" in compared.words[0]
+    with pytest.raises(ModelError, match="outside of the tests"):
+        compare(result, result, preload="1100 N")
 
 
 def test_a_diagnosis_takes_stated_preloads_as_known() -> None:
