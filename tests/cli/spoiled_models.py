@@ -43,6 +43,7 @@ IN_MODEL = [
     ("a covariance with nothing beside it", entry("covariance", value={"names": ["mu", "m"], "matrix": [[0, 1], [1, 1]]}), "model.json, covariance.matrix: a covariance that no quantities have"),
     ("a covariance that is not symmetric", entry("covariance", value={"names": ["mu", "m"], "matrix": [[1e6, 5e5], [-5e5, 1e6]]}), "model.json, covariance.matrix: a covariance that is not symmetric"),
     ("a parameter twice", entry("covariance", value={"names": ["mu", "mu"], "matrix": [[1e6, 0], [0, 1e6]]}), "model.json, covariance.names: a parameter twice"),
+    ("a spread of two names", entry("covariance", value={"names": ["mu"], "matrix": [[1e6]], "spread": [[[1, 2]]]}), "model.json, covariance", "a covariance that does not match its names", "1 x 1"),
     ("a spread of 1e300", entry("covariance", "spread", value=[[[1e300]]]), "model.json, covariance.spread #1 #1 #1: this value is not understood"),
     ("100 000 warnings", entry("warnings", value=["w"] * 100_000), "model.json, warnings: this value is not understood", "at most 10000 items"),
     ("a warning of 5 MB", entry("warnings", value=["w" * 5_000_000]), "model.json, warnings #1: this value is not understood", "at most 10000 characters"),

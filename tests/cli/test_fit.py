@@ -62,7 +62,6 @@ def second_off(own: Path, off: float, tilted: bool = False) -> None:
     [
         (0.0, False, []),
         (0.05, False, [REPEATS_OFF]),
-        (0.13, False, [ROWS_APART, REPEATS_OFF]),
         (0.13, True, [ROWS_APART, REPEATS_OFF]),
     ],
 )

@@ -27,6 +27,7 @@ def test_files_are_told_and_the_campaign_s_text_can_be_pasted(typed: Run, root: 
     assert "bushfit reduce" in done.stdout
     assert done.stderr.count("nothing unusual") == 3
     assert "mean displacement: 0 mm" in done.stderr
+    assert "amplitudes: 0.1005, 0.1999, 0.4994 mm zero-to-peak, as reached" in done.stderr
     assert not re.search(r": -?[\d.]+e[-+]?\d", done.stderr)
     for words in (
         "a hysteresis loop, axial",

@@ -78,6 +78,13 @@ def test_compliances_in_series_add() -> None:
     np.testing.assert_allclose(*forces, rtol=1e-10)
 
 
+def test_a_rig_in_series_leaves_the_bushing_its_share_of_the_amplitude() -> None:
+    """1/K = 1/K_b + c, where K_b is the bushing's stiffness at |1 - c K| of the amplitude."""
+    total = added("rig_compliance", compliance=4e-7).stiffness(*AXIAL)
+    inside = PLAIN.stiffness("axial", FREQUENCY, AMPLITUDE * np.abs(1.0 - 4e-7 * total))
+    np.testing.assert_allclose(total, inside / (1.0 + 4e-7 * inside), rtol=1e-6)
+
+
 @pytest.mark.parametrize("history", [LOOP, STARTED], ids=["steady", "from rest"])
 @pytest.mark.parametrize(
     "alone",

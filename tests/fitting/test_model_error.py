@@ -26,6 +26,7 @@ from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.robust import estimate
+from bushfit.gaussian_process import condition, matern
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
@@ -257,3 +258,11 @@ def test_the_likelihood_is_averaged_over_the_process(refitted: FitResult) -> Non
     expected = np.logaddexp.reduce(likelihoods) - np.log(len(cases)) - 0.5 * sweep.log_det_covariance
     expected -= 0.5 * informations[likelihoods.argmax()]
     assert log_likelihood(refitted, dict.fromkeys(free, 1.0)) == pytest.approx(expected, abs=0.1)
+
+
+def test_conditioning_is_that_of_a_normal_distribution() -> None:
+    points, nodes = np.random.default_rng(0).normal(size=(2, 5, 2))
+    weights, variance = condition(points, nodes)
+    solved = np.linalg.solve(matern(nodes, nodes), matern(nodes, points))
+    np.testing.assert_allclose(weights, solved.T, atol=1e-4)
+    np.testing.assert_allclose(variance, 1.0 - np.diag(matern(points, nodes) @ solved), atol=1e-4)

@@ -97,6 +97,14 @@ def test_gents_relation(shore: float, megapascal: float) -> None:
     assert 3e-6 * gent_modulus(shore) == pytest.approx(megapascal, rel=5e-4)
 
 
+def test_filler_amplifies_strain_and_makes_a_network() -> None:
+    """50 phr over the paper's 27, by hand: X_0/X of Guth 1.511/2.093, and phi^3.5 of the shares 0.204 and 0.121."""
+    many, few = (guess_parameters(BUSHING, Compound(61, phr)).model.values for phr in (50, 27))
+    ratio = {name: many[name] / few[name] for name in few}
+    assert ratio["eps_half"] == pytest.approx(0.722, rel=0.01)
+    assert ratio["sigma_fmax"] / ratio["eps_half"] / ratio["mu"] == pytest.approx(4.41, rel=0.03)
+
+
 def test_the_guess_holds_the_papers_and_a_measured_rubber(root: Path) -> None:
     found = off(guess_parameters(BUSHING, Compound(61, 27)), TABLE_1)
     assert np.abs(found).max() < Z95
