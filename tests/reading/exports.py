@@ -201,9 +201,8 @@ EXPORTS: dict[str, Export] = {
     "MTS793, nine acquisitions": Export(MTS793, "loop", name="loop.dat"),
     "means under a unit's symbol": Export(sweep(USUAL + "tan delta", F, A, K, ETA) + "MW\t\t1\t1\n", words=["line 12 (MW, 1, 1)"]),
     "means under a unit's symbol, between blocks": Export(
-        2 * (sweep(USUAL + "tan delta", F[:5], A[:5], K[:5], ETA[:5]) + "MW\t\t1\t1\n"),
+        "".join(sweep(USUAL + "tan delta", F[n], A[n], K[n], ETA[n]) + "MW\t\t1\t1\n" for n in (slice(5), slice(5, None))),
         words=["2 rows left out", "row 14 (MW, 1, 1"],
-        reference={"frequency": np.tile(F[:5], 2), "stiffness": 1e3 * np.tile(STIFFNESS[:5], 2)},
     ),
     "end of a loop": Export(loop() + "End of test\n---\n\tNaN\tNaN\n", "loop", ["rows left out"]),
     # sign and range of phases
