@@ -76,12 +76,24 @@ class ParameterSetting:
         value: start value of the fit, or fixed value.
         min, max: smallest and largest value.
         vary: false keeps the parameter fixed.
+        equal: name of a parameter that this one is equal to.
+        expression: expression of other parameters in SI units that gives the value, such as "0.5 * mu".
+        prior: earlier knowledge, as value and standard deviation such as "0.24 +- 0.03", or the model file of an
+            earlier fit to other tests.
     """
 
     value: ParameterValue | None = None
     min: ParameterValue | None = None
     max: ParameterValue | None = None
     vary: Flag = True
+    equal: Text | None = None
+    expression: Text | None = None
+    prior: Text | None = None
+
+    @property
+    def tie(self) -> str | None:
+        """Expression that gives the value; None for a parameter that is not tied."""
+        return self.equal or self.expression
 
 
 @dataclass(frozen=True)
@@ -135,12 +147,15 @@ class FitSettings:
         residuals: residuals of real and imaginary part, or of |K| and loss factor.
         loss: "linear" for least squares; "soft_l1" reduces the weight of distant points and leaves outliers out.
         effects: effects added to the paper's model, such as "stiffness_factor.mount".
+        prior: model file of an earlier fit to other tests, whose values and covariance are a prior of all parameters
+            that both fits have.
     """
 
     dynamic_amplitudes: Annotated[tuple[Annotated[float, si("m", "rad"), Field(gt=0)], ...], Field(fail_fast=True)] = ()
     residuals: Residuals = "complex"
     loss: Loss = "linear"
     effects: tuple[Text, ...] = ()
+    prior: Text | None = None
     parameters: Annotated[Mapping[str, ParameterSetting], table(parameter_settings)] = field(
         default_factory=dict, metadata=inline_keys(parameter_names)
     )

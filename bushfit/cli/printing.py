@@ -114,3 +114,10 @@ def print_parameters(output: Output, title: str, result: Result) -> None:
     columns = ("parameter", "value", "std error", interval_kind(result), "unit")
     rows = ((row.label, row.value, row.error, row.interval, row.unit) for row in parameter_rows(result))
     output.print_table(title, columns, rows)
+    for name, expression in result.ties.items():
+        output.print(f"{name} is tied: {name} = {expression}")
+    for name, use in result.priors.items():
+        output.print(
+            f"prior of {name}, {use.source}: {number(100.0 * use.share, 2)} % of the information; tests and prior "
+            f"differ by {number(abs(use.distance), 2)} standard deviations"
+        )

@@ -8,7 +8,13 @@ import numpy as np
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
-from bushfit.fitting.agreement import expected_errors, expected_errors_without_refits, misfits
+from bushfit.fitting.agreement import (
+    expected_errors,
+    expected_errors_without_refits,
+    misfits,
+    prior_uses,
+    prior_warnings,
+)
 from bushfit.fitting.assess import FitStage, covariance, measured_range, quality, temperature_warning
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.design import fit_from
@@ -143,6 +149,7 @@ def result_of(
     solution = found
     moving = tuple(name for name in solution.coordinates.names if name not in solution.at_bound)
     cov = covariance(solution.model, [FitStage(moving, found.covariance_tests or found.minimised, found.smooth_error)])
+    priors = prior_uses(solution, cov)
     return Result(
         model,
         moving,
@@ -153,6 +160,7 @@ def result_of(
             *([_CORRECTED] if corrected else []),
             *([model_error_warning(error)] if error else []),
             *temperature_warning(model, tests),
+            *prior_warnings(priors),
             *fit_warnings(solution.model, found, bounds, cov),
         ),
         sources(tests),
@@ -161,5 +169,7 @@ def result_of(
         # a correction has seen every run
         usable=expected_errors_without_refits(model, tests, ()) if corrected else expected_errors(solution),
         model_error=error,
+        ties={tie.name: tie.expression for tie in model.constraints.active_ties(model.values)},
+        priors=priors,
         unresolved=tuple(effect.name for effect in model.records if effect.twins and effect.name not in resolved),
     )

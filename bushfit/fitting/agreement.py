@@ -3,18 +3,21 @@
 Each test and each run has its own figures, so that the thousands of rows of a loop do not hide a sweep that is missed.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.fitting.coordinates import Coordinates, coordinate_changes, prior_covariance
 from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, log_slopes, rows_of
 from bushfit.fitting.problem import FitResult
+from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
-from bushfit.model.result import ExpectedError, Misfit
+from bushfit.model.result import ExpectedError, Misfit, PriorUse
 from bushfit.reading.measurement import loss_factor
+from bushfit.units import number
 
 #: Largest growth of a parameter's variance when a part of the rows is held out: beyond it the other rows do not
 #: determine the parameter, and the part is not predicted.
@@ -27,6 +30,8 @@ _LONGEST_STEP = 0.3
 _SHARE = 0.95
 #: Smallest share of the points of a direction that must be predicted for the expected error to use these alone.
 _ENOUGH = 0.5
+#: Share of the information that comes from a prior, above which tests cannot contradict it.
+_ALL = 0.99
 
 
 class _Run(NamedTuple):
@@ -148,7 +153,7 @@ def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[Mea
         One `Misfit` for each test, and one for each run of a test with several runs.
     """
     found = []
-    for number, whole in enumerate([*fitted, *unfitted]):
+    for index, whole in enumerate([*fitted, *unfitted]):
         test = whole.with_weight()
         relative, gain = test.relative(model), np.abs(test.noise_free(model).measured / test.measured) - 1.0
         squares = np.square(test.residual(model)).reshape(test.residuals_per_point, -1).sum(axis=0)
@@ -159,7 +164,7 @@ def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[Mea
             misfit = Misfit(
                 test=test.name,
                 place=str(test.direction),
-                fitted=number < len(fitted),
+                fitted=index < len(fitted),
                 held=run.held,
                 value=run.value,
                 unit=run.unit,
@@ -221,10 +226,60 @@ def expected_errors_without_refits(
         absolute difference of the loss factor.
     """
     parts = list[tuple[str, Array, bool]]()
-    for number, test in enumerate([*fitted, *unfitted]):
+    for index, test in enumerate([*fitted, *unfitted]):
         difference = _absolute_difference(test.noise_free(model).measured, test.measured)
-        parts.append((str(test.direction), difference, number >= len(fitted)))
+        parts.append((str(test.direction), difference, index >= len(fitted)))
     return _by_place(parts)
+
+
+def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUse]:
+    """Compare each prior of a fit with the tests.
+
+    Args:
+        solution: result of the fit.
+        covariance: covariance of the fitted parameters.
+
+    Returns:
+        By name of the parameter, the share of the information that comes from the prior, and the distance of the tests
+        from it.
+
+    Notes:
+        With the variance S of the prior, the variance V of the estimate and v of the same estimate if the weights of
+        the fit are right, v/S is the weight of the prior. If prior and tests agree, the estimate differs from the mean
+        of the prior with the variance V + S - 2 v, which is S - v for right weights.
+    """
+    moving, model = solution.moving, solution.model
+    names, uses = [solution.names[i] for i in moving], dict[str, PriorUse]()
+    rows = solution.jacobian[moving]
+    linear = np.linalg.pinv(rows @ rows.T, hermitian=True)
+    for prior in model.constraints.priors:
+        known = [name for name in prior.names if name in covariance.names]
+        if not names or not known:
+            continue
+        coordinates = Coordinates.of_parameters(model, known)
+        mean = dict(zip(prior.names, prior.mean.tolist(), strict=True))
+        before = np.diag(prior_covariance(prior, coordinates))
+        changes = coordinate_changes(model, names, known)
+        after = np.diag(changes.T @ linear @ changes)
+        distances = coordinates.point(model.values) - coordinates.point(mean)
+        errors = np.array([covariance.stderr(name) for name in known]) / coordinates.slopes(model.values)
+        spread = np.sqrt(np.maximum(np.square(errors) + before - 2.0 * after, np.finfo(float).tiny))
+        for i, name in enumerate(known):
+            share = float(after[i] / before[i])
+            if np.any(changes[:, i]):
+                distance = float(distances[i] / spread[i]) if share < _ALL else 0.0
+                uses[name] = PriorUse(prior.source, mean[name], min(share, 1.0), distance)
+    return uses
+
+
+def prior_warnings(uses: Mapping[str, PriorUse]) -> list[str]:
+    """Warnings about priors that the tests contradict, one sentence each."""
+    return [
+        f"the tests contradict the prior of {name} ({use.source}): they differ by {number(abs(use.distance), 2)} "
+        "standard deviations (1.96 for 95 of 100 right priors); check the prior, or leave it out"
+        for name, use in uses.items()
+        if abs(use.distance) > Z95
+    ]
 
 
 def _by_place(parts: Sequence[tuple[str, Array, bool]]) -> tuple[ExpectedError, ...]:

@@ -81,6 +81,7 @@ def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | Non
         of M below 1/_LARGEST_ERROR are lifted to it.
     """
     fixed, stages = fixed or Covariance(), [stage for stage in stages if stage.names]
+    fixed = fixed.restricted([name for name in fixed.names if name not in model.tied])
     names = (*fixed.names, *(name for stage in stages for name in stage.names))
     slopes = Coordinates.of_parameters(model, names).slopes(model.values)
     system, root = np.eye(len(names)), np.zeros((len(names), len(names)))
@@ -129,7 +130,9 @@ def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | Non
         values, vectors = np.linalg.eigh(lost / scale)  # what is below zero is rounding
         matrix = matrix + 2.0 * (vectors * np.maximum(values, 0.0)) @ vectors.T * scale
         spread.append(change)
-    return Covariance(names, matrix, tuple(spread))
+    mixing = np.vstack([np.eye(len(names)), model.constraints.slopes(model.values, names).T])
+    with_ties = (mixing @ part @ mixing.T for part in (matrix, *spread))
+    return Covariance((*names, *model.tied), next(with_ties), tuple(with_ties))
 
 
 def _changes_by_noise(

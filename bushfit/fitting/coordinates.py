@@ -14,6 +14,7 @@ from bushfit.effects import Parameter
 from bushfit.effects.contract import Array
 from bushfit.fitting.common_error import CorrelatedTests
 from bushfit.fitting.preparation import MeasuredTest
+from bushfit.model.constraints import Prior
 from bushfit.model.model import Model
 
 #: Lower and upper limit of parameters [SI], by name; None for the parameter's default limit.
@@ -96,7 +97,10 @@ def jacobian(
         with_priors: True to append the derivatives of the residuals of the model's priors, (len(names), n + p).
     """
     slopes = Coordinates.of_parameters(model, names).slopes(model.values)
-    by_value = np.concatenate(list(map(methodcaller("jacobian", model, names), data_sets)), axis=-1)
+    moving = (*names, *model.tied)
+    by_value = np.concatenate(list(map(methodcaller("jacobian", model, moving), data_sets)), axis=-1)
+    if model.tied:
+        by_value = by_value[: len(names)] + model.constraints.slopes(model.values, names) @ by_value[len(names) :]
     of_priors = [prior_rows(model, names)[1]] * with_priors
     return whiten_together(data_sets, np.concatenate([by_value * slopes[:, None], *of_priors], axis=-1))
 
@@ -115,16 +119,42 @@ def prior_rows(model: Model, names: Sequence[str]) -> tuple[Array, Array]:
     """
     residuals, slopes = [np.empty(0)], [np.empty((len(names), 0))]
     for prior in model.constraints.priors:
-        indices = [i for i, name in enumerate(prior.names) if name in model.values]
-        coordinates = Coordinates.of_parameters(model, [prior.names[i] for i in indices])
+        coordinates = Coordinates.of_parameters(model, [name for name in prior.names if name in model.values])
         mean = dict(zip(prior.names, prior.mean.tolist(), strict=True))
-        size = coordinates.slopes(mean)
-        root = np.linalg.cholesky(prior.covariance[np.ix_(indices, indices)] / np.outer(size, size))
-        whitening = np.linalg.inv(root)
+        whitening = np.linalg.inv(np.linalg.cholesky(prior_covariance(prior, coordinates)))
         residuals.append(whitening @ (coordinates.point(model.values) - coordinates.point(mean)))
-        moved = np.array([[name == moving for name in coordinates.names] for moving in names], dtype=float)
-        slopes.append(moved.reshape(len(names), len(indices)) @ whitening.T)
+        slopes.append(coordinate_changes(model, names, coordinates.names) @ whitening.T)
     return np.concatenate(residuals), np.concatenate(slopes, axis=-1)
+
+
+def prior_covariance(prior: Prior, coordinates: Coordinates) -> Array:
+    """Covariance of a prior in the coordinates of k of its parameters, (k, k)."""
+    indices = [prior.names.index(name) for name in coordinates.names]
+    size = coordinates.slopes(dict(zip(prior.names, prior.mean.tolist(), strict=True)))
+    return np.asarray(prior.covariance[np.ix_(indices, indices)] / np.outer(size, size))
+
+
+def coordinate_changes(model: Model, names: Sequence[str], changed: Sequence[str]) -> Array:
+    """Derivatives of coordinates by the coordinates of free parameters, 1 or 0 but for tied parameters.
+
+    Args:
+        model: model with its ties.
+        names: names of the k free parameters.
+        changed: names of the c parameters whose coordinates change.
+
+    Returns:
+        Derivatives, (k, c).
+    """
+    changes = np.zeros((len(names), len(changed)))
+    by_value = model.constraints.slopes(model.values, names)
+    sizes = [Coordinates.of_parameters(model, group).slopes(model.values) for group in (names, model.tied)]
+    for column, name in enumerate(changed):
+        if name in model.tied:
+            tie = model.tied.index(name)
+            changes[:, column] = by_value[:, tie] * sizes[0] / sizes[1][tie]
+        elif name in names:
+            changes[list(names).index(name), column] = 1.0
+    return changes
 
 
 def whiten_together(data_sets: Sequence[MeasuredTest], rows: Array) -> Array:

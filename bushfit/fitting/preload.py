@@ -83,7 +83,7 @@ def _probability_of_chance(data: PreparedCampaign, tests: Sequence[MeasuredTest]
     """
     tests = with_gain_weighting(tests, weigh=True)
     model = data.starting_model(data.effects, tests, {})
-    names = list(data.free(tuple(model.parameters)))
+    names = [name for name in data.free(tuple(model.parameters)) if name not in model.tied]
     plain, full = _fits(data, FitProblem(model, tests, names, data.bounds), fixed)
     errors = level_errors(full.minimised, full.residual, full.jacobian, largest_error(data.campaign.rig))
     if errors.matters:

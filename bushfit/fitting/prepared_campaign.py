@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.constraints import constraints_of
 from bushfit.campaign.session import measured_session
 from bushfit.effects import BASE, effect_name_of, get_effect, with_base
 from bushfit.errors import FitError, ModelError, error_location
@@ -48,7 +49,7 @@ class PreparedCampaign:
         sweeps: measured sweeps with their noise.
         bounds: limits of parameters from [fit] [SI], by name.
         preload_notes: sentences on the influence of the preload that the tests show.
-        constraints: priors of parameters, for every model that is fitted.
+        constraints: priors and ties of parameters, for every model that is fitted.
     """
 
     campaign: Campaign
@@ -76,6 +77,7 @@ class PreparedCampaign:
             tuple(prepare_loops(campaign.loops, campaign.rig, without_outliers=campaign.fit.loss != "linear")),
             tuple(prepare_sweeps(campaign.sweeps, campaign.fit.residuals, campaign.rig)),
             {name: (setting.min, setting.max) for name, setting in campaign.fit.parameters.items()},
+            constraints=constraints_of(campaign),
         )
         return with_preload(data.in_session())
 

@@ -59,7 +59,7 @@ class FitProblem:
             fixed: names of the fixed parameters.
             bounds: limits of parameters [SI] by name, inside their default limits.
         """
-        return cls(model, tests, [name for name in model.parameters if name not in fixed], bounds)
+        return cls(model, tests, [name for name in model.parameters if name not in (*fixed, *model.tied)], bounds)
 
     @cached_property
     def coordinates(self) -> Coordinates:

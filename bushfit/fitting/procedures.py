@@ -9,7 +9,7 @@ import numpy as np
 from bushfit.effects import BASE, effect_name_of, get_effect
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.agreement import expected_errors, misfits
+from bushfit.fitting.agreement import expected_errors, misfits, prior_uses, prior_warnings
 from bushfit.fitting.assess import (
     FitStage,
     covariance,
@@ -248,7 +248,7 @@ def _problem(
         fixed: values of parameters that this fit keeps fixed, by name [SI].
     """
     model = data.starting_model(effects, tests, fixed)
-    names = [name for name in data.free(tuple(model.parameters)) if name not in fixed]
+    names = [name for name in data.free(tuple(model.parameters)) if name not in (*fixed, *model.tied)]
     return FitProblem(model, tests, names, data.bounds)
 
 
@@ -289,6 +289,7 @@ def _result(
         names = tuple(name for name in step.names if not (step.smooth_error and name in step.at_bound))
         stages.append(FitStage(names, step.covariance_tests or step.minimised, step.smooth_error))
     cov = covariance(model, stages, fixed)
+    priors = {name: use for step in steps for name, use in prior_uses(step, cov).items()}
     fitted = tuple(name for step in steps for name in step.names)
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
     warnings = (
@@ -296,6 +297,13 @@ def _result(
         *implausible_modulus(data.campaign.bushing, tests),
         *temperature_warning(model, tests),
         *data.assumed,
+        *prior_warnings(priors),
+        *(
+            f"the tie {tie.name} = {tie.expression} is not used: the model lacks {name}"
+            for tie in data.constraints.ties
+            for name in tie.names
+            if tie.name in model.values and name not in model.values
+        ),
         *outlier_warnings(outliers, robust=data.robust),
         *(sentence for step in steps for sentence in fit_warnings(model, step, data.bounds, cov, NEXT)),
     )
@@ -311,6 +319,8 @@ def _result(
         at_bound={name: end for step in steps for name, end in step.at_bound.items()},
         specimens=data.campaign.specimens,
         tests=misfits(model, tests, unused),
+        ties={tie.name: tie.expression for tie in model.constraints.active_ties(model.values)},
+        priors=priors,
     )
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bushfit.errors import FitError
+from bushfit.errors import FitError, ModelError
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.model.model import Model
@@ -90,7 +90,7 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
         return model_at(*(parameter.value for parameter in parameters.values()))
 
     # a residual that is not finite is a ValueError of lmfit, which takes roots of a covariance nobody asked for
-    with suppress(_OutOfBoundsError, ValueError), np.errstate(invalid="ignore", divide="ignore"):
+    with suppress(_OutOfBoundsError, ModelError, ValueError), np.errstate(invalid="ignore", divide="ignore"):
         fit = lmfit.minimize(
             lambda parameters: problem.residual(model_of(parameters)),
             list(free.values()),  # which lmfit takes as they are, without a copy

@@ -1,9 +1,26 @@
-"""Constraints of a model's parameters that do not come from its tests: priors from earlier knowledge."""
+"""Constraints of a model's parameters that do not come from its tests: priors from earlier knowledge, and ties."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
+import numpy as np
+
+from bushfit.effects import is_parameter, parameter_names
 from bushfit.effects.contract import Array
+from bushfit.errors import ModelError
+from bushfit.validation import unknown_key
+
+#: Functions of an expression; all are analytic, as the complex steps of their derivatives require.
+_FUNCTIONS = {"exp": np.exp, "log": np.log, "sqrt": np.sqrt}
+#: Parts of Python's grammar that an expression may have; attributes, subscripts and texts are not among them.
+_GRAMMAR = {"module", "expr", "expression", "binop", "unaryop", "call", "name", "constant"}
+#: Name of a parameter or function in an expression, with dots.
+_NAME = re.compile(r"(?<![\w.])[A-Za-z_][\w.]*(?!\w*\s*\()")
+#: Relative step into the complex plane: a derivative so taken is exact to rounding.
+_STEP = 1e-30
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,15 +40,113 @@ class Prior:
     source: str
 
 
+@dataclass(frozen=True)
+class Tie:
+    """Parameter whose value follows from other parameters.
+
+    Args:
+        name: name of the tied parameter.
+        expression: expression of other parameters [SI], such as "0.5 * mu".
+        names: names of these parameters, in the order of their first use.
+    """
+
+    name: str
+    expression: str
+    names: tuple[str, ...]
+
+    @classmethod
+    def from_expression(cls, name: str, expression: str) -> "Tie":
+        """Parse an expression; raise a CampaignError for an unknown name, a ModelError for anything that is no number.
+
+        Args:
+            name: name of the tied parameter.
+            expression: numbers, parameters, + - * / ** and brackets, exp, log and sqrt.
+        """
+        names = tuple(dict.fromkeys(_NAME.findall(expression)))
+        for used in names:
+            if not is_parameter(used):
+                raise unknown_key(used, parameter_names())
+        tie = cls(name, expression, names)
+        tie.value(dict.fromkeys(names, 1.0))
+        return tie
+
+    def value(self, values: Mapping[str, Any]) -> Any:
+        """Value of the tied parameter [SI], real or complex, from parameter values [SI] by name.
+
+        Raises:
+            ModelError: the expression has no value.
+        """
+        symbols = {name: f"p{i}" for i, name in enumerate(self.names)}
+        code = _NAME.sub(lambda match: symbols[match[0]], self.expression)
+        try:
+            with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+                value = _evaluate(code, {symbol: values[name] for name, symbol in symbols.items()})
+        except Exception as error:
+            raise ModelError(
+                "this expression has no value",
+                found=self.expression,
+                expected="numbers, names of parameters, + - * / ** ( ), exp, log and sqrt",
+            ) from error
+        return value
+
+
+def _evaluate(code: str, symbols: Mapping[str, Any]) -> Any:
+    """Evaluate an expression of symbols, numbers and functions to a number."""
+    interpreter = _interpreter()
+    interpreter.symtable.update(symbols)
+    interpreter.error = []
+    value = interpreter(code, show_errors=False, raise_errors=True)
+    return value + 0.0  # a text or a function is no number
+
+
+@cache
+def _interpreter() -> Any:
+    """Interpreter of asteval, as lmfit has it, without all but arithmetic."""
+    from asteval import Interpreter
+    from asteval.asteval import ALL_NODES
+
+    refused = dict.fromkeys(set(ALL_NODES) - _GRAMMAR, False)
+    return Interpreter(symtable=dict(_FUNCTIONS), minimal=True, use_numpy=False, config=refused)
+
+
 @dataclass(frozen=True, eq=False)
 class Constraints:
     """Constraints that hold in every fit of a model.
 
     Args:
         priors: independent priors of parameters; a prior applies to those of its parameters that a model has.
+        ties: ties of parameters, each after the ties of the parameters that it uses. A tie applies to models that have
+            all its parameters.
     """
 
     priors: Sequence[Prior] = ()
+    ties: Sequence[Tie] = ()
+
+    def active_ties(self, values: Mapping[str, Any]) -> list[Tie]:
+        """Ties that apply to a model with the given parameters."""
+        return [tie for tie in self.ties if {tie.name, *tie.names} <= values.keys()]
+
+    def tied_values(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Parameter values [SI] by name, with those of tied parameters computed from the others."""
+        tied = dict(values)
+        for tie in self.active_ties(values):
+            tied[tie.name] = tie.value(tied)
+        return tied
+
+    def slopes(self, values: Mapping[str, float], names: Sequence[str]) -> Array:
+        """Derivatives of the t tied parameters by other parameters, (k, t), by complex steps.
+
+        Args:
+            values: parameter values [SI] by name.
+            names: names of the k other parameters.
+        """
+        tied = [tie.name for tie in self.active_ties(values)]
+        slopes = np.zeros((len(names), len(tied)))
+        for i, name in enumerate(names if tied else ()):
+            step = _STEP * (abs(values[name]) or 1.0)
+            moved = self.tied_values({**values, name: values[name] + 1j * step})
+            slopes[i] = [np.imag(moved[tie]) / step for tie in tied]
+        return slopes
 
 
 #: Constraints of a model that only its tests determine.

@@ -16,7 +16,7 @@ from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import Shape, SpecimenKind, StatedStrain
 from bushfit.model.result import CampaignTable as CampaignTable
-from bushfit.model.result import End, ExpectedError, Misfit, Outlier, PreloadRange, Quality, Range
+from bushfit.model.result import End, ExpectedError, Misfit, Outlier, PreloadRange, PriorUse, Quality, Range
 from bushfit.model.result import TestTable as TestTable
 from bushfit.units import SIZES
 from bushfit.validation import Flag, Name, Number, WholeNumber
@@ -71,6 +71,8 @@ class ParameterTable:
         Field(description="95 % interval by profile likelihood, if requested; null for an open end."),
     ] = None
     at_bound: Annotated[End | None, Field(description="Bound that the value reached: min or max.")] = None
+    tied: Annotated[str | None, Field(description="Expression of other parameters that gives the value.")] = None
+    prior: Annotated[PriorUse | None, Field(description="Prior of the parameter; null without one.")] = None
 
 
 @dataclass(frozen=True)

@@ -112,6 +112,8 @@ def from_document(document: object, file: Path | None = None) -> Result:
             model_error=tables.model_error,
             campaign=tables.campaign,
             alternatives=tuple(alternatives),
+            ties={name: entry.tied for name, entry in entries.items() if entry.tied},
+            priors={name: entry.prior for name, entry in entries.items() if entry.prior},
         )
         with error_location(place="fit, directions"):
             for name in result.measured.directions if result.measured else ():
@@ -147,6 +149,8 @@ def to_document(result: Result) -> dict[str, Any]:
             vary=name in result.fitted,
             profile95=result.profile.get(name),
             at_bound=result.at_bound.get(name),
+            tied=result.ties.get(name),
+            prior=result.priors.get(name),
         )
         for name, parameter in model.parameters.items()
     }

@@ -38,7 +38,7 @@ class Model:
         effects: names of effects from the library, in any order.
         values: SI value of every parameter, by its name in files and reports.
         unnamed: data of the smooth correction `unnamed`; None if `effects` does not include it.
-        constraints: priors of its parameters, which all fits of the model use.
+        constraints: priors and ties of its parameters; the values of tied parameters follow from the others.
 
     Raises:
         ModelError: an effect is unknown, listed twice or without its data, or a value is missing, unknown, not finite
@@ -53,7 +53,8 @@ class Model:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", tuple(self.effects))
-        object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
+        tied_values = self.constraints.tied_values(self.values)
+        object.__setattr__(self, "values", MappingProxyType(tied_values))
         if (UNNAMED in self.effects) != (self.unnamed is not None):
             expected = "both, or neither"
             raise ModelError("an effect without its data, or data without an effect", place=UNNAMED, expected=expected)
@@ -67,6 +68,11 @@ class Model:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Model, (self.bushing, self.effects, dict(self.values), self.unnamed, self.constraints)
+
+    @cached_property
+    def tied(self) -> tuple[str, ...]:
+        """Names of the parameters whose values follow from other parameters."""
+        return tuple(tie.name for tie in self.constraints.active_ties(self.values))
 
     @cached_property
     def structure(self) -> Structure:
@@ -155,7 +161,7 @@ class Model:
             effects: names of the effects.
             values: parameter values [SI] by name in files; values of other effects are ignored.
             unnamed: data of the smooth correction `unnamed`, if it is among the effects.
-            constraints: priors of its parameters.
+            constraints: priors and ties of its parameters.
 
         Returns:
             The model.

@@ -170,6 +170,23 @@ class Outlier:
 
 
 @dataclass(frozen=True)
+class PriorUse:
+    """Part that the prior of a parameter has in its estimate.
+
+    Args:
+        source: prior as the campaign states it, such as "0.24 +- 0.03".
+        mean: mean of the prior [SI].
+        share: share of the information on the parameter that comes from the prior, 0 to 1.
+        distance: difference of the tests from the prior, in standard deviations.
+    """
+
+    source: str
+    mean: Number
+    share: Number
+    distance: Number
+
+
+@dataclass(frozen=True)
 class Alternative:
     """Alternative model that the tests do not rule out.
 
@@ -271,6 +288,8 @@ class Result:
             smooth correction of the bushing that the compound was transferred from; None if there is neither.
         alternatives: other models that the tests do not rule out.
         campaign: description of the campaign; None for a model without a campaign.
+        ties: expressions of the parameters whose values follow from others, by name.
+        priors: use of the prior of each parameter that has one, by name.
     """
 
     model: Model
@@ -290,6 +309,8 @@ class Result:
     model_error: Unnamed | None = None
     alternatives: tuple[Alternative, ...] = ()
     campaign: CampaignTable | None = None
+    ties: Mapping[str, str] = field(default_factory=dict)
+    priors: Mapping[str, PriorUse] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Text with one line per parameter (value and standard error), and the quality of the fit."""

@@ -23,7 +23,7 @@ class ParameterRow(NamedTuple):
 
     Args:
         name: name of the parameter.
-        state: "held" (fixed in the fit), "at min" or "at max" (at a bound); empty otherwise.
+        state: "held" (fixed in the fit), "tied", "prior", "at min" or "at max" (at a bound); empty otherwise.
         value: value in `unit`.
         error: standard error in `unit`; empty if it is not known.
         interval: 95 % interval in `unit`, such as "1.02 to 1.10" or "1.02 to open"; empty if it is not known.
@@ -41,7 +41,7 @@ class ParameterRow(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Name of the parameter, followed in brackets by its state ("held", "at min" or "at max") if it has one."""
+        """Name of the parameter, followed in brackets by its state, such as "held", if it has one."""
         return f"{self.name} ({self.state})" if self.state else self.name
 
 
@@ -80,5 +80,7 @@ def parameter_rows(result: Result) -> Iterator[ParameterRow]:
         value_text, *texts = format_aligned([value * factor, *finite_ends], digits, minimum_digits=2)
         ends = ["open" if end is None else texts.pop(0) for end in interval or ()]
         error = "" if stderr is None else format_aligned([stderr * factor], 2)[0]
-        state = f"at {result.at_bound[name]}" if name in result.at_bound else "held" * (name not in result.fitted)
+        state = "prior" if name in result.priors else "held" * (name not in result.fitted)
+        state = "tied" if name in result.ties else state
+        state = f"at {result.at_bound[name]}" if name in result.at_bound else state
         yield ParameterRow(name, state, value_text, error, " to ".join(ends), unit, parameter.meaning)

@@ -1,19 +1,29 @@
-"""Priors of parameters: rows of the least-squares problem that weigh as one more measurement of the parameters."""
+"""Priors of parameters, which weigh as one more measurement of the parameters, and ties between parameters."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import ParameterSetting, RigSettings
+from bushfit.errors import BushfitError
 from bushfit.fitting.assess import FitStage, covariance
+from bushfit.fitting.coordinates import jacobian, residual
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem, FitResult
+from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.solve import solve, solve_with_lmfit
 from bushfit.model.constraints import Constraints, Prior
+from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
+from bushfit.model.result import Result
 
 
 @pytest.mark.parametrize("solver", [solve, solve_with_lmfit])
@@ -32,5 +42,78 @@ def test_a_prior_weighs_as_one_more_measurement_of_the_parameter(
     assert fitted.model.values["alpha"] == pytest.approx(value + error, rel=0.02 * error / value)
     assert fitted.chi_square - plain.chi_square == pytest.approx(2.0, rel=0.05)
     stage = [FitStage(tuple(FIVE), tests)]
-    before, after = (covariance(fit.model, stage).stderr("alpha") for fit in (plain, fitted))
+    before, after = (covariance(fit.model, stage).stderr("alpha") or 0.0 for fit in (plain, fitted))
     assert after == pytest.approx(np.hypot(before, error) / 2.0, rel=0.03)
+
+
+def _fitted(campaign: Campaign, **settings: ParameterSetting) -> Result:
+    fit = replace(campaign.fit, parameters=settings)
+    return fit_joint(PreparedCampaign.from_campaign(replace(campaign, fit=fit)))
+
+
+def test_a_tie_holds_in_values_errors_and_derivatives(rig: Callable[..., Campaign]) -> None:
+    tied = _fitted(rig(3), m=ParameterSetting(expression="0.18 * mu + 1e3 * exp(alpha)"))
+    mu, m, alpha = (tied.model.values[name] for name in ("mu", "m", "alpha"))
+    assert m == pytest.approx(0.18 * mu + 1e3 * np.exp(alpha), rel=1e-12)
+    assert list(tied.ties) == ["m"]
+    assert "m" not in tied.fitted
+    slopes = np.array([0.18, 1e3 * np.exp(alpha)])
+    free = tied.covariance.restricted(["mu", "alpha"]).matrix
+    assert tied.covariance.stderr("m") == pytest.approx(float(np.sqrt(slopes @ free @ slopes)))
+    tests = PreparedCampaign.from_campaign(rig(3)).data_sets
+    above, below = (residual(tied.model.with_values({"mu": mu * np.exp(s)}), tests) for s in (1e-5, -1e-5))
+    assert jacobian(tied.model, tests, ["mu"])[0] == pytest.approx((above - below) / 2e-5, rel=1e-3, abs=1e-2)
+
+
+def test_the_model_of_earlier_tests_is_a_prior_that_counts_as_these_tests(
+    rig: Callable[..., Campaign], tmp_path: Path
+) -> None:
+    """The fit with the covariance of the first campaign is the fit to both campaigns, and its file says how it came."""
+    stated = RigSettings(gain_error=5e-3, phase_error=2e-3)
+    first, second = replace(rig(1), rig=stated), replace(rig(2), rig=stated, path=tmp_path / "campaign.toml")
+    one, two = _fitted(first), _fitted(second)
+    (tmp_path / "model.json").write_text(json.dumps(to_document(one)), encoding="utf-8")
+    both = fit_joint(PreparedCampaign.from_campaign(replace(second, fit=replace(second.fit, prior="model.json"))))
+    for name in FIVE:
+        ends = sorted((one.model.values[name], two.model.values[name]))
+        error = both.covariance.stderr(name)
+        assert error is not None
+        assert ends[0] - error < both.model.values[name] < ends[1] + error
+        assert error == pytest.approx((two.covariance.stderr(name) or 0.0) / np.sqrt(2.0), rel=0.2)
+    read = from_document(to_document(both))
+    assert read.priors == both.priors
+    assert all(0.2 < use.share < 0.8 and abs(use.distance) < 4.0 for use in read.priors.values())
+
+
+def test_tests_contradict_a_wrong_prior_and_no_right_one(rig: Callable[..., Campaign], paper_model: Model) -> None:
+    truth = paper_model.values["alpha"]
+    for shift, contradicts in ((0.5, False), (-6.0, True), (6.0, True)):
+        found = _fitted(rig(4), alpha=ParameterSetting(prior=f"{truth + 0.004 * shift} +- 0.004"))
+        assert any("the tests contradict the prior of alpha" in line for line in found.warnings) == contradicts
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ({"prior": "0.24"}, "this is no prior"),
+        ({"prior": "0.24 +- 0"}, "this is no prior"),
+        ({"prior": "5 +- 0.1"}, "this is no prior"),
+        ({"prior": "0.2 MPa +- 0.1 MPa"}, "unit"),
+        ({"prior": "0.2 +- 0.1", "vary": False}, "exclude each other"),
+        ({"equal": "mu", "value": 0.2}, "exclude each other"),
+        ({"equal": "alfa"}, "unknown key"),
+        ({"equal": "alpha"}, "in a circle"),
+        ({"expression": "mu.__class__"}, "unknown key"),
+        ({"expression": "(mu).real"}, "has no value"),
+        ({"expression": "__import__(1)"}, "has no value"),
+        ({"expression": "9**9**9**9"}, "has no value"),
+        ({"expression": "2 *"}, "has no value"),
+        ({"expression": "mu"}, "impossible value"),
+    ],
+)
+def test_what_is_no_tie_or_prior_is_one_clear_error(
+    rig: Callable[..., Campaign], setting: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(BushfitError) as error:
+        _fitted(rig(0), alpha=ParameterSetting(**setting))
+    assert message in str(error.value)

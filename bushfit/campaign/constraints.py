@@ -1,0 +1,123 @@
+"""Priors and ties of parameters in [fit] of a campaign."""
+
+import re
+from collections.abc import Mapping
+
+import numpy as np
+
+from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.quantities import parameter_value
+from bushfit.campaign.schema import ParameterSetting
+from bushfit.effects import get_parameter
+from bushfit.errors import CampaignError, error_location
+from bushfit.model.constraints import Constraints, Prior, Tie
+from bushfit.model.file import load_result
+
+#: Number of a prior, and its value and standard deviation, each with a unit; one unit may serve both.
+_NUMBER = r"(\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)"
+_PLUS_MINUS = re.compile(rf"\s*{_NUMBER}\s*(|[^\d\s+].*?)\s*(?:\+-|±)\s*{_NUMBER}\s*(|[^\d\s].*?)\s*")
+
+
+def constraints_of(campaign: Campaign) -> Constraints:
+    """Read the priors and ties of a campaign.
+
+    Args:
+        campaign: campaign with its [fit].
+
+    Returns:
+        Priors, and ties in an order in which each can be computed.
+
+    Raises:
+        CampaignError: a text that is no prior, ties in a circle, or settings that exclude each other.
+        ModelError: an earlier model that cannot be used, or an expression without a value.
+    """
+    settings = campaign.fit.parameters
+    priors, stated = list[Prior](), dict[str, str]()
+    for name, setting in settings.items():
+        with error_location(campaign.path, place=f"fit.{name}"):
+            _check(setting)
+            if setting.prior:
+                priors.append(_prior(campaign, setting.prior, name))
+                stated[name] = setting.prior
+    if whole := campaign.fit.prior:
+        with error_location(campaign.path, place="fit.prior"):
+            fixed = [name for name, setting in settings.items() if not setting.vary or setting.tie]
+            priors.append(_from_file(campaign, whole, without=(*stated, *fixed)))
+    with error_location(campaign.path):
+        return Constraints(priors, _ties(settings))
+
+
+def _check(setting: ParameterSetting) -> None:
+    """Raise a CampaignError for settings of a parameter that exclude each other."""
+    limits = [key for key in ("value", "min", "max") if getattr(setting, key) is not None]
+    stated = [key for key in ("equal", "expression") if getattr(setting, key)]
+    stated += limits if stated else []
+    stated += ["vary = false"] * (not setting.vary and bool(stated or setting.prior))
+    if len(stated) > 1 or (setting.prior and not setting.vary):
+        found = ", ".join([*stated, *(["prior"] * bool(setting.prior))])
+        expected = "equal or expression alone, or a prior of a parameter that varies"
+        raise CampaignError("these keys exclude each other", found=found, expected=expected)
+
+
+def _prior(campaign: Campaign, text: str, name: str) -> Prior:
+    """Prior of one parameter, from a value with its standard deviation or from an earlier model."""
+    if text.endswith(".json"):
+        return _from_file(campaign, text, only=name)
+    if not (match := _PLUS_MINUS.fullmatch(text)):
+        expected = '"0.24 +- 0.03" (with a unit if the parameter has one), or the model.json of an earlier fit'
+        raise CampaignError("this is no prior", found=f'"{text}"', expected=expected)
+    parameter = get_parameter(name)
+    parts = (match[1], match[2] or match[4]), (match[3], match[4])
+    mean, deviation = (
+        parameter_value("prior", name, f"{number} {unit}" if unit else float(number)) for number, unit in parts
+    )
+    low, high = parameter.bounds
+    if not (low <= mean <= high and deviation > 0.0 and (mean > 0.0 or not parameter.log)):
+        expected = f"a value within {low:g} to {high:g} {parameter.unit}, and a positive standard deviation"
+        raise CampaignError("this is no prior", found=f'"{text}"', expected=expected)
+    return Prior((name,), np.array([mean]), np.array([[deviation**2]]), text)
+
+
+def _from_file(campaign: Campaign, file: str, only: str | None = None, without: tuple[str, ...] = ()) -> Prior:
+    """Prior from the fitted values and the covariance of an earlier model.
+
+    Args:
+        campaign: campaign whose tests the earlier fit must not have used.
+        file: model.json, relative to the campaign file.
+        only: name of the parameter that is taken; None for all fitted parameters that are free in the campaign.
+        without: names of parameters that are not taken.
+    """
+    result = load_result(campaign.path.parent / file)
+    sources = [loop.source for loop in campaign.loops] + [sweep.source for sweep in campaign.sweeps]
+    hashes = {source.sha256 for source in sources if source}
+    if twice := [str(source.file) for source in result.inputs if source.sha256 in hashes]:
+        expected = "a model of other tests: a test that counts twice makes intervals too narrow"
+        raise CampaignError("the prior was fitted to tests of this campaign", found=", ".join(twice), expected=expected)
+    names = [name for name in result.fitted if name not in result.at_bound and name not in without]
+    names = [name for name in names if only in (None, name) and result.covariance.stderr(name)]
+    if not names:
+        found = f"{only or 'no parameter'} is not fitted in {file}"
+        raise CampaignError("the earlier model has no such parameter", found=found, expected="a fitted parameter")
+    covariance = result.covariance.restricted(names)
+    mean = np.array([result.model.values[name] for name in covariance.names])
+    return Prior(covariance.names, mean, covariance.matrix, file)
+
+
+def _ties(settings: Mapping[str, ParameterSetting]) -> list[Tie]:
+    """Parse the ties and sort them: each after the ties of the parameters that it uses."""
+    waiting, ordered = dict[str, Tie](), list[Tie]()
+    for name, setting in settings.items():
+        if setting.tie:
+            with error_location(place=f"fit.{name}"):
+                waiting[name] = Tie.from_expression(name, setting.tie)
+    while waiting:
+        ready = [tie for tie in waiting.values() if not waiting.keys() & {*tie.names}]
+        if not ready:
+            circle = ", ".join(f"{tie.name} = {tie.expression}" for tie in waiting.values())
+            raise CampaignError(
+                "these parameters are tied in a circle", place="fit", found=circle, expected="one that is free"
+            )
+        ordered += ready
+        for tie in ready:
+            del waiting[tie.name]
+    return ordered
