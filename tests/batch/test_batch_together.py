@@ -92,8 +92,8 @@ def test_a_soft_part_of_ten_is_named() -> None:
     assert not find_outliers({"0": (values[0], np.where(np.arange(10) == 6, 9.0, 0.1))})[1]["0"].any(), "a large error"
 
 
-@pytest.mark.parametrize("count", [5, 10, 30])
-@pytest.mark.parametrize("error", [0.0, 1.0, 3.0])
+@pytest.mark.parametrize("count", [5, 30])
+@pytest.mark.parametrize("error", [0.0, 3.0])
 def test_a_part_is_named_by_chance_in_one_batch_of_twenty_at_most(count: int, error: float) -> None:
     random, named, batches = np.random.default_rng(count), 0, 200
     for _ in range(batches):
