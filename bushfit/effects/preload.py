@@ -1,4 +1,4 @@
-"""Preload: rubber about a static deformation has the tangent of its elastic law, and another friction and springpot."""
+"""Preload: rubber about a static deformation has another slope of its elastic law, another friction and springpot."""
 
 import numpy as np
 
@@ -21,18 +21,19 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
         condition: operating condition, with the preload as a displacement or force.
 
     Returns:
-        mu times the tangent, the stresses and moduli of friction times one factor, and those that depend on the rate
+        mu times the slope, the stresses and moduli of friction times one factor, and those that depend on the rate
         times another; the cubic term of `strain_stiffening`, which is relative to mu, remains as it is. Empty if the
         preload is unknown.
 
     Notes:
         The elastic law s = 2 mu (e + c2 e^2 + c3 e^3) has the tangent 2 mu (1 + 2 c2 e + 3 c3 e^2) at the static
-        strain e. The factors are exp(friction e + friction_square e^2) and exp(rate e + rate_square e^2).
+        strain e; a strain amplitude e0 about it adds 2 mu 3/4 c3 e0^2 to the first harmonic. The factors are
+        exp(friction e + friction_square e^2) and exp(rate e + rate_square e^2).
     """
     if condition.setting.conditions.preload is None:
         return {}
     strain = static_strain(p, condition.setting)
-    slope = tangent(p, strain)
+    slope = np.maximum(tangent(p, strain) + 0.75 * p["c3"] * np.square(condition.strain), _SMALLEST_TANGENT)
     friction = tuple(name for name in condition.moduli if name.rpartition(".")[2] in _FRICTION)
     rate = tuple(name for name in condition.moduli if name not in ("mu", *friction))
     return {

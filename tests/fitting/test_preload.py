@@ -50,7 +50,6 @@ class Rubber:
     c3: float = 0.0
     friction: float = 0.0
     springpot: float = 0.0
-    amplitude: bool = False  # the elastic stress is that of the whole motion, not only its tangent
 
 
 @cache
@@ -81,7 +80,7 @@ def truth(rubber: Rubber, frequency: float, amplitude: float, preload: Preload, 
     static = preload.value * STRAIN
     if preload.unit == "N":
         static = brentq(lambda strain: elastic(strain) - preload.value * STRAIN / SIZE, -1.0, 1.0)
-    reach = amplitude * STRAIN if rubber.amplitude else 1e-6
+    reach = amplitude * STRAIN
     motion = static + reach * np.sin(2.0 * np.pi * np.arange(SAMPLES) / SAMPLES)
     share = preload.value / largest if largest else 0.0
     return SIZE * (
@@ -122,11 +121,12 @@ STIFF = Rubber(c2=0.5, c3=8.0, friction=0.5, springpot=0.15)
 CASES = {
     "three forces": (STIFF, newtons(0.0, 500.0, 1000.0), ()),
     "four forces": (STIFF, newtons(0.0, 300.0, 600.0, 1000.0), ()),
-    "the tangent alone": (Rubber(c3=10.0), newtons(0.0, 500.0, 1000.0), ()),
+    "the elastic law alone": (Rubber(c3=10.0), newtons(0.0, 500.0, 1000.0), ()),
     "both senses": (Rubber(c2=1.0, c3=8.0), metres(-1e-3, 0.0, 1e-3), ()),
     "not from zero": (STIFF, newtons(300.0, 600.0, 900.0), ()),
-    "five positions, in time": (
-        Rubber(c3=8.0, amplitude=True),
+    "five positions": (Rubber(c3=8.0), metres(0.0, 5e-4, 1e-3, 1.5e-3, 2e-3), ()),
+    "five positions, stiffening added": (
+        Rubber(c3=8.0),
         metres(0.0, 5e-4, 1e-3, 1.5e-3, 2e-3),
         ("strain_stiffening",),
     ),
