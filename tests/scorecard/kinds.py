@@ -1,7 +1,8 @@
 """What a kind of discrepancy is made for and of: by a bench, what changes in rig, rubber, software or record.
 
-The kinds themselves, which no page of bushfit lists, stand in working_kinds.py and, held back, in held_back_kinds.py:
-no verdict on those is looked at while anything is tuned. Each is brought to one of three sizes.
+Kinds that a library of laws lists stand in listed_kinds.py, mistakes in files in mistaken_records.py, and kinds that no
+page of bushfit lists in working_kinds.py and, held back, in held_back_kinds.py: no verdict on those is looked at while
+anything is tuned. All but mistakes are brought to one of three sizes.
 """
 
 from __future__ import annotations
@@ -94,6 +95,8 @@ class Kind:
         right: effects of the library that describe it truly; a family, such as "stiffness_factor", is all its places.
         place: parts of the tests that alone are off.
         needs: what the tests must have.
+        form: columns of the sweeps' files, 0 for loss factor, 1 for phase, 2 for storage and loss; None for any.
+        in_sizes: False for a mistake that is made or not made.
     """
 
     sentence: str
@@ -101,6 +104,8 @@ class Kind:
     right: tuple[str, ...] = ()
     place: tuple[Place, ...] = ()
     needs: tuple[Literal["both", "loop", "repeats"], ...] = ()
+    form: int | None = None
+    in_sizes: bool = True
 
     @classmethod
     def into(cls, kinds: dict[str, Kind], sentence: str, **said: Any) -> Callable[[Made], Made]:
@@ -144,6 +149,8 @@ def largest(bench: Bench, response: Response, change: Change) -> float:
 def sized(bench: Bench, kind: Kind, size: float) -> Change:
     """The kind, brought as near to a size as it comes: one that goes in steps may not reach it."""
     by, amount = kind.made(bench), size
+    if not kind.in_sizes:
+        return by(amount)
     best, off = by(amount), np.inf
     for _ in range(_TRIES):
         change = by(amount)

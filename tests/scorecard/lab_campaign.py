@@ -12,8 +12,12 @@ from typing import Any
 
 import numpy as np
 from held_back_kinds import HELD_BACK
-from kinds import Bench, Place, sized
+from held_back_rubbers import HELD_BACK_RUBBERS
+from kinds import Bench, Kind, Place, sized
+from listed_kinds import LISTED
+from mistaken_records import MISTAKEN
 from numpy.random import Generator
+from rubber_in_time import StrainHistory, StressLaw
 from scipy.signal import lfilter
 from time_rig import (
     DIRECTIONS,
@@ -29,9 +33,24 @@ from time_rig import (
     respond,
 )
 from working_kinds import WORKING
+from working_rubbers import WORKING_RUBBERS
 
 #: Every kind by name.
-KINDS = WORKING | HELD_BACK
+KINDS = WORKING | HELD_BACK | LISTED | MISTAKEN
+#: Rubbers of other laws, and the effects of a list that describe their difference from the paper's rubber truly.
+RUBBERS = WORKING_RUBBERS | HELD_BACK_RUBBERS
+TRUE_OF_RUBBER: dict[str, tuple[str, ...]] = {
+    "log_normal_sliders": ("distributed_sliders", "sliders"),
+    "two_springpots": ("second_springpot", "viscous", "sliders", "distributed_sliders"),
+    "filler_breakdown": ("kraus", "coupled_breakdown"),
+    "stiffening_with_dry_friction": ("strain_stiffening", "fifth_power_stiffening"),
+    "rate_dependent_sliders": ("rate_dependent_friction", "distributed_sliders", "sliders"),
+    "intrinsic_time": ("intrinsic_time",),
+    "bouc_wen": (),
+    "uniform_sliders": ("sliders", "distributed_sliders", "fractional_zener"),
+    "softening_prony_series": ("maxwell", "second_maxwell", "coupled_breakdown"),
+    "process_dependent_viscosity": ("maxwell", "second_maxwell", "intrinsic_time"),
+}
 #: The class of the rig: gain, and phase [rad], of which each run has errors.
 CLASS = (5e-3, float(np.radians(0.25)))
 #: Scatter of an amplitude that was reached.
@@ -86,6 +105,10 @@ class Answer:
         place: parts of the tests that alone are off.
         left: largest share of |K| that the best clean model leaves.
         misfit: chi-square that it leaves without noise, with errors of the rig's class free.
+        law: of the rubber; "" for the paper's.
+        also: effects that describe the law of the rubber truly, beside a kind.
+        points: of the sweeps as stated: direction, frequency [Hz], amplitude [mm], and 1 where the kind changes the
+            stated stiffness by more than the scatter of a point, or a condition that is stated.
     """
 
     kind: str
@@ -94,6 +117,9 @@ class Answer:
     place: tuple[Place, ...] = ()
     left: float = 0.0
     misfit: float = 0.0
+    law: str = ""
+    also: tuple[str, ...] = ()
+    points: tuple[tuple[str, float, float, int], ...] = ()
 
     @property
     def visible(self) -> bool:
@@ -101,30 +127,81 @@ class Answer:
         return self.left >= 0.02 and self.misfit >= 40.0
 
 
-def campaign(kind: str, size: float, seed: int, folder: Path, *, silent: bool = False) -> Answer:
+@dataclass(frozen=True)
+class OtherRubber:
+    """A rubber that follows a law of its own; `mu` is the modulus that sizes are relative to."""
+
+    law: StressLaw
+    mu: float
+
+    def times(self, **factors: object) -> OtherRubber:
+        assert not factors  # the paper's parameters are none of this rubber
+        return self
+
+    def stress(self, strain: Array, frequency: Array) -> Array:
+        """Stress [Pa] over a steady cycle of the strain."""
+        return self.law(StrainHistory(strain, 1.0 / (SAMPLES * frequency[:, None]), periodic=True))
+
+
+def campaign(kind: str, size: float, seed: int, folder: Path, *, law: str = "") -> Answer:
     """Write one campaign into a folder, bushing.toml and its tables, and return the truth; the same seed, the same.
 
     Args:
-        kind: a name of KINDS; "" for a clean campaign with an awkward plan.
+        kind: a name of KINDS; "" for none.
         size: share of |K| that changes at most.
         seed: of everything random.
         folder: made where there is none.
-        silent: whether the rig makes no errors in it.
+        law: a name of RUBBERS; "" for the paper's rubber, whose plan is awkward where there is no kind.
     """
     random = np.random.default_rng([seed, 2007])
-    bushing, rubber = a_specimen(random)
-    needs = KINDS[kind].needs if kind else ()
-    plan = _plan(random, needs) if kind else awkward(_plan(random, ()), random)
+    bushing, paper = a_specimen(random)
+    known = KINDS.get(kind, Kind("nothing", lambda _: lambda _: Change()))
+    plan = _plan(random, known.needs)
+    if not (kind or law):
+        plan = awkward(plan, random)
     tests = _tests(bushing, plan, random)
+    rubber = OtherRubber(RUBBERS[law](random), paper.mu) if law else paper
     bench = Bench(tests, rubber, random)
-    change = sized(bench, KINDS[kind], size) if kind else Change()
+    change = sized(bench, known, size) if kind else Change()
     response = respond(tests, rubber, change)
-    answer = Answer(kind, size)
-    if kind:
-        left, misfit = seen(tests, rubber, change.record(response.stiffness), response.force, plan.noise)
-        answer = Answer(kind, size, KINDS[kind].right, KINDS[kind].place, left, misfit)
-    _write(folder, tests, replace(plan, noise=_NONE) if silent else plan, change, response, random)
+    stated = change.stated(tests)
+    left, misfit = 0.0, 0.0
+    if kind or law:
+        stiffness = change.record(response.stiffness)
+        left, misfit = seen(stated, paper, stiffness, response.force, plan.noise, rounds=_ROUNDS * (3 if law else 1))
+    answer = Answer(
+        kind,
+        size,
+        known.right if kind else TRUE_OF_RUBBER.get(law, ()),
+        known.place,
+        float(f"{left:.3g}"),
+        float(f"{misfit:.3g}"),
+        law,
+        TRUE_OF_RUBBER[law] if kind and law else (),
+        _points(bench, change, response, stated, np.sqrt(2.0) * plan.noise.scatter) if kind else (),
+    )
+    form = random.integers(3) if known.form is None else known.form
+    _write(folder, tests, plan, change, response, int(form), random)
     return answer
+
+
+def _points(
+    bench: Bench, change: Change, response: Response, stated: Tests, scatter: float
+) -> tuple[tuple[str, float, float, int], ...]:
+    """Operating points of the sweeps, repeats taken together, and whether the kind shows at each; as of `Answer`."""
+    tests = bench.tests
+    changed = np.abs(change.record(response.stiffness) - bench.clean.stiffness) > scatter * bench.size
+    for name in ("frequency", "amplitude", "direction"):
+        changed |= getattr(stated, name) != getattr(tests, name)
+    changed |= stated.bushing != tests.bushing
+    key = np.column_stack([tests.direction, tests.level, tests.frequency])
+    points = []
+    for row in np.unique(key[bench.sweeps], axis=0):
+        rows = np.flatnonzero(bench.sweeps & np.all(key == row, axis=1))
+        amplitude = 1e3 * float(np.mean(stated.amplitude[rows]))
+        place = DIRECTIONS[stated.direction[rows[0]]]
+        points.append((place, float(row[2]), float(f"{amplitude:.4g}"), int(changed[rows].any())))
+    return tuple(points)
 
 
 def a_specimen(random: Generator) -> tuple[Bushing, Rubber]:
@@ -228,7 +305,9 @@ def _tests(bushing: Bushing, plan: Plan, random: Generator) -> Tests:
     return Tests(bushing, frequency, amplitude * reached, direction, level, repeat, loop)
 
 
-def _write(folder: Path, tests: Tests, plan: Plan, change: Change, response: Response, random: Generator) -> None:
+def _write(
+    folder: Path, tests: Tests, plan: Plan, change: Change, response: Response, form: int, random: Generator
+) -> None:
     noise, count = plan.noise, tests.frequency.size
 
     def scatter() -> Array:
@@ -244,7 +323,9 @@ def _write(folder: Path, tests: Tests, plan: Plan, change: Change, response: Res
     gain, phase = shared
     white = scatter() + 1j * scatter()
     measured = response.stiffness * (1.0 + gain) * np.exp(1j * phase) * (1.0 + noise.scatter * white)
-    stiffness = change.record(measured)
+    stiffness, stated = change.record(measured), change.stated(tests)
+    motion = response.motion * (stated.amplitude / tests.amplitude)[:, None]
+    response, tests = replace(response, motion=motion), stated
     folder.mkdir(parents=True, exist_ok=True)
     text = ["[bushing]", 'name = "tested"']
     for name, value in (("inner_radius", "inner"), ("outer_radius", "outer"), ("length", "length")):
@@ -253,7 +334,6 @@ def _write(folder: Path, tests: Tests, plan: Plan, change: Change, response: Res
         name = f"loop_{DIRECTIONS[tests.direction[row]]}_{number}.csv"
         _write_loop(folder / name, tests, row, response, 1.0 + gain[row], noise, random)
         text += ["", "[[loops]]", f'file = "{name}"', f'direction = "{DIRECTIONS[tests.direction[row]]}"']
-    form = int(random.integers(3))
     for direction in plan.directions:
         name = f"sweep_{DIRECTIONS[direction]}.csv"
         rows = np.flatnonzero(~tests.loop & (tests.direction == direction))
@@ -319,11 +399,9 @@ class Noise:
     level: float
 
 
-#: A rig without errors.
-_NONE = Noise(0.0, 0.0, 0.0, (0.0, 0.0), 0.0)
-
-
-def seen(tests: Tests, rubber: Rubber, stiffness: Complex, force: Array, noise: Noise) -> tuple[float, float]:
+def seen(
+    tests: Tests, rubber: Rubber, stiffness: Complex, force: Array, noise: Noise, rounds: int = _ROUNDS
+) -> tuple[float, float]:
     """Largest share of |K| that the five parameters leave, and chi-square beside free errors of runs and levels.
 
     Args:
@@ -365,7 +443,7 @@ def seen(tests: Tests, rubber: Rubber, stiffness: Complex, force: Array, noise: 
     k, waves = model(logs)
     gap = column(stiffness - k, force - waves)
     misfit = float(gap @ cleared(gap))
-    for _ in range(_ROUNDS):
+    for _ in range(rounds):
         moved = [model(logs + step) for step in _STEP * np.eye(logs.size)]
         slopes = np.array([column(other - k, others - waves) for other, others in moved]).T / _STEP
         aim = np.linalg.lstsq(slopes.T @ cleared(slopes), slopes.T @ cleared(gap), rcond=1e-10)[0]

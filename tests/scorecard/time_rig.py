@@ -223,6 +223,7 @@ class Change:
         force: as it is recorded [N], by motion and true force.
         reading: what the software makes of the motion asked for and the recorded force, K [N/m].
         record: K [N/m] as it stands in the file, by K with its noise, (n,).
+        stated: the tests as the files state them, by the tests as they were run.
     """
 
     motion: Callable[[Array], Array] = lambda asked: asked
@@ -232,6 +233,7 @@ class Change:
     force: Callable[[Array, Array], Array] = lambda _, force: force
     reading: Callable[[Array, Array], Complex] = projected
     record: Callable[[Complex], Complex] = lambda stiffness: stiffness
+    stated: Callable[[Tests], Tests] = lambda tests: tests
 
 
 @dataclass(frozen=True)
