@@ -40,15 +40,9 @@ class ColumnTexts(NamedTuple):
     values: Sequence[str]
     codes: NDArray[np.intp]
 
-    def __bool__(self) -> bool:
-        return len(self.values) > 0
-
     def per_row(self) -> list[str]:
         """Return the text of the column in each row, (n,)."""
         return [self.values[code] for code in self.codes.tolist()]
-
-
-_NONE = ColumnTexts((), np.empty(0, dtype=np.intp))
 
 
 def same_text(text: str, reference: str) -> bool:
@@ -95,9 +89,11 @@ def find_labels(cells: Cells) -> Mapping[str, tuple[int, Sequence[str]]]:
             texts = column_texts(cells, index)
             if heading.role == "direction":
                 directions = [named_direction([text], short=True) for text in texts.values]
+                if not any(directions):
+                    continue
                 named = [str(direction or text) for direction, text in zip(directions, texts.values, strict=True)]
-                texts = ColumnTexts(named, texts.codes) if any(directions) else _NONE
-            labels |= {heading.role: (index, texts.per_row())} if texts else {}
+                texts = ColumnTexts(named, texts.codes)
+            labels[heading.role] = (index, texts.per_row())
     return labels
 
 

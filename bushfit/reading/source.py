@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from numpy.typing import NDArray
 
 from bushfit.reading.files import CHUNK_BYTES, HEAD_BYTES
-from bushfit.reading.layout import MOST_HEAD_LINES, Layout, Line, is_comment, split
+from bushfit.reading.layout import MOST_HEAD_LINES, Layout, Line, split
 from bushfit.units import SIZES
 
 #: Smallest positive value and largest magnitude of a number in a table [SI unit].
@@ -154,6 +154,7 @@ class Sheet:
         encoding: always None; only texts have an encoding.
         layout: header and units, if the file format defines them; None if they have to be found.
         numeric: indices of columns that contain only numbers.
+        above: lines above the table, such as those above the first block, or properties of a recording.
     """
 
     sheet: str
@@ -162,10 +163,11 @@ class Sheet:
     encoding: None = None
     layout: Layout | None = None
     numeric: frozenset[int] = frozenset()
+    above: Sequence[Line] = ()
 
     def head(self) -> list[Line]:
-        """Return the first non-empty rows of the sheet, which can contain the header."""
-        return list(islice(self.lines(0), MOST_HEAD_LINES))
+        """Return the lines above the table, and the first non-empty rows, which can contain the header."""
+        return [*self.above, *islice(self.lines(0), MOST_HEAD_LINES)]
 
     def lines(self, after: int) -> Iterator[Line]:
         """Yield the non-empty rows of the sheet below the row with number `after`."""
@@ -180,15 +182,9 @@ class Combined(Sheet):
 
     Args:
         numbers: original line number of each row.
-        above: lines above the first block.
     """
 
     numbers: Sequence[int] = ()
-    above: Sequence[Line] = ()
-
-    def head(self) -> list[Line]:
-        """Return the lines above the first block, and the first rows, which can contain the header."""
-        return [*self.above, *islice(self.lines(0), MOST_HEAD_LINES)]
 
     def lines(self, after: int) -> Iterator[Line]:  # noqa: ARG002
         """Yield all rows, with their original line numbers; `after` is ignored: all rows are below the header."""
@@ -201,17 +197,11 @@ class Channels(Sheet):
 
     Args:
         arrays: samples of each channel, (n,) each: floats, or objects that are texts.
-        above: properties of the recording, as lines above the table.
         format: name of the file format, such as "TDMS".
     """
 
     arrays: Sequence[NDArray[Any]] = ()
-    above: Sequence[Line] = ()
     format: str = ""
-
-    def head(self) -> list[Line]:
-        """Return the properties of the recording as lines, and the first samples as rows."""
-        return [*self.above, *islice(self.lines(0), MOST_HEAD_LINES)]
 
     def lines(self, after: int) -> Iterator[Line]:
         """Yield the samples of all channels as rows, after row number `after`."""
@@ -235,17 +225,6 @@ Group = tuple[str, list[Channel], Sequence[tuple[Any, ...]]]
 
 #: Part of a file that can contain a table.
 RowSource = Text | Sheet
-
-
-def rows(source: RowSource, layout: Layout) -> Iterator[tuple[int, Sequence[str | float]]]:
-    """Yield the line number and the cells of each line below the header, without comments.
-
-    Raises:
-        csv.Error: a line or a quoted cell is far too long.
-    """
-    for line in source.lines(layout.lines_before_data):
-        if layout.numbered or not is_comment(line.content, layout.delimiter):
-            yield line.number, cells_of(line, layout)
 
 
 def cells_of(line: Line, layout: Layout) -> Sequence[str | float]:
