@@ -63,6 +63,7 @@ def test_one_column_takes_its_direction_from_an_option(bushfit: Run, tmp_path: P
         (TIME, MOTION + 1000.0, (), "1000 mm, the first value, is subtracted"),
         (TIME, MOTION + 1000.0, ("--steady",), "1000 mm, the mean, is subtracted"),
         (TIME, 10.0 * MOTION, (), "but fitted at"),
+        (TIME, MOTION, ("--lowpass", "60 Hz"), "low-passed at 60 Hz without delay, which removes"),
     ],
 )
 def test_corrections_are_stated(
@@ -90,6 +91,7 @@ def test_corrections_are_stated(
             ("--direction", "radial"),
             "no column for the displacement",
         ),
+        ({"time__s": TIME, "axial_displacement__mm": MOTION}, ("--lowpass", "100 Hz"), "does not suit the history"),
         ({"time__s": TIME, "axial_displacement__mm": 0.0 * MOTION}, (), "this is no motion"),
         ({"axial_displacement__mm": MOTION, "radial_displacement__mm": MOTION}, (), "no column for the time"),
         ({"time__s": TIME, "axial_displacement__mm": TIME}, ("--steady",), "a steady state needs whole cycles"),

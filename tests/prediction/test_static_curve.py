@@ -12,7 +12,7 @@ from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
-from bushfit.model.result import CampaignTable, Result, TestTable
+from bushfit.model.result import Alternative, CampaignTable, Result, TestTable
 from bushfit.prediction.static_curve import static_curve, static_rate
 
 #: 10 mm/min.
@@ -92,3 +92,17 @@ def test_a_law_of_the_harmonic_alone_has_no_curve_unless_it_is_the_rigs(paper_mo
     rigged = paper_model.with_effect("rig_compliance", {"rig_compliance.compliance": 1e-7})
     kept, plain = (static_curve(Result(model), Direction.AXIAL, 1e-3, RATE) for model in (rigged, paper_model))
     np.testing.assert_array_equal(kept.mean.value, plain.mean.value)
+
+
+def test_an_alternative_without_a_law_in_time_is_left_out_with_a_sentence(paper_model: Model) -> None:
+    other = paper_model.with_values({"mu": 1.05 * paper_model.values["mu"]})
+    untimed = paper_model.without("friction").with_effect("kraus", {"kraus.delta": 1e6})
+    alternatives = tuple(Alternative(model, 0.1) for model in (other, untimed))
+    with_both, with_one = (
+        static_curve(Result(paper_model, alternatives=chosen), Direction.AXIAL, 1e-3, RATE)
+        for chosen in (alternatives, alternatives[:1])
+    )
+    sentence = "axial, static curve: the band excludes the alternative with kraus, which has no law in time"
+    assert (with_both.warnings, with_one.warnings) == ((sentence,), ())
+    np.testing.assert_array_equal(with_both.mean.high, with_one.mean.high)
+    assert with_one.mean.high[-1] > with_one.mean.value[-1]
