@@ -1,12 +1,13 @@
-"""Tables [bushing] and [[specimens]] of a campaign file: the bodies that were tested."""
+"""Tables [bushing], [[bushings]] and [[specimens]] of a campaign file: the bodies that were tested."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from bushfit.errors import CampaignError
-from bushfit.geometry import Bushing, Direction, Shape, SpecimenKind, StatedStrain
+from bushfit.geometry import Bushing, CouponKind, Direction, Shape, Specimen, StatedStrain
 from bushfit.validation import Count, Length, Name, si
 
 
@@ -48,6 +49,21 @@ class BushingSettings:
 
 
 @dataclass(frozen=True)
+class SeveralBushings(BushingSettings):
+    """[[bushings]]: one of several bushings of one compound, in place of [bushing].
+
+    Args:
+        factor: "free" to fit the measured over the computed stiffness of this bushing; "one" if they are equal.
+    """
+
+    factor: Literal["one", "free"] = "one"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check_name(self.name)
+
+
+@dataclass(frozen=True)
 class SpecimenSettings:
     """[[specimens]]: another body of the same compound, and the kind of its tests. See geometry.Specimen.
 
@@ -61,15 +77,24 @@ class SpecimenSettings:
     """
 
     name: Name
-    kind: SpecimenKind
+    kind: CouponKind
     strain: StatedStrain = "engineering"
     area: Annotated[float, si("m^2"), Field(gt=0)] | None = None
     thickness: Length | None = None
     elements: Count = 1
 
     def __post_init__(self) -> None:
-        if self.name in (*Direction, "loops", "sweeps", "gap", "candidates", "measured", "shear"):
-            expected = "a name of its own: its tables are named after it"
-            raise ValueError(
-                CampaignError("another table has this name", place="name", found=self.name, expected=expected)
-            )
+        _check_name(self.name)
+
+
+def _check_name(name: str) -> None:
+    """Raise a ValueError if a body has the name of a direction or of another table of the results."""
+    if name in (*Direction, "loops", "sweeps", "gap", "candidates", "measured", "shear"):
+        expected = "a name of its own: its tables are named after it"
+        raise ValueError(CampaignError("another table has this name", place="name", found=name, expected=expected))
+
+
+def specimens_of(bushings: Iterable[SeveralBushings], coupons: Iterable[SpecimenSettings]) -> list[Specimen]:
+    """Make the specimens of a campaign: the three directions of each of several bushings, then the coupons."""
+    directions = [place for table in bushings for place in Specimen.of_bushing(table.to_bushing())]
+    return [*directions, *(Specimen(**vars(table)) for table in coupons)]

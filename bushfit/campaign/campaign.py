@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from bushfit.campaign.bodies import specimens_of
 from bushfit.campaign.copies import without_copied_repeats, without_copied_tests
 from bushfit.campaign.quantities import Compound, EffectsSettings, ReportSettings, embedded
 from bushfit.campaign.schema import CampaignFile, FitSettings, PredictSettings, RigSettings, SimulateSettings
 from bushfit.campaign.toml import parse_toml
 from bushfit.effects import effect_name_of, place_suffix, with_base
 from bushfit.errors import CampaignError, error_location, quote_path
-from bushfit.geometry import Bushing, Specimen, get_place
+from bushfit.geometry import Bushing, Specimen, get_places
 from bushfit.model.laws import register_file
 from bushfit.model.model import FIVE, Model
 from bushfit.progress import track
@@ -94,7 +95,8 @@ def load_campaign(path: str | Path) -> Campaign:
         )
     with error_location(path):
         bushing = content.bushing.to_bushing() if content.bushing else None
-        specimens = tuple(Specimen(**vars(table)) for table in content.specimens)
+        specimens = tuple(specimens_of(content.bushings, content.specimens))
+        _check_bodies(content)
         _check_places(content, specimens)
     with error_location(place="[report] logo"):
         logo = embedded(path.parent / content.report.logo) if content.report.logo else None
@@ -103,7 +105,9 @@ def load_campaign(path: str | Path) -> Campaign:
         for kind, tests in (("loops", content.loops), ("sweeps", content.sweeps), ("records", content.validation))
     )
     found: dict[str, Any] = {
-        **{"name": content.name or (bushing or specimens[0]).name, "bushing": bushing, "specimens": specimens},
+        "name": content.name or (bushing.name if bushing else specimens[0].body),
+        "bushing": bushing,
+        "specimens": specimens,
         "loops": tuple(
             without_copied_tests(
                 [loop for keywords in loops for loop in programme(read_loop(**keywords), keywords["test"])]
@@ -117,7 +121,8 @@ def load_campaign(path: str | Path) -> Campaign:
         "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
         "logo": logo,
     }
-    return Campaign(**{**vars(content), **found}, path=path)
+    settings = {key: value for key, value in vars(content).items() if key != "bushings"}
+    return Campaign(**{**settings, **found}, path=path)
 
 
 def _read_file(path: Path) -> CampaignFile:
@@ -145,23 +150,37 @@ def load_bushing(path: Path) -> Bushing:
         return table.to_bushing()
 
 
-def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
-    """Raise a CampaignError for missing bodies, repeated specimen names, and unknown directions or specimens."""
-    names = [specimen.name for specimen in specimens]
+def _check_bodies(content: CampaignFile) -> None:
+    """Raise a CampaignError for missing bodies, two kinds of bushings, repeated names, and bushings without tests."""
+    names = [*(table.name for table in content.bushings), *(table.name for table in content.specimens)]
     if not (content.bushing or names):
-        expected = "[bushing] with its name, radii and length, or [[specimens]]"
+        expected = "[bushing] with its name, radii and length, [[bushings]] or [[specimens]]"
         raise CampaignError("the campaign does not state what was tested", expected=expected)
+    if content.bushing and content.bushings:
+        expected = "[bushing] for one bushing, or [[bushings]] for several of one compound"
+        raise CampaignError("two lists of bushings", found="[bushing] and [[bushings]]", expected=expected)
     if doubles := {name for name in names if names.count(name) > 1}:
-        raise CampaignError("two specimens have one name", place="[[specimens]]", found=", ".join(sorted(doubles)))
+        table = "[[bushings]]" if content.bushings else "[[specimens]]"
+        raise CampaignError("two bodies have one name", place=table, found=", ".join(sorted(doubles)))
+    tests = (*content.loops, *content.sweeps)
+    untested = [table.name for table in content.bushings if all(test.bushing != table.name for test in tests)]
+    if tests and untested:
+        hint = "bushfit predict --bushing FILE predicts a bushing that was not tested from its [bushing] in a file"
+        expected = f'a test with bushing = "{untested[0]}"'
+        raise CampaignError("a bushing has no tests", found=untested[0], expected=expected, hint=hint)
+
+
+def _check_places(content: CampaignFile, specimens: Sequence[Specimen]) -> None:
+    """Raise a CampaignError for unknown directions or specimens in [predict], [fit] and [simulate]."""
     with error_location(place="predict.directions"):
         for name in content.predict.directions or ():
-            get_place(name, specimens)
+            get_places(name, specimens)
     simulated = content.simulate.effects if content.simulate else {}
     simulated_names = [f"{effect}.{name}" for effect, table in simulated.items() for name in table]
     for name in (*content.fit.effects, *content.fit.parameters, *simulated_names):
         if place := place_suffix(name):
             with error_location(place=name):
-                get_place(place, specimens)
+                get_places(place, specimens)
 
 
 def model_of(campaign: Campaign) -> Model:
@@ -259,7 +278,7 @@ def reader_keywords(
             "shared": counts[place] > 1,
         }
         with error_location(campaign, place=test.file):
-            keywords["direction"] = body = place_tested(test.specimen, test.direction, specimens)
+            keywords["direction"] = body = place_tested(vars(test), specimens)
             if isinstance(test, SweepFile) and (amplitude := test.at_amplitude):
                 keywords["at_amplitude"] = level = parse_quantity(amplitude, body.motion.displacement_unit)
                 if level <= 0.0:

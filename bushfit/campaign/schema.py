@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import ConfigDict, Field, InstanceOf, WithJsonSchema
 
-from bushfit.campaign.bodies import BushingSettings, SpecimenSettings
+from bushfit.campaign.bodies import BushingSettings, SeveralBushings, SpecimenSettings, specimens_of
 from bushfit.campaign.quantities import (
     Compound,
     EffectsSettings,
@@ -19,7 +19,7 @@ from bushfit.campaign.quantities import (
 from bushfit.effects import is_parameter, parameter_names
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
-from bushfit.geometry import TRANSLATION, Place, Specimen
+from bushfit.geometry import TRANSLATION, Place
 from bushfit.reading.measurement import Stepped, Waveform
 from bushfit.reading.preload import Preload, parse_preload
 from bushfit.reading.resonance import FEWEST_ROWS
@@ -64,7 +64,7 @@ def _fit_table(raw: dict[str, Any]) -> dict[str, Any]:
 
 #: Validator that replaces the name of a direction or specimen in each test of [simulate] by the object.
 _SIMULATED_PLACES = converter(
-    lambda raw, info: with_places(raw, [Specimen(**vars(table)) for table in info.data.get("specimens", ())])
+    lambda raw, info: with_places(raw, specimens_of(info.data.get("bushings", ()), info.data.get("specimens", ())))
 )
 
 
@@ -185,6 +185,7 @@ class SimulatedTest:
     Args:
         direction: direction of the bushing that is tested; for a specimen, none or "shear".
         specimen: name in [[specimens]] of the specimen that is tested in place of the bushing.
+        bushing: name in [[bushings]] of the bushing that is tested, if there are several.
         temperature: temperature of the test [K]; None if not stated.
         preload: displacement or force about which the test is made, such as "500 N"; None if not stated.
     """
@@ -374,6 +375,7 @@ class CampaignFile:
     Args:
         bushing: geometry of the bushing.
         name: name of the campaign and its results folder; default the name of the bushing.
+        bushings: several bushings of one compound, in place of `bushing`.
         specimens: other bodies of the same compound.
         loops: hysteresis loops.
         sweeps: stepped sines.
@@ -392,6 +394,7 @@ class CampaignFile:
 
     bushing: BushingSettings | None = None
     name: Name | None = None
+    bushings: tuple[SeveralBushings, ...] = ()
     specimens: tuple[SpecimenSettings, ...] = ()
     loops: tuple[LoopFile, ...] = ()
     sweeps: tuple[SweepFile, ...] = ()

@@ -8,7 +8,7 @@ import numpy as np
 
 from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulatedTest
 from bushfit.effects.contract import Array, RubberConditions
-from bushfit.geometry import Bushing, Place, Specimen, unit_strain
+from bushfit.geometry import Bushing, Place, unit_strain
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.preload import Preload
 
@@ -95,7 +95,7 @@ def session(bushing: Bushing | None, visits: Sequence[SessionTest]) -> list[Rubb
         1), and the strain amplitudes before each point, (n,) each.
     """
     numbers = [place if visit.order is None else visit.order for place, visit in enumerate(visits, start=1)]
-    bodies = [visit.place if isinstance(visit.place, Specimen) else None for visit in visits]
+    bodies = [visit.place.body for visit in visits]
     conditions: dict[int, RubberConditions] = {}
     for body in dict.fromkeys(bodies):
         visited = sorted((i for i, tested in enumerate(bodies) if tested == body), key=numbers.__getitem__)

@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -85,11 +85,11 @@ def parse_toml(path: Path, description: str = "a campaign file", largest: int = 
     raise CampaignError("the tables are nested too deeply", file=path, place=place, expected=expected)
 
 
-def body_lines(bushing: Bushing | None, specimens: Iterable[Specimen]) -> list[str]:
-    """Write the tables [bushing] and [[specimens]] of a campaign file.
+def body_lines(bushing: Bushing | None, specimens: Collection[Specimen]) -> list[str]:
+    """Write the tables [bushing], [[bushings]] and [[specimens]] of a campaign file.
 
     Args:
-        bushing: the bushing; None for specimens only.
+        bushing: the bushing; None for several bushings, or for specimens only.
         specimens: bodies of the same compound.
 
     Returns:
@@ -97,14 +97,18 @@ def body_lines(bushing: Bushing | None, specimens: Iterable[Specimen]) -> list[s
     """
     lines = []
     if bushing:
-        lines += ["[bushing]", f"name = {toml_value(bushing.name)}"]
-        lines += [
-            f'{key} = "{getattr(bushing, key) * 1e3:.6g} mm"' for key in ("inner_radius", "outer_radius", "length")
-        ]
-        lines += [f'shape = "{bushing.shape}"'] if bushing.shape != "paper" else []
+        lines += ["[bushing]", *_bushing_lines(bushing)]
+    for tube in dict.fromkeys(specimen.bushing for specimen in specimens if specimen.bushing):
+        lines += ["", "[[bushings]]", *_bushing_lines(tube)]
     for specimen in specimens:
-        lines += ["", *specimen_lines(specimen)]
+        lines += [] if specimen.bushing else ["", *specimen_lines(specimen)]
     return lines
+
+
+def _bushing_lines(bushing: Bushing) -> list[str]:
+    sizes = [f'{key} = "{getattr(bushing, key) * 1e3:.6g} mm"' for key in ("inner_radius", "outer_radius", "length")]
+    shape = [f'shape = "{bushing.shape}"'] if bushing.shape != "paper" else []
+    return [f"name = {toml_value(bushing.name)}", *sizes, *shape]
 
 
 def specimen_lines(specimen: Specimen) -> list[str]:
@@ -142,12 +146,14 @@ def table_lines(
     """
     warm = [] if temperature is None else [f'temperature = "{temperature - CELSIUS:.6g} degC"']
     loaded = [] if preload is None else ['preload = "{:.6g} {}"'.format(*preload.in_display_unit(place))]
-    return ["", f"[[{kind}]]", f"file = {toml_value(file)}", place_line(place), *warm, *loaded]
+    return ["", f"[[{kind}]]", f"file = {toml_value(file)}", *place_lines(place), *warm, *loaded]
 
 
-def place_line(place: Place) -> str:
-    """Write the TOML line that states the specimen or direction of a test."""
-    return f"specimen = {toml_value(place.name)}" if isinstance(place, Specimen) else f'direction = "{place}"'
+def place_lines(place: Place) -> list[str]:
+    """Write the TOML lines that state the specimen, or the bushing and direction, of a test."""
+    if not place.axis:
+        return [f"specimen = {toml_value(place.body)}"]
+    return [*([f"bushing = {toml_value(place.body)}"] if place.body else []), f'direction = "{place.axis}"']
 
 
 def toml_value(value: Any) -> str:

@@ -18,7 +18,7 @@ from bushfit.diagnosis.families import FittedFamily, fit_families
 from bushfit.effects import Level
 from bushfit.errors import BushfitError, ModelError
 from bushfit.fitting.assess import lack_of_fit
-from bushfit.geometry import Direction, Place, Specimen
+from bushfit.geometry import Place, Specimen, default_places
 from bushfit.model.document import BushingTable
 from bushfit.model.file import model_document, versions
 from bushfit.model.result import Result
@@ -293,8 +293,7 @@ def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> li
         return [[result.place(name) for result in results] for name in names]
     known = []
     for result in results:
-        directions = [Direction.AXIAL, Direction.RADIAL] if result.model.bushing else []
-        default = [*map(str, directions), *(specimen.name for specimen in result.specimens)]
+        default = [str(place) for place in default_places(result.model.bushing, result.specimens)]
         known.append(list(result.measured.directions if result.measured else ()) or default)
     common = [name for name in known[0] if all(name in places for places in known)]
     places = [[result.place(name) for result in results] for name in common]

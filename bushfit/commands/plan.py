@@ -15,7 +15,7 @@ from bushfit.commands.fit import prepare_tests
 from bushfit.commands.predict import Numbers, grid_of
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError, did_you_mean
-from bushfit.geometry import Direction, Place, get_place
+from bushfit.geometry import Place, default_places, get_places
 from bushfit.model.result import Result
 from bushfit.planning.campaign import campaign_toml
 from bushfit.planning.compound import guess_parameters
@@ -114,8 +114,9 @@ def plan(
                 expected=", ".join(knowledge.names),
                 hint=did_you_mean(name, knowledge.names),
             )
-    default = [Direction.AXIAL, Direction.RADIAL] if knowledge.model.bushing else list(knowledge.specimens)
-    places = tuple(get_place(name, knowledge.specimens) for name in test_directions) or tuple(default)
+    specimens = knowledge.specimens
+    default = default_places(knowledge.model.bushing, () if knowledge.model.bushing else specimens)
+    places = tuple(place for name in test_directions for place in get_places(name, specimens)) or tuple(default)
     grid = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
     points = tuple(_wanted_points(Result(knowledge.model, specimens=knowledge.specimens), grid, campaign, default))
     rig = rig_of(campaign.rig if campaign else RigSettings(), knowledge.noise)
@@ -152,7 +153,7 @@ def _wanted_points(
         default: directions or specimens if the grid states none.
     """
     settings = grid_settings(grid, campaign)
-    places = [get_place(name, result.specimens) for name in settings.directions or ()]
+    places = [place for name in settings.directions or () for place in get_places(name, result.specimens)]
     for place in places or default:
         usual = default_grid(result, place, campaign.sweeps if campaign else ())
         frequencies, amplitudes = requested_grid(usual, settings, place)

@@ -20,7 +20,7 @@ from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError, UnitError
 from bushfit.fitting.agreement import expected_errors_without_refits, misfits
 from bushfit.fitting.preparation import MeasuredSweep, prepare_sweeps
-from bushfit.geometry import Bushing, Direction, Place, Specimen, get_place
+from bushfit.geometry import Bushing, Direction, Place, Specimen, default_places, get_places
 from bushfit.model.arms import Arms, model_arms
 from bushfit.model.result import ExpectedError, Misfit, Result, transfer_compound
 from bushfit.prediction.caveats import warnings_of
@@ -130,7 +130,7 @@ def predict(
     strain_amplitudes: Numbers | None = None,
     temperature: float | None = None,
     preloads: Sequence[str] = (),
-    bushing: Bushing | None = None,
+    bushing: Bushing | str | None = None,
     mass: float | None = None,
     base_acceleration: float | None = None,
     wide: bool = False,
@@ -152,7 +152,7 @@ def predict(
         strain_amplitudes: zero-to-peak strains of specimens that give a modulus.
         temperature: temperature [K], if the model has the effect of temperature.
         preloads: preloads with their unit, such as "500 N", within the tested range; default none.
-        bushing: another bushing of the same compound, to predict instead of the tested one.
+        bushing: one of several fitted bushings by its name, or another bushing of the same compound.
         mass: mass on the bushing [kg], to predict its resonance.
         base_acceleration: zero-to-peak acceleration of the base under the mass [m/s^2].
         wide: True to add tables with one column per amplitude.
@@ -171,7 +171,9 @@ def predict(
         UnitError: a preload that is no displacement or force of a direction.
     """
     result, sweeps = as_result(model), campaign.sweeps if campaign else ()
-    if bushing:
+    if isinstance(bushing, str):
+        directions = [f"{bushing} {direction}" for direction in directions or _DIRECTIONS]
+    elif bushing:
         result, note = transfer_compound(result, bushing)
         notes, directions = (*notes, note), directions or [str(direction) for direction in _DIRECTIONS]
     depends_on_temperature = result.model.depends_on_temperature
@@ -190,8 +192,8 @@ def predict(
     requested = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
     settings = grid_settings(requested, campaign)
     specimens = {specimen.name: specimen for specimen in (*result.specimens, *(campaign.specimens if campaign else ()))}
-    default = (*(_DIRECTIONS if result.model.bushing or not specimens else ()), *specimens.values())
-    places = [get_place(name, specimens.values()) for name in settings.directions or ()] or list(default)
+    places = [place for name in settings.directions or () for place in get_places(name, [*specimens.values()])]
+    places = places or default_places(result.model.bushing, [*specimens.values()])
     measured = _predictable_sweeps(result, campaign) if campaign and not over else []
     drawn_sweeps = [
         sweep

@@ -20,6 +20,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.design import fit_from, probes
 from bushfit.fitting.preparation import MeasuredTest
+from bushfit.geometry import shared_labels
 from bushfit.model.model import Model
 
 #: Smallest share of a sensitivity vector, after projection on the model's parameters, at which an effect is visible.
@@ -63,7 +64,9 @@ def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str
     for test, place in evidence.residual_rows.items():
         relative_noise[place] = test.relative_noise
     ranked = []
-    for effect in missing_effects(evidence.model, [str(test.direction) for test in evidence.data_sets], excluded):
+    for effect in missing_effects(
+        evidence.model, shared_labels(test.direction for test in evidence.data_sets), excluded
+    ):
         family = effect.name.partition(".")[0]
         if effect.replaces is not None:
             if effect.replaces in evidence.model.effects and (start := _replacement(evidence, effect, fixed)):
@@ -119,7 +122,7 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
 
     Args:
         model: the model.
-        places: directions tested, or names of specimens.
+        places: names of directions, specimens and bushings tested, see `geometry.shared_labels`.
         excluded: names of effects not to consider, with their twins.
 
     Returns:

@@ -238,8 +238,12 @@ class Effect:
         return short[0].lower() + short[1:]
 
     def acts_at(self, place: Place) -> bool:
-        """Return True if the effect acts in this direction or specimen; a name such as `inertia` has no restriction."""
-        return self.name.partition(".")[2] in ("", str(place))
+        """Return True if the effect acts in this direction or specimen; a name such as `inertia` has no restriction.
+
+        Of several bushings, `stiffness_factor.long` acts on all tests of the bushing "long", `stiffness_factor.radial`
+        on the radial tests of all bushings, and `stiffness_factor.long radial` on the radial tests of one.
+        """
+        return self.name.partition(".")[2] in ("", *place.labels)
 
     @property
     def amount(self) -> Parameter:

@@ -3,12 +3,13 @@
 import numpy as np
 
 from bushfit.effects.contract import Array, ForceBelow, History, Setting, StiffnessBelow, Value, Values
+from bushfit.geometry import bushing_at
 
 
 def _force(p: Values, setting: Setting) -> Value:
     """Slip force [N], or in torsion its moment [N m] at the outer radius of the bushing."""
-    arm = setting.bushing.outer_radius if setting.bushing and setting.direction.is_rotation else 1.0
-    return p["force"] * arm
+    bushing = bushing_at(setting.bushing, setting.direction)
+    return p["force"] * (bushing.outer_radius if bushing and setting.direction.is_rotation else 1.0)
 
 
 def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, setting: Setting) -> Array:

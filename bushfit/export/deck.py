@@ -11,7 +11,7 @@ from bushfit.effects import Level as EffectLevel
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.export.contract import ExportRequest, UnitSystem
-from bushfit.geometry import Direction
+from bushfit.geometry import Direction, bushing_at
 from bushfit.prediction.caveats import format_deviation
 from bushfit.prediction.stiffness import Prediction
 from bushfit.units import number
@@ -63,7 +63,10 @@ def exported_directions(request: ExportRequest) -> list[Prediction]:
     Raises:
         ModelError: there is no direction, or the frequencies of the directions differ.
     """
-    predictions = [prediction for prediction in request.predictions if isinstance(prediction.direction, Direction)]
+    predictions = [prediction for prediction in request.predictions if prediction.direction.axis]
+    if len(bodies := dict.fromkeys(prediction.direction.body for prediction in predictions)) > 1:
+        expected, hint = "one bushing", f'--direction "{next(iter(bodies))}" selects one'
+        raise ModelError("this format is of one bushing", found=", ".join(bodies), expected=expected, hint=hint)
     if not predictions:
         raise ModelError(
             "there is no direction of a bushing to export",
@@ -79,7 +82,8 @@ def exported_directions(request: ExportRequest) -> list[Prediction]:
 
 def stiffness_tables(prediction: Prediction) -> list[StiffnessTable]:
     """Split the prediction of one direction into a table for each amplitude, in ascending order."""
-    direction = Direction(str(prediction.direction))
+    direction = prediction.direction.axis
+    assert direction
     stiffness = prediction.storage_stiffness.value + 1j * prediction.loss_stiffness.value
     rows = [(amplitude, prediction.amplitude == amplitude) for amplitude in np.unique(prediction.amplitude)]
     return [
@@ -157,7 +161,8 @@ def heading(request: ExportRequest, units: str, losses: Iterable[str]) -> list[s
     Returns:
         Lines without comment signs.
     """
-    bushing, source = request.result.model.bushing, request.source
+    place = exported_directions(request)[0].direction
+    bushing, source = bushing_at(request.result.model.bushing, place), request.source
     sizes = (bushing.inner_radius, bushing.outer_radius, bushing.length) if bushing else ()
     return [
         f"written by bushfit {__version__}{f' on {request.day}' if request.day else ''}",
@@ -269,7 +274,7 @@ def common_losses(request: ExportRequest) -> Iterator[str]:
         yield f"rotations about x and y: the stated constant, {constant}, which no test supports"
     if missing:
         yield f"no stiffness in {', '.join(missing)}"
-    if specimens := [str(place) for place in request.places if place not in DOFS]:
+    if specimens := [str(place) for place in request.places if not place.axis]:
         yield f"specimens: {', '.join(specimens)}"
 
 

@@ -13,7 +13,7 @@ from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError
 from bushfit.export.contract import ExportRequest
 from bushfit.export.deck import band_losses
-from bushfit.geometry import Place
+from bushfit.geometry import Place, bushing_at
 from bushfit.model.arms import Arms, model_arms, qualified_size, values_under
 from bushfit.model.model import Model
 from bushfit.prediction.stiffness import Prediction
@@ -107,13 +107,14 @@ def time_model(request: ExportRequest) -> TimeModel:
     for prediction in request.predictions:
         losses += [*_steady_losses(model, omitted, prediction, conditions), *band_losses(prediction)]
     sizes = values_under(model, conditions)
+    tubes = [(bushing_at(model.bushing, place), place) for place in request.places]
     return TimeModel(
         request.places,
         values,
         tuple(
             _fields(model, place, place_names, arms) for place, place_names in zip(request.places, names, strict=True)
         ),
-        tuple(model.bushing.outer_radius if model.bushing and place.is_rotation else 1.0 for place in request.places),
+        tuple(tube.outer_radius if tube and place.is_rotation else 1.0 for tube, place in tubes),
         tuple(part.size for part in arms),
         tuple(
             (index, float(modulus / sizes[part.size]), float(time))

@@ -358,7 +358,7 @@ def mixed_conditions(data_sets: Sequence[MeasuredTest]) -> list[str]:
         by_value: dict[str, str] = {}
         for data_set in data_sets:
             conditions = data_set.source.conditions if data_set.source else {}
-            if key in conditions and isinstance(data_set.direction, Direction):
+            if key in conditions and data_set.direction.axis:
                 by_value.setdefault(str(conditions[key]), data_set.name)
         if len(by_value) > 1:
             listed = ", ".join(f"{value} ({name})" for value, name in by_value.items())

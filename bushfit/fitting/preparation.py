@@ -15,7 +15,7 @@ from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.fitting.outliers import contradictions
 from bushfit.fitting.rig_class import class_errors
-from bushfit.geometry import Bushing, Place, Specimen, unit_strain
+from bushfit.geometry import Bushing, Place, unit_strain
 from bushfit.model.model import Model
 from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.reading.measurement import Loop, Source, Sweep
@@ -98,7 +98,7 @@ def prepare_sweeps(
 ) -> list[MeasuredSweep]:
     """Prepare sweeps for a fit, each with its noise.
 
-    The noise is estimated once for all sweeps of the bushing, and once for those of each specimen.
+    The noise is estimated once for all sweeps of bushings, and once for those of each specimen.
 
     Args:
         sweeps: measured sweeps.
@@ -108,9 +108,9 @@ def prepare_sweeps(
     Returns:
         Measured sweeps with their noise, in the order given.
     """
-    by_rig = dict[Specimen | None, list[Sweep]]()
+    by_rig = dict[Place | None, list[Sweep]]()
     for sweep in sweeps:
-        by_rig.setdefault(sweep.direction if isinstance(sweep.direction, Specimen) else None, []).append(sweep)
+        by_rig.setdefault(None if sweep.direction.axis else sweep.direction, []).append(sweep)
     noises = {id(sweep): noise for group in by_rig.values() for noise in [sweep_noise(group, rig)] for sweep in group}
     found = [MeasuredSweep(sweep, noises[id(sweep)], residuals).weighted(np.array(sweep.weight)) for sweep in sweeps]
     names = [f"{test.direction} {test.test.preload}" for test in found]

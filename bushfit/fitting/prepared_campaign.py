@@ -27,7 +27,7 @@ from bushfit.fitting.preparation import (
 )
 from bushfit.fitting.rig_class import describe_class
 from bushfit.fitting.starts import start_values
-from bushfit.geometry import Direction, Specimen, get_place
+from bushfit.geometry import Direction, get_places
 from bushfit.model.constraints import UNCONSTRAINED, Constraints
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
@@ -214,8 +214,8 @@ class PreparedCampaign:
         """Select the tests of some directions and specimens.
 
         Args:
-            places: names of directions or specimens. None: all specimens, and the axial tests as in the paper; without
-                axial loops, all loops, and without axial sweeps, all sweeps.
+            places: names of directions, specimens or bushings. None: all specimens, and the axial tests as in the
+                paper; without axial loops, all loops, and without axial sweeps, all sweeps.
 
         Returns:
             Loops, then sweeps.
@@ -229,12 +229,12 @@ class PreparedCampaign:
         if places is None:
             chosen = []
             for tests in (self.loops, self.sweeps):
-                any_axial = any(test.direction is Direction.AXIAL for test in tests)
+                any_axial = any(test.direction.axis is Direction.AXIAL for test in tests)
                 left_out = [d for d in Direction if d is not Direction.AXIAL] if any_axial else []
-                chosen += [test for test in tests if test.direction not in left_out]
+                chosen += [test for test in tests if test.direction.axis not in left_out]
             return chosen
         with error_location(self.campaign.path):
-            wanted = [get_place(str(place), self.campaign.specimens) for place in places]
+            wanted = [place for name in places for place in get_places(str(name), self.campaign.specimens)]
         chosen = [data_set for data_set in data_sets if data_set.direction in wanted]
         if not chosen:
             raise FitError(
@@ -296,7 +296,7 @@ def _chi_square(model: Model, data_sets: Sequence[MeasuredTest]) -> float:
 
 def _preferred(data_sets: Sequence[_Kind]) -> list[_Kind]:
     """Select the axial tests, else those of the bushing, else all; of these, the tests at the smallest preload."""
-    axial = [test for test in data_sets if test.direction is Direction.AXIAL]
-    tests = axial or [test for test in data_sets if not isinstance(test.direction, Specimen)] or list(data_sets)
+    axial = [test for test in data_sets if test.direction.axis is Direction.AXIAL]
+    tests = axial or [test for test in data_sets if test.direction.axis] or list(data_sets)
     loads = [abs(test.test.preload.value) if test.test.preload else 0.0 for test in tests]
     return [test for test, load in zip(tests, loads, strict=True) if load == min(loads)]

@@ -34,7 +34,7 @@ from bushfit.fitting.profile import limit95, profile95
 from bushfit.fitting.rig_class import format_class_errors, largest_error
 from bushfit.fitting.robust import estimate, outlier_warnings
 from bushfit.fitting.solve import solve_with_lmfit
-from bushfit.geometry import get_place
+from bushfit.geometry import get_places
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -92,7 +92,7 @@ def fit_joint(
     """
     for effect in map(get_effect, effects or ()):
         if effect.corrects:
-            get_place(effect.corrects, data.campaign.specimens)
+            get_places(effect.corrects, data.campaign.specimens)
     tests = data.select_tests(directions)
     effects = data.effects if effects is None else effects
     if not preload_ranges(tests):

@@ -1,7 +1,8 @@
 """Bodies under test: a bushing in a direction, or a specimen of its compound; equivalent strain and stiffness."""
 
 import math
-from collections.abc import Callable, Iterable
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -13,8 +14,10 @@ from bushfit.geometry.shape import NO_CORRECTION, Correction, radial_correction
 
 #: Radial formulas of a bushing: those of the paper, or corrected by finite elements.
 Shape = Literal["paper", "calibrated"]
-#: Kind of test of a specimen: strain and modulus, or displacement and force of blocks in shear.
-SpecimenKind = Literal["modulus", "shear"]
+#: Kind of test of a coupon: strain and modulus, or displacement and force of blocks in shear.
+CouponKind = Literal["modulus", "shear"]
+#: Kind of specimen: a coupon, or one direction of one of several bushings.
+SpecimenKind = CouponKind | Literal["bushing"]
 #: Kind of strain in the files of a modulus test.
 StatedStrain = Literal["engineering", "tensor", "tension"]
 
@@ -89,6 +92,11 @@ class _TestObject:
         raise NotImplementedError
 
     @property
+    def labels(self) -> tuple[str, ...]:
+        """Names that include this place in the name of an effect: of the place, its body, and its direction."""
+        return (str(self),)
+
+    @property
     def is_rotation(self) -> bool:
         """True if tests have rotation [rad] and moment [N m] instead of displacement [m] and force [N]."""
         return self.motion is ROTATION
@@ -110,6 +118,16 @@ class Direction(_TestObject, StrEnum):
     def motion(self) -> Motion:
         """Kind of motion of this direction: translation or rotation."""
         return _DEFINITIONS[self].motion
+
+    @property
+    def axis(self) -> "Direction":
+        """Direction of the motion: this direction."""
+        return self
+
+    @property
+    def body(self) -> str:
+        """Name of the body under test; empty for the one bushing of a campaign."""
+        return ""
 
 
 @dataclass(frozen=True)
@@ -192,17 +210,18 @@ class Bushing:
 
 @dataclass(frozen=True)
 class Specimen(_TestObject):
-    """Specimen of the rubber compound that is tested instead of a bushing: a coupon, or a mount in simple shear.
+    """Specimen of the compound: a coupon, a mount in simple shear, or a direction of one of several bushings.
 
     Args:
         name: name of the specimen.
         kind: "modulus" if tests measure strain and modulus; "shear" if they measure displacement and force of rubber
-            blocks in shear.
+            blocks in shear; "bushing" for one direction of one of several bushings.
         strain: strain in the files of a modulus test: "engineering" for the shear strain gamma = 2 e, "tensor" for the
             tensor's shear component e (the files' strains are doubled), or "tension" for the strain of a bar in
             tension, with Young's modulus.
         area, thickness: area [m^2] and thickness [m] of one block in shear; None for a modulus test.
         elements: number of blocks in parallel.
+        bushing, axis: bushing and direction of its tests; None for a coupon.
 
     Raises:
         ModelError: a shear specimen lacks a positive area or thickness, or a modulus test has one.
@@ -219,6 +238,17 @@ class Specimen(_TestObject):
     area: float | None = None
     thickness: float | None = None
     elements: int = 1
+    bushing: Bushing | None = None
+    axis: Direction | None = None
+
+    @classmethod
+    def of_bushing(cls, bushing: Bushing) -> "list[Specimen]":
+        """List the three directions of one of several bushings as specimens.
+
+        >>> [str(place) for place in Specimen.of_bushing(Bushing("long", 0.01, 0.018, 0.034))]
+        ['long axial', 'long radial', 'long torsion']
+        """
+        return [cls(f"{bushing.name} {axis}", "bushing", bushing=bushing, axis=axis) for axis in Direction]
 
     def __post_init__(self) -> None:
         for key in ("area", "thickness"):
@@ -236,8 +266,20 @@ class Specimen(_TestObject):
 
     @property
     def motion(self) -> Motion:
-        """Kind of motion: translation of a block in shear, or strain of the material."""
+        """Kind of motion: that of the direction, translation of a block in shear, or strain of the material."""
+        if self.axis:
+            return self.axis.motion
         return TRANSLATION if self.kind == "shear" else STRAINING
+
+    @property
+    def body(self) -> str:
+        """Name of the body under test: of the bushing, or of the coupon."""
+        return self.bushing.name if self.bushing else self.name
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names that include this place in the name of an effect: of the place, its body, and its direction."""
+        return (self.name, self.body, str(self.axis)) if self.axis else (self.name,)
 
 
 #: A direction of the bushing, or a specimen of its compound.
@@ -260,6 +302,40 @@ def get_place(name: str, specimens: Iterable[Specimen]) -> Place:
     return places[name]
 
 
+def get_places(name: str, specimens: Sequence[Specimen]) -> list[Place]:
+    """Return the directions and specimens that a name stands for: of several bushings, all of a bushing or direction.
+
+    Raises:
+        ModelError: no direction, specimen or bushing has this name.
+
+    >>> sides = Specimen.of_bushing(Bushing("long", 0.01, 0.018, 0.034))
+    >>> [str(place) for place in get_places("radial", sides)], len(get_places("long", sides))
+    (['long radial'], 3)
+    """
+    return [place for place in specimens if name in place.labels] or [get_place(name, specimens)]
+
+
+def default_places(bushing: Bushing | None, specimens: Sequence[Specimen]) -> list[Place]:
+    """List the axial and radial directions of all bushings, and all coupons: what a prediction contains by default."""
+    directions = [Direction.AXIAL, Direction.RADIAL] if bushing or not specimens else []
+    return [*directions, *(place for place in specimens if place.axis is not Direction.TORSION)]
+
+
+def shared_labels(places: Iterable[Place]) -> list[str]:
+    """List the names of tested places for a search: of each place, then of bodies and directions of several bushings.
+
+    A body tested in one direction has the name of its only place, and the first of two bodies has no name, because its
+    error is that of the second with the opposite sign.
+    """
+    tested = [*dict.fromkeys(places)]
+    mounted = [place for place in tested if isinstance(place, Specimen) and place.bushing]
+    bodies = Counter(place.body for place in mounted)
+    names = [str(place) for place in tested if bodies[place.body] != 1]
+    names += list(bodies)[len(bodies) == 2 :]
+    axes = [*dict.fromkeys(str(place.axis) for place in mounted)]
+    return [*names, *(axes if len(bodies) > 1 and len(axes) > 1 else [])]
+
+
 def unit_strain(bushing: Bushing | None, place: Place) -> float:
     """Equivalent strain of the rubber per displacement [1/m], rotation [1/rad] or stated strain [1] at a place.
 
@@ -271,8 +347,8 @@ def unit_strain(bushing: Bushing | None, place: Place) -> float:
     >>> unit_strain(None, Specimen("coupon", "modulus"))
     0.5
     """
-    if not isinstance(place, Specimen):
-        return _present(bushing, place).unit_strain(place)
+    if not isinstance(place, Specimen) or place.axis:
+        return _present(bushing, place).unit_strain(_axis_of(place))
     if place.thickness is not None:
         return 0.5 / place.thickness
     return math.sqrt(3.0) / 2.0 if place.strain == "tension" else 0.5
@@ -289,8 +365,8 @@ def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
     >>> stiffness_per_modulus(None, Specimen("mount", "shear", area=1e-3, thickness=0.01, elements=2))
     0.2
     """
-    if not isinstance(place, Specimen):
-        return _present(bushing, place).stiffness_per_modulus(place)
+    if not isinstance(place, Specimen) or place.axis:
+        return _present(bushing, place).stiffness_per_modulus(_axis_of(place))
     if place.area is not None and place.thickness is not None:
         return place.elements * place.area / place.thickness
     return 3.0 if place.strain == "tension" else 1.0
@@ -305,8 +381,17 @@ def strain_factor_of_files(place: Place) -> float:
     return 2.0 if isinstance(place, Specimen) and place.strain == "tensor" else 1.0
 
 
-def _present(bushing: Bushing | None, place: Direction) -> Bushing:
-    if bushing is None:
+def bushing_at(bushing: Bushing | None, place: Place) -> Bushing | None:
+    """Return the bushing that is tested at a place: its own, or the one bushing of the campaign; None for a coupon."""
+    return place.bushing if isinstance(place, Specimen) else bushing
+
+
+def _axis_of(place: Place) -> Direction:
+    return place.axis if isinstance(place, Specimen) and place.axis else Direction(str(place))
+
+
+def _present(bushing: Bushing | None, place: Place) -> Bushing:
+    if (bushing := bushing_at(bushing, place)) is None:
         raise ModelError(
             "there is no bushing",
             place=str(place),

@@ -14,7 +14,7 @@ from pydantic import AfterValidator, ConfigDict, Field
 from bushfit.effects import Origin
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
-from bushfit.geometry import Shape, SpecimenKind, StatedStrain
+from bushfit.geometry import CouponKind, Shape, StatedStrain
 from bushfit.model.result import CampaignTable as CampaignTable
 from bushfit.model.result import End, ExpectedError, Misfit, Outlier, PreloadRange, PriorUse, Quality, Range
 from bushfit.model.result import TestTable as TestTable
@@ -48,7 +48,7 @@ class SpecimenTable:
     """Entry of a model file for a specimen of the compound (coupon or blocks in shear): kind and dimensions."""
 
     name: Annotated[Name, Field(description="Name of the specimen.")]
-    kind: Annotated[SpecimenKind, Field(description='"modulus" for tests of the modulus, "shear" for blocks in shear.')]
+    kind: Annotated[CouponKind, Field(description='"modulus" for tests of the modulus, "shear" for blocks in shear.')]
     strain: Annotated[StatedStrain, Field(description="Kind of strain in the test files; for the kind modulus.")] = (
         "engineering"
     )
@@ -199,13 +199,15 @@ class ModelFile:
 
     schema: Annotated[Literal["bushfit/model/1"], Field(description="Schema of the file.")]
     bushing: Annotated[
-        BushingTable | None, Field(description="Geometry of the bushing; null if only specimens were tested.")
+        BushingTable | None,
+        Field(description="Geometry of the bushing; null if several bushings, or only specimens, were tested."),
     ]
     effects: Annotated[tuple[str, ...], Field(description="Names of the effects of the model.")]
     laws: Annotated[
         Mapping[str, Origin], Field(description="Package or file of each effect from outside bushfit, by its name.")
     ] = field(default_factory=dict, kw_only=True)
     parameters: Annotated[Mapping[str, ParameterTable], Field(description="Parameters by name.")]
+    bushings: Annotated[tuple[BushingTable, ...], Field(description="Bushings, if several were tested.")] = ()
     specimens: Annotated[tuple[SpecimenTable, ...], Field(description="Other bodies of the compound.")] = ()
     covariance: Annotated[
         CovarianceTable | None,

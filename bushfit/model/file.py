@@ -3,7 +3,7 @@
 import importlib.metadata
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, astuple
+from dataclasses import asdict, astuple, fields
 from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
@@ -105,7 +105,10 @@ def from_document(document: object, file: Path | None = None) -> Result:
             outliers=tables.outliers,
             profile={name: entry.profile95 for name, entry in entries.items() if entry.profile95},
             at_bound={name: entry.at_bound for name, entry in entries.items() if entry.at_bound},
-            specimens=tuple(Specimen(*astuple(specimen)) for specimen in tables.specimens),
+            specimens=(
+                *(place for table in tables.bushings for place in Specimen.of_bushing(Bushing(*astuple(table)))),
+                *(Specimen(*astuple(specimen)) for specimen in tables.specimens),
+            ),
             tests=fit.tests if fit else (),
             usable=fit.usable if fit else (),
             unresolved=tuple(name for name in tables.unresolved if name in model.effects),
@@ -166,7 +169,12 @@ def to_document(result: Result) -> dict[str, Any]:
             if name in ORIGINS
         },
         parameters=parameters,
-        specimens=tuple(SpecimenTable(*astuple(specimen)) for specimen in result.specimens),
+        bushings=tuple(BushingTable(*astuple(bushing)) for bushing in result.bushings),
+        specimens=tuple(
+            SpecimenTable(*astuple(coupon)[: len(fields(SpecimenTable))])
+            for coupon in result.specimens
+            if not coupon.bushing
+        ),
         covariance=CovarianceTable(covariance.names, matrices[0], tuple(matrices[1:])),
         fit=fit,
         unresolved=result.unresolved,

@@ -371,14 +371,9 @@ class Model:
         15648
         """
         omega, reached = 2.0 * np.pi * np.atleast_1d(frequency), np.atleast_1d(amplitude)
-        found = adjusted_values(
-            self,
-            self.setting(place, conditions=conditions),
-            self.values,
-            omega,
-            reached,
-            reached * self.unit_strain(place),
-        )
+        setting = self.setting(place, conditions=conditions)
+        strain = reached * self.unit_strain(setting.direction)
+        found = adjusted_values(self, setting, self.values, omega, reached, strain)
         return {name: float(np.asarray(value).item()) for name, value in found.items()}
 
     def shift_factor(self, conditions: RubberConditions, values: Values | None = None) -> Value:

@@ -11,7 +11,7 @@ from pydantic import Field
 from bushfit.effects import Level
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
-from bushfit.geometry import Bushing, Place, Specimen, get_place
+from bushfit.geometry import Bushing, Direction, Place, Specimen, get_place
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Source, Stepped
@@ -329,8 +329,15 @@ class Result:
 
     @property
     def name(self) -> str:
-        """Name of the bushing, or of the first specimen if the result has no bushing."""
-        return self.specimens[0].name if self.specimens and not self.model.bushing else self.model.name
+        """Name of the bushing, or of several bushings, or else of the first specimen."""
+        if self.model.bushing or not self.specimens:
+            return self.model.name
+        return " and ".join(bushing.name for bushing in self.bushings) or self.specimens[0].name
+
+    @property
+    def bushings(self) -> list[Bushing]:
+        """Bushings of the compound, if several were tested."""
+        return [*dict.fromkeys(specimen.bushing for specimen in self.specimens if specimen.bushing)]
 
     @property
     def unknown_parameters(self) -> str:
@@ -348,6 +355,13 @@ class Result:
         lacking = f"the tests {choice} {' and '.join(names)}: the prediction uses the plain model, and"
         open_values = "the tests permit other values of the parameters:"
         return [f"{lacking if names else open_values} the bands, low to high, include each alternative"]
+
+    @property
+    def fitted_places(self) -> list[Place]:
+        """Directions and specimens that were fitted, but not those of another bushing of the compound."""
+        names = self.measured.directions if self.measured else ()
+        places: dict[str, Place] = {str(place): place for place in (*Direction, *self.specimens)}
+        return [places[name] for name in names if name in places]
 
     def place(self, name: str) -> Place:
         """Return the direction or specimen with the given name; raise a ModelError for other names."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.campaign.toml import body_lines, place_line, toml_value
+from bushfit.campaign.toml import body_lines, place_lines, toml_value
 from bushfit.effects import BASE, qualified_name
 from bushfit.geometry import Specimen
 from bushfit.planning.contract import Noise, Plan, Test
@@ -86,7 +86,7 @@ def campaign_toml(plan: Plan, seed: int = 0) -> str:
             lines.append(f"{parameter.name} = {text}")
     for kind, tests in (("loops", settings.loops), ("sweeps", settings.sweeps)):
         for test in tests:
-            lines += ["", f"[[simulate.{kind}]]", place_line(test.direction)]
+            lines += ["", f"[[simulate.{kind}]]", *place_lines(test.direction)]
             for key in fields(test):  # values other than the default
                 value = getattr(test, key.name)
                 if key.name not in ("direction", "temperature") and value != key.default:

@@ -8,7 +8,7 @@ import numpy as np
 from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.next_test import within_limits
 from bushfit.errors import ModelError
-from bushfit.geometry import TRANSLATION, Direction, Place
+from bushfit.geometry import TRANSLATION, Direction, Place, bushing_at
 from bushfit.planning.contract import Knowledge, PlanRequest, Test, operating_points
 from bushfit.simulation.undisturbed import PAPER_LOOPS, PAPER_SWEEPS
 from bushfit.units import number
@@ -70,8 +70,10 @@ def paper_tests(knowledge: Knowledge, rig: RigSettings, place: Place) -> list[Te
     Returns:
         Loops, then sweeps, within the limits of the rig. The amplitudes cause the same strains as in the paper.
     """
-    strained = Direction.AXIAL if place is Direction.RADIAL else place  # the paper's radial displacements are axial
-    scale = _PAPER_STRAIN / knowledge.model.unit_strain(strained)
+    tube = bushing_at(knowledge.model.bushing, place)
+    scale = _PAPER_STRAIN / knowledge.model.unit_strain(place)
+    if tube and place.axis is Direction.RADIAL:  # the paper's radial displacements are axial
+        scale = _PAPER_STRAIN / tube.unit_strain(Direction.AXIAL)
     sweep = PAPER_SWEEPS[0]
     tests: list[Test] = [
         *(replace(loop, direction=place, amplitude=_set_point(loop.amplitude * scale)) for loop in PAPER_LOOPS),

@@ -22,7 +22,7 @@ from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
 from bushfit.fitting.coordinates import Coordinates, jacobian
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.preparation import MeasuredTest, new_loop, new_sweep, split_by_kind
-from bushfit.geometry import Place
+from bushfit.geometry import Place, shared_labels
 from bushfit.planning.contract import Knowledge, Test, operating_points
 
 #: Rows of a loop's cycle that its sensitivities are taken at; chosen: its force is smooth over them.
@@ -242,7 +242,7 @@ class CandidateGrid:
             Effect of each column, repeated for each of its shapes, and the changes of the n whitened residuals by a
             typical amount of the effect, (e, n).
         """
-        model, places = self.knowledge.model, dict.fromkeys(str(test.direction) for test in self.tests)
+        model, places = self.knowledge.model, shared_labels(test.direction for test in self.tests)
         effects, columns = list[Effect](), [np.empty((0, sum(data_set.size for data_set in self.data_sets)))]
         for effect in missing_effects(model, places):
             if not (effect.replaces or effect.depends_on):

@@ -11,7 +11,7 @@ from bushfit.campaign.schema import SimulatedSweep
 from bushfit.effects import qualified_name
 from bushfit.effects.contract import Array
 from bushfit.fitting.repeats import FEWEST_STEPS
-from bushfit.geometry import Place, Specimen
+from bushfit.geometry import Place
 from bushfit.model.result import Range, Result
 from bushfit.planning.candidates import standard_tests
 from bushfit.planning.contract import DetectableAmount, Programme, Test
@@ -239,7 +239,7 @@ class PlanSearch:
         freedom = Counter[Place | None]()
         for test, count in runs.items():
             if isinstance(test, SimulatedSweep):
-                specimen = test.direction if isinstance(test.direction, Specimen) else None
+                specimen = None if test.direction.axis else test.direction
                 freedom[specimen] += scatter_differences(test) * (count - 1)
         return sorted(min(n, _SCATTER_FREEDOM) for n in freedom.values())
 

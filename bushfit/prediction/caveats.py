@@ -13,7 +13,7 @@ import numpy as np
 
 from bushfit.effects import Level, get_effect
 from bushfit.effects.contract import Array
-from bushfit.geometry import Bushing, Direction, Place
+from bushfit.geometry import Bushing, Direction, Place, bushing_at
 from bushfit.model.covariance import Z95
 from bushfit.model.result import Result
 from bushfit.reading.measurement import SAME_TEMPERATURE
@@ -87,9 +87,7 @@ def caveats(result: Result) -> list[str]:
     Returns:
         Sentences: unfitted directions, unresolved effects, and the limits of the model.
     """
-    fitted = result.measured.directions if result.measured else ()
-    places = {*Direction, *(specimen.name for specimen in result.specimens)}  # a compound was fitted on other bodies
-    lines = [line for name in fitted if name in places for line in unfitted_warnings(result, result.place(name))]
+    lines = [line for place in result.fitted_places for line in unfitted_warnings(result, place)]
     for name in result.unresolved:
         twins = " or ".join(get_effect(name).twins)
         lines.append(f"{name} is assigned to the bushing, but these tests cannot distinguish it from {twins}")
@@ -140,22 +138,24 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[str]:
     if not fitted:
         return
     corrected = {effect.corrects for effect in result.model.without(Level.INSTRUMENT).records}
-    bushing, tests = result.model.bushing, " and ".join(fitted)
+    bushing, tests = bushing_at(result.model.bushing, direction), " and ".join(fitted)
+    axes = {place.axis for place in result.fitted_places}
     if str(direction) in fitted:
-        if direction is Direction.RADIAL and bushing and bushing.shape == "paper" and direction not in corrected:
+        is_radial = direction.axis is Direction.RADIAL and corrected.isdisjoint(direction.labels)
+        if is_radial and bushing and bushing.shape == "paper":
             error = _radial_error(bushing)
             yield f"{direction}: fitted with the paper's formula, {error}. The parameters carry that error"
-            yield from _compressible(result, bushing)
+            yield from _compressible(result, bushing, direction)
         return
-    of_bushing = direction is Direction.AXIAL and not set(Direction).isdisjoint(fitted)
-    if not (of_bushing or direction in (Direction.RADIAL, Direction.TORSION)):
-        if str(direction) not in corrected:
+    of_bushing = direction.axis is Direction.AXIAL and not axes.isdisjoint(Direction)
+    if not (of_bushing or direction.axis in (Direction.RADIAL, Direction.TORSION)):
+        if corrected.isdisjoint(direction.labels):
             yield (
                 f"{direction}: not fitted, predicted from the {tests} tests. The band excludes the difference between "
                 "two bodies of one compound and the error of their dimensions"
             )
         return
-    radially = direction is Direction.RADIAL or (Direction.AXIAL not in fitted and Direction.RADIAL in fitted)
+    radially = direction.axis is Direction.RADIAL or (Direction.AXIAL not in axes and Direction.RADIAL in axes)
     formula, error = Direction.TORSION, "which was not compared with finite elements"
     if radially and bushing:
         formula, error = Direction.RADIAL, _radial_error(bushing)
@@ -168,18 +168,19 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[str]:
         agreement = f"; the measured sweep {'agrees within' if agrees else 'differs by more than'} its noise"
     yield f"{direction}: not fitted, predicted from the {tests} tests{agreement}. {band}, {error}"
     if radially and bushing:
-        yield from _compressible(result, bushing)
+        yield from _compressible(result, bushing, direction)
 
 
-def _compressible(result: Result, bushing: Bushing) -> Iterator[str]:
+def _compressible(result: Result, bushing: Bushing, direction: Place) -> Iterator[str]:
     """Yield a warning if a bulk modulus of 2 GPa would lower the radial stiffness by more than 1 %."""
+    place = direction if direction.axis is Direction.RADIAL else Direction.RADIAL
     stiffness_decrease = (
         bushing.correction.stiffness_decrease(result.model.values.get("mu", 0.0)) if bushing.correction else 0.0
     )
     if stiffness_decrease > _NOTED_LOWERING:
         percent = number(100.0 * stiffness_decrease, 2)
         yield (
-            f"{Direction.RADIAL}: the model assumes incompressible rubber; a bulk modulus of 2 GPa would lower "
+            f"{place}: the model assumes incompressible rubber; a bulk modulus of 2 GPa would lower "
             f"the radial stiffness of this shape by {percent} %"
         )
 

@@ -9,7 +9,7 @@ import numpy as np
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
 from bushfit.effects.contract import Array
-from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place, Specimen
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place, bushing_at
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import MARGIN
 from bushfit.reading.measurement import Sweep
@@ -104,7 +104,8 @@ def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ())
         inside = _distinct(np.geomspace(*result.measured.frequency, _FREQUENCIES))
     if direction.is_rotation:
         return inside, amplitudes
-    per_displacement = result.model.unit_strain(direction if isinstance(direction, Specimen) else Direction.AXIAL)
+    tube = bushing_at(result.model.bushing, direction)
+    per_displacement = tube.unit_strain(Direction.AXIAL) if tube else result.model.unit_strain(direction)
     return inside, _limit(amplitudes, [np.array(result.measured.strain) / per_displacement], _AMPLITUDES)
 
 

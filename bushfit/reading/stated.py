@@ -28,7 +28,7 @@ from bushfit.validation import (
 )
 
 #: Keys of [[loops]] and [[sweeps]] that state which direction or specimen was tested.
-PLACE_KEYS = ("direction", "specimen")
+PLACE_KEYS = ("direction", "specimen", "bushing")
 #: Lists of tests in [simulate].
 _LISTS = ("loops", "sweeps", "resonances", "validation")
 #: Validator that replaces the direction "shear" of a specimen by None.
@@ -54,25 +54,34 @@ def motion_quantity(suffix: str = "") -> BeforeValidator:
 Displacement = Annotated[float, motion_quantity(), Field(gt=0)]
 
 
-def place_tested(specimen: object, direction: object, specimens: Sequence[Specimen]) -> Place:
+def place_tested(test: Mapping[str, object], specimens: Sequence[Specimen]) -> Place:
     """Find the direction of the bushing, or the specimen, that was tested, from the keys of a test.
 
     Args:
-        specimen: value of the key "specimen" of the test; None if the key is missing.
-        direction: value of the key "direction" of the test; None if the key is missing.
+        test: keys of the test, of which direction, specimen and bushing matter; a missing key may be None.
         specimens: all specimens of the campaign.
 
     Returns:
-        Direction of the bushing, or specimen.
+        Direction of the bushing, or specimen; one direction of one of several bushings is a specimen.
 
     Raises:
-        CampaignError: an unknown specimen, a test of the bushing without a direction, or a test of a specimen with a
-            direction of the bushing.
+        CampaignError: an unknown specimen or bushing, a test of a bushing without a direction, or a test of a specimen
+            with a direction of the bushing.
     """
-    by_name = {specimen.name: specimen for specimen in specimens}
+    direction, specimen, bushing = (test.get(key) for key in PLACE_KEYS)
+    bushings = dict.fromkeys(place.body for place in specimens if place.axis)
+    if bushing is not None or (bushings and specimen is None):
+        if bushing not in bushings or specimen is not None:
+            raise CampaignError(
+                "a test of no bushing of the campaign" if specimen is None else "a test of two bodies",
+                found=" and ".join(str(name) for name in (bushing, specimen) if name is not None) or "no bushing",
+                expected="bushing = " + (" or ".join(f'"{name}"' for name in bushings) or "a name in [[bushings]]"),
+            )
+        specimens = [place for place in specimens if place.body == bushing]
+    by_name = {place.name: place for place in specimens if not place.axis}
     if specimen is None:
         if isinstance(direction, str) and direction in [*Direction]:
-            return Direction(direction)
+            return next((place for place in specimens if place.axis == direction), Direction(direction))
         expected = "direction = " + " or ".join(f'"{choice}"' for choice in Direction)
         hint = f'or specimen = "{next(iter(by_name))}"' if by_name else None
         found = "none" if direction is None else str(direction)
@@ -100,7 +109,7 @@ def with_places(tables: Any, specimens: Sequence[Specimen]) -> Any:
         if not isinstance(test, dict):
             return test
         with error_location(place=place):
-            direction = place_tested(test.get("specimen"), test.get("direction"), specimens)
+            direction = place_tested(test, specimens)
         return {**{key: value for key, value in test.items() if key not in PLACE_KEYS}, "direction": direction}
 
     if not isinstance(tables, dict):
@@ -135,6 +144,7 @@ class TestFile(FileFormat):
         file: path of the test file, relative to the campaign file.
         direction: direction of the bushing; None for a specimen.
         specimen: name of the specimen in [[specimens]]; default the bushing.
+        bushing: name in [[bushings]] of the bushing, if the campaign has several.
         noise: relative standard deviation of a point; None if it is not known.
         weight: weight of the test in the fit, relative to the weight that its noise gives.
         temperature: temperature of the test [K]; it selects the rows of a file with several temperatures. Direction and
@@ -149,6 +159,7 @@ class TestFile(FileFormat):
     file: Text
     direction: Annotated[Direction | None, _SHEAR] = None
     specimen: Name | None = None
+    bushing: Name | None = None
     noise: Share | None = None
     weight: Annotated[float, Field(gt=0, le=1)] = 1.0
     temperature: Temperature | None = None

@@ -75,7 +75,10 @@ def report_context(record: ReportRecord) -> dict[str, Any]:
     """
     result, diagnosis, campaign, tests = record.result, record.diagnosis, record.campaign, record.tests
     bodies = [("Bushing", tube_description(result.model.bushing))] if result.model.bushing else []
-    bodies += [(f"Specimen {specimen}", specimen_description(specimen)) for specimen in result.specimens]
+    tubes = len(result.bushings) + (result.model.bushing is not None)
+    bodies += [(f"Bushing {bushing.name}", tube_description(bushing)) for bushing in result.bushings]
+    coupons = [specimen for specimen in result.specimens if not specimen.bushing]
+    bodies += [(f"Specimen {specimen}", specimen_description(specimen)) for specimen in coupons]
     predictions = [*record.predictions.values()][:_MOST_PLACES]
     place_warnings = [prediction.warnings for prediction in record.predictions.values()]
     warnings = warnings_of(result, place_warnings, diagnosis["warnings"] if diagnosis else ())
@@ -86,7 +89,7 @@ def report_context(record: ReportRecord) -> dict[str, Any]:
     inputs = [(str(source.file), source.sha256) for source in result.inputs]
     return {
         "name": campaign.name if campaign else result.name,
-        "subject": "rubber bushing" if result.model.bushing else "rubber compound",
+        "subject": "rubber compound" if not tubes else "rubber bushing" if tubes == 1 else "rubber bushings",
         "head": {
             key.replace("_", " ").capitalize(): text for key, text in (campaign.report if campaign else {}).items()
         },
