@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.options import FILE, command_called, file_option, flag, option, option_group
+from bushfit.cli.options import FILE, command_called, flag, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.printing import print_tests
 from bushfit.cli.shared_options import (
@@ -23,6 +23,8 @@ from bushfit.errors import error_location
 
 if TYPE_CHECKING:
     from bushfit.commands.predict import PredictionOutput
+    from bushfit.geometry import Bushing
+    from bushfit.model.result import Result
     from bushfit.prediction.static_curve import StaticCurve
     from bushfit.prediction.superposed import LargeMotion
 
@@ -41,8 +43,10 @@ _MOST_AMPLITUDES = 8
         'Such as "500 N" or "1.5 mm", within the tests; may be given again [none].',
         multiple=True,
     ),
-    file_option(
-        "--bushing", "Predict another bushing of the same compound; its dimensions are in [bushing] of this TOML file."
+    option(
+        "--bushing",
+        "NAME",
+        "Predict one of several fitted bushings, or another of the same compound, from [bushing] of this TOML file.",
     ),
     option("--mass", "MASS"),
     option(
@@ -73,7 +77,7 @@ _MOST_AMPLITUDES = 8
 def command(
     model: Path,
     campaign: Path | None,
-    bushing: Path | None,
+    bushing: str | None,
     directions: tuple[str, ...],
     temperature: str | None,
     preload: tuple[str, ...],
@@ -93,7 +97,7 @@ def command(
     are left out. A warning reports predictions outside the tested range. Writes a table and a plot for each direction
     or specimen (axial.csv, axial.png), and with --campaign measured.csv.
     """
-    from bushfit.campaign.campaign import load_bushing, load_campaign
+    from bushfit.campaign.campaign import load_campaign
     from bushfit.commands.loading import load_model, model_file
     from bushfit.commands.predict import predict
     from bushfit.commands.provenance import input_files
@@ -105,7 +109,7 @@ def command(
         **grid_values(directions, grids),
         "temperature": kelvin(temperature),
         "preloads": preload,
-        "bushing": load_bushing(bushing) if bushing else None,
+        "bushing": _bushing_of(result, bushing) if bushing else None,
         "mass": positive(mass, "--mass", "kg"),
         "base_acceleration": positive(base_acceleration, "--base-acceleration", "m/s^2"),
         "arms": positive(arms, "--arms", "1"),
@@ -125,9 +129,25 @@ def command(
     for part in predicted.arms:
         output.print(part.sentence)
     print_tests(output, predicted.tests, predicted.usable)
-    inputs = [model_file(model), *([bushing] if bushing else []), *(input_files(loaded) if loaded else [])]
+    inputs = [model_file(model), *(input_files(loaded) if loaded else [])]
+    if bushing and not isinstance(settings["bushing"], str):
+        inputs.append(Path(bushing))
     folder = output.folder((loaded or predicted.result).name)
     output.write(folder, predicted.files, predicted.document, inputs)
+
+
+def _bushing_of(result: Result, text: str) -> Bushing | str:
+    """Find the bushing of --bushing: one of several fitted bushings by its name, or that of a TOML file."""
+    from bushfit.campaign.campaign import load_bushing
+    from bushfit.errors import ModelError
+
+    names = [bushing.name for bushing in result.bushings]
+    if text in names:
+        return text
+    if names and not Path(text).suffix:
+        expected = f"{', '.join(names)}, or a TOML file with a [bushing]"
+        raise ModelError("no such bushing in the model", place="--bushing", found=text, expected=expected)
+    return load_bushing(Path(text))
 
 
 def _print_summary(output: Output, predicted: PredictionOutput) -> None:

@@ -404,7 +404,8 @@ def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, str]:
     Returns:
         Result for the other bushing, and a sentence that lists the effects that are left out.
     """
-    names = [specimen.name for specimen in result.specimens]
+    coupons = tuple(specimen for specimen in result.specimens if not specimen.bushing)
+    names = [coupon.name for coupon in coupons]
 
     def transfer(model: Model) -> Model:
         effects = [
@@ -424,7 +425,7 @@ def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, str]:
         measured=measured,
         warnings=tuple(f"{result.name}: {line}" for line in result.warnings if line not in result.undecided),
         inputs=result.inputs,
-        specimens=result.specimens,
+        specimens=coupons,
         unresolved=tuple(name for name in result.unresolved if name in model.effects),
         model_error=result.model_error or result.model.unnamed,
         alternatives=tuple(replace(record, model=transfer(record.model)) for record in result.alternatives),

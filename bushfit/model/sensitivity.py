@@ -14,7 +14,7 @@ import numpy as np
 from bushfit.effects import Branch, place_suffix, qualified_name
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Value, Values
 from bushfit.effects.history import History
-from bushfit.geometry import Place
+from bushfit.geometry import Place, Specimen
 from bushfit.model.model import Kind, Model
 from bushfit.model.structure import values_for_effect
 
@@ -145,7 +145,8 @@ def _differences_at(
     Returns:
         Response, (n,), and its derivatives per SI unit of each parameter, (k, n).
     """
-    local = [i for i, name in enumerate(names) if place_suffix(name) in (None, str(place))]
+    labels = place.labels if isinstance(place, Specimen) else (str(place),)
+    local = [i for i, name in enumerate(names) if place_suffix(name) in (None, *labels)]
     response, local_slopes = differences(model, [names[i] for i in local], respond)
     slopes = np.zeros((len(names), response.size), dtype=response.dtype)
     slopes[local] = local_slopes

@@ -1,0 +1,100 @@
+"""Several bushings of one compound: one set of parameters, and a stiffness factor of each bushing."""
+
+from pathlib import Path
+
+import pytest
+
+from bushfit.campaign.campaign import load_campaign
+from bushfit.commands.fit import fit
+from bushfit.commands.predict import predict
+from bushfit.commands.simulate import simulate
+from bushfit.errors import CampaignError
+from bushfit.model.file import from_document, to_document
+
+SHAPES = {"short": (10, 18, 20), "long": (10, 18, 50), "thick": (8, 25, 40)}
+BODIES = "".join(
+    f'[[bushings]]\nname = "{name}"\ninner_radius = "{a} mm"\nouter_radius = "{b} mm"\nlength = "{length} mm"\n'
+    for name, (a, b, length) in SHAPES.items()
+)
+TESTS = "".join(
+    f"""[[simulate.sweeps]]
+bushing = "{name}"
+direction = "axial"
+amplitudes = ["{0.01 * (b - a):.3f} mm", "{0.1 * (b - a):.3f} mm"]
+frequencies = ["5 Hz", "25 Hz", "75 Hz", "105 Hz"]
+"""
+    for name, (a, b, _) in SHAPES.items()
+)
+CAMPAIGN = f"""name = "three shapes"
+{BODIES}
+[simulate]
+seed = 1
+noise = "0.5 %"
+repeats = 3
+[simulate.parameters]
+mu = "1.1 MPa"
+m = "0.2 MPa*s^alpha"
+alpha = 0.24
+sigma_fmax = "15 kPa"
+eps_half = "0.5 %"
+[simulate.effects.stiffness_factor]
+long = 1.04
+thick = 0.98
+{TESTS}"""
+
+
+def test_factors_of_three_shapes_are_recovered_and_read_back(tmp_path: Path) -> None:
+    (tmp_path / "sim.toml").write_text(CAMPAIGN, encoding="utf-8")
+    simulate(load_campaign(tmp_path / "sim.toml"), tmp_path / "tests")
+    file = tmp_path / "tests/campaign.toml"
+    text = file.read_text(encoding="utf-8").replace("[[bushings]]", '[[bushings]]\nfactor = "free"')
+    file.write_text(text, encoding="utf-8")
+    result = fit(load_campaign(file)).result
+    values = result.model.values
+    ratio = values["stiffness_factor.long"] / values["stiffness_factor.thick"]
+    assert ratio == pytest.approx(1.04 / 0.98, abs=0.01)
+    low, high = result.interval("stiffness_factor.long") or (0.0, 0.0)
+    assert low < 1.04 < high
+    assert 0.02 < high - low < 0.12  # the prior determines the common level of the factors
+    read = from_document(to_document(result))
+    assert [bushing.name for bushing in read.bushings] == [*SHAPES]
+    predicted = predict(read, bushing="long")
+    assert [str(prediction.direction) for prediction in predicted.predictions] == ["long axial", "long radial"]
+    ratios = [predict(one, bushing="long").predictions[0].stiffness.value for one in (result, read)]
+    assert ratios[0] == pytest.approx(ratios[1])
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (("long", "lung", 2), "no bushing of the campaign"),
+        (("bushing = ", "specimen = ", 1), "not in the campaign"),
+        (
+            (
+                "[simulate]\nseed",
+                '[[bushings]]\nname = "short"\ninner_radius = "1 mm"\nouter_radius = "2 mm"\nlength = "3 mm"\n[simulate]\nseed',
+                1,
+            ),
+            "two bodies have one name",
+        ),
+        (
+            (
+                "[simulate]\nseed",
+                '[bushing]\nname = "one"\ninner_radius = "1 mm"\nouter_radius = "2 mm"\nlength = "3 mm"\n[simulate]\nseed',
+                1,
+            ),
+            "two lists of bushings",
+        ),
+        (('name = "long"', 'name = "radial"', 1), "another table has this name"),
+    ],
+)
+def test_bodies_that_do_not_fit_the_tests_are_refused(
+    change: tuple[str, str, int], problem: str, tmp_path: Path
+) -> None:
+    old, new, count = change
+    text = CAMPAIGN.replace(old, new, count) if count == 1 else new.join(CAMPAIGN.rsplit(old, count))
+    if old == "long":
+        text = CAMPAIGN.replace('bushing = "long"', 'bushing = "lung"')
+    (tmp_path / "sim.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(CampaignError, match=problem):
+        load_campaign(tmp_path / "sim.toml")
