@@ -64,6 +64,11 @@ def test_factors_of_three_shapes_are_recovered_and_read_back(tmp_path: Path) -> 
     assert ratios[0] == pytest.approx(ratios[1])
 
 
+def _body(table: str, name: str) -> str:
+    sizes = 'inner_radius = "1 mm"\nouter_radius = "2 mm"\nlength = "3 mm"'
+    return f'{table}\nname = "{name}"\n{sizes}\n[simulate]\nseed'
+
+
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
@@ -72,7 +77,7 @@ def test_factors_of_three_shapes_are_recovered_and_read_back(tmp_path: Path) -> 
         (
             (
                 "[simulate]\nseed",
-                '[[bushings]]\nname = "short"\ninner_radius = "1 mm"\nouter_radius = "2 mm"\nlength = "3 mm"\n[simulate]\nseed',
+                _body("[[bushings]]", "short"),
                 1,
             ),
             "two bodies have one name",
@@ -80,7 +85,7 @@ def test_factors_of_three_shapes_are_recovered_and_read_back(tmp_path: Path) -> 
         (
             (
                 "[simulate]\nseed",
-                '[bushing]\nname = "one"\ninner_radius = "1 mm"\nouter_radius = "2 mm"\nlength = "3 mm"\n[simulate]\nseed',
+                _body("[bushing]", "one"),
                 1,
             ),
             "two lists of bushings",
