@@ -200,8 +200,7 @@ def _compared(
             found = ", ".join(f"{place}: {place.motion.words[0]}" for place in places)
             raise ModelError("a place that is not one kind of motion in all", found=found, expected="one kind")
         grids.append(requested_grid(common_grid(results, places, entries[0].sweeps), grid, places[0]))
-    texts = [preload] if preload else []
-    preloads = [requested_preloads(results[0], places[0], texts)[0] if texts else None for places in columns]
+    preloads = [requested_preloads(results[0], places[0], [preload])[0] if preload else None for places in columns]
     comparisons = with_holm(
         [
             compare_two(results[0], result, [(places[0], places[index]) for places in columns], grids, preloads)
@@ -380,13 +379,7 @@ def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
 
 
 def _family_document(label: str, family: FittedFamily, result: Result) -> FamilyEntry:
-    """Make the entry of a model family in compare.json: its fit and its root mean square held-out residual.
-
-    Args:
-        label: letter of the family.
-        family: fitted family.
-        result: result of its fit.
-    """
+    """Make the entry of a model family, by its letter (`label`), in compare.json, with its held-out residual."""
     evidence, held_out = family.evidence, family.holdout
     return {
         "label": label,
