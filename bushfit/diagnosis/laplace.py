@@ -44,9 +44,10 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
         count = max(len(effect.parameters) - 2, 0)
         precisions = {qualified_name(effect, parameter): 0.5 for parameter in effect.parameters}
         return count * (0.5 * log(2.0 * np.pi) - log(3.0)), precisions, size
+    stated = [name for prior in model.constraints.priors for name in prior.names]
     for parameter in effect.parameters:
         coordinate = qualified_name(effect, parameter)
-        if coordinate not in names:
+        if coordinate not in names or coordinate in stated:  # a stated prior is part of the likelihood
             continue
         count += 1
         if parameter is effect.amount:

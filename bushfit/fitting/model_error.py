@@ -31,7 +31,7 @@ from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import excess_chi_square
 from bushfit.fitting.common_error import CommonError
-from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, prior_rows
+from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, prior_covariance, prior_rows
 from bushfit.fitting.discrepancy import (
     OVER_FREQUENCY,
     OVER_STRAIN,
@@ -221,6 +221,11 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
     log_size = sum(test.log_det_covariance for test in tests.data_sets) + float(
         np.linalg.slogdet(information + prior)[1]
     )
+    for known in solution.model.constraints.priors:
+        names = [name for name in known.names if name in solution.names]
+        log_size += float(
+            np.linalg.slogdet(prior_covariance(known, Coordinates.of_parameters(solution.model, names)))[1]
+        )
     return gain - 0.5 * (float(residual @ residual) + log_size)
 
 

@@ -16,6 +16,7 @@ from bushfit.campaign.schema import ParameterSetting, RigSettings
 from bushfit.errors import BushfitError
 from bushfit.fitting.assess import FitStage, covariance
 from bushfit.fitting.coordinates import jacobian, residual
+from bushfit.fitting.model_error import log_likelihood
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.fitting.procedures import fit_joint
@@ -117,3 +118,15 @@ def test_what_is_no_tie_or_prior_is_one_clear_error(
     with pytest.raises(BushfitError) as error:
         _fitted(rig(0), alpha=ParameterSetting(**setting))
     assert message in str(error.value)
+
+
+def test_the_likelihood_of_a_fit_has_the_density_of_its_prior(rig: Callable[..., Campaign], paper_model: Model) -> None:
+    """A prior around the estimate multiplies it by its density there, averaged over the errors of the tests."""
+    tests = PreparedCampaign.from_campaign(rig(5)).data_sets
+    plain = solve(FitProblem(paper_model, tests, FIVE))
+    prior = Prior(("alpha",), np.array([plain.model.values["alpha"]]), np.array([[0.01**2]]), "")
+    known = solve(FitProblem(replace(plain.model, constraints=Constraints([prior])), tests, FIVE))
+    i, size = FIVE.index("alpha"), float(plain.coordinates.slopes(plain.model.values)[FIVE.index("alpha")])
+    variance = np.linalg.inv(plain.jacobian @ plain.jacobian.T)[i, i] + (0.01 / size) ** 2
+    gain = log_likelihood(known, {}) - log_likelihood(plain, {})
+    assert gain == pytest.approx(-0.5 * np.log(variance), abs=0.01)
