@@ -112,6 +112,8 @@ def _candidates(data_sets: Sequence[MeasuredTest]) -> Iterator[NextTest]:
     for place, test in product(places, FIXTURE_TESTS):
         yield replace(test, place=place, sentence=test.sentence.format(place=place))
     swept = {sweep.direction for sweep in split_by_kind(data_sets)[1]}
+    if not places.keys() & {*Direction}:  # several bushings, or coupons: which body to sweep is a choice of plan
+        swept |= {*Direction}
     yield from (test for test in BUSHING_TESTS if test.place not in swept)
 
 
