@@ -126,7 +126,7 @@ class BatchResult:
 
     @cached_property
     def curve_deviation(self) -> Array:
-        """Relative deviation of each part's |K| from the median |K|, geometric mean over the measured curve, (n,)."""
+        """|K| of each part over the median of all parts, less 1: geometric mean along the measured curve, (n,)."""
         if not self.curves:
             return np.full(len(self.records), np.nan)
         logarithms = np.log([*self.curves.values()])

@@ -190,7 +190,7 @@ def _compared(
         grid: directions, frequencies and amplitudes; None for the default of an axis.
         families: model families to which the entries belong; empty for other results.
         notes: further warnings.
-        preload: preload with its unit; None for none, or the tested preload nearest to none.
+        preload: preload with its unit; None for the tested preload nearest to zero.
         command: command line for the document.
     """
     results, labels = [entry.result for entry in entries], list(ascii_uppercase[: len(entries)])
@@ -362,7 +362,7 @@ def _family_to_use(families: Sequence[FittedFamily], entries: Sequence[ComparedR
 
 
 def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
-    """Make the entry of a compared result, by its letter (`label`), in compare.json."""
+    """Convert a compared result to its entry in compare.json; the label, a letter, stands for it in tables."""
     result, bushing = entry.result, model_document(entry.result.model)["bushing"]
     return {
         "label": label,

@@ -250,15 +250,15 @@ def predict(
 
 
 def requested_preloads(result: Result, place: Place, preloads: Sequence[str]) -> list[Preload | None]:
-    """Preloads of a prediction in a direction: those of the texts, or else the default.
+    """Parse the preloads at which a direction is predicted.
 
     Args:
         result: fitted result.
         place: direction or specimen.
-        preloads: texts such as "500 N"; empty for the default.
+        preloads: texts such as "500 N"; if empty, the direction is predicted at the tested preload nearest to zero.
 
     Returns:
-        Preloads; None for a prediction that does not depend on a preload.
+        Preloads within the tested range; None in place of a preload if the model does not depend on it.
     """
     if not preloads:
         return [tested_preload(result, place, None)]

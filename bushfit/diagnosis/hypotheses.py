@@ -143,10 +143,10 @@ class Tests:
 
     @cached_property
     def compound_in_fits(self) -> Group | None:
-        """Smooth deviation of the rubber from the model's laws, as columns of the residuals that a fit minimises.
+        """Residual columns of the smooth deviation of the compound's modulus from the model's laws, for refits.
 
-        These residuals are whitened by the scatter and by errors that points share. The columns are left free when an
-        effect is refitted; None without tests.
+        The columns are whitened as the residuals of a fit are. A refit with an effect also estimates their
+        coefficients, without a prior; None without tests.
         """
         return compound(self.base)
 

@@ -136,7 +136,8 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
         Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
-        (A + iB)/(2 e0) of the steady loop of strain amplitude e0.
+        (A + iB)/(2 e0), with the in-phase and quadrature amplitudes A and B of the stress in the first harmonic of the
+        steady loop of Eq. 5, in which the stress approaches sigma_fmax and is half of it at the strain eps_half.
 
     >>> modulus({"sigma_fmax": 2e4, "eps_half": 0.01}, 1.0, np.array([0.0, 0.01])).round()
     array([1000000.     +0.j,  394736.+151040.j])

@@ -114,8 +114,8 @@ class Unnamed:
         return float(np.sqrt(self._at_nodes[0].max()))
 
     @property
-    def typical(self) -> float:
-        """Root mean square of the correction at the nodes including its errors, relative to the stiffness."""
+    def rms(self) -> float:
+        """Root mean square of the relative correction at the nodes, whose standard deviation s adds: of c^2 + s^2."""
         return float(np.sqrt(np.mean(self._at_nodes[0] + self._at_nodes[1])))
 
     @property

@@ -81,7 +81,11 @@ def exported_directions(request: ExportRequest) -> list[Prediction]:
 
 
 def stiffness_tables(prediction: Prediction) -> list[StiffnessTable]:
-    """Split the prediction of one direction into a table for each amplitude, in ascending order."""
+    """Split the prediction of one direction by amplitude.
+
+    Returns:
+        Tables of stiffness and loss over frequency, one for each amplitude, in ascending order.
+    """
     direction = prediction.direction.axis
     assert direction
     stiffness = prediction.storage_stiffness.value + 1j * prediction.loss_stiffness.value

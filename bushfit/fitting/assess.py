@@ -272,7 +272,9 @@ def measured_range(model: Model, data_sets: Sequence[MeasuredTest]) -> Range:
 
 
 def preload_ranges(data_sets: Sequence[MeasuredTest]) -> list[PreloadRange]:
-    """List the directions and specimens with tests at two preloads or more, all displacements or all forces.
+    """Ranges of preload of the directions and specimens that were tested at two preloads or more.
+
+    A direction with preloads of which some are displacements and some forces is left out.
 
     Returns:
         For each of them the smallest and largest preload [m, rad, N or N m], and the number of preloads.

@@ -88,13 +88,16 @@ def residual(model: Model, data_sets: Sequence[MeasuredTest], *, with_priors: bo
 def jacobian(
     model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str], *, with_priors: bool = False
 ) -> Array:
-    """Derivatives of the whitened residuals of all tests by parameter coordinate, (len(names), n).
+    """Derivatives of the whitened residuals of all tests by parameter coordinate.
 
     Args:
         model: model at whose values the derivatives are taken.
         data_sets: tests.
         names: names of the parameters.
-        with_priors: True to append the derivatives of the residuals of the model's priors, (len(names), n + p).
+        with_priors: True to append the derivatives of the p residuals of the model's priors.
+
+    Returns:
+        Derivatives, (len(names), n) or (len(names), n + p).
     """
     slopes = Coordinates.of_parameters(model, names).slopes(model.values)
     moving = (*names, *model.tied)

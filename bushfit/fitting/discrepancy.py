@@ -273,7 +273,11 @@ def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
 
 
 def discrepancies(tests: FittedTests) -> list[Discrepancy]:
-    """Processes with all candidate lengths, each once shared by all directions and once separate for each direction."""
+    """List the Gaussian processes of the misfit that are compared by their likelihood.
+
+    For each pair of correlation lengths, in ln frequency and in ln strain, there is one process that all directions
+    share and one of which each direction has its own.
+    """
     names = tuple(dict.fromkeys(tests.directions.tolist()))
     shared = dict.fromkeys([(names,), tuple((name,) for name in names)])
     pairs = product(shared, product(OVER_FREQUENCY, OVER_STRAIN))

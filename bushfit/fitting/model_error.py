@@ -98,7 +98,7 @@ def with_model_error(
     processes = [replace(process, sizes=sizes) for process in discrepancies(tests)]
     likeliest = max(processes, key=lambda process: process.best[0])
     error = averaged(processes)
-    if error.typical >= SIZES[-1]:
+    if error.rms >= SIZES[-1]:
         return plain_fit, None
     weighed = [test.with_model_error(size) for test in plain_fit.covariance_tests or plain_fit.minimised]
     whole = Discrepancy.over_tests(_in_noise(closest, weighed), likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
@@ -232,7 +232,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
 def model_error_warning(error: Unnamed) -> str:
     """Warning that the model misses its tests, with the rms correction of the stiffness in per cent of |K|."""
     return (
-        f"the model misses the tests by {number(100.0 * error.typical, 2)} %; parameters are the closest fit, and "
+        f"the model misses the tests by {number(100.0 * error.rms, 2)} %; parameters are the closest fit, and "
         "their intervals include this misfit"
     )
 

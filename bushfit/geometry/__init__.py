@@ -326,6 +326,9 @@ def shared_labels(places: Iterable[Place]) -> list[str]:
 
     A body tested in one direction has the name of its only place, and the first of two bodies has no name, because its
     error is that of the second with the opposite sign.
+
+    Returns:
+        Names of places, then of bodies, then of directions.
     """
     tested = [*dict.fromkeys(places)]
     mounted = [place for place in tested if isinstance(place, Specimen) and place.bushing]

@@ -56,11 +56,18 @@ class Tie:
 
     @classmethod
     def from_expression(cls, name: str, expression: str) -> "Tie":
-        """Parse an expression; raise a CampaignError for an unknown name, a ModelError for anything that is no number.
+        """Parse the expression of a tie.
 
         Args:
             name: name of the tied parameter.
             expression: numbers, parameters, + - * / ** and brackets, exp, log and sqrt.
+
+        Returns:
+            The tie.
+
+        Raises:
+            CampaignError: a name is unknown.
+            ModelError: the expression has another element.
         """
         names = tuple(dict.fromkeys(_NAME.findall(expression)))
         for used in names:
@@ -71,7 +78,10 @@ class Tie:
         return tie
 
     def value(self, values: Mapping[str, Any]) -> Any:
-        """Value of the tied parameter [SI], real or complex, from parameter values [SI] by name.
+        """Value of the tied parameter, from parameter values [SI] by name.
+
+        Returns:
+            Value [SI]; complex if a parameter value is.
 
         Raises:
             ModelError: the expression has no value.
@@ -134,11 +144,14 @@ class Constraints:
         return tied
 
     def slopes(self, values: Mapping[str, float], names: Sequence[str]) -> Array:
-        """Derivatives of the t tied parameters by other parameters, (k, t), by complex steps.
+        """Derivatives of the t tied parameters by other parameters, by complex steps.
 
         Args:
             values: parameter values [SI] by name.
             names: names of the k other parameters.
+
+        Returns:
+            Derivatives, (k, t).
         """
         tied = [tie.name for tie in self.active_ties(values)]
         slopes = np.zeros((len(names), len(tied)))

@@ -170,7 +170,7 @@ def compare(
         places: pairs of directions or specimens to compare: of the reference, and of the compared result. Both have the
             same kind of motion.
         grids: frequencies [Hz] and zero-to-peak amplitudes [m, rad or 1] of each pair.
-        preloads: preload of each pair; None for none, or the tested preload nearest to none.
+        preloads: preload of each pair, where None selects the tested preload nearest to zero; by default, so for all.
 
     Returns:
         Comparison over the common parameters and the grids.

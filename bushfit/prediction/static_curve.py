@@ -110,8 +110,8 @@ def static_curve(
         reach: largest displacement, in both senses [m, rad or 1].
         rate: rate of the motion [m/s, rad/s or 1/s].
         temperature: temperature of the rubber [K]; None for the reference temperature.
-        preload: preload about which the motion takes place, within the tested range; None for none, or the tested
-            preload nearest to none.
+        preload: preload about which the motion takes place, within the tested range; None for the tested
+            preload nearest to zero.
 
     Returns:
         Curve at even displacements from -reach to reach.

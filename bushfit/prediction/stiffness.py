@@ -98,7 +98,7 @@ def predict(
         rig: True to include the effects of the rig, as in the tests.
         sweeps: measured sweeps for comparison; None for no comparison.
         temperature: temperature of the rubber [K]; None for the reference temperature.
-        preload: preload within the tested range; None for none, or the tested preload nearest to none.
+        preload: preload within the tested range; None for the tested preload nearest to zero.
         over: slow large motion or static offset under the harmonic; None for the harmonic alone.
 
     Returns:
@@ -158,7 +158,7 @@ def tested_preload(result: Result, place: Place, preload: Preload | None) -> Pre
     Args:
         result: fitted result.
         place: direction or specimen.
-        preload: requested preload; None for none, or the tested preload nearest to none.
+        preload: requested preload; None for the tested preload nearest to zero.
 
     Returns:
         The preload; None if it is not requested and the model does not depend on it in this direction.

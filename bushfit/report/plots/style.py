@@ -171,7 +171,11 @@ class Chart(Figure):
 
     @contextmanager
     def panels_alone(self) -> Iterator[None]:
-        """Context in which the figure consists of its panels, whatever its title and explanation are."""
+        """Context in which the figure consists of its panels, whatever its title and explanation are.
+
+        Returns:
+            Iterator for `contextlib.contextmanager`.
+        """
         texts = self.heading, self.footer
         for text in texts:
             text.set_visible(False)
