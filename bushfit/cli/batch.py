@@ -81,7 +81,7 @@ def command(
 ) -> None:
     """Evaluate many campaigns and collect the results in one table.
 
-    MANIFEST is a list (TOML, or CSV with the same keys as columns), a pattern in quotes, or campaigns:
+    MANIFEST is a list (TOML, or CSV with a column per key), a pattern in quotes, or campaigns:
 
     \b
         [[bushings]]
