@@ -8,16 +8,16 @@ import io
 import os
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field
 
 from bushfit.batch.quantities import Point, PointText
-from bushfit.campaign.toml import read_toml
+from bushfit.campaign.toml import parse_toml
 from bushfit.effects import Effect, get_effect
 from bushfit.effects.mistakes import get_candidate
 from bushfit.errors import CampaignError
@@ -174,12 +174,10 @@ def read_manifest(source: str, settings: RowSettings, *more: str) -> Manifest:
     if more or (_PATTERN.search(source) and not os.path.exists(path)):  # noqa: PTH110
         title, base, entries = "batch", Path(), [Entry(campaign=name) for name in (source, *more)]
     elif path.suffix.lower() == ".toml":
-        try:
-            content = read_toml(path, ManifestFile, description="a manifest", largest=_LARGEST_MANIFEST)
-        except CampaignError as error:
-            if error.found not in ('"bushing"', '"specimens"'):
-                raise
-            content = ManifestFile(bushings=(Entry(campaign=path.name),))  # a campaign is a batch of one
+        tables = parse_toml(path, "a manifest", _LARGEST_MANIFEST)
+        if is_campaign(tables):  # a batch of one
+            tables = {"bushings": [{"campaign": path.name}]}
+        content = validate_tables(tables, path, ManifestFile)
         settings, points, entries = settings.with_defaults(content), content.at, list(content.bushings)
     elif path.suffix.lower() in (".csv", ".tsv", ".txt"):
         entries = read_csv_entries(path)
@@ -191,6 +189,15 @@ def read_manifest(source: str, settings: RowSettings, *more: str) -> Manifest:
     if not listed:
         raise CampaignError("the manifest has no rows", file=source, expected="a campaign on each line")
     return Manifest(title, make_rows(listed, base, settings, source), points)
+
+
+def is_campaign(tables: Mapping[str, Any]) -> bool:
+    """True if a TOML file is a campaign: it has a body that was tested, or [[bushings]] with a length."""
+    bushings = tables.get("bushings")
+    rows = bushings if isinstance(bushings, list) else []
+    return not tables.keys().isdisjoint(("bushing", "specimens")) or any(
+        isinstance(row, dict) and "length" in row for row in rows
+    )
 
 
 def read_csv_entries(path: Path) -> list[Entry]:

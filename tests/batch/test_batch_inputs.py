@@ -51,6 +51,14 @@ def test_toml_rows_take_what_they_do_not_say_from_the_top(tmp_path: Path) -> Non
     assert {row.settings.model for row in manifest.rows} == {str(tmp_path / "m.json")}
 
 
+@pytest.mark.parametrize(
+    "body", ['[bushing]\nname = "a"', '[[specimens]]\nname = "a"', '[[bushings]]\nlength = "3 mm"']
+)
+def test_a_campaign_is_a_batch_of_one_whatever_its_bodies(body: str, tmp_path: Path) -> None:
+    (row,) = read(tmp_path, f'[[loops]]\nfile = "a.csv"\n{body}\n').rows
+    assert (row.name, row.campaign) == ("m", str(tmp_path / "m.toml"))
+
+
 def test_a_pattern_takes_every_match_and_names_by_folder_where_files_share_a_name(shop: Path) -> None:
     manifest = read_manifest(str(shop / "bushings/*/bushing.toml"), RowSettings())
     assert [row.name for row in manifest.rows] == ["b0", "b1", "b2", "b3", "b4"]
