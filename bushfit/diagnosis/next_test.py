@@ -14,7 +14,7 @@ import numpy as np
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array, Level
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind
-from bushfit.geometry import TRANSLATION, Direction, Place
+from bushfit.geometry import TRANSLATION, Bushing, Direction, Place
 from bushfit.model.model import Model
 
 #: Relative noise of one point of a test that was not made yet: that of a good servo-hydraulic rig.
@@ -93,7 +93,7 @@ def deciding_test(
         return ""
     undecided = float(remaining_entropy(odds, np.zeros((len(models), len(models)))))
     best, best_rate = "", _LEAST_INFORMATION
-    for test in _candidates(data_sets):
+    for test in _candidates(data_sets, models[0].bushing):
         frequency, amplitude, place = _points(test, data_sets)
         feasible = np.all([within_limits(model, rig, place, frequency, amplitude) for model in models], axis=0)
         if test.mounted is None and not feasible.any():
@@ -106,13 +106,13 @@ def deciding_test(
     return best
 
 
-def _candidates(data_sets: Sequence[MeasuredTest]) -> Iterator[NextTest]:
+def _candidates(data_sets: Sequence[MeasuredTest], bushing: Bushing | None) -> Iterator[NextTest]:
     """List the candidate tests: dummies in place of the bushing, and the bushing in directions that were not swept."""
     places = dict.fromkeys(data_set.direction for data_set in data_sets)
     for place, test in product(places, FIXTURE_TESTS):
         yield replace(test, place=place, sentence=test.sentence.format(place=place))
     swept = {sweep.direction for sweep in split_by_kind(data_sets)[1]}
-    if not places.keys() & {*Direction}:  # several bushings, or coupons: which body to sweep is a choice of plan
+    if bushing is None:  # several bushings, or coupons alone: which body to sweep is a choice of plan
         swept |= {*Direction}
     yield from (test for test in BUSHING_TESTS if test.place not in swept)
 

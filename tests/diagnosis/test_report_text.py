@@ -14,9 +14,9 @@ from rigged import SHARED, Measured, asked, no_repeats, said
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.next_test import BUSHING_TESTS, FIXTURE_TESTS, deciding_test, remaining_entropy
 from bushfit.effects import BASE
-from bushfit.fitting.preparation import MeasuredTest
+from bushfit.fitting.preparation import MeasuredTest, new_sweep
 from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.geometry import Direction
+from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
 
 
@@ -136,3 +136,13 @@ def test_what_stays_open_is_bounded_from_above(odds: tuple[float, float]) -> Non
     assert remaining_entropy(odds, np.zeros((2, 2))) == pytest.approx(-float(p @ np.log(p)))
     far = [float(remaining_entropy((*odds, 0.0), d * (1.0 - np.eye(3)))) for d in (300.0, 1000.0, 3000.0)]
     assert far[0] > far[1] > far[2] > 0.0, "no rounding stands in for what is left"
+
+
+@pytest.mark.parametrize("bushing", [True, False])
+def test_coupons_with_a_bushing_are_followed_by_a_sweep_of_it(bushing: bool, paper_model: Model) -> None:
+    """A bushing that was not tested is proposed, and no test of a bushing if the campaign has none."""
+    model = paper_model if bushing else replace(paper_model, bushing=None)
+    coupon = Specimen("DMA", "modulus")
+    sweep = new_sweep(model, coupon, np.array([5.0, 25.0, 105.0]), np.full(3, 0.01), (2e-3, 2e-3), (2e-3, 2e-3))
+    rivals = [model, model.with_effect("stiffness_factor.radial", {"stiffness_factor.radial": 1.2})]
+    assert ("radial direction" in deciding_test(rivals, EVEN, [sweep])) == bushing
