@@ -25,6 +25,7 @@ from bushfit.errors import CampaignError, error_location, quote_path
 from bushfit.geometry import Bushing, Specimen, get_places
 from bushfit.model.laws import register_file
 from bushfit.model.model import FIVE, Model
+from bushfit.model.transfer import FACTOR_SPREAD
 from bushfit.progress import track
 from bushfit.reading.instruments import RECORDINGS
 from bushfit.reading.loops import read_loop
@@ -37,9 +38,6 @@ from bushfit.validation import validate_tables
 
 #: Endings of test files, from which `bushfit init` writes a campaign.
 TEST_FILES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".xls", ".xlsx", ".xlsm", ".xlsb", ".ods", *RECORDINGS)
-#: Prior of the measured over the computed stiffness of one of several bushings; chosen: 0.2 mm of 8 mm of rubber, as
-#: moulded parts vary, is 2.5 %, and the modulus varies by 2 % within a batch.
-_FACTOR_PRIOR = "1 +- 0.03"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -132,7 +130,7 @@ def load_campaign(path: str | Path) -> Campaign:
         "logo": logo,
     }
     factors = tuple(f"stiffness_factor.{table.name}" for table in content.bushings if table.factor == "free")
-    priors = {name: ParameterSetting(prior=_FACTOR_PRIOR) for name in factors}
+    priors = {name: ParameterSetting(prior=f"1 +- {FACTOR_SPREAD}") for name in factors}
     effects = tuple(dict.fromkeys((*content.fit.effects, *factors)))
     found["fit"] = replace(content.fit, effects=effects, parameters={**priors, **content.fit.parameters})
     settings = {key: value for key, value in vars(content).items() if key != "bushings"}

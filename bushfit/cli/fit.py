@@ -96,7 +96,8 @@ def fit(
     parameters (vary = false), the command reports how well these values agree with the tests. If the tests hardly
     determine a parameter, its standard error is misleading: use --profile.
 
-    Writes model.json, and a table and a plot of loops and sweeps.
+    Writes model.json, and a table and a plot of loops and sweeps. Of several bushings, bushings.csv compares each with
+    a fit to the others.
     """
     from bushfit.commands.fit import fit as fit_campaign
 
@@ -137,6 +138,11 @@ def _finish(output: Output, folder: Path, fitted: FitOutput, model: Path | None,
     output.print_headline(campaign.name, verdict, f"next: {action}")
     for title, step in fitted.steps:
         print_step(output, f"{campaign.name}: {title}", step)
+    for table in (part.content for part in fitted.files if part.name == "bushings"):
+        rows = [
+            (row[0], str(row[1]), *(number(value, 2) for value in row[2:])) for row in table.itertuples(index=False)
+        ]
+        output.print_table("each bushing predicted by a fit to the others", list(table.columns), rows)
     output.warn(fitted.data.notes)
     output.write(folder, fitted.files, fitted.document, [*input_files(campaign), *([model] if model else [])])
     exit_above(max_nrmse, result)

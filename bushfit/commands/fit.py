@@ -15,6 +15,7 @@ from bushfit.fitting import procedures
 from bushfit.fitting.master_curve import can_shift, master_curve
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.result import Result
+from bushfit.prediction.other_bushings import predict_each_bushing
 from bushfit.report import plots, tables
 from bushfit.report.results import ResultFile, figure_file, json_file, table_file
 
@@ -73,6 +74,9 @@ def fit(
     options = option_words(direction=directions, effect=effects, profile=profile)
     document = result_document(result, campaign_document(data, "fit", options))
     files = [json_file("model", document), *campaign_files(data, result)]
+    if len({place.body for place in result.fitted_places if place.axis and place.body}) > 1:
+        predicted = partial(predict_each_bushing, data, names, directions or None)
+        files.append(table_file("bushings", lambda: tables.bushings_table(predicted())))
     return FitOutput(data, (("joint fit", result),), document, files)
 
 

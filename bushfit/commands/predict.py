@@ -22,7 +22,8 @@ from bushfit.fitting.agreement import expected_errors_without_refits, misfits
 from bushfit.fitting.preparation import MeasuredSweep, prepare_sweeps
 from bushfit.geometry import Bushing, Direction, Place, Specimen, default_places, get_places
 from bushfit.model.arms import Arms, model_arms
-from bushfit.model.result import ExpectedError, Misfit, Result, transfer_compound
+from bushfit.model.result import ExpectedError, Misfit, Result
+from bushfit.model.transfer import transfer_compound
 from bushfit.prediction.caveats import warnings_of
 from bushfit.prediction.grid import default_grid, grid_settings, requested_grid, static_reach
 from bushfit.prediction.resonance import PredictedResonance, predict_resonance

@@ -2,13 +2,12 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
-from bushfit.effects import Level
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction, Place, Specimen, get_place
@@ -390,47 +389,3 @@ class Result:
             low, high = value / factor, value * factor
         minimum, maximum = parameter.bounds
         return max(low, min(minimum, value)), min(high, max(maximum, value))
-
-
-def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, str]:
-    """Transfer the compound of a fitted model to another bushing.
-
-    Effects of the material and factors of specimens are kept; effects of the first bushing and its rig are left out.
-
-    Args:
-        result: fitted model.
-        bushing: geometry of the other bushing.
-
-    Returns:
-        Result for the other bushing, and a sentence that lists the effects that are left out.
-    """
-    coupons = tuple(specimen for specimen in result.specimens if not specimen.bushing)
-    names = [coupon.name for coupon in coupons]
-
-    def transfer(model: Model) -> Model:
-        effects = [
-            record.name for record in model.records if record.level is Level.MATERIAL or record.corrects in names
-        ]
-        return Model.with_defaults(bushing, effects, model.values)
-
-    model = transfer(result.model)
-    measured = result.measured
-    if measured:
-        of_specimens = tuple(name for name in measured.directions if name in names)
-        measured = replace(measured, directions=of_specimens or (result.name,), preloads=())
-    elsewhere = Result(
-        model,
-        fitted=tuple(name for name in result.fitted if name in model.values),
-        covariance=result.covariance.restricted([*model.values]),
-        measured=measured,
-        warnings=tuple(f"{result.name}: {line}" for line in result.warnings if line not in result.undecided),
-        inputs=result.inputs,
-        specimens=coupons,
-        unresolved=tuple(name for name in result.unresolved if name in model.effects),
-        model_error=result.model_error or result.model.unnamed,
-        alternatives=tuple(replace(record, model=transfer(record.model)) for record in result.alternatives),
-    )
-    sentence = f"{bushing.name}: the compound of {result.name}, of which no bushing of this shape was tested"
-    if omitted := ", ".join(record.name for record in result.model.records if record.name not in model.effects):
-        sentence += f"; left out, because they belong to {result.name} or its rig: {omitted}"
-    return elsewhere, sentence

@@ -30,7 +30,8 @@ from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import Model
-from bushfit.model.result import Range, Result, transfer_compound
+from bushfit.model.result import Range, Result
+from bushfit.model.transfer import transfer_compound
 from bushfit.prediction.caveats import caveats
 from bushfit.prediction.resonance import predict_resonance
 from bushfit.prediction.stiffness import predict

@@ -14,7 +14,8 @@ from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction, Shape
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
-from bushfit.model.result import Range, Result, transfer_compound
+from bushfit.model.result import Range, Result
+from bushfit.model.transfer import transfer_compound
 from bushfit.prediction.caveats import caveats
 from bushfit.prediction.grid import PAPER_AMPLITUDES, PAPER_FREQUENCIES, default_grid
 from bushfit.prediction.resonance import predict_resonance

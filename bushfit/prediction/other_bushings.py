@@ -1,0 +1,89 @@
+"""How well each of several bushings is predicted by a fit to the others."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bushfit.effects import place_suffix
+from bushfit.effects.contract import Array
+from bushfit.fitting.preparation import MeasuredTest, log_slopes
+from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.procedures import fit_joint
+from bushfit.geometry import Specimen
+from bushfit.model.covariance import Z95
+from bushfit.model.result import Result
+from bushfit.model.transfer import with_factor
+from bushfit.prediction.bands import uncertainty
+
+
+@dataclass(frozen=True)
+class OtherBushings:
+    """Agreement of the tests of one bushing with a model that was fitted to the other bushings.
+
+    Args:
+        bushing: name of the bushing.
+        points: number of operating points of its tests.
+        nrmse: root mean square error of the prediction, relative to |K|, or of a loop to half its range of force.
+        reduced_chi_square: mean square error in units of noise.
+        gain: mean relative error of |K|: positive if the prediction is stiffer than measured.
+        share_inside: share of the points whose |K| is in the 95 % band of prediction and noise, 0 to 1.
+    """
+
+    bushing: str
+    points: int
+    nrmse: float
+    reduced_chi_square: float
+    gain: float
+    share_inside: float
+
+
+def predict_each_bushing(
+    data: PreparedCampaign, effects: Sequence[str], directions: Sequence[str] | None = None
+) -> list[OtherBushings]:
+    """Fit all bushings but one, from the start values of a fit to them, and predict that one; each in turn.
+
+    If the factors of bushings are free, the band includes their spread.
+
+    Args:
+        data: prepared campaign.
+        effects: names of the effects of the model.
+        directions: directions, specimens or bushings whose tests to use; see `PreparedCampaign.select_tests`.
+
+    Returns:
+        Agreement for each bushing; empty if the tests are of fewer than two.
+    """
+    tests = data.select_tests(directions)
+    places = [test.direction for test in tests if isinstance(test.direction, Specimen) and test.direction.bushing]
+    names = list(dict.fromkeys(place.body for place in places))
+    predicted = []
+    for name in names if len(names) > 1 else ():
+        left_out = [test for test in tests if test.direction.body == name]
+        others = list(dict.fromkeys(str(test.direction) for test in tests if test.direction.body != name))
+        labels = {name, *(str(test.direction) for test in left_out)}
+        kept = [effect for effect in effects if place_suffix(effect) not in labels]
+        result = fit_joint(data, effects=kept, directions=others)
+        misfits = [misfit for misfit in result.tests if misfit.held is None and misfit.place in labels]
+        result = with_factor(result, [name]) if f"stiffness_factor.{name}" in effects else result
+        points = [misfit.points for misfit in misfits]
+        predicted.append(
+            OtherBushings(
+                name,
+                sum(points),
+                float(np.sqrt(np.average([misfit.nrmse**2 for misfit in misfits], weights=points))),
+                float(np.average([misfit.reduced_chi_square for misfit in misfits], weights=points)),
+                float(np.average([misfit.gain for misfit in misfits], weights=points)),
+                float(np.mean(np.concatenate([_inside(result, test) for test in left_out]))),
+            )
+        )
+    return predicted
+
+
+def _inside(result: Result, test: MeasuredTest) -> Array:
+    """True for each operating point of a test at which |K| is within the 95 % band of a prediction and the noise."""
+    ratio = test.measured / test.noise_free(result.model).measured
+    errors = uncertainty(result, result.model, test.direction, test.frequency, test.amplitude, test.conditions)
+    slopes = log_slopes(result.model, test, errors.covariance.names)
+    band = errors.band(np.zeros(ratio.size), np.concatenate((slopes, errors.relative)).real)
+    noise = test.relative_noise
+    return np.abs(np.log(np.abs(ratio))) <= np.hypot(band.high, Z95 * noise)
