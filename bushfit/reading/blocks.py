@@ -6,9 +6,12 @@ from dataclasses import replace
 from itertools import islice
 
 from bushfit import units
-from bushfit.reading.headers import AmplitudeConvention, Vocabulary
+from bushfit.errors import UnitError
+from bushfit.reading.cells import Cells, FaultyRow
+from bushfit.reading.headers import AmplitudeConvention, Column, Vocabulary, parse_unit, plain, split_unit
 from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row, is_units_row, split
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names, named_direction
+from bushfit.reading.numerals import is_like_number
 from bushfit.reading.source import Channels, Combined, RowSource, Text, cells_of
 
 #: Largest text that is searched for blocks without their own headers [bytes]; chosen: some 100,000 rows.
@@ -49,7 +52,13 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     starts = [index for index, header in enumerate(headers) if header == headers[first]]
     sides = [slice(start, end) for start, end in zip(starts, [*starts[1:], len(headers)], strict=True)]
     names = [[header for header in headers[side] if header] for side in sides]
-    if len(sides) > 1 and all(side == names[0] for side in names) and 1 < len(names[0]) == len(set(names[0])):
+    unlike = any(layout.units[side][: len(names[0])] != layout.units[sides[0]][: len(names[0])] for side in sides)
+    if (
+        len(sides) > 1
+        and not unlike
+        and all(side == names[0] for side in names)
+        and 1 < len(names[0]) == len(set(names[0]))
+    ):
         return _side_by_side(source, layout, sides, vocabulary)
     if isinstance(source, Text):
         start, end = source.offset(layout.header_line - 1), source.offset(layout.lines_before_data)
@@ -112,7 +121,8 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
             if layout.is_repeated(cells):
                 repeated = True
                 continue
-            if parts and (is_summary_row(cells) or is_units_row(cells)):  # left out later, with a note
+            is_units = is_units_row([cell.strip("[]() ") for cell in cells])
+            if parts and (is_summary_row(cells) or is_units or layout.is_header(cells)):  # left out later, or refused
                 parts.append((line.number, cells, len(groups) - 1))
                 continue
             if is_note or not is_row(cells):
@@ -221,3 +231,46 @@ def _with_complex_parts(source: RowSource, layout: Layout) -> tuple[RowSource, L
         numbers.append(line.number)
     layout = replace(layout, headers=tuple(headers), units=tuple(row_of_units))
     return Combined(source.sheet or "", content, numbers=numbers, above=source.head()), layout
+
+
+def refuse_other_columns(table: Cells, left_out: Iterable[FaultyRow]) -> None:
+    """Refuse a header or row of units that states another order or other units for the rows below it.
+
+    Args:
+        table: table with its columns by role.
+        left_out: rows of the table that are not data.
+
+    Raises:
+        MeasurementError: a header repeats the columns in another order.
+        UnitError: a header or row of units states other units.
+    """
+    first = table.layout.units_line or table.layout.header_line
+    for line, cells, _ in left_out:
+        texts = [str(cell) for cell in cells]
+        is_header, compatible, different = table.layout.is_header(texts), 0, list[Column]()
+        for column in sorted(table.roles.values(), key=lambda column: column.index):
+            text = texts[column.index]
+            name, unit, convention = split_unit(text) if is_header else ("", *parse_unit(text.strip("[]() "))[:2])
+            if is_header and plain(name) != plain(split_unit(column.header)[0]):
+                raise table.error(
+                    "a header repeats the columns in another order",
+                    line=line,
+                    found=", ".join(filter(None, texts)),
+                    expected=f"the columns of line {table.layout.header_line}: {', '.join(table.headers)}",
+                    hint="write all blocks with the same columns, or each to a file of its own",
+                )
+            is_unit = unit != "-" and not is_like_number(unit or "1")
+            if unit and column.unit and is_unit and units.is_compatible(unit, column.unit):
+                compatible += 1
+                is_other = units.si_factor(unit, column.unit) != units.si_factor(column.unit, column.unit)
+                different += [column] * (is_other or convention not in (None, column.convention))
+        if different and (is_header or compatible > 1):
+            raise UnitError(
+                f"the {different[0].role.replace('_', ' ')} has two units",
+                file=table.file,
+                place=table.place(line, different[0]),
+                found=f"{', '.join(texts[column.index] for column in different)} on line {line}, "
+                f"{', '.join(str(column.unit) for column in different)} on line {first}",
+                expected="the same units in all blocks of a file",
+                hint="convert all blocks to the same units, or write each to a file of its own",
+            )

@@ -178,15 +178,20 @@ class Cells:
         block.clean.add((block.before, indices))
         return {index: frame[index].to_numpy() for index in indices}
 
-    def distinct_texts(self, block: RowSource, index: int) -> tuple[Sequence[str | float], Any]:
-        """Return texts or numbers of a column in a block, and the index among them of each row of data, (n,)."""
+    def distinct_texts(self, block: RowSource, indices: Sequence[int]) -> Iterator[tuple[Sequence[str | float], Any]]:
+        """Yield texts or numbers of each column in a block, and the index among them of each row of data, (n,)."""
         if isinstance(block, Text) and self.layout.delimiter != " " and b'"' not in block.data:
             is_clean = (block.before, self.needed) in block.clean or self.parse(block, self.needed) is not None
-            frame = block.frame(self.layout, {index: "category"}, len(self.headers), ".") if is_clean else None
+            types = dict.fromkeys(indices, "category")
+            frame = block.frame(self.layout, types, len(self.headers), ".") if is_clean else None
             if frame is not None:
-                codes, texts = frame[index].factorize()
-                return list(texts), codes
-        return [row[index] for _, row in self.rows(block)], slice(None)
+                for index in indices:
+                    codes, texts = frame[index].factorize()
+                    yield list(texts), codes
+                return
+        rows = [row for _, row in self.rows(block)]
+        for index in indices:
+            yield [row[index] for row in rows], slice(None)
 
     def note_left_out(self, rows: Sequence[FaultyRow], count: int) -> Iterator[str]:
         """Describe rows that are left out because they are not data, except headers and units that are repeated.

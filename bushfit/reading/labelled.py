@@ -50,17 +50,20 @@ def same_text(text: str, reference: str) -> bool:
     return text.strip(" #").casefold() == reference.strip(" #").casefold()
 
 
-def column_texts(cells: Cells, index: int) -> ColumnTexts:
-    """Return the texts of a column by its index; an empty or merged cell gets the text of the cell above."""
-    words, parts = dict[str, int](), [np.empty(0, dtype=np.intp)]
-    for block in cells.blocks():
-        texts, rows = cells.distinct_texts(block, index)
-        numbers = [words.setdefault(_text(cell).strip(" #"), len(words)) for cell in texts]
-        parts.append(np.array(numbers, dtype=np.intp)[rows])
-    codes = np.concatenate(parts)
-    if "" in words:
-        codes = codes[np.maximum.accumulate(np.where(codes == words[""], 0, np.arange(codes.size)))]
-    return ColumnTexts(list(words), codes)
+def column_texts(cells: Cells, *indices: int) -> list[ColumnTexts]:
+    """Return the texts of columns by their indices; an empty or merged cell gets the text of the cell above."""
+    words: list[dict[str, int]] = [{} for _ in indices]
+    parts = [[np.empty(0, dtype=np.intp)] for _ in indices]
+    for block in cells.blocks() if indices else ():
+        for known, part, (texts, rows) in zip(words, parts, cells.distinct_texts(block, indices), strict=True):
+            numbers = [known.setdefault(_text(cell).strip(" #"), len(known)) for cell in texts]
+            part.append(np.array(numbers, dtype=np.intp)[rows])
+    columns = []
+    for known, codes in zip(words, map(np.concatenate, parts), strict=True):
+        if "" in known:
+            codes = codes[np.maximum.accumulate(np.where(codes == known[""], 0, np.arange(codes.size)))]
+        columns.append(ColumnTexts(list(known), codes))
+    return columns
 
 
 def _text(cell: str | float) -> str:
@@ -86,7 +89,7 @@ def find_labels(cells: Cells) -> Mapping[str, tuple[int, Sequence[str]]]:
         if heading is None or heading.role in labels or (header == "block" and "displacement" not in cells.roles):
             continue
         if _may_distinguish_tests(cells, index):
-            texts = column_texts(cells, index)
+            (texts,) = column_texts(cells, index)
             if heading.role == "direction":
                 directions = [named_direction([text], short=True) for text in texts.values]
                 if not any(directions):
@@ -118,7 +121,7 @@ def select_rows(cells: Cells, labels: Mapping[str, tuple[int, Sequence[str]]], w
         if header not in cells.headers:
             raise cells.header_error(f'there is no column "{header}"', expected="headers, as keys of rows")
         index = cells.headers.index(header)
-        chosen.append((index, column_texts(cells, index).per_row(), text))
+        chosen.append((index, column_texts(cells, index)[0].per_row(), text))
     if wanted.shared and not chosen:
         expected = "each file once, or a column that selects the rows of each test"
         raise cells.header_error("a file is listed twice", expected=expected)
@@ -158,16 +161,16 @@ def note_not_understood(
         One sentence for each such column.
     """
     understood = {index for key, (index, texts) in labels.items() if key != "direction" or len({*texts}) == 1}
-    for index, header in enumerate(cells.headers):
-        is_number = cells.holds_numbers(index)
-        if (
-            index in understood
-            or header == "block"
-            or (is_number and not settled)
-            or not _may_distinguish_tests(cells, index)
-        ):
-            continue
-        texts = column_texts(cells, index)
+    unclear = [
+        index
+        for index, header in enumerate(cells.headers)
+        if index not in understood
+        and header != "block"
+        and (settled or not cells.holds_numbers(index))
+        and _may_distinguish_tests(cells, index)
+    ]
+    for index, texts in zip(unclear, column_texts(cells, *unclear), strict=True):
+        header, is_number = cells.headers[index], cells.holds_numbers(index)
         number, counts = np.unique(
             texts.codes if rows is None else texts.codes[rows], return_inverse=True, return_counts=True
         )[1:]

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from bushfit import units
-from bushfit.reading.headers import WORDS, Vocabulary, plain, split_convention
+from bushfit.reading.headers import WORDS, Vocabulary, plain, split_convention, split_unit
 from bushfit.reading.numerals import is_like_number
 
 #: First words of rows that summarise others.
@@ -109,6 +109,11 @@ class Layout:
         """Return True if a row repeats the header or the row of units."""
         texts = [plain(cell) for cell in cells]
         return any(texts) and any(texts == list(map(plain, row)) for row in (self.headers, self.units))
+
+    def is_header(self, cells: Sequence[str]) -> bool:
+        """Return True if at least two cells of a row name columns of the table, with these or other units."""
+        names = {plain(split_unit(header)[0]) for header in self.headers} - {""}
+        return len(names & {plain(split_unit(cell)[0]) for cell in cells}) > 1
 
 
 def split(content: Content, delimiter: str) -> list[str]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bushfit import units
 from bushfit.errors import MeasurementError, UnitError, error_location
 from bushfit.geometry import STRAINING, TRANSLATION, Motion
-from bushfit.reading.blocks import combined
+from bushfit.reading.blocks import combined, refuse_other_columns
 from bushfit.reading.cells import Cells, FaultyRow
 from bushfit.reading.classification import classify
 from bushfit.reading.headers import (
@@ -277,6 +277,7 @@ class Table(Cells):
             for values in table._read_block(block, wanted, left_out):
                 for role, numbers in values.items():
                     parts[role].append(numbers)
+        refuse_other_columns(table, left_out)
         values = {role: np.concatenate(parts.pop(role)) for role in wanted}
         count = len(next(iter(values.values())))
         notes = (*self.notes, *table.note_left_out(left_out, count))
