@@ -45,7 +45,7 @@ class Campaign:
     """A bushing, specimens of its compound, their tests, and the settings of the campaign file, all in SI.
 
     Args:
-        name: name of the campaign; default the name of the bushing, or of the first specimen.
+        name: name of the campaign; default the name of the bushing, of several bushings, or of the first specimen.
         path: path of the campaign file.
         sha256: SHA-256 of the campaign file; empty without a file.
         logo: logo of [report] as a data URI; None without a logo.
@@ -112,8 +112,9 @@ def load_campaign(path: str | Path) -> Campaign:
         track(f"{kind} read", reader_keywords(path, tests, specimens), len(tests))
         for kind, tests in (("loops", content.loops), ("sweeps", content.sweeps), ("records", content.validation))
     )
+    several = " and ".join(table.name for table in content.bushings)
     found: dict[str, Any] = {
-        "name": content.name or (bushing.name if bushing else specimens[0].body),
+        "name": content.name or (bushing.name if bushing else several or specimens[0].body),
         "bushing": bushing,
         "specimens": specimens,
         "loops": tuple(

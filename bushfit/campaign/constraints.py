@@ -73,7 +73,8 @@ def _prior(campaign: Campaign, text: str, name: str) -> Prior:
     )
     low, high = parameter.bounds
     if not (low <= mean <= high and deviation > 0.0 and (mean > 0.0 or not parameter.log)):
-        expected = f"a value within {low:g} to {high:g} {parameter.unit}, and a positive standard deviation"
+        limits = f"{low:g} to {high:g} {parameter.unit}".removesuffix(" 1")
+        expected = f"a value within {limits}, and a positive standard deviation"
         raise CampaignError("this is no prior", found=f'"{text}"', expected=expected)
     return Prior((name,), np.array([mean]), np.array([[deviation**2]]), text)
 

@@ -109,7 +109,7 @@ def command(
         **grid_values(directions, grids),
         "temperature": kelvin(temperature),
         "preloads": preload,
-        "bushing": _bushing_of(result, bushing) if bushing else None,
+        "bushing": None if bushing is None else _bushing_of(result, bushing),
         "mass": positive(mass, "--mass", "kg"),
         "base_acceleration": positive(base_acceleration, "--base-acceleration", "m/s^2"),
         "arms": positive(arms, "--arms", "1"),

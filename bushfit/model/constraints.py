@@ -1,5 +1,6 @@
 """Constraints of a model's parameters that do not come from its tests: priors from earlier knowledge, and ties."""
 
+import ast
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bushfit.effects import is_parameter, parameter_names
+from bushfit.effects import get_parameter, is_parameter, parameter_names
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.validation import unknown_key
@@ -74,7 +75,7 @@ class Tie:
             if not is_parameter(used):
                 raise unknown_key(used, parameter_names())
         tie = cls(name, expression, names)
-        tie.value(dict.fromkeys(names, 1.0))
+        tie.value({used: get_parameter(used).typical + 0j for used in names})  # complex, as for derivatives
         return tie
 
     def value(self, values: Mapping[str, Any]) -> Any:
@@ -84,16 +85,19 @@ class Tie:
             Value [SI]; complex if a parameter value is.
 
         Raises:
-            ModelError: the expression has no value.
+            ModelError: the expression has no value, or no real value of real parameters.
         """
         symbols = {name: f"p{i}" for i, name in enumerate(self.names)}
         code = _NAME.sub(lambda match: symbols[match[0]], self.expression)
         try:
             with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
                 value = _evaluate(code, {symbol: values[name] for name, symbol in symbols.items()})
+            if not any(map(np.iscomplexobj, map(values.get, self.names))) and not np.isfinite(float(value)):
+                raise ValueError(value)
         except Exception as error:
             raise ModelError(
                 "this expression has no value",
+                place=f"fit.{self.name}",
                 found=self.expression,
                 expected="numbers, names of parameters, + - * / ** ( ), exp, log and sqrt",
             ) from error
@@ -102,6 +106,7 @@ class Tie:
 
 def _evaluate(code: str, symbols: Mapping[str, Any]) -> Any:
     """Evaluate an expression of symbols, numbers and functions to a number."""
+    ast.parse(code.strip(), mode="eval")  # asteval also takes several expressions
     interpreter = _interpreter()
     interpreter.symtable.update(symbols)
     interpreter.error = []

@@ -50,7 +50,9 @@ def test_factors_of_three_shapes_are_recovered_and_read_back(tmp_path: Path) -> 
     file = tmp_path / "tests/campaign.toml"
     text = file.read_text(encoding="utf-8").replace("[[bushings]]", '[[bushings]]\nfactor = "free"')
     file.write_text(text, encoding="utf-8")
-    result = fit(load_campaign(file)).result
+    campaign = load_campaign(file)
+    result = fit(campaign).result
+    assert campaign.name == result.name == "short and long and thick"
     values = result.model.values
     ratio = values["stiffness_factor.long"] / values["stiffness_factor.thick"]
     assert ratio == pytest.approx(1.04 / 0.98, abs=0.01)
