@@ -97,7 +97,7 @@ def _from_file(campaign: Campaign, file: str, only: str | None = None, without: 
     names = [name for name in result.fitted if name not in result.at_bound and name not in without]
     names = [name for name in names if only in (None, name) and result.covariance.stderr(name)]
     if not names:
-        found = f"{only or 'no parameter'} is not fitted in {file}"
+        found = f"{only} is not fitted in {file}" if only else f"no fitted parameter in {file}"
         raise CampaignError("the earlier model has no such parameter", found=found, expected="a fitted parameter")
     covariance = result.covariance.restricted(names)
     mean = np.array([result.model.values[name] for name in covariance.names])

@@ -191,11 +191,15 @@ def _one_cycle(channel: DisplacementHistory) -> DisplacementHistory:
 
 def _smoothed(channel: DisplacementHistory, frequency: float, *, steady: bool) -> DisplacementHistory:
     """Remove frequencies of a displacement above a cut-off frequency [Hz], and note the size of what is removed."""
-    nyquist = 0.5 / channel.step
-    if not 0.0 < frequency < nyquist:
-        found, expected = f"{number(frequency, 4)} Hz", f"below {number(nyquist, 4)} Hz, half of the sampling rate"
+    lowest, nyquist = 1.0 / (channel.step * channel.displacement.size), 0.5 / channel.step
+    if not lowest <= frequency < nyquist:
+        low, high = number(lowest, 4), number(nyquist, 4)
+        expected = f"from {low} Hz, one cycle in the history, to below {high} Hz, half of the sampling rate"
         raise MeasurementError(
-            "the low-pass does not suit the history", place="lowpass", found=found, expected=expected
+            "the low-pass does not suit the history",
+            place="--lowpass",
+            found=f"{number(frequency, 4)} Hz",
+            expected=expected,
         )
     smooth = low_pass(channel.displacement, channel.step, frequency, periodic=steady)
     unit, factor = channel.direction.display.displacement

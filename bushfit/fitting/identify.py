@@ -121,8 +121,9 @@ def undetermined_parameters(
         idle = {effect_name_of(name) for name in zero}
         idle -= {effect_name_of(name) for name in amounts if not is_zero(name)}
         for name in zero:
-            effect = effect_name_of(name)
-            lines.append(f"{name} does not differ from zero" + f": these tests do not show {effect}" * (effect in idle))
+            effect, neutral = effect_name_of(name), model.parameters[name].neutral
+            unseen = f": these tests do not show {effect}" * (effect in idle)
+            lines.append(f"{name} does not differ from {neutral:g}{unseen}")
         rest = [name for name in names if name not in zero and effect_name_of(name) not in idle]
         if not rest:
             return lines

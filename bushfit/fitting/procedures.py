@@ -304,6 +304,11 @@ def _result(
             for name in tie.names
             if tie.name in model.values and name not in model.values
         ),
+        *(
+            f"the prior {prior.source} is not used: the model lacks {', '.join(prior.names)}"
+            for prior in data.constraints.priors
+            if model.values.keys().isdisjoint(prior.names)
+        ),
         *outlier_warnings(outliers, robust=data.robust),
         *(sentence for step in steps for sentence in fit_warnings(model, step, data.bounds, cov, NEXT)),
     )

@@ -91,8 +91,9 @@ class Tie:
         code = _NAME.sub(lambda match: symbols[match[0]], self.expression)
         try:
             with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-                value = _evaluate(code, {symbol: values[name] for name, symbol in symbols.items()})
-            if not any(map(np.iscomplexobj, map(values.get, self.names))) and not np.isfinite(float(value)):
+                given = {symbol: values[name] for name, symbol in symbols.items()}
+                value = _evaluate(code, given)
+            if not any(isinstance(number, complex) for number in given.values()) and not np.isfinite(float(value)):
                 raise ValueError(value)
         except Exception as error:
             raise ModelError(

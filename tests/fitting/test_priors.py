@@ -93,6 +93,11 @@ def test_tests_contradict_a_wrong_prior_and_no_right_one(rig: Callable[..., Camp
         assert any("the tests contradict the prior of alpha" in line for line in found.warnings) == contradicts
 
 
+def test_a_prior_of_a_parameter_that_the_model_lacks_is_reported(rig: Callable[..., Campaign]) -> None:
+    found = _fitted(rig(0), **{"inertia.mass": ParameterSetting(prior="0.1 kg +- 0.01 kg")})
+    assert "the prior 0.1 kg +- 0.01 kg is not used: the model lacks inertia.mass" in found.warnings
+
+
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
