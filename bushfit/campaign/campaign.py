@@ -132,7 +132,8 @@ def load_campaign(path: str | Path) -> Campaign:
     }
     factors = tuple(f"stiffness_factor.{table.name}" for table in content.bushings if table.factor == "free")
     priors = {name: ParameterSetting(prior=f"1 +- {FACTOR_SPREAD}") for name in factors}
-    effects = tuple(dict.fromkeys((*content.fit.effects, *factors)))
+    stated = content.fit.effects
+    effects = (*stated, *(factor for factor in factors if factor not in stated))
     found["fit"] = replace(content.fit, effects=effects, parameters={**priors, **content.fit.parameters})
     settings = {key: value for key, value in vars(content).items() if key != "bushings"}
     return Campaign(**{**settings, **found}, path=path)

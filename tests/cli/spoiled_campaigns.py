@@ -6,7 +6,7 @@ from __future__ import annotations
 BUSHING = '[bushing]\nname = "x"\ninner_radius = "10 mm"\nouter_radius = "18 mm"\nlength = "34 mm"\n'
 #: (text of the campaign, text instead of it, what the error says ...)
 IN_CAMPAIGN = [
-    ("[bushing]", "[bushings]", "campaign.toml, bushings: unknown key", 'did you mean "bushing"?'),
+    ("[bushing]", "[bushings]", "campaign.toml, bushings: this value is not understood", "write [[bushings]], in two brackets"),
     ('name = "Test bushing"\n', "", "campaign.toml, bushing.name: a key is missing", "name = ..."),
     ('name = "Test bushing"', 'name = ""', "campaign.toml, bushing.name: this value is not understood", "a text that is not empty"),
     ('name = "Test bushing"', 'name = "a\\u001b[2J"', "campaign.toml, bushing.name: this value is not understood", "one line without control characters"),

@@ -15,6 +15,7 @@ import numpy as np
 
 from bushfit.effects import Parameter
 from bushfit.effects.contract import Array
+from bushfit.model.constraints import UNCONSTRAINED, Constraints
 
 FOLDER = Path(__file__).with_name("strd")
 #: How far from its start a parameter may go, in units of the start's size: bushfit's fits have bounds always.
@@ -28,6 +29,8 @@ class Curve:
     values: Mapping[str, float]
     parameters: Mapping[str, Parameter]
     effects: tuple[str, ...] = ()
+    constraints: Constraints = UNCONSTRAINED
+    tied: tuple[str, ...] = ()
 
     def with_values(self, values: Mapping[str, float]) -> Curve:
         return replace(self, values={**self.values, **values})
