@@ -260,10 +260,13 @@ def refuse_other_columns(table: Cells, left_out: Iterable[FaultyRow]) -> None:
                     hint="write all blocks with the same columns, or each to a file of its own",
                 )
             is_unit = unit != "-" and not is_like_number(unit or "1")
-            if unit and column.unit and is_unit and units.is_compatible(unit, column.unit):
+            if not (unit and column.unit and is_unit):
+                continue
+            degrees = [units.kelvin_scale(text) for text in (unit, column.unit)]
+            if all(degrees) or units.is_compatible(unit, column.unit):
                 compatible += 1
-                is_other = units.si_factor(unit, column.unit) != units.si_factor(column.unit, column.unit)
-                different += [column] * (is_other or convention not in (None, column.convention))
+                scale, usual = degrees if all(degrees) else (units.si_factor(t, t) for t in (unit, column.unit))
+                different += [column] * (scale != usual or convention not in (None, column.convention))
         if different and (is_header or compatible > 1):
             raise UnitError(
                 f"the {different[0].role.replace('_', ' ')} has two units",
