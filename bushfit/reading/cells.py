@@ -179,7 +179,11 @@ class Cells:
         return {index: frame[index].to_numpy() for index in indices}
 
     def distinct_texts(self, block: RowSource, indices: Sequence[int]) -> Iterator[tuple[Sequence[str | float], Any]]:
-        """Yield texts or numbers of each column in a block, and the index among them of each row of data, (n,)."""
+        """Find the distinct texts of columns in a block of rows.
+
+        Returns:
+            For each column its texts or numbers, and the index among them of each of the n rows of data, (n,).
+        """
         if isinstance(block, Text) and self.layout.delimiter != " " and b'"' not in block.data:
             is_clean = (block.before, self.needed) in block.clean or self.parse(block, self.needed) is not None
             types = dict.fromkeys(indices, "category")
