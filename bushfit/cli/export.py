@@ -54,7 +54,7 @@ from bushfit.cli.shared_options import (
     option("--accuracy", "ERROR", "Largest permitted error of the modulus in an FMU or prony [1 %].", default="1 %"),
 )
 @prediction_options("Use the frequencies and amplitudes of this campaign.")
-@with_output("results/<name>", "tables", "pictures")
+@with_output("results/<name>", "tables")
 def command(
     model: Path,
     formats: tuple[str, ...],

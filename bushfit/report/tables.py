@@ -321,7 +321,7 @@ def master_curve_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:
 
 def bushings_table(bushings: Sequence[OtherBushings]) -> pd.DataFrame:
     """Table of the agreement of each of several bushings with a fit to the others, one row per bushing."""
-    columns = ["bushing", "points", "NRMSE [%]", "reduced chi-square [-]", "mean error [%]", "points in band [%]"]
+    columns = ["bushing", "points", "NRMSE [%]", "chi2 [-]", "mean error [%]", "in band [%]"]
     table = pd.DataFrame([astuple(row) for row in bushings], columns=columns)
     percent = [name for name in columns if "%" in name]
     return table.assign(**{name: 100.0 * table[name] for name in percent})
