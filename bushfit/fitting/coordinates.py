@@ -82,7 +82,8 @@ def residual(model: Model, data_sets: Sequence[MeasuredTest], *, with_priors: bo
         with_priors: True to append the residuals of the model's priors, (n + p,).
     """
     of_tests = list(map(methodcaller("residual", model), data_sets))
-    return whiten_together(data_sets, np.concatenate([*of_tests, *([prior_rows(model, ())[0]] * with_priors)]))
+    of_priors = [prior_rows(model, ())[0]] if with_priors else []
+    return whiten_together(data_sets, np.concatenate([*of_tests, *of_priors]))
 
 
 def jacobian(
@@ -104,7 +105,7 @@ def jacobian(
     by_value = np.concatenate(list(map(methodcaller("jacobian", model, moving), data_sets)), axis=-1)
     if model.tied:
         by_value = by_value[: len(names)] + model.constraints.slopes(model.values, names) @ by_value[len(names) :]
-    of_priors = [prior_rows(model, names)[1]] * with_priors
+    of_priors = [prior_rows(model, names)[1]] if with_priors else []
     return whiten_together(data_sets, np.concatenate([by_value * slopes[:, None], *of_priors], axis=-1))
 
 
