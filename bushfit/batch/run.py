@@ -20,18 +20,7 @@ from bushfit.batch.summary import BatchPlan, BatchResult
 from bushfit.errors import OutputError
 from bushfit.progress import track
 from bushfit.report.batch_document import BatchFile
-from bushfit.report.results import (
-    Picture,
-    ResultFile,
-    check_free,
-    encode_all,
-    figure_file,
-    json_file,
-    page_file,
-    table_file,
-    unwritable,
-    write_files,
-)
+from bushfit.report.results import Picture, ResultFile, check_free, encode_all, unwritable, write_files
 from bushfit.validation import to_json_data
 
 if TYPE_CHECKING:
@@ -163,9 +152,13 @@ def batch_files(result: BatchResult) -> list[ResultFile]:
 
     plan, panels = result.plan, make_panels(result) if result.plan.formats.pictures else []
     names = [row.name for row in plan.rows]
-    files = [json_file("batch", to_json_data(result.document, BatchFile)), table_file("batch", result.table)]
-    files += [page_file("index", partial(index_page, folder=plan.task.output), files[:1])] if plan.formats.pages else []
-    return files + ([figure_file("batch", partial(batch_figure, panels, plan.title, names))] if panels else [])
+    document = ResultFile("batch", "json", to_json_data(result.document, BatchFile))
+    files = [document, ResultFile("batch", "table", result.table)]
+    if plan.formats.pages:
+        files.append(ResultFile("index", "page", partial(index_page, [document], plan.task.output)))
+    if panels:
+        files.append(ResultFile("batch", "figure", partial(batch_figure, panels, plan.title, names)))
+    return files
 
 
 def make_panels(result: BatchResult) -> list[Panel]:

@@ -19,7 +19,7 @@ from bushfit.cli.options import command_called, flag, option, option_group, opti
 from bushfit.cli.output import Output, with_output
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, error_location, quote_path
 from bushfit.progress import track
-from bushfit.report.results import check_free, raw_file
+from bushfit.report.results import ResultFile, check_free
 from bushfit.units import parse_quantity
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def command(
         "files": [inspection.to_document() for inspection in inspections],
         "left_out": left_out,
     }
-    results = [raw_file(file, text.encode()) for file, text in written.items()]
+    results = [ResultFile(file, "raw", text.encode()) for file, text in written.items()]
     output.write(folder, results, document, files)
     output.print(f"next: bushfit {'batch' if len(written) > 1 else 'run'} {quote_path(folder / target)}")
 

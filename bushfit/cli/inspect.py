@@ -17,7 +17,7 @@ from bushfit.cli.output import Output, with_output
 from bushfit.errors import BushfitError
 from bushfit.progress import track
 from bushfit.report import plots
-from bushfit.report.results import figure_file
+from bushfit.report.results import ResultFile
 
 if TYPE_CHECKING:
     from bushfit.inspection.record import Inspection, InspectionDocument
@@ -78,7 +78,7 @@ def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Ou
     if output.formats.pictures:
         draw = plots.inspection.inspection_figure
         figures = [
-            figure_file(page, partial(draw, inspections, number * _FILES_A_PICTURE, _FILES_A_PICTURE))
+            ResultFile(page, "figure", partial(draw, inspections, number * _FILES_A_PICTURE, _FILES_A_PICTURE))
             for number, page in enumerate(pages)
         ]
         output.write(folder, figures, document, files)

@@ -24,7 +24,7 @@ def command(page: str | None, output: Output) -> None:
 
     from bushfit.errors import BushfitError, did_you_mean
     from bushfit.report.page.manual import manual_page, page_names
-    from bushfit.report.results import page_file
+    from bushfit.report.results import ResultFile
 
     names = page_names()
     if page not in (None, *names):
@@ -32,6 +32,10 @@ def command(page: str | None, output: Output) -> None:
         raise BushfitError("no such page", place="PAGE", found=page, expected=f"one of {', '.join(names)}", hint=hint)
     folder = output.output or Path(tempfile.mkdtemp(prefix="bushfit-manual-"))
     file = (folder / "manual.html").resolve()
-    output.write(folder, [page_file("manual", lambda _: manual_page(), ())], {"file": str(file), "pages": names})
+    output.write(
+        folder,
+        [ResultFile("manual", "page", manual_page)],
+        {"file": str(file), "pages": names},
+    )
     if output.output is None:
         click.launch(f"{file.as_uri()}#{page}" if page else file.as_uri())

@@ -17,7 +17,7 @@ from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import parse_grid, positive
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.report import plots
-from bushfit.report.results import figure_file, table_file
+from bushfit.report.results import ResultFile
 from bushfit.units import format_aligned, number
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def command(
     snippet = f'[[sweeps]]\nfile = "{file}"\n{body} = {json.dumps(name, ensure_ascii=False)}\n'
     document = {body: name, "points": points.to_dict(orient="list"), **document}
     document |= {"warnings": list(warnings), "campaign": snippet}
-    results = [table_file("sweep", lambda: points), figure_file("reduce", figure)]
+    results = [ResultFile("sweep", "table", points), ResultFile("reduce", "figure", figure)]
     output.write(folder, results, document, files)
     output.print(f"for a campaign in {folder} (in another folder, add the path):\n\n{snippet}")
 

@@ -22,10 +22,10 @@ def command(folder: Path, output: Output) -> None:
     Writes report.html, or for a batch index.html.
     """
     from bushfit.report.page import folder_pages
-    from bushfit.report.results import Formats, raw_file
+    from bushfit.report.results import Formats, ResultFile
 
     target = output.output or folder
     base = "" if output.output is None else f"{folder.resolve().as_uri()}/"
     pages = {name: page for file in folder_pages(folder, base) for name, page in Formats().encode(file).items()}
-    files = [raw_file(name, page) for name, page in pages.items()]
+    files = [ResultFile(name, "raw", page) for name, page in pages.items()]
     output.write(target, files, {"pages": {str(target / name): len(page) for name, page in pages.items()}})

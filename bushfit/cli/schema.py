@@ -21,7 +21,7 @@ def command(name: str | None, output: Output) -> None:
     With -o, writes <name>.schema.json; without NAME, writes the schemas of all files.
     """
     from bushfit.errors import error_location
-    from bushfit.report.results import json_file
+    from bushfit.report.results import ResultFile
     from bushfit.schemas import DESCRIBED, schema
 
     with error_location(place="NAME"):
@@ -36,7 +36,7 @@ def command(name: str | None, output: Output) -> None:
     if output.output:
         output.write(
             output.output,
-            [json_file(f"{schema_name}.schema", text) for schema_name, text in documents.items()],
+            [ResultFile(f"{schema_name}.schema", "json", text) for schema_name, text in documents.items()],
             document,
         )
         return

@@ -23,7 +23,7 @@ from bushfit.planning.knowledge import look_alikes
 from bushfit.prediction.validation import Validation, validate
 from bushfit.report import diagnosed, plots
 from bushfit.report.page import report_page
-from bushfit.report.results import ResultFile, figure_file, json_file, page_file, table_file
+from bushfit.report.results import ResultFile, table_with_figure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -108,10 +108,13 @@ def diagnose(
     before = validate((joint or fit(data)).result, records) if records and diagnosis.added else []
     if validations:
         document["validation"] = [_validation_entry(*pair) for pair in zip_longest(validations, before)]
-    files = [json_file("diagnosis", document), json_file("model", result_document(diagnosis.result, origin))]
+    files = [
+        ResultFile("diagnosis", "json", document),
+        ResultFile("model", "json", result_document(diagnosis.result, origin)),
+    ]
     files += diagnosis_files(diagnosis, document, data.campaign.name)
     files += validation_files(validations, before, data.campaign.name)
-    files.append(page_file("report", report_page, files))
+    files.append(ResultFile("report", "page", partial(report_page, files)))
     return DiagnosisOutput(data.campaign.name, data, diagnosis, document, files, validations, before)
 
 
@@ -139,9 +142,12 @@ def diagnosis_files(diagnosis: Diagnosis, document: DiagnosisFile, title: str) -
     Returns:
         Files gap.csv, gap.png and candidates.csv, not yet rendered.
     """
-    gap = table_file("gap", partial(diagnosed.gap_table, diagnosis))
-    figure = figure_file("gap", lambda: plots.gap.gap_figure(gap.make(), diagnosis.result, document, title))
-    return [gap, figure, table_file("candidates", partial(diagnosed.candidates_table, diagnosis))]
+    gap = table_with_figure(
+        "gap",
+        partial(diagnosed.gap_table, diagnosis),
+        lambda table: plots.gap.gap_figure(table, diagnosis.result, document, title),
+    )
+    return [*gap, ResultFile("candidates", "table", partial(diagnosed.candidates_table, diagnosis))]
 
 
 def _require_free_parameter(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> None:

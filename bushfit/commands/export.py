@@ -18,7 +18,7 @@ from bushfit.export.contract import Dialect, Exported, ExportRequest, UnitSystem
 from bushfit.model.arms import ACCURACY
 from bushfit.model.file import load_result
 from bushfit.progress import track
-from bushfit.report.results import ResultFile, raw_file
+from bushfit.report.results import ResultFile
 
 #: Module below bushfit and function that write each format; imported when the format is asked for.
 FORMATS = {
@@ -127,5 +127,5 @@ def export(
     contents = {name: content for written in exported.values() for name, content in written.files.items()}
     arms = tuple(part for written in exported.values() for part in written.arms)
     places = [prediction.direction for prediction in predicted.predictions]
-    files = [raw_file(name, content) for name, content in contents.items()]
+    files = [ResultFile(name, "raw", content) for name, content in contents.items()]
     return ExportOutput(replace(predicted, arms=arms), exported, [*files, *arms_files(result, arms, places)])

@@ -17,7 +17,7 @@ from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.result import Result
 from bushfit.prediction.other_bushings import predict_each_bushing
 from bushfit.report import plots, tables
-from bushfit.report.results import ResultFile, figure_file, json_file, table_file
+from bushfit.report.results import ResultFile, table_with_figure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -73,10 +73,10 @@ def fit(
     result = procedures.fit_joint(data, effects=names, directions=directions or None, profile=profile)
     options = option_words(direction=directions, effect=effects, profile=profile)
     document = result_document(result, campaign_document(data, "fit", options))
-    files = [json_file("model", document), *campaign_files(data, result)]
+    files = [ResultFile("model", "json", document), *campaign_files(data, result)]
     if len({place.body for place in result.fitted_places if place.axis and place.body}) > 1:
         predicted = partial(predict_each_bushing, data, names, directions or None)
-        files.append(table_file("bushings", lambda: tables.bushings_table(predicted())))
+        files.append(ResultFile("bushings", "table", lambda: tables.bushings_table(predicted())))
     return FitOutput(data, (("joint fit", result),), document, files)
 
 
@@ -94,7 +94,7 @@ def fit_static(
     result = procedures.fit_static(data, as_result(dynamic) if dynamic else None)
     options = ("--dynamic", "DYNAMIC.json") if dynamic else ()
     document = result_document(result, campaign_document(data, "fit-static", options))
-    files = [json_file("static", document), *campaign_files(data, result, ["loop"])]
+    files = [ResultFile("static", "json", document), *campaign_files(data, result, ["loop"])]
     return FitOutput(data, (("static fit of the loops", result),), document, files)
 
 
@@ -130,7 +130,7 @@ def fit_dynamic(
     result = procedures.fit_dynamic(data, fixed)
     options = ("--static", "STATIC.json") if static else ()
     document = result_document(result, campaign_document(data, "fit-dynamic", options))
-    files = [json_file("dynamic", document), *campaign_files(data, result, ["sweep"])]
+    files = [ResultFile("dynamic", "json", document), *campaign_files(data, result, ["sweep"])]
     return FitOutput(data, (*steps, ("dynamic fit of the smallest sweep", result)), document, files)
 
 
@@ -151,7 +151,7 @@ def campaign_files(
 ) -> list[ResultFile]:
     """Tables and figures that compare the tests with the model; outliers that the fit left out have no weight.
 
-    Sweeps at several temperatures add a master curve, if the model has the effect of temperature.
+    Sweeps at several temperatures add a master curve and its shift factors, if the model has the effect of temperature.
 
     Args:
         data: campaign, prepared for a fit.
@@ -165,31 +165,20 @@ def campaign_files(
     title = model.name if model.bushing else data.campaign.name
     files = list[ResultFile]()
     if "loop" in kinds and marked.loops:
-        loops = table_file("loops", lambda: tables.loops_table(model, marked.loops))
-        files += [loops, figure_file("loops", lambda: plots.fits.loops_figure(result, loops.make(), title))]
+        make = partial(tables.loops_table, model, marked.loops)
+        files += table_with_figure("loops", make, lambda table: plots.fits.loops_figure(result, table, title))
     if "sweep" in kinds and marked.sweeps:
-        sweeps = table_file("sweeps", lambda: tables.sweeps_table(model, marked.sweeps))
-        files += [sweeps, figure_file("sweeps", lambda: plots.fits.sweeps_figure(result, sweeps.make(), title))]
+        make = partial(tables.sweeps_table, model, marked.sweeps)
+        files += table_with_figure("sweeps", make, lambda table: plots.fits.sweeps_figure(result, table, title))
         if "temperature" in model.effects and any(map(can_shift, data.campaign.sweeps)):
-            files += temperature_files(data, result, title)
+            shifted = cache(partial(master_curve, result, marked.sweeps))
+            files += [
+                ResultFile("master_curve", "table", lambda: tables.master_curve_table(shifted())),
+                ResultFile(
+                    "master_curve",
+                    "figure",
+                    lambda: plots.master_curve.master_curve_figure(model, shifted(), title),
+                ),
+                ResultFile("shift_factors", "table", lambda: tables.shift_factors_table(shifted())),
+            ]
     return files
-
-
-def temperature_files(data: PreparedCampaign, result: Result, title: str) -> list[ResultFile]:
-    """Master curve and shift factors of sweeps at several temperatures, each a table and a figure.
-
-    Args:
-        data: campaign, prepared for a fit.
-        result: fit of the campaign with the effect of temperature.
-        title: title of the figure.
-
-    Returns:
-        Two tables and a figure, not yet rendered.
-    """
-    sweeps, model = data.without(result.outliers).sweeps, result.model
-    shifted = cache(partial(master_curve, result, sweeps))
-    return [
-        table_file("master_curve", lambda: tables.master_curve_table(shifted())),
-        figure_file("master_curve", lambda: plots.master_curve.master_curve_figure(model, shifted(), title)),
-        table_file("shift_factors", lambda: tables.shift_factors_table(shifted())),
-    ]

@@ -24,7 +24,7 @@ from bushfit.planning.document import PlanFile, plan_document
 from bushfit.planning.knowledge import from_campaign, from_result, rig_of
 from bushfit.planning.plan import plan as choose_tests
 from bushfit.prediction.grid import default_grid, grid_settings, requested_grid
-from bushfit.report.results import ResultFile, json_file, raw_file, table_file
+from bushfit.report.results import ResultFile
 from bushfit.units import number
 
 #: Predicted quantities that may be targets.
@@ -48,11 +48,11 @@ class PlanOutput:
     def files(self) -> list[ResultFile]:
         """Document and table of tests; and a campaign file, if the plan has tests."""
         files = [
-            json_file("plan", self.document),
-            table_file("plan", partial(plan_sheet, self.plan)),
+            ResultFile("plan", "json", self.document),
+            ResultFile("plan", "table", partial(plan_sheet, self.plan)),
         ]
         if self.plan.planned.tests:
-            files.append(raw_file(CAMPAIGN_FILE, campaign_toml(self.plan).encode()))
+            files.append(ResultFile(CAMPAIGN_FILE, "raw", campaign_toml(self.plan).encode()))
         return files
 
     @cached_property

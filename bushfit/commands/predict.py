@@ -34,7 +34,7 @@ from bushfit.prediction.superposed import LargeMotion
 from bushfit.reading.measurement import SAME_TEMPERATURE, Loop, Sweep
 from bushfit.reading.preload import Preload, parse_preload
 from bushfit.report import plots, tables
-from bushfit.report.results import ResultFile, figure_file, place_names, table_file
+from bushfit.report.results import ResultFile, place_names
 from bushfit.report.tables import prediction_table
 from bushfit.units import CELSIUS
 
@@ -353,11 +353,11 @@ def _files(
 
     files = list[ResultFile]()
     for name, predictions in zip(names, by_place.values(), strict=True):
-        files.append(table_file(name, partial(joined_table, predictions)))
-        files.append(figure_file(name, partial(draw, predictions[0])))
+        files.append(ResultFile(name, "table", partial(joined_table, predictions)))
+        files.append(ResultFile(name, "figure", partial(draw, predictions[0])))
         if len(predictions) > 1:
             over_preload = partial(plots.preload.preload_figure, result, predictions, result.name, temperature)
-            files.append(figure_file(f"{name}_preload", over_preload))
+            files.append(ResultFile(f"{name}_preload", "figure", over_preload))
     files += arms_files(result, output.arms, places)
     suffixes: Sequence[tuple[str, Callable[[Any], pd.DataFrame], Sequence[Any]]] = [
         ("wide", tables.wide_table, output.predictions if wide else ()),
@@ -369,11 +369,11 @@ def _files(
             stem = f"{name}_{suffix}"
             while stem in names:  # of a specimen
                 stem += "_"
-            files.append(table_file(stem, partial(make, part)))
+            files.append(ResultFile(stem, "table", partial(make, part)))
             if isinstance(part, StaticCurve):
                 title = f"{result.name}: {part.label}, static curve"
-                files.append(figure_file(stem, partial(plots.prediction.static_figure, part, title)))
-    return [*files, *([table_file("measured", measured_table)] if output.measured else [])]
+                files.append(ResultFile(stem, "figure", partial(plots.prediction.static_figure, part, title)))
+    return [*files, *([ResultFile("measured", "table", measured_table)] if output.measured else [])]
 
 
 def arms_files(result: Result, arms: Sequence[Arms], places: Sequence[Place]) -> list[ResultFile]:
@@ -387,7 +387,7 @@ def arms_files(result: Result, arms: Sequence[Arms], places: Sequence[Place]) ->
     Returns:
         File arms.csv, not yet rendered.
     """
-    return [table_file("arms", lambda: tables.arms_table(result.model, arms, places))] if arms else []
+    return [ResultFile("arms", "table", lambda: tables.arms_table(result.model, arms, places))] if arms else []
 
 
 def joined_table(predictions: Sequence[Prediction]) -> pd.DataFrame:

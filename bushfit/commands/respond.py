@@ -1,12 +1,10 @@
 """respond: force of a fitted model over time for a displacement history."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -27,11 +25,8 @@ from bushfit.reading.tablefile import folder_name
 from bushfit.reduction.lowpass import low_pass
 from bushfit.report import plots
 from bushfit.report.response import record_table, response_figures, response_table, validation_table
-from bushfit.report.results import ResultFile, figure_file, table_file
+from bushfit.report.results import ResultFile, table_with_figure
 from bushfit.units import number
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: Ratio of mean to range of a displacement above which the mean is the zero of a transducer; chosen: no rubber follows.
 _OFFSET = 10.0
@@ -82,14 +77,13 @@ class ResponseOutput:
     @property
     def files(self) -> list[ResultFile]:
         """Table response.csv and figure response.png."""
-
-        table = table_file("response", lambda: response_table(self.time, self.responses))
-
-        def draw() -> Figure:
-            note = plots.style.warnings_note(self.warnings)
-            return plots.response.response_figure(f"{self.result.name}: force over time", table.make(), note)
-
-        return [table, figure_file("response", draw)]
+        return table_with_figure(
+            "response",
+            lambda: response_table(self.time, self.responses),
+            lambda table: plots.response.response_figure(
+                f"{self.result.name}: force over time", table, plots.style.warnings_note(self.warnings)
+            ),
+        )
 
 
 def respond(
@@ -220,14 +214,10 @@ def validation_files(validations: Sequence[Validation], before: Sequence[Validat
     Returns:
         Result files, not yet rendered; empty without records.
     """
-    files = [table_file("validation", lambda: validation_table(validations, before))] if validations else []
+    files = [ResultFile("validation", "table", lambda: validation_table(validations, before))] if validations else []
+    draw = lambda title, table: plots.response.response_figure(title, table)  # noqa: E731  # imported late
     for validation in validations:
         name = f"validation_{folder_name(validation.record.name)}"
-        table = table_file(name, partial(record_table, validation))
-        draw = partial(_validation_figure, f"{title}: {validation.record.name}", table)
-        files += [table, figure_file(name, draw)]
+        record_title = f"{title}: {validation.record.name}"
+        files += table_with_figure(name, partial(record_table, validation), partial(draw, record_title))
     return files
-
-
-def _validation_figure(title: str, table: ResultFile) -> Figure:
-    return plots.response.response_figure(title, table.make())

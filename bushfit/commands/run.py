@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any, Required
 
 from pydantic import Field
@@ -23,7 +24,7 @@ from bushfit.model.model import FIVE
 from bushfit.model.result import Result
 from bushfit.prediction.validation import Validation, validate
 from bushfit.report.page import report_page
-from bushfit.report.results import ResultFile, json_file, page_file
+from bushfit.report.results import ResultFile
 
 
 class RunDocument(TypedDict, total=False):
@@ -113,13 +114,13 @@ def run(campaign: Campaign | PreparedCampaign, *, loss: Loss | None = None) -> R
     }
     if diagnosed:
         documents["diagnosis"] = diagnosed.document
-    files = [json_file(name, document) for name, document in documents.items()]
+    files = [ResultFile(name, "json", document) for name, document in documents.items()]
     files += campaign_files(data, predicted.result)
     files += diagnosis_files(diagnosed.diagnosis, diagnosed.document, data.campaign.name) if diagnosed else []
     files += [file for file in predicted.files if file.name != "measured"]
     validations = diagnosed.validations if diagnosed else validate(predicted.result, data.campaign.validation)
     files += validation_files(validations, diagnosed.validations_before if diagnosed else (), data.campaign.name)
-    files.append(page_file("report", report_page, files))
+    files.append(ResultFile("report", "page", partial(report_page, files)))
     document = {**documents, "warnings": predicted.warnings}
     return RunOutput(data, static, two_step, reason, joint, diagnosed, predicted, document, files, validations)
 

@@ -15,7 +15,7 @@ from bushfit.model.file import to_document
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.reading.tablefile import Form
-from bushfit.report.results import ResultFile, raw_file, write_results
+from bushfit.report.results import ResultFile, write_results
 from bushfit.simulation.files import to_files
 from bushfit.simulation.measured import Simulated
 from bushfit.simulation.measured import simulate as simulate_tests
@@ -58,7 +58,7 @@ def simulate_campaign(truth: Model, settings: SimulateSettings, form: Form = "cs
         truth = truth.without(UNNAMED)
     simulated = simulate_tests(truth, settings)
     contents = to_files(simulated, form)
-    files = [raw_file(name, content) for name, content in contents.items()]
+    files = [ResultFile(name, "raw", content) for name, content in contents.items()]
     return SimulationOutput(simulated, files, warnings)
 
 

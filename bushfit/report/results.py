@@ -16,7 +16,7 @@ import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -48,48 +48,25 @@ class ResultFile:
     Args:
         name: file name without its extension; a raw file has its extension.
         kind: "json", "table", "figure", "page" (HTML) or "raw".
-        make: function that makes the content: a mapping, a pandas table, a chart, HTML text or bytes, by kind.
+        source: content, or function that makes it: a mapping, a pandas table, a chart, HTML text or bytes, by kind.
     """
 
     name: str
     kind: Kind
-    make: Callable[[], Any]
+    source: Any
 
     @cached_property
     def content(self) -> Any:
         """Content of the file before encoding; it is computed once."""
-        return self.make()
+        return self.source() if callable(self.source) else self.source
 
 
-def json_file(name: str, document: Mapping[str, Any]) -> ResultFile:
-    """Make the result file for a JSON document; `name` has no extension."""
-    return ResultFile(name, "json", lambda: document)
-
-
-def table_file(name: str, make: Callable[[], pd.DataFrame]) -> ResultFile:
-    """Make the result file for a table, which `make` computes when the file is first needed."""
-    return ResultFile(name, "table", cache(make))
-
-
-def figure_file(name: str, make: Callable[[], Figure]) -> ResultFile:
-    """Make the result file for a figure, which `make` draws when the file is first needed."""
-    return ResultFile(name, "figure", make)
-
-
-def raw_file(name: str, content: bytes) -> ResultFile:
-    """Make the result file with given bytes; `name` has its extension."""
-    return ResultFile(name, "raw", lambda: content)
-
-
-def page_file(name: str, page: Callable[[Sequence[ResultFile]], str], files: Sequence[ResultFile]) -> ResultFile:
-    """Result file for an HTML page that shows other result files.
-
-    Args:
-        name: file name without its extension.
-        page: function that makes the HTML from result files.
-        files: result files with documents, tables and figures.
-    """
-    return ResultFile(name, "page", lambda: page(files))
+def table_with_figure(
+    name: str, make: Callable[[], pd.DataFrame], draw: Callable[[pd.DataFrame], Figure]
+) -> list[ResultFile]:
+    """Make the result files for a table and for its figure, which `draw` makes from the table."""
+    table = ResultFile(name, "table", make)
+    return [table, ResultFile(name, "figure", lambda: draw(table.content))]
 
 
 def contents(files: Iterable[ResultFile], kind: Kind) -> dict[str, Any]:
@@ -268,7 +245,10 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
             if file.exists() and any(file.samefile(path) for path in read):
                 raise OutputError("a result would replace an input of this run", file=file, hint=elsewhere)
         # digests before the record: a command that runs now records its files, then moves them here
-        lines = {f"{_digest(file)}  {name}": name for name, file in existing.items()}
+        lines = {}
+        for name, file in existing.items():
+            is_plain = file.is_file() and not file.is_symlink()
+            lines[f"{hashlib.sha256(file.read_bytes()).hexdigest() if is_plain else ''}  {name}"] = name
         record = folder / _RECORD
         recorded = record.read_text(encoding="utf-8", errors="replace").splitlines() if record.exists() else []
         foreign = [name for line, name in lines.items() if line not in recorded]
@@ -288,11 +268,6 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
             found=", ".join(existing),
             hint="--force replaces them; -o/--output names another folder",
         )
-
-
-def _digest(file: Path) -> str:
-    """SHA-256 of a regular file, hexadecimal; empty for a symbolic link or anything that is not a file."""
-    return hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() and not file.is_symlink() else ""
 
 
 def unwritable(folder: Path, error: OSError) -> OutputError:

@@ -18,7 +18,7 @@ import pytest
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
-from bushfit.commands.fit import fit, temperature_files
+from bushfit.commands.fit import campaign_files, fit
 from bushfit.commands.predict import predict as predict_campaign
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
@@ -144,8 +144,8 @@ def test_shift_factors_are_those_of_the_law_where_it_holds(clean: Undisturbed) -
     for each in found:
         line = result.model.stiffness(Direction.AXIAL, each.reduced_frequency, each.sweep.amplitude)
         assert np.max(np.abs(each.reduced_stiffness / line - 1.0)) < 0.02
-    tables = {file.name: file for file in temperature_files(data, result, "bushing") if file.kind == "table"}
-    factors, curve = (tables[name].make() for name in ("shift_factors", "master_curve"))
+    tables = {file.name: file for file in campaign_files(data, result) if file.kind == "table"}
+    factors, curve = (tables[name].content for name in ("shift_factors", "master_curve"))
     assert len(factors) == len(DEGREES)
     assert len(curve) == sum(each.sweep.frequency.size for each in found)
     assert factors["log10 a_T [-]"].to_numpy() == pytest.approx([each.shift[0] / np.log(10.0) for each in found])

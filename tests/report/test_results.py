@@ -26,7 +26,7 @@ from bushfit.errors import CONTROL, OutputError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.model import Model
 from bushfit.report.plots.style import to_image
-from bushfit.report.results import Formats, Picture, ResultFile, encode_all, raw_file, write_results
+from bushfit.report.results import Formats, Picture, ResultFile, encode_all, write_results
 from bushfit.report.tables import loops_table, sweeps_table
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are forked and killed")
@@ -36,7 +36,9 @@ NEW = {"a.csv": b"new a", "b.json": b"new b"}
 
 
 def write(folder: Path, files: dict[str, bytes], *, force: bool = False, inputs: tuple[Path, ...] = ()) -> None:
-    write_results(folder, [raw_file(*pair) for pair in files.items()], overwrite=force, inputs=inputs)
+    write_results(
+        folder, [ResultFile(name, "raw", content) for name, content in files.items()], overwrite=force, inputs=inputs
+    )
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -220,7 +222,7 @@ def outputs(root: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, l
 def test_pictures_and_sheets(command: str, outputs: dict[str, list[ResultFile]]) -> None:
     files, texts, cells = outputs[command], list[str](), list[Any]()
     for file in (file for file in files if file.kind == "figure"):
-        figure = file.make()
+        figure = file.content
         to_image(figure)
         drawn = figure.findobj(Text)
         assert not [text.get_text() for text in drawn if text._preprocess_math(text.get_text())[1]], "mathematics"

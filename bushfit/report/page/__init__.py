@@ -108,12 +108,12 @@ def folder_pages(folder: Path, base: str = "") -> list[ResultFile]:
     from bushfit.report.page.comparison import read_comparison
     from bushfit.report.page.index import index_page, read_batch
     from bushfit.report.page.record import has_model, read_results
-    from bushfit.report.results import page_file
+    from bushfit.report.results import ResultFile
 
     if (folder / "batch.json").exists():
-        return [page_file("index", partial(index_page, folder=folder, base=base), read_batch(folder))]
+        return [ResultFile("index", "page", partial(partial(index_page, folder=folder, base=base), read_batch(folder)))]
     compared = (folder / "compare.json").exists()
-    pages = [page_file("compare", comparison_page, read_comparison(folder))] if compared else []
+    pages = [ResultFile("compare", "page", partial(comparison_page, read_comparison(folder)))] if compared else []
     if has_model(folder) or not compared:
-        pages.append(page_file("report", report_page, read_results(folder)))
+        pages.append(ResultFile("report", "page", partial(report_page, read_results(folder))))
     return pages

@@ -22,7 +22,7 @@ from bushfit.report.compared import (
 from bushfit.report.page.report import MOST, conditions, tube_description
 from bushfit.report.page.svg import picture
 from bushfit.report.page.values import grid_corners
-from bushfit.report.results import ResultFile, contents, json_file
+from bushfit.report.results import ResultFile, contents
 from bushfit.report.tables import numeric_columns
 from bushfit.units import format_aligned, format_range, number, split_header
 
@@ -46,7 +46,7 @@ def read_comparison(folder: Path) -> list[ResultFile]:
     file = folder / "compare.json"
     document = read_document(file)
     ComparisonDocument.from_document(document, file)
-    return [json_file("compare", document)]
+    return [ResultFile("compare", "json", document)]
 
 
 def comparison_context(files: Sequence[ResultFile]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from bushfit.report import plots
 from bushfit.report.batch_document import BATCH_SCHEMA, BatchFile, PartTable
 from bushfit.report.page import filled, rendered
 from bushfit.report.page.svg import Picture, picture
-from bushfit.report.results import ResultFile, contents, json_file
+from bushfit.report.results import ResultFile, contents
 from bushfit.report.tables import spread
 from bushfit.units import number, split_header
 from bushfit.validation import validate_tables
@@ -46,7 +46,7 @@ def read_batch(folder: Path) -> list[ResultFile]:
     document = read_document(file)
     require_schema(document, file, "a batch", BATCH_SCHEMA, hint="run the batch again with --resume")
     validate_tables(document, file, BatchFile, kind=ModelError)
-    return [json_file("batch", document)]
+    return [ResultFile("batch", "json", document)]
 
 
 def index_page(files: Sequence[ResultFile], folder: Path, base: str = "") -> str:

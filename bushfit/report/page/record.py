@@ -22,7 +22,7 @@ from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.files import read_utf8
 from bushfit.reading.tablefile import unescape_formula
-from bushfit.report.results import ResultFile, contents, json_file, place_names, table_file
+from bushfit.report.results import ResultFile, contents, place_names
 from bushfit.report.tables import require_columns, response_headers, spread
 from bushfit.validation import validate_tables
 
@@ -185,12 +185,12 @@ def read_results(folder: Path) -> list[ResultFile]:
             hint=f"bushfit run CAMPAIGN -o {folder} writes one",
         )
     paths = {name: folder / f"{name}.json" for name in (*MODELS, JOINT, "diagnosis")}
-    documents = [json_file(name, read_document(path)) for name, path in paths.items() if path.exists()]
+    documents = [ResultFile(name, "json", read_document(path)) for name, path in paths.items() if path.exists()]
     specimens = report_record(documents, folder).result.specimens
     records = sorted({path.stem for path in folder.glob("validation_*") if path.suffix in (".csv", ".xlsx")})
     names = ("loops", "sweeps", "gap", *records, *place_names([*Direction, *specimens]))
     tables = {name: table for name in names if (table := read_table(folder, name)) is not None}
-    return [*documents, *(table_file(name, partial(pd.DataFrame, table)) for name, table in tables.items())]
+    return [*documents, *(ResultFile(name, "table", partial(pd.DataFrame, table)) for name, table in tables.items())]
 
 
 def read_table(folder: Path, name: str) -> pd.DataFrame | None:

@@ -26,7 +26,7 @@ from bushfit.model.rig import wave
 from bushfit.report.page import report_page
 from bushfit.report.page.record import read_results
 from bushfit.report.page.report import sweeps_beside
-from bushfit.report.results import ResultFile, contents, json_file
+from bushfit.report.results import ResultFile, contents
 
 Results = Callable[[str], Path]
 
@@ -192,7 +192,7 @@ def read(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
 
 def page_from(documents: dict[str, Any], tables: dict[str, Any]) -> str:
     return report_page(
-        [json_file(*pair) for pair in documents.items()]
+        [ResultFile(name, "json", document) for name, document in documents.items()]
         + [ResultFile(name, "table", partial(pd.DataFrame, table)) for name, table in tables.items()]
     )
 

@@ -13,7 +13,7 @@ from production import COUNT, LOSSY, SOFT
 from reading_html import HARMFUL, LARGEST, assert_harmless, loads, parsed, spoiled
 
 from bushfit.report.page import comparison_page, folder_pages
-from bushfit.report.results import Formats, encode_all, json_file
+from bushfit.report.results import Formats, ResultFile, encode_all
 
 NAMES = ["two", "families"]
 #: Keys of compare.json whose texts come from a user's files or names.
@@ -21,7 +21,7 @@ FOREIGN = {"name", "source", "words", "warnings", "command", "file", "note", "pa
 
 
 def page_of(document: Any) -> str:
-    return comparison_page([json_file("compare", document)])
+    return comparison_page([ResultFile("compare", "json", document)])
 
 
 def document_of(compared: Path, name: str) -> Any:

@@ -14,7 +14,7 @@ from typing_extensions import TypedDict
 
 from bushfit import __version__
 from bushfit.cli.output import Output
-from bushfit.report.results import check_free, raw_file, to_json
+from bushfit.report.results import ResultFile, check_free, to_json
 from bushfit.validation import to_json_data
 from cards.card import Row, card
 from cards.families import CARD_SEEDS, FAMILIES, Family, tasks
@@ -119,6 +119,6 @@ def command(campaigns: int, seed: int, jobs: int, family: str, session: float | 
     }
     document = to_json_data(whole, Scorecard)
     if folder:
-        replace(output, force=True).write(folder, [raw_file(SCORECARD, to_json(document))], document)
+        replace(output, force=True).write(folder, [ResultFile(SCORECARD, "raw", to_json(document))], document)
     else:
         output.print_json(document)
