@@ -20,8 +20,8 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from cards.hidden import hidden_campaign
 from fmus import Running, request_of, wandering, written
+from hidden import hidden_campaign
 from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.optimize import leastsq
 
@@ -176,7 +176,7 @@ def test_whole_commands(benchmark: BenchmarkFixture, root: Path, tmp_path: Path,
 def test_diagnose(
     benchmark: BenchmarkFixture, table: Rows, kind: str, hidden: tuple[str, ...], without: tuple[str, ...]
 ) -> None:
-    simulated, _ = hidden_campaign(5, hidden)
+    simulated = hidden_campaign(5, hidden)
     campaign = simulated.campaign()
 
     def work() -> object:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cards.hidden import hidden_campaign, hideable
+from hidden import hidden_campaign, hideable
 from rigged import BOTH, PLAN, Diagnosed, Measured, changed, in_closed_form
 from tries import some
 
@@ -36,11 +36,11 @@ SINGLE = [name for name in hideable() if twins_of(name)[0] == name]
 
 @pytest.mark.parametrize("name", some(SINGLE, set(SINGLE[::3]) - SLOW))
 def test_known_effects_are_recovered(name: str) -> None:
-    simulated, sealed = hidden_campaign(1, [name])
-    near = {key: ParameterSetting(0.95 * sealed.values[key]) for key in NEAR if key in sealed.values}
+    simulated = hidden_campaign(1, [name])
+    near = {key: ParameterSetting(0.95 * simulated.truth.values[key]) for key in NEAR if key in simulated.truth.values}
     campaign = replace(simulated.campaign(), fit=FitSettings(parameters=near))
     result = fit_joint(PreparedCampaign.from_campaign(campaign), effects=with_base([name]), directions=BOTH)
-    reduced = agrees(result, sealed.values)
+    reduced = agrees(result, simulated.truth.values)
     # softening from cycle to cycle passes for scatter from cycle to cycle, and so for noise
     assert (0.5 if name == "mullins_softening" else 0.9) < reduced < 1.1
 

@@ -10,6 +10,8 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parent))  # as pytest does
     from benchmark import benchmark
     from rubber_card import rubber_command
+    from sessions import sessions_command
 
     benchmark.add_command(rubber_command)
+    benchmark.add_command(sessions_command)
     benchmark()

@@ -1,12 +1,12 @@
-"""Hidden campaigns: random bushings with a hidden effect, measured by the time-domain rig, the truth kept apart.
+"""Random bushings with hidden effects, measured by the package's rig in time.
 
-The closed forms that fits use never make these data. Sizes are random, from hardly visible to plain, where visible
-means what is left of the effect after the plain model has absorbed what it can.
+The closed forms that fits use never make these data. The size of an effect is random, from hardly visible to plain: it
+is the largest misfit that the paper's model leaves.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,29 +25,7 @@ from bushfit.reading.measurement import Loop, Sweep
 from bushfit.simulation.measured import Simulated, measure
 from bushfit.simulation.undisturbed import PAPER_FREQUENCIES, undisturbed
 
-#: Effects of the family `effects`, in turn: those of its first card, so that a seed makes the same card ever after.
-FIRST = (
-    "viscous",
-    "maxwell",
-    "strain_stiffening",
-    "asymmetry",
-    "second_friction",
-    "mullins_softening",
-    "rate_dependent_friction",
-    "coupled_breakdown",
-    "self_heating",
-    "clearance",
-    "interface_slip",
-    "bump_stop",
-    "stiffness_factor.radial",
-    "rig_compliance",
-    "inertia",
-    "fixture_resonance",
-    "delay",
-    "amplitude_rolloff",
-    "force_gain",
-    "force_offset",
-)
+BOTH = (Direction.AXIAL, Direction.RADIAL)
 #: Least and largest size of what stays visible, relative to |K| or half a loop's force range: hardly seen to plain.
 _VISIBLE = (0.015, 0.12)
 #: Least and largest scatter of a sweep point, relative to |K|: good rigs.
@@ -60,57 +38,31 @@ _TEMPERATURES = (285.0, 308.0)
 STEPS = 1024
 
 
-@dataclass(frozen=True)
-class Sealed:
-    """The truth of a hidden campaign: what is hidden, how large, and how visible.
-
-    Args:
-        hidden: effects, or the mistake and its tests.
-        values: of the parameters that are asked for [SI].
-        seed: of everything random.
-        visible: largest misfit of the plain model without noise, relative; of a recipe the size it was asked for.
-        shared: whether blocks share gain and phase errors.
-    """
-
-    hidden: tuple[str, ...]
-    values: Mapping[str, float]
-    visible: float
-    shared: bool
-    seed: int
-
-
 class _OutOfReachError(Exception):
     """No amount of an effect shows at a size in range."""
 
 
-def hidden_campaign(
-    seed: int,
-    hidden: Sequence[str],
-    directions: Sequence[Direction] = (Direction.AXIAL, Direction.RADIAL),
-    visible: tuple[float, float] = _VISIBLE,
-) -> tuple[Simulated, Sealed]:
-    """One hidden campaign; the same seed makes the same.
+def hidden_campaign(seed: int, hidden: Sequence[str] = (), visible: tuple[float, float] = _VISIBLE) -> Simulated:
+    """One simulated campaign, with its true model in `truth`; the same seed makes the same.
 
     Args:
         seed: of everything random.
-        hidden: effects of the library to hide, none for a clean campaign.
-        directions: of the two sweeps.
-        visible: least and largest size of what stays visible of each effect, relative.
+        hidden: effects of the library to hide.
+        visible: smallest and largest relative misfit that the paper's model leaves of each effect.
     """
     random = np.random.default_rng([seed, 7])
     for _ in range(30):  # the worst effect needs a dozen bushings until one shows it at a size in range
         plain = random_bushing(random)
-        plan = plan_of(plain, random, seed, directions)
+        plan = plan_of(plain, random, seed)
         if any("temperature" in get_effect(name).depends_on for name in hidden):
             plan = _at_temperatures(plan, random)
         with suppress(_OutOfReachError):
-            model, least = _with_hidden(plain, hidden, plan, random, visible)
-            break
-    else:
-        raise RuntimeError(f"no visible size of {', '.join(hidden)} was found for seed {seed}")
-    clean = undisturbed(model, plan, steps_per_cycle=STEPS)
-    sealed = Sealed(tuple(hidden), dict(model.values), least, plan.gain_error > 0.0, seed)
-    return measure(clean, plan), sealed
+            model = plain
+            for name in hidden:
+                wanted = float(np.exp(random.uniform(*np.log(visible))))
+                model = model.with_effect(name, _sized(plain, get_effect(name), wanted, plan, random, visible))
+            return measure(undisturbed(model, plan, steps_per_cycle=STEPS), plan)
+    raise RuntimeError(f"no visible size of {', '.join(hidden)} was found for seed {seed}")
 
 
 def random_bushing(random: Generator) -> Model:
@@ -131,16 +83,11 @@ def random_bushing(random: Generator) -> Model:
     )
 
 
-def plan_of(
-    plain: Model,
-    random: Generator,
-    seed: int,
-    directions: Sequence[Direction] = (Direction.AXIAL, Direction.RADIAL),
-) -> SimulateSettings:
+def plan_of(plain: Model, random: Generator, seed: int) -> SimulateSettings:
     """Two directions at three levels of like strain, as in the paper, two axial loops, three repeats; half of the rigs
     share errors of gain and phase in a block."""
     top = random.uniform(0.03, 0.06)
-    axial, second = (float(f"{top / plain.unit_strain(direction):.2g}") for direction in directions)
+    axial, second = (float(f"{top / plain.unit_strain(direction):.2g}") for direction in BOTH)
     shared = random.random() < 0.5
     return SimulateSettings(
         seed=seed,
@@ -153,7 +100,7 @@ def plan_of(
         loops=tuple(SimulatedLoop(Direction.AXIAL, factor * axial, 0.1, cycles=3) for factor in (1.0, 2.0)),
         sweeps=tuple(
             SimulatedSweep(direction, tuple((np.array([0.2, 0.4, 1.0]) * largest).tolist()), PAPER_FREQUENCIES)
-            for direction, largest in zip(directions, (axial, second), strict=True)
+            for direction, largest in zip(BOTH, (axial, second), strict=True)
         ),
     )
 
@@ -165,19 +112,6 @@ def _at_temperatures(plan: SimulateSettings, random: Generator) -> SimulateSetti
     return replace(plan, loops=loops, sweeps=sweeps)
 
 
-def _with_hidden(
-    plain: Model, hidden: Sequence[str], plan: SimulateSettings, random: Generator, visible: tuple[float, float]
-) -> tuple[Model, float]:
-    """The plain model with effects of random visible size, and the least size."""
-    model, sizes = plain, []
-    for name in hidden:
-        wanted = float(np.exp(random.uniform(*np.log(visible))))
-        sized, size = _sized(plain, get_effect(name), wanted, plan, random, visible)
-        model = model.with_effect(name, sized)
-        sizes.append(size)
-    return model, min(sizes, default=0.0)
-
-
 def _sized(
     plain: Model,
     effect: Effect,
@@ -185,8 +119,8 @@ def _sized(
     plan: SimulateSettings,
     random: Generator,
     visible: tuple[float, float],
-) -> tuple[dict[str, float], float]:
-    """Values of an effect of which about the wanted size stays visible after a plain fit, and that size."""
+) -> dict[str, float]:
+    """Values of an effect of which about the wanted size stays visible after a plain fit."""
     values = {
         qualified_name(effect, parameter): _shape(plain, plan, parameter.scale, parameter.typical, random)
         for parameter in effect.parameters
@@ -211,7 +145,7 @@ def _sized(
         share *= float(np.clip(wanted / size, 0.1, 10.0))
     if not 0.7 * visible[0] < size < 2.0 * visible[1]:
         raise _OutOfReachError
-    return values | {name: each.value_at_share(share) for name, each in amounts.items()}, size
+    return values | {name: each.value_at_share(share) for name, each in amounts.items()}
 
 
 def _shape(plain: Model, plan: SimulateSettings, scale: str | None, typical: float, random: Generator) -> float:

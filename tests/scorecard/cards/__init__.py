@@ -1,1 +1,0 @@
-"""The score card: the workflow judged on hidden campaigns."""
