@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -221,6 +222,31 @@ def test_adams_holds_curve_and_damping(export_request: ExportRequest, known: pd.
             assert float(blocks["DAMPING"][0][f"{end}_DAMPING"]) == 0.0
 
 
+@pytest.mark.parametrize("kind", ["car", "ride"])
+def test_adams_says_how_far_its_element_is_off(export_request: ExportRequest, known: pd.DataFrame, kind: str) -> None:
+    """The first harmonic of the curve as it is in the file, beside a damper or at a loss angle."""
+    exported = adams.export(export_request)
+    text = exported.files[f"bushing_{kind}.bus"].decode("ascii")
+    blocks = teimorbit(text)
+    moved, force = blocks["FZ_CURVE"][2].T
+    damping = float(blocks["DAMPING"][0]["FZ_DAMPING"])
+    wave = np.cos(2.0 * np.pi * np.arange(64) / 64)
+    ratio, apart = [], []
+    for rank in range(1, 6):
+        frequency, stiffness = rows_of(known, Direction.AXIAL, rank)
+        amplitude = 1e3 * amplitude_of(known, Direction.AXIAL, rank)
+        storage = 2.0 * np.mean(np.interp(amplitude * wave, moved, force) * wave) / amplitude
+        turn = 2j * np.pi * frequency * damping if kind == "car" else 1j * storage * np.tan(np.radians(damping))
+        written = storage + turn
+        ratio.append(np.abs(1e3 * written / stiffness) - 1.0)
+        apart.append(np.abs(written.imag / written.real - stiffness.imag / stiffness.real))
+    told = next(line for line in exported.losses if line.startswith(f"axial, {kind}: "))
+    low, high, loss = re.findall(r"is (\S+) to (\S+) % off, the loss factor up to (\S+)", told)[0]
+    assert (float(low), float(high)) == pytest.approx((100.0 * np.min(ratio), 100.0 * np.max(ratio)), rel=0.05)
+    assert float(loss) == pytest.approx(np.max(apart), rel=0.05)
+    assert "damping at 75 Hz, axial at 0.2 mm, radial at 0.1 mm, torsion at 0.572958 deg" in text
+
+
 def resting(model: Model, place: Direction, amplitude: float) -> float:
     """The force at the end of a triangular cycle of 10 mm/min or 10 deg/min."""
     rate = np.radians(10.0) / 60.0 if place.is_rotation else 1e-2 / 60.0
@@ -283,7 +309,7 @@ def test_every_deck_says_what_it_is_of_and_takes_directions_of_one_grid_alone(
     export: Callable[[ExportRequest], Exported], export_request: ExportRequest
 ) -> None:
     body = predict(export_request.result, Specimen("DMA =1+1", "modulus"), [5.0, 10.0], [0.01])
-    exported = export(replace(export_request, units=MM_T_S_N, predictions=(*export_request.predictions, body)))
+    exported = export(replace(export_request, units=MM_T_S_N, predictions=(body, *export_request.predictions)))
     assert "specimens: DMA =1+1" in exported.losses
     for content in exported.files.values():
         text = content.decode("ascii")

@@ -1,7 +1,4 @@
-"""Campaigns as a laboratory writes them: a random bushing and plan, a kind of discrepancy or none, noise, files.
-
-And how well a discrepancy can be seen at all: what the best clean model leaves of a noise-free campaign.
-"""
+"""Campaigns as a laboratory writes them: a random bushing and plan, a kind of discrepancy or none, noise, files."""
 
 from __future__ import annotations
 
@@ -25,13 +22,12 @@ from time_rig import (
     Array,
     Bushing,
     Change,
-    Complex,
     Response,
     Rubber,
     Tests,
-    first_harmonic,
     respond,
 )
+from visibility import CYCLES, ROUNDS, Noise, seen
 from working_kinds import WORKING
 from working_rubbers import WORKING_RUBBERS
 
@@ -143,6 +139,22 @@ class OtherRubber:
         return self.law(StrainHistory(strain, 1.0 / (SAMPLES * frequency[:, None]), periodic=True))
 
 
+#: What a clean campaign has.
+NOTHING = Kind("nothing", lambda _: lambda _: Change())
+
+
+def draw(kind: str, seed: int, law: str) -> tuple[Plan, Rubber, Bench]:
+    """Plan, the paper's rubber, and the tests with the rubber that is in them, of the arguments of `campaign`."""
+    random = np.random.default_rng([seed, 2007])
+    bushing, paper = a_specimen(random)
+    plan = _plan(random, KINDS.get(kind, NOTHING).needs)
+    if not (kind or law):
+        plan = awkward(plan, random)
+    tests = _tests(bushing, plan, random)
+    rubber = OtherRubber(RUBBERS[law](random), paper.mu) if law else paper
+    return plan, paper, Bench(tests, rubber, random)
+
+
 def campaign(kind: str, size: float, seed: int, folder: Path, *, law: str = "") -> Answer:
     """Write one campaign into a folder, bushing.toml and its tables, and return the truth; the same seed, the same.
 
@@ -153,22 +165,15 @@ def campaign(kind: str, size: float, seed: int, folder: Path, *, law: str = "") 
         folder: made where there is none.
         law: a name of RUBBERS; "" for the paper's rubber, whose plan is awkward where there is no kind.
     """
-    random = np.random.default_rng([seed, 2007])
-    bushing, paper = a_specimen(random)
-    known = KINDS.get(kind, Kind("nothing", lambda _: lambda _: Change()))
-    plan = _plan(random, known.needs)
-    if not (kind or law):
-        plan = awkward(plan, random)
-    tests = _tests(bushing, plan, random)
-    rubber = OtherRubber(RUBBERS[law](random), paper.mu) if law else paper
-    bench = Bench(tests, rubber, random)
+    plan, paper, bench = draw(kind, seed, law)
+    tests, rubber, known = bench.tests, bench.rubber, KINDS.get(kind, NOTHING)
     change = sized(bench, known, size) if kind else Change()
     response = respond(tests, rubber, change)
     stated = change.stated(tests)
     left, misfit = 0.0, 0.0
     if kind or law:
         stiffness = change.record(response.stiffness)
-        left, misfit = seen(stated, paper, stiffness, response.force, plan.noise, rounds=_ROUNDS * (3 if law else 1))
+        left, misfit = seen(stated, paper, stiffness, response.force, plan.noise, rounds=ROUNDS * (3 if law else 1))
     answer = Answer(
         kind,
         size,
@@ -180,8 +185,8 @@ def campaign(kind: str, size: float, seed: int, folder: Path, *, law: str = "") 
         TRUE_OF_RUBBER[law] if kind and law else (),
         _points(bench, change, response, stated, np.sqrt(2.0) * plan.noise.scatter) if kind else (),
     )
-    form = random.integers(3) if known.form is None else known.form
-    _write(folder, tests, plan, change, response, int(form), random)
+    form = bench.random.integers(3) if known.form is None else known.form
+    _write(folder, tests, plan, change, response, int(form), bench.random)
     return answer
 
 
@@ -370,92 +375,3 @@ def _write_sweep(file: Path, tests: Tests, rows: Array, stiffness: Array, form: 
         number = f"{tests.repeat[row]}," * repeats
         lines.append(f"{tests.frequency[row]:g},{1e3 * tests.amplitude[row]:.5g},{number}{first:.6g},{second:.6g}")
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-#: Step of the parameters' logarithms for slopes, the farthest that a round goes, and its shares that are tried.
-_STEP, _FARTHEST, _SHARES = 1e-3, 0.5, (1.0, 0.3, 0.1)
-#: Rounds of the fit.
-_ROUNDS = 5
-#: Cycles of a loop's record.
-CYCLES = 3
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Errors of a rig, all as standard deviations.
-
-    Args:
-        scatter: of a sweep's point, of |K|, in each of its two parts.
-        force: of a loop's force, of half its range.
-        correlation: of one row of a loop with the next.
-        run: gain, and phase [rad], that a run shares.
-        level: the same that all repeats of a level share, in units of a run's; a reader allows for one unit.
-    """
-
-    scatter: float
-    force: float
-    correlation: float
-    run: tuple[float, float]
-    level: float
-
-
-def seen(
-    tests: Tests, rubber: Rubber, stiffness: Complex, force: Array, noise: Noise, rounds: int = _ROUNDS
-) -> tuple[float, float]:
-    """Largest share of |K| that the five parameters leave, and chi-square beside free errors of runs and levels.
-
-    Args:
-        stiffness: of the sweeps as it stands in the record without noise [N/m], (n,).
-        force: of the loops likewise [N], (n, SAMPLES).
-    """
-    sweeps, loops = ~tests.loop, tests.loop
-    size = np.abs(stiffness[sweeps]) * noise.scatter
-    keep = noise.correlation
-    alike = np.sqrt((1.0 + keep) / (1.0 - keep) / CYCLES)  # rows that depend on each other tell less
-    spread = noise.force * alike * 0.5 * np.ptp(force[loops], axis=-1, keepdims=True)
-
-    def column(moved: Complex, waves: Array) -> Array:
-        """Changes of K and of the loops' forces, in units of noise."""
-        swept = moved[sweeps] / size
-        return np.concatenate([swept.real, swept.imag, (waves[loops] / spread).ravel()])
-
-    errors = []
-    for rows in (*tests.runs(), *tests.runs(repeats=False)):
-        chosen = np.isin(np.arange(tests.loop.size), rows)
-        gain, phase = noise.run
-        errors.append(column(gain * stiffness * chosen, gain * force * chosen[:, None]))
-        if not tests.loop[rows].any():
-            errors.append(column(1j * phase * stiffness * chosen, np.zeros_like(force)))
-    names = tuple(vars(rubber))
-    logs = np.log([getattr(rubber, name) for name in names])
-
-    def model(values: Array) -> tuple[Complex, Array]:
-        response = respond(tests, Rubber(*np.exp(values)))
-        return response.stiffness, response.force
-
-    shared = np.array(errors).T
-    inner = np.linalg.inv(np.eye(len(errors)) + shared.T @ shared)
-
-    def cleared(columns: Array) -> Array:
-        """The covariance's inverse times columns: what errors of runs and levels do not make of them."""
-        return np.asarray(columns - shared @ (inner @ (shared.T @ columns)))
-
-    k, waves = model(logs)
-    gap = column(stiffness - k, force - waves)
-    misfit = float(gap @ cleared(gap))
-    for _ in range(rounds):
-        moved = [model(logs + step) for step in _STEP * np.eye(logs.size)]
-        slopes = np.array([column(other - k, others - waves) for other, others in moved]).T / _STEP
-        aim = np.linalg.lstsq(slopes.T @ cleared(slopes), slopes.T @ cleared(gap), rcond=1e-10)[0]
-        for share in _SHARES:
-            tried = logs + np.clip(share * aim, -_FARTHEST, _FARTHEST)
-            tried_k, tried_waves = model(tried)
-            tried_gap = column(stiffness - tried_k, force - tried_waves)
-            tried_misfit = float(tried_gap @ cleared(tried_gap))
-            if tried_misfit < misfit:
-                logs, k, waves, gap, misfit = tried, tried_k, tried_waves, tried_gap, tried_misfit
-                break
-        else:
-            break
-    shares = np.where(loops, first_harmonic(force - waves) / first_harmonic(force), (stiffness - k) / stiffness)
-    return float(np.max(np.abs(shares))), misfit
