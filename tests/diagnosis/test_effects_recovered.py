@@ -163,6 +163,19 @@ def test_the_interval_of_the_gain_is_that_of_noise(paper_model: Model) -> None:
     assert 0.4 < said / real < 2.5
 
 
+def test_the_interval_of_the_gain_grows_with_the_misfit(paper_model: Model) -> None:
+    """Noise that is stated as half makes residuals of twice the size, and four times the gain and its interval."""
+    made = paper_model.with_effect("intrinsic_time", {"intrinsic_time.d": 3.0})
+    campaign = replace(measure(undisturbed(made, PLAN), PLAN).campaign(), loops=())
+    gains = []
+    for noise in (2e-3, 1e-3):
+        stated = replace(campaign, sweeps=tuple(replace(sweep, noise=noise) for sweep in campaign.sweeps))
+        (_, family), _ = fit_families(*begun(paper_model, stated), ["fractional_zener"], (), {})
+        assert family.gain is not None
+        gains.append(np.array([family.gain[0], family.gain[2] - family.gain[1]]))
+    assert gains[1] == pytest.approx(4.0 * gains[0], rel=0.05)
+
+
 def test_known_families_are_each_law_of_rate_with_each_of_amplitude(paper_model: Model, campaign: Campaign) -> None:
     tests = PreparedCampaign.from_campaign(campaign).sweeps
     found = known_families(paper_model, tests)

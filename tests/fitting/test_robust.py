@@ -102,6 +102,15 @@ def test_clean_tests_have_no_outliers_and_the_same_answer(rig: Rig, other_models
     assert np.max(np.abs(shifts)) < 0.5
 
 
+def test_the_noise_that_is_stated_does_not_move_a_robust_fit(rig: Rig) -> None:
+    """soft_l1 turns at twice the scatter that the residuals show, whatever the file says of it."""
+    sweep = rig().sweeps[0]
+    tails = np.random.default_rng(3).standard_t(2, (2, sweep.stiffness.size)) * 5e-3
+    heavy = replace(sweep, stiffness=sweep.stiffness * (1.0 + tails[0] + 1j * tails[1]))
+    low, high = (robust(replace(rig(), loops=(), sweeps=(replace(heavy, noise=noise),))) for noise in (5e-4, 2e-3))
+    assert low.model.values == pytest.approx(high.model.values, rel=2e-3)
+
+
 def test_outliers_are_listed_by_file_and_row_and_told(rig: Rig) -> None:
     campaign = rig()
     force = campaign.loops[0].force.copy()
