@@ -18,7 +18,7 @@ from bushfit.diagnosis.families import FittedFamily, fit_families
 from bushfit.effects import Level
 from bushfit.errors import BushfitError, ModelError
 from bushfit.fitting.assess import lack_of_fit
-from bushfit.geometry import Place, Specimen, default_places
+from bushfit.geometry import Place, Specimen, default_places, get_places
 from bushfit.model.document import BushingTable
 from bushfit.model.file import model_document, versions
 from bushfit.model.result import Result
@@ -289,7 +289,15 @@ def _warnings(
 def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> list[list[Place]]:
     """Directions or specimens to compare, each as a list with one entry per result; the compound if none is common."""
     if names:
-        return [[result.place(name) for result in results] for name in names]
+        columns = list[list[Place]]()
+        for name in names:
+            places_of = [get_places(name, result.specimens) for result in results]
+            labels = dict.fromkeys(", ".join(map(str, places)) for places in places_of)
+            if len(labels) > 1 and {len(places) for places in places_of} != {1}:
+                expected = "one direction of one body in each result"
+                raise ModelError(f"{name} is not the same in all results", found="; ".join(labels), expected=expected)
+            columns += map(list, zip(*places_of, strict=True))
+        return columns
     known = []
     for result in results:
         default = [str(place) for place in default_places(result.model.bushing, result.specimens)]

@@ -171,12 +171,15 @@ def predict(
         ModelError: a direction, frequency, amplitude, temperature or preload for which the model cannot predict.
         UnitError: a preload that is no displacement or force of a direction.
     """
-    result, sweeps = as_result(model), campaign.sweeps if campaign else ()
+    result = as_result(model)
     if isinstance(bushing, str):
-        directions = [f"{bushing} {direction}" for direction in directions or _DIRECTIONS]
+        of_bushing = [place for place in result.specimens if place.bushing and place.body == bushing]
+        directions = [str(place) for name in directions or _DIRECTIONS for place in get_places(name, of_bushing)]
     elif bushing:
         result, note = transfer_compound(result, bushing)
         notes, directions = (*notes, note), directions or [str(direction) for direction in _DIRECTIONS]
+    campaign = campaign and _of_bushings(campaign, result)
+    sweeps = campaign.sweeps if campaign else ()
     depends_on_temperature = result.model.depends_on_temperature
     if temperature is not None and not depends_on_temperature:
         raise ModelError(
@@ -248,6 +251,25 @@ def predict(
     notes = (*notes, *(f"{sweep.name}: {note}" for sweep in measured for note in sweep.notes))
     output = PredictionOutput(result, predictions, measured, notes, resonances, maxwell, curves)
     return replace(output, files=_files(output, drawn_sweeps, temperature, wide=wide))
+
+
+def _of_bushings(campaign: Campaign, result: Result) -> Campaign:
+    """Assign the tests of a campaign with a [bushing] to the one of several fitted bushings that has its geometry."""
+    stated, fitted = campaign.bushing, result.bushings
+    if not stated or not fitted:
+        return campaign
+    bodies = [body for body in fitted if replace(stated, name=body.name) == body]
+    if not bodies:
+        found, expected = stated.name, f"a campaign of {' or '.join(body.name for body in fitted)}"
+        raise ModelError("the campaign tests another bushing", file=campaign.path, found=found, expected=expected)
+    places = {place.axis: place for place in result.specimens if place.bushing == bodies[0]}
+    return replace(
+        campaign,
+        loops=tuple(
+            replace(loop, direction=places.get(loop.direction.axis, loop.direction)) for loop in campaign.loops
+        ),
+        sweeps=tuple(replace(one, direction=places.get(one.direction.axis, one.direction)) for one in campaign.sweeps),
+    )
 
 
 def requested_preloads(result: Result, place: Place, preloads: Sequence[str]) -> list[Preload | None]:

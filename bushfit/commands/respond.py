@@ -14,7 +14,7 @@ from bushfit.commands.loading import HasResult, as_result
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
 from bushfit.errors import MeasurementError
-from bushfit.geometry import get_place
+from bushfit.geometry import get_places
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import warnings_of
 from bushfit.prediction.response import TimeResponse, time_response
@@ -106,7 +106,7 @@ def respond(
         history: file with time and one or more displacements; or displacements [m, rad or 1] by direction or specimen,
             (n,) each.
         step: time between samples [s], for displacements that are no file.
-        direction: direction or specimen, if the file does not state it.
+        direction: direction, specimen or bushing, if the file does not state it; default all of several bushings.
         columns, units: headers and units of unusual columns by role: time, displacement, axial, radial, torsion.
         file_format: format of the file; default detected.
         steady: True for whole cycles of a steady state, False for a motion from rest.
@@ -122,14 +122,16 @@ def respond(
     """
     result = as_result(model)
     if isinstance(history, str | Path):
-        place = get_place(direction, result.specimens) if direction else None
-        channels = read_displacements(Path(history), place, columns=columns, units=units, file_format=file_format)
+        channels = read_displacements(
+            Path(history), direction, result.specimens, columns=columns, units=units, file_format=file_format
+        )
     elif step is None or not step > 0.0:
         raise MeasurementError("the time between samples is not stated", place="step", expected="seconds above zero")
     else:
         channels = tuple(
-            DisplacementHistory(get_place(name, result.specimens), np.asarray(values, dtype=float), step)
+            DisplacementHistory(place, np.asarray(values, dtype=float), step)
             for name, values in history.items()
+            for place in get_places(name, result.specimens)
         )
     channels = tuple(_without_offset(channel, steady=steady) for channel in channels)
     if steady:

@@ -297,8 +297,9 @@ def get_place(name: str, specimens: Iterable[Specimen]) -> Place:
     """
     places: dict[str, Place] = {str(place): place for place in (*Direction, *specimens)}
     if name not in places:
-        near = did_you_mean(name, places)
-        raise ModelError("no such direction or specimen", found=name, expected="one of " + ", ".join(places), hint=near)
+        names = dict.fromkeys([*Direction, *(label for place in places.values() for label in place.labels)])
+        near = did_you_mean(name, names)
+        raise ModelError("no such direction or specimen", found=name, expected="one of " + ", ".join(names), hint=near)
     return places[name]
 
 

@@ -9,7 +9,7 @@ from scipy.signal import hilbert
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.effects.history import History
 from bushfit.effects.unnamed import NAME as UNNAMED
-from bushfit.geometry import Place
+from bushfit.geometry import Place, Specimen
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -162,10 +162,12 @@ def _tested(result: Result) -> tuple[float, float] | None:
     """Largest strain [1] and strain rate [1/s] of the fitted tests; None for a model without tests."""
     if result.measured is None:
         return None
+    fitted = (place for place in result.fitted_places if result.model.bushing or isinstance(place, Specimen))
+    places = {str(place): place for place in fitted}
     tests = [
-        (test.amplitude[-1] * result.model.unit_strain(result.place(test.place)), test.frequency_Hz[-1])
+        (test.amplitude[-1] * result.model.unit_strain(places[test.place]), test.frequency_Hz[-1])
         for test in (result.campaign.tests if result.campaign else ())
-        if test.place in result.measured.directions and (result.model.bushing or test.unit == "1")
+        if test.place in places
     ]
     ends = tests or [(result.measured.strain[1], result.measured.frequency[1])]
     return result.measured.strain[1], max(2.0 * np.pi * strain * frequency for strain, frequency in ends)

@@ -1,13 +1,13 @@
 """Displacement histories read from files: evenly sampled channels of one or more directions."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from bushfit.errors import MeasurementError, error_location
-from bushfit.geometry import TRANSLATION, Direction, Place, strain_factor_of_files
+from bushfit.geometry import TRANSLATION, Direction, Place, Specimen, get_places, strain_factor_of_files
 from bushfit.reading.headers import LOOP_COLUMNS
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import increasing_time, time_column
@@ -67,17 +67,19 @@ class DisplacementHistory:
 
 def read_displacements(
     file: Path,
-    place: Place | None = None,
+    direction: str | None = None,
+    specimens: Sequence[Specimen] = (),
     *,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
     file_format: FileFormat | None = None,
 ) -> tuple[DisplacementHistory, ...]:
-    """Read the displacement histories of a file, one for each direction in its headers.
+    """Read the displacement histories of a file, one for each direction in its headers and each of several bushings.
 
     Args:
         file: table or recording with a time and one or more displacements.
-        place: direction or specimen, if the file does not state it or if one of several directions is wanted.
+        direction: direction, specimen or bushing, if the file does not state it or if not all of several are wanted.
+        specimens: specimens of the model, which names of bushings and directions select.
         columns: headers or numbers of columns with unusual names, by role (time, displacement, axial, radial, torsion).
         units: units that the file does not state, by role.
         file_format: format of the file; default detected.
@@ -88,26 +90,30 @@ def read_displacements(
     Raises:
         MeasurementError, UnitError: a column, its unit, the direction or the time cannot be used.
     """
-    table = Table.open(file, DISPLACEMENT_COLUMNS, columns, units, file_format, place.motion if place else TRANSLATION)
-    roles: dict[Place, str] = {direction: str(direction) for direction in Direction if str(direction) in table.roles}
-    if place in roles:
-        roles = {place: roles[place]}
-    elif place or not roles:
+    stated = get_places(direction, specimens) if direction else []
+    motion = stated[0].motion if len({place.axis for place in stated}) == 1 else None
+    table = Table.open(file, DISPLACEMENT_COLUMNS, columns, units, file_format, motion or TRANSLATION)
+    headed = [axis for axis in Direction if str(axis) in table.roles]
+    places = stated or [place for axis in headed for place in get_places(axis, specimens)]
+    roles = {place: str(place.axis) for place in places if place.axis in headed}
+    if not roles:
         turns = table.agrees("displacement", "rad")
-        column = table.column("displacement", place.motion.displacement_unit if place else "rad" if turns else "m")
-        place = place or direction_of_file(table.file, [column.header], turns=turns, sheet=table.source.sheet)
-        if place is None:
+        column = table.column("displacement", motion.displacement_unit if motion else "rad" if turns else "m")
+        axis = direction_of_file(table.file, [column.header], turns=turns, sheet=table.source.sheet)
+        if axis and not motion:
+            stated = [place for place in stated or get_places(axis, specimens) if place.axis == axis]
+        if len({place.axis for place in stated}) != 1:
             raise table.header_error(
                 "the direction of this displacement is not stated",
                 found=f'"{column.header}"',
                 expected="axial, radial or torsion in the header or in the name of the file",
-                hint="state it: --direction axial (or radial, torsion)",
+                hint=f"state it: --direction {next(map(repr, map(str, stated)), 'axial (or radial, torsion)')}",
             )
-        roles = {place: "displacement"}
-    wanted = {role: table.column(role, direction.motion.displacement_unit) for direction, role in roles.items()}
+        roles = dict.fromkeys(stated, "displacement")
+    wanted = {role: table.column(role, place.motion.displacement_unit) for place, role in roles.items()}
     wanted = {
-        role: replace(wanted[role], scale=strain_factor_of_files(direction) * wanted[role].scale)
-        for direction, role in roles.items()
+        role: replace(wanted[role], scale=strain_factor_of_files(place) * wanted[role].scale)
+        for place, role in roles.items()
     }
     wanted["time"] = time_column(table)
     values, notes = table.read_with_notes(wanted, fewest_rows=_FEWEST_ROWS)
@@ -117,13 +123,13 @@ def read_displacements(
     notes = (*(note for note in notes if "displacement" in wanted or note not in table.notes), *more, *correction)
     return tuple(
         DisplacementHistory(
-            direction,
+            place,
             np.interp(even, time, values[role]) if correction else values[role],
             float(even[1] - even[0]),
             float(even[0]),
             notes,
         )
-        for direction, role in roles.items()
+        for place, role in roles.items()
     )
 
 

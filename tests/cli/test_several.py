@@ -1,0 +1,120 @@
+"""Commands on several bushings of one compound: names of bushings and directions, and other campaigns."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from shell import Run, typing
+
+N = 200
+TIME = np.arange(N) / 200.0
+MOTION = 0.2 * np.sin(2.0 * np.pi * 5.0 * TIME)
+SIZES = 'inner_radius = "10 mm"\nouter_radius = "18 mm"\nlength = "50 mm"\n'
+
+
+@pytest.fixture(scope="module")
+def shapes(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the fit of three shapes under `model`, and displacement histories."""
+    folder = tmp_path_factory.mktemp("shapes")
+    typing(folder)("fit", root / "configs/three_shapes.toml", "-o", "model", "--no-plots")
+    histories = {
+        "road": {"axial [mm]": MOTION, "torsion [deg]": MOTION},
+        "plain": {"displacement [mm]": MOTION},
+        "radial": {"displacement [mm]": MOTION},
+        "turn": {"displacement [deg]": MOTION},
+    }
+    for name, columns in histories.items():
+        pd.DataFrame({"time [s]": TIME, **columns}).to_csv(folder / f"{name}.csv", index=False)
+    test = f'[[sweeps]]\nfile = "{root}/data/three_shapes/long.csv"\ndirection = "axial"\n'
+    (folder / "mine.toml").write_text(f'[bushing]\nname = "mine"\n{SIZES}{test}', encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("history", "direction", "places"),
+    [
+        ("road", None, "short axial, long axial, thick axial, short torsion, long torsion, thick torsion"),
+        ("road", "long", "long axial, long torsion"),
+        ("road", "torsion", "short torsion, long torsion, thick torsion"),
+        ("plain", "long radial", "long radial"),
+        ("radial", "long", "long radial"),
+        ("turn", "thick", "thick torsion"),
+    ],
+)
+def test_a_history_moves_the_bushings_asked_for(
+    shapes: Path, tmp_path: Path, history: str, direction: str | None, places: str
+) -> None:
+    options = ("--direction", direction) if direction else ()
+    done = typing(shapes)("respond", "model", f"{history}.csv", *options, "-o", tmp_path / "x", "--no-plots", "--json")
+    assert list(json.loads(done.stdout)["directions"]) == places.split(", ")
+
+
+@pytest.mark.parametrize(
+    ("history", "options", "problem"),
+    [
+        ("plain", ("--direction", "long"), "try: state it: --direction 'long axial'"),
+        ("plain", (), "the direction of this displacement is not stated"),
+        ("road", ("--direction", "lon"), 'did you mean "long"?'),
+    ],
+)
+def test_a_history_of_no_known_bushing_or_direction_is_refused(
+    shapes: Path, tmp_path: Path, history: str, options: tuple[str, ...], problem: str
+) -> None:
+    done = typing(shapes)("respond", "model", f"{history}.csv", *options, "-o", tmp_path / "x", status=2)
+    assert problem in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "places"),
+    [
+        (("--direction", "long"), {"long axial", "long radial", "long torsion"}),
+        (("--direction", "radial"), {"short radial", "long radial", "thick radial"}),
+    ],
+)
+def test_results_are_compared_for_the_bushings_asked_for(
+    bushfit: Run, shapes: Path, tmp_path: Path, options: tuple[str, ...], places: set[str]
+) -> None:
+    bushfit("compare", shapes / "model", shapes / "model", *options, "-o", tmp_path / "x", "--no-plots")
+    assert set(pd.read_csv(tmp_path / "x/differences.csv")["place"]) == places
+    done = bushfit("compare", shapes / "model", "model", *options, "-o", tmp_path / "y", status=2)
+    problem = "no such direction" if "long" in options else "radial is not the same in all results"
+    assert problem in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "files"),
+    [
+        (("--bushing", "long", "--direction", "long"), {"long axial", "long radial", "long torsion"}),
+        (("--bushing", "long", "--direction", "long radial"), {"long radial"}),
+        (("--bushing", "long", "--campaign", "mine.toml"), {"long axial", "long radial", "measured"}),
+        (("--bushing", "mine.toml", "--campaign", "mine.toml"), {"axial", "radial", "measured"}),
+    ],
+)
+def test_predictions_are_of_the_bushing_asked_for(
+    shapes: Path, tmp_path: Path, options: tuple[str, ...], files: set[str]
+) -> None:
+    """A campaign with a [bushing] is of the fitted bushing with its geometry."""
+    done = typing(shapes)("predict", "model", *options, "-o", tmp_path / "x", "--no-plots")
+    assert {file.stem for file in (tmp_path / "x").glob("*.csv")} == files
+    if "measured" in files:
+        assert "expected error" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        (("--bushing", "long", "--direction", "short"), "expected: one of axial, radial, torsion, long axial, long,"),
+        (("--bushing", "long", "--campaign", "CMP"), "cmp_15961.toml: the campaign tests another bushing"),
+    ],
+)
+def test_bushings_that_do_not_fit_the_model_are_refused(
+    shapes: Path, root: Path, tmp_path: Path, options: tuple[str, ...], problem: str
+) -> None:
+    stated = [root / "configs/cmp_15961.toml" if option == "CMP" else option for option in options]
+    done = typing(shapes)("predict", "model", *stated, "-o", tmp_path / "x", status=2)
+    assert problem in done.stderr
+    assert not (tmp_path / "x").exists()
