@@ -155,7 +155,7 @@ def batch_files(result: BatchResult) -> list[ResultFile]:
     document = ResultFile("batch", "json", to_json_data(result.document, BatchFile))
     files = [document, ResultFile("batch", "table", result.table)]
     if plan.formats.pages:
-        files.append(ResultFile("index", "page", partial(index_page, [document], plan.task.output)))
+        files.append(ResultFile("index", "page", partial(index_page, result.document, plan.task.output)))
     if panels:
         files.append(ResultFile("batch", "figure", partial(batch_figure, panels, plan.title, names)))
     return files

@@ -14,11 +14,12 @@ from bushfit.cli.output import Output, with_output
 from bushfit.cli.printing import print_parameters, print_validations
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
 from bushfit.errors import BushfitError, error_location
-from bushfit.units import display_unit, format_aligned, number, parse_quantity
+from bushfit.units import number, parse_quantity
 
 if TYPE_CHECKING:
     from bushfit.campaign.schema import Loss
     from bushfit.commands.diagnose import DiagnosisOutput
+    from bushfit.diagnosis.document import EffectEntry
 
 #: Terminal colours of the verdicts.
 _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
@@ -163,18 +164,15 @@ def _print_gap(output: Output, document: Mapping[str, Any]) -> None:
             console.print(f"  not held out: {part['part']}; {part['reason']}")
 
 
-def _print_effect(output: Output, effect: Mapping[str, Any]) -> None:
+def _print_effect(output: Output, effect: EffectEntry) -> None:
     """Print one named effect: description, parameter values, and effects that the tests cannot distinguish from it."""
+    from bushfit.report.parameters import effect_sizes
+
     console = output.console
     test = f" in {effect['test']}" if effect["test"] else ""
     console.print(f"  [bold]{effect['name']}[/bold]{escape(test)} ({effect['level']}): {escape(effect['sentence'])}")
-    for parameter, entry in effect["parameters"].items():
-        unit, factor = display_unit(entry["unit"], 1.0, entry["value"])
-        value, *ends = format_aligned(
-            [factor * x for x in (entry["value"], *(entry["ci95"] or ()))], 4, minimum_digits=2
-        )
-        interval = f"95 % {' to '.join(ends)}" if ends else "no interval"
-        console.print(f"    {parameter} = {f'{value} {unit}'.removesuffix(' -')}, {interval}")
+    for parameter, value, interval in effect_sizes(effect):
+        console.print(f"    {parameter} = {value}, {f'95 % {interval}' if interval else 'no interval'}")
     if effect["twins"]:
         names = f"{effect['name']} from {' or '.join(effect['twins'])}"
         if effect["alternatives"]:

@@ -30,7 +30,7 @@ from bushfit.reading.measurement import Source, Sweep
 from bushfit.report import plots
 from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFile, FamilyEntry
 from bushfit.report.compared import ComparisonDocument, contrast_table
-from bushfit.report.page import comparison_page
+from bushfit.report.page.comparison import comparison_page
 from bushfit.report.results import ResultFile
 from bushfit.units import format_range, number
 from bushfit.validation import to_json_data
@@ -243,10 +243,10 @@ def _compared(
     }
     side_by_side = ComparisonDocument.from_document(document)
     names = ("parameters", *(["families"] if families else []), "differences")
-    files = [ResultFile("compare", "json", document)]
+    figure = ResultFile("compare", "figure", lambda: plots.comparison.comparison_figure(side_by_side))
+    files = [ResultFile("compare", "json", document), figure]
     files += [ResultFile(name, "table", partial(lambda name: side_by_side.tables()[name], name)) for name in names]
-    files.append(ResultFile("compare", "figure", lambda: plots.comparison.comparison_figure(side_by_side)))
-    files.append(ResultFile("compare", "page", partial(comparison_page, files)))
+    files.append(ResultFile("compare", "page", partial(comparison_page, side_by_side, figure)))
     return ComparisonOutput(entries, comparisons, families, labels, advice, words, notes, warnings, document, files)
 
 

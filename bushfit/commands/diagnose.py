@@ -22,7 +22,7 @@ from bushfit.model.result import Result
 from bushfit.planning.knowledge import look_alikes
 from bushfit.prediction.validation import Validation, validate
 from bushfit.report import diagnosed, plots
-from bushfit.report.page import report_page
+from bushfit.report.page.report import report_page
 from bushfit.report.results import ResultFile, table_with_figure
 
 

@@ -23,7 +23,7 @@ from bushfit.model.document import ModelFile
 from bushfit.model.model import FIVE
 from bushfit.model.result import Result
 from bushfit.prediction.validation import Validation, validate
-from bushfit.report.page import report_page
+from bushfit.report.page.report import report_page
 from bushfit.report.results import ResultFile
 
 

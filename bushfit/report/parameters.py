@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from bushfit.diagnosis.document import EffectEntry
 from bushfit.model.result import Result
 from bushfit.units import display_unit, format_aligned
 
@@ -84,3 +85,13 @@ def parameter_rows(result: Result) -> Iterator[ParameterRow]:
         state = "tied" if name in result.ties else state
         state = f"at {result.at_bound[name]}" if name in result.at_bound else state
         yield ParameterRow(name, state, value_text, error, " to ".join(ends), unit, parameter.meaning)
+
+
+def effect_sizes(effect: EffectEntry) -> list[tuple[str, str, str]]:
+    """Format the parameters of an effect that a diagnosis named: name, value with unit, and 95 % interval of each."""
+    rows = []
+    for name, size in effect["parameters"].items():
+        unit, factor = display_unit(size["unit"], 1.0, size["value"])
+        value, *ends = format_aligned([factor * x for x in (size["value"], *(size["ci95"] or ()))], 4, minimum_digits=2)
+        rows.append((name, f"{value} {unit}".removesuffix(" -"), " to ".join(ends)))
+    return rows

@@ -1,14 +1,12 @@
 """Content of the page of a comparison: parameters, stiffness and loss factor side by side, and their differences."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import astuple
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bushfit.geometry import Bushing
-from bushfit.model.file import read_document
 from bushfit.prediction.caveats import by_importance, consequence_of
 from bushfit.report import plots
 from bushfit.report.compared import (
@@ -19,10 +17,11 @@ from bushfit.report.compared import (
     format_p_value,
     parameter_cells,
 )
+from bushfit.report.page import rendered
 from bushfit.report.page.report import MOST, conditions, tube_description
 from bushfit.report.page.svg import picture
 from bushfit.report.page.values import grid_corners
-from bushfit.report.results import ResultFile, contents
+from bushfit.report.results import ResultFile
 from bushfit.report.tables import numeric_columns
 from bushfit.units import format_aligned, format_range, number, split_header
 
@@ -34,31 +33,16 @@ _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 24
 _CONDITIONS = ("Temperature", "Preload")
 
 
-def read_comparison(folder: Path) -> list[ResultFile]:
-    """Read and check compare.json, the comparison in a folder.
-
-    Returns:
-        Result file of the comparison, as the only element of a list.
-
-    Raises:
-        ModelError: there is no compare.json, or it is not as bushfit writes it.
-    """
-    file = folder / "compare.json"
-    document = read_document(file)
-    ComparisonDocument.from_document(document, file)
-    return [ResultFile("compare", "json", document)]
-
-
-def comparison_context(files: Sequence[ResultFile]) -> dict[str, Any]:
-    """Values of the variables of the template compare.html.
+def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = None) -> str:
+    """Make the HTML page of a comparison.
 
     Args:
-        files: document of the comparison and, if it has been made, its figure.
+        comparison: validated comparison.
+        chart: figure of the comparison; None to make it.
 
     Returns:
-        Values by the names of the template variables.
+        The page as HTML.
     """
-    comparison = ComparisonDocument.from_document(contents(files, "json")["compare"])
     document, names, places = comparison.document, comparison.names, comparison.places
     compared, (reference, *other_names) = document["compared"], names.values()
     tables = [next(iter(comparison.differences_at(place).values())) for place in places]
@@ -88,10 +72,9 @@ def comparison_context(files: Sequence[ResultFile]) -> dict[str, Any]:
                 labels.setdefault((file, sha256), []).append(entry["label"])
     pictures = []
     if len(names) * len(places) <= _MOST_DRAWN:
-        charts = contents(files, "figure")
-        chart = charts.get("compare") or plots.comparison.comparison_figure(comparison)
-        pictures.append(picture(chart, "compare", chart.heading.get_text()))
-    return {
+        figure = chart.content if chart else plots.comparison.comparison_figure(comparison)
+        pictures.append(picture(figure, "compare", figure.heading.get_text()))
+    context = {
         "document": document,
         "names": names,
         "resisted": "modulus" if all(header.startswith("modulus") for header in stiffness) else "stiffness",
@@ -110,6 +93,7 @@ def comparison_context(files: Sequence[ResultFile]) -> dict[str, Any]:
         "warnings": [(line, consequence_of(line)) for line in by_importance(document["warnings"])],
         "files": [(f"{', '.join(letters)}: {file}", sha256) for (file, sha256), letters in labels.items()],
     }
+    return rendered("compare.html", context)
 
 
 def difference_sizes(comparison: ComparisonDocument, place: str) -> Iterator[dict[str, Any]]:

@@ -1,8 +1,5 @@
 """Content of the page of a batch, `index.html`: parts that fail or differ, statistics, and a table of all parts."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -11,16 +8,12 @@ import numpy as np
 from markupsafe import Markup
 
 from bushfit.effects.contract import Array
-from bushfit.errors import ModelError
-from bushfit.model.file import read_document, require_schema
 from bushfit.report import plots
-from bushfit.report.batch_document import BATCH_SCHEMA, BatchFile, PartTable
-from bushfit.report.page import filled, rendered
-from bushfit.report.page.svg import Picture, picture
-from bushfit.report.results import ResultFile, contents
+from bushfit.report.batch_document import BatchFile, PartTable
+from bushfit.report.page import rendered, templates
+from bushfit.report.page.svg import picture
 from bushfit.report.tables import spread
 from bushfit.units import number, split_header
-from bushfit.validation import validate_tables
 
 #: Largest number of cells of the table of parts, where a curve is three cells: the page stays below 500 kB.
 _MOST_CELLS = 4000
@@ -36,71 +29,66 @@ _LABELS = ("campaign name", "subgroup", "verdict", "named effects", "on a bound"
 _TONES = {"pass": "good", "conditional pass": "fair", "not judged": "fair", "conditional fail": "bad", "fail": "bad"}
 
 
-def read_batch(folder: Path) -> list[ResultFile]:
-    """Read and check the document of a batch, batch.json, as the JSON result file `batch`.
-
-    Raises:
-        ModelError: the document is missing, or not as bushfit writes it.
-    """
-    file = folder / "batch.json"
-    document = read_document(file)
-    require_schema(document, file, "a batch", BATCH_SCHEMA, hint="run the batch again with --resume")
-    validate_tables(document, file, BatchFile, kind=ModelError)
-    return [ResultFile("batch", "json", document)]
-
-
-def index_page(files: Sequence[ResultFile], folder: Path, base: str = "") -> str:
+def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
     """Make the HTML page of a batch.
 
     Args:
-        files: document of the batch.
+        batch: content of batch.json.
         folder: results folder of the batch; the page links each part to its report in this folder, or to its subfolder.
         base: prefix of the links, if the page is written to another folder.
 
     Returns:
         The page as HTML.
     """
-    batch = validate_tables(contents(files, "json")["batch"], None, BatchFile, kind=ModelError)
-    parts, curves = batch.parts, Curves.from_batch(batch)
-    status = [part_status(part) for part in parts]
+    parts, units = batch.parts, {header: split_header(header) for header in batch.quantities}
+    unknown = [np.nan] * len(batch.curve_points)
+    curves = np.array([unknown if part.curve is None else part.curve for part in parts], dtype=float)
+    usual = np.array([not (part.deviations or part.poor_fit or part.curve is None) for part in parts])
+    has_curves = bool(unknown) and bool(usual.any())
+    relative = curves / np.nanmedian(curves, axis=0) - 1.0 if has_curves else curves
+    scale = max(_LEAST_SCALE, 1.5 * float(np.abs(relative[usual]).max())) if has_curves else 0.0
+    status, links, listed = list[str](), list[str](), dict[str, list[tuple[PartTable, str]]]()
+    for part in parts:
+        result = "" if part.result in ("pass", None) else str(part.result)
+        differs = part.deviations and result in ("", "conditional pass")
+        status.append("differs" if differs else "error" if part.error else result)
+        reported = (folder / part.folder / "report.html").exists()
+        links.append(base + quote(part.folder) + ("/report.html" if reported else "/") if part.folder else "")
+        listed.setdefault(status[-1], []).append((part, links[-1]))
     labels = [name for name in _LABELS if len({part.labels.get(name, "") for part in parts}) > 1]
     heads = ["result"] * bool(batch.limits) + labels
-    row_limit = max(1, _MOST_CELLS // (len(heads) + len(batch.quantities) + (4 if curves else 1)))
+    row_limit = max(1, _MOST_CELLS // (len(heads) + len(batch.quantities) + (4 if has_curves else 1)))
     ordered = sorted(range(len(parts)), key=lambda index: _ORDER.index(status[index]))
     important = sum(map(bool, status))
     first, ordinary = ordered[: min(important, row_limit)], ordered[important:]
     chosen = first + [ordinary[index] for index in spread(len(ordinary), max(0, row_limit - len(first)))]
     warnings = list(dict.fromkeys(line for index in chosen for line in parts[index].warnings))
-    reported = [bool(part.folder) and (folder / part.folder / "report.html").exists() for part in parts]
-    links = [
-        base + quote(part.folder) + ("/report.html" if report else "/") if part.folder else ""
-        for part, report in zip(parts, reported, strict=True)
-    ]
-    listed: dict[str, list[tuple[PartTable, str]]] = {}
-    for part, state, link in zip(parts, status, links, strict=True):
-        listed.setdefault(state, []).append((part, link))
     rows = []
     for index in chosen:
         part = parts[index]
-        mean = 100.0 * float(np.expm1(np.log1p(curves.relative[index]).mean())) if curves else np.nan
+        mean = 100.0 * float(np.expm1(np.log1p(relative[index]).mean())) if has_curves else np.nan
         numbers = ", ".join(str(warnings.index(line) + 1) for line in part.warnings)
         remarks = [part.error, part.poor_fit and "poor fit", part.differs and f"differs: {part.differs}"]
         remarks += [*([] if part.poor_fit else part.doubtful.values()), numbers and f"warnings {numbers}"]
-        names = [split_header(header)[0] for header in batch.quantities]
-        tones = ["bad" if name in part.misses else "fair" if name in part.deviations else "" for name in names]
+        color = _DIFFERENT if part.deviations else _USUAL
+        tones = ["bad" if name in part.misses else "fair" * (name in part.deviations) for name, _ in units.values()]
         values = ["" if value is None else number(value, 4) for value in part.values]
         rows.append(
             {
                 "part": part,
                 "link": links[index],
                 "texts": [part.result or ""] * bool(batch.limits) + [part.labels.get(name, "") for name in labels],
-                "curve": curves.sparkline(index, differs=bool(part.deviations)) if curves else "",
+                "curve": sparkline(relative[index], relative[usual], scale, color) if np.isfinite(mean) else "",
                 "deviation": number(mean, 2, "+") if np.isfinite(mean) else "",
                 "cells": list(zip(values, tones, strict=True)),
                 "remarks": "; ".join(filter(None, remarks)),
             }
         )
-    units = {header: split_header(header) for header in batch.quantities}
+    pictures = []
+    if has_curves:
+        singles = {part.name: curves[k] for k, part in enumerate(parts) if part.curve and not usual[k]}
+        chart = plots.batch.curves_figure(batch.curve_points, curves[usual], singles)
+        pictures.append(picture(chart, "curves", chart.heading.get_text()))
     compared = [table.parts for table in batch.quantities.values() if table.detectable]
     context: dict[str, Any] = {
         "batch": batch,
@@ -115,10 +103,10 @@ def index_page(files: Sequence[ResultFile], folder: Path, base: str = "") -> str
             (table, units[header][0], "" if units[header][1] in (None, "-") else f" {units[header][1]}")
             for header, table in batch.quantities.items()
         ],
-        "curves": curves,
-        "curves_picture": curves.picture(parts) if curves else None,
+        "scale": scale,
+        "pictures": pictures,
         "heads": heads,
-        "columns": ["measured stiffness, deviation [%]"] * bool(curves) + [*batch.quantities],
+        "columns": ["measured stiffness, deviation [%]"] * has_curves + [*batch.quantities],
         "rows": rows,
         "warnings": warnings,
         "shown": (len(first), important, len(chosen) - len(first)),
@@ -127,74 +115,21 @@ def index_page(files: Sequence[ResultFile], folder: Path, base: str = "") -> str
     return rendered("index.html", context)
 
 
-def part_status(part: PartTable) -> str:
-    """Reason why a part of a batch needs attention, such as "error", "fail" or "differs"; empty if there is none."""
-    result = "" if part.result in ("pass", None) else str(part.result)
-    if part.deviations and result in ("", "conditional pass"):
-        return "differs"
-    return "error" if part.error else result
-
-
-@dataclass(frozen=True, eq=False)
-class Curves:
-    """Measured stiffness curves of the n parts of a batch, at k common operating points.
+def sparkline(curve: Array, usual: Array, scale: float, color: str) -> Markup:
+    """Draw the relative deviation of a measured curve from the median of the batch as a small SVG element.
 
     Args:
-        headers: column headers of the points, with units, (k,).
-        values: stiffness magnitude in the unit of the headers, (n, k), NaN for parts without a curve.
-        usual: True for parts that do not differ from the others, have no poor fit and have a curve, (n,).
+        curve: relative deviation of |K| at each operating point, (k,).
+        usual: the same of the m usual parts, whose range is a grey band, (m, k).
+        scale: relative deviation at the upper and lower edge.
+        color: colour of the curve.
     """
-
-    headers: Sequence[str]
-    values: Array
-    usual: Array
-
-    @classmethod
-    def from_batch(cls, batch: BatchFile) -> "Curves | None":
-        """Curves of the parts of a batch; None if no usual part has a curve."""
-        unknown = [np.nan] * len(batch.curve_points)
-        values = np.array([unknown if part.curve is None else part.curve for part in batch.parts], dtype=float)
-        usual = np.array([not (part.deviations or part.poor_fit or part.curve is None) for part in batch.parts])
-        return cls(batch.curve_points, values, usual) if unknown and usual.any() else None
-
-    @cached_property
-    def relative(self) -> Array:
-        """Relative deviation of |K| of each part from the median |K| of all parts, at each operating point, (n, k)."""
-        return np.asarray(self.values / np.nanmedian(self.values, axis=0) - 1.0)
-
-    @cached_property
-    def scale(self) -> float:
-        """Relative deviation of |K| at both edges of a sparkline: 1.5 times the largest deviation of a usual part."""
-        return max(_LEAST_SCALE, 1.5 * float(np.abs(self.relative[self.usual]).max()))
-
-    def picture(self, parts: Sequence[PartTable]) -> Picture:
-        """Drawing of the median and range of the usual curves, and of the single curves of the other parts."""
-        curves = zip(parts, self.values, self.usual, strict=True)
-        singles = {part.name: curve for part, curve, is_usual in curves if part.curve and not is_usual}
-        chart = plots.batch.curves_figure(self.headers, self.values[self.usual], singles)
-        return picture(chart, "curves", chart.heading.get_text())
-
-    def sparkline(self, index: int, *, differs: bool) -> Markup:
-        """Draw the relative deviation of one curve from the median as a small SVG, with the range of the usual parts.
-
-        Args:
-            index: index of the part.
-            differs: True to draw the curve in the colour of parts that differ.
-
-        Returns:
-            SVG element; empty for a part without a curve.
-        """
-        line, usual = self.relative[index], self.relative[self.usual]
-        if not np.isfinite(line).all():
-            return Markup()
-        x = np.linspace(1.0, _WIDTH - 1.0, line.size)
-
-        def path(x: Array, relative: Array) -> str:
-            y = (0.5 - 0.46 * np.clip(relative / self.scale, -1.0, 1.0)) * _HEIGHT
-            return "M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(x, y, strict=True))
-
-        ends = (number(100.0 * float(end), 2, "+") for end in (line.min(), line.max()))
-        band = path(np.concatenate([x, x[::-1]]), np.concatenate([usual.min(axis=0), usual.max(axis=0)[::-1]]))
-        drawn = {"band": band, "line": path(x, line), "color": _DIFFERENT if differs else _USUAL}
-        alt = f"{' to '.join(ends)} % off the median"
-        return Markup(filled("spark.html", {"alt": alt, "width": _WIDTH, "height": _HEIGHT, **drawn}))
+    x = np.linspace(1.0, _WIDTH - 1.0, curve.size)
+    band = np.concatenate([x, x[::-1]]), np.concatenate([usual.min(axis=0), usual.max(axis=0)[::-1]])
+    paths = {}
+    for name, (across, relative) in {"line": (x, curve), "band": band}.items():
+        y = (0.5 - 0.46 * np.clip(relative / scale, -1.0, 1.0)) * _HEIGHT
+        paths[name] = "M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in zip(across, y, strict=True))
+    ends = (number(100.0 * float(end), 2, "+") for end in (curve.min(), curve.max()))
+    context = {"alt": f"{' to '.join(ends)} % off the median", "width": _WIDTH, "height": _HEIGHT, "color": color}
+    return Markup(templates().get_template("spark.html").render(context | paths))

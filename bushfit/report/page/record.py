@@ -16,7 +16,7 @@ import pandas as pd
 from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction, Place
-from bushfit.model.document import CampaignTable, TestTable
+from bushfit.model.document import CampaignTable
 from bushfit.model.file import from_document, read_document, require_schema
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction, predict
@@ -62,11 +62,6 @@ class ReportRecord:
     tables: Mapping[str, pd.DataFrame]
     predictions: Mapping[str, Prediction]
     charts: Mapping[str, ResultFile]
-
-    @property
-    def tests(self) -> Sequence[TestTable]:
-        """Description of each test of the campaign (ranges, file, conditions); empty if the campaign is not known."""
-        return self.campaign.tests if self.campaign else ()
 
 
 def report_record(files: Sequence[ResultFile], folder: Path | None = None) -> ReportRecord:

@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
-from bushfit.diagnosis.document import DiagnosisFile, EffectEntry
 from bushfit.diagnosis.record import format_odds
 from bushfit.effects.temperature import REFERENCE
 from bushfit.geometry import STRAINING, TRANSLATION, Bushing, Specimen
+from bushfit.model.document import TestTable
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import by_importance, consequence_of, warnings_of
 from bushfit.reading.measurement import SAME_TEMPERATURE
 from bushfit.report import plots
-from bushfit.report.page.record import ReportRecord
+from bushfit.report.page import rendered
+from bushfit.report.page.record import ReportRecord, report_record
 from bushfit.report.page.svg import Picture, picture
 from bushfit.report.page.values import headline, value_rows
-from bushfit.report.parameters import correlation_texts, interval_kind, parameter_rows
+from bushfit.report.parameters import correlation_texts, effect_sizes, interval_kind, parameter_rows
+from bushfit.report.results import ResultFile
 from bushfit.report.tables import DISPLAYS, missing_column
-from bushfit.units import CELSIUS, display_unit, format_aligned, format_range, number
+from bushfit.units import CELSIUS, format_range, number
 
 if TYPE_CHECKING:
     from bushfit.report.plots.style import Chart
@@ -56,24 +58,28 @@ _CONDITION_FORMATS = {
     "preload": "{} preload",
     "order": "no. {} of the session",
 }
-#: Kinds of data whose gap is reported, and their keys in diagnosis.json.
-_GAPS: dict[str, Literal["heldout", "calibration"]] = {"held-out": "heldout", "fitted": "calibration"}
 #: Largest numbers of tests and regions, and of directions and specimens, in a page; the result files contain all.
 MOST, _MOST_PLACES = 12, 6
 #: Largest total size of the figures of a page [characters]: the page stays below 500 kB.
 _LARGEST_FIGURES = 440_000
 
 
-def report_context(record: ReportRecord) -> dict[str, Any]:
-    """Values of the variables of the template report.html.
+def report_page(files: Sequence[ResultFile]) -> str:
+    """Make the report of a result as an HTML page.
 
     Args:
-        record: records of the result.
+        files: documents (model, fit without the effects of a diagnosis, diagnosis), tables (sweeps, loops, gap, and
+            predictions of directions and specimens) and figures.
 
     Returns:
-        Values by the names of the template variables.
+        The page as HTML.
+
+    Raises:
+        ModelError: no model among the documents, or a document or table that is not as bushfit writes it.
     """
-    result, diagnosis, campaign, tests = record.result, record.diagnosis, record.campaign, record.tests
+    record = report_record(files)
+    result, diagnosis, campaign = record.result, record.diagnosis, record.campaign
+    tests = campaign.tests if campaign else ()
     bodies = [("Bushing", tube_description(result.model.bushing))] if result.model.bushing else []
     tubes = len(result.bushings) + (result.model.bushing is not None)
     bodies += [(f"Bushing {bushing.name}", tube_description(bushing)) for bushing in result.bushings]
@@ -87,7 +93,13 @@ def report_context(record: ReportRecord) -> dict[str, Any]:
     ends = [20.0 * math.log10(end) for end in (min(map(np.min, sizes)), max(map(np.max, sizes)))] if sizes else []
     named = [(file.file, file.sha256) for file in ([campaign] if campaign else []) + [*tests]]
     inputs = [(str(source.file), source.sha256) for source in result.inputs]
-    return {
+    gaps = dict[str, list[str]]()
+    if diagnosis:
+        gap = diagnosis["gap"]
+        for name, part in (("held-out data", gap["heldout"]), ("fitted data", gap["calibration"])):
+            misfits = (part["before"], part["after"]) if part else (None, None)
+            gaps[name] = ["not known" if misfit is None else f"{misfit:.2f}" for misfit in misfits]
+    context = {
         "name": campaign.name if campaign else result.name,
         "subject": "rubber compound" if not tubes else "rubber bushing" if tubes == 1 else "rubber bushings",
         "head": {
@@ -99,7 +111,7 @@ def report_context(record: ReportRecord) -> dict[str, Any]:
         "diagnosis": diagnosis,
         "tone": _TONES.get(diagnosis["verdict"], "fair") if diagnosis else "fair",
         "consequence": _CONSEQUENCES[diagnosis["verdict"]] if diagnosis else "",
-        "effects": [(effect, [*effect_sizes(effect)]) for effect in diagnosis["effects"]] if diagnosis else [],
+        "effects": [(effect, effect_sizes(effect)) for effect in diagnosis["effects"]] if diagnosis else [],
         "odds": format_odds(diagnosis) if diagnosis else [],
         "pictures": pictures,
         "left_out": left_out,
@@ -110,11 +122,11 @@ def report_context(record: ReportRecord) -> dict[str, Any]:
         "correlations": correlation_texts(result),
         "model_error": result.model_error is not None,
         "equation": result.model.equation().splitlines()[0],
-        "tests": test_rows(record),
+        "tests": test_rows(result, tests[:MOST]),
         "conditioned": any(test.conditions for test in tests),
         "more_tests": max(0, len(tests) - MOST),
         "tabled": [*value_rows(predictions)],
-        "gaps": {f"{name} data": gap_texts(diagnosis, part) for name, part in _GAPS.items()} if diagnosis else {},
+        "gaps": gaps,
         "warnings": [(line, consequence_of(line)) for line in by_importance(warnings)],
         "campaign": campaign,
         "files": list(dict.fromkeys((file, sha256) for file, sha256 in (*named, *inputs) if file and sha256)),
@@ -122,6 +134,7 @@ def report_context(record: ReportRecord) -> dict[str, Any]:
         "levels": " to ".join(dict.fromkeys(f"{end:.1f}" for end in ends)),
         "moduli": any(prediction.direction.motion is STRAINING for prediction in predictions),
     }
+    return rendered("report.html", context)
 
 
 def draw_figures(record: ReportRecord) -> tuple[list[Picture], bool]:
@@ -186,18 +199,6 @@ def sweeps_beside(sweeps: pd.DataFrame | None, result: Result) -> pd.DataFrame |
     return sweeps[~((degrees - (REFERENCE - CELSIUS)).abs() > SAME_TEMPERATURE)]
 
 
-def gap_texts(diagnosis: DiagnosisFile, part: Literal["heldout", "calibration"]) -> list[str]:
-    """Texts of the root mean square residual before and after a diagnosis, in units of noise.
-
-    Args:
-        diagnosis: content of diagnosis.json.
-        part: "heldout" for held-out data, "calibration" for fitted data.
-    """
-    gap = diagnosis["gap"][part]
-    ends = (gap["before"], gap["after"]) if gap else (None, None)
-    return ["not known" if end is None else f"{end:.2f}" for end in ends]
-
-
 def tube_description(bushing: Bushing) -> str:
     """Describe the dimensions [mm] of a bushing in words."""
     sizes = 2 * bushing.inner_radius, 2 * bushing.outer_radius, bushing.length
@@ -237,15 +238,15 @@ def conditions(test_conditions: Iterable[Mapping[str, str | float]]) -> Iterator
             yield name, "not stated"
 
 
-def test_rows(record: ReportRecord) -> list[dict[str, str | int]]:
-    """Rows of the table of tests in a report: range, conditions and NRMSE of the model for the first twelve tests.
+def test_rows(result: Result, tests: Iterable[TestTable]) -> list[dict[str, str | int]]:
+    """Rows of the table of tests in a report: range, conditions and NRMSE of the model for each test.
 
     Returns:
         Texts of each row, and its number of recorded rows, by the names that the template uses.
     """
-    misfits = {misfit.test: misfit for misfit in record.result.tests if misfit.held is None}
+    misfits = {misfit.test: misfit for misfit in result.tests if misfit.held is None}
     rows = list[dict[str, str | int]]()
-    for test in record.tests[:MOST]:
+    for test in tests:
         unit, factor = DISPLAYS[test.unit]
         test_conditions = {key: value for key in _CONDITION_FORMATS if (value := test.conditions.get(key)) is not None}
         texts = {key: value if isinstance(value, str) else number(value, 3) for key, value in test_conditions.items()}
@@ -264,11 +265,3 @@ def test_rows(record: ReportRecord) -> list[dict[str, str | int]]:
             row["nrmse"], row["chi"] = f"{number(100 * misfit.nrmse, 2)} %", number(misfit.reduced_chi_square, 2)
         rows.append(row)
     return rows
-
-
-def effect_sizes(effect: EffectEntry) -> Iterator[tuple[str, str, str]]:
-    """Name, value with unit and 95 % interval of each parameter of an effect, as texts."""
-    for name, size in effect["parameters"].items():
-        unit, factor = display_unit(size["unit"], 1.0, size["value"])
-        value, *ends = format_aligned([factor * x for x in (size["value"], *(size["ci95"] or ()))], 4, minimum_digits=2)
-        yield name, f"{value} {unit}".removesuffix(" -"), " to ".join(ends)

@@ -23,9 +23,8 @@ from bushfit.model.file import from_document
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.rig import wave
-from bushfit.report.page import report_page
 from bushfit.report.page.record import read_results
-from bushfit.report.page.report import sweeps_beside
+from bushfit.report.page.report import report_page, sweeps_beside
 from bushfit.report.results import ResultFile, contents
 
 Results = Callable[[str], Path]

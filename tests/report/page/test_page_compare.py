@@ -12,8 +12,10 @@ import pytest
 from production import COUNT, LOSSY, SOFT
 from reading_html import HARMFUL, LARGEST, assert_harmless, loads, parsed, spoiled
 
-from bushfit.report.page import comparison_page, folder_pages
-from bushfit.report.results import Formats, ResultFile, encode_all
+from bushfit.report.compared import ComparisonDocument
+from bushfit.report.page import folder_pages
+from bushfit.report.page.comparison import comparison_page
+from bushfit.report.results import Formats, encode_all
 
 NAMES = ["two", "families"]
 #: Keys of compare.json whose texts come from a user's files or names.
@@ -21,7 +23,7 @@ FOREIGN = {"name", "source", "words", "warnings", "command", "file", "note", "pa
 
 
 def page_of(document: Any) -> str:
-    return comparison_page([ResultFile("compare", "json", document)])
+    return comparison_page(ComparisonDocument.from_document(document))
 
 
 def document_of(compared: Path, name: str) -> Any:
