@@ -71,7 +71,7 @@ def local_workers(processes: int) -> Workers:
     if forks:
         from multiprocessing.forkserver import ensure_running
 
-        context.set_forkserver_preload(["bushfit.batch.row", "pandas"])
+        context.set_forkserver_preload(["bushfit.batch.row", "bushfit.commands.respond", "bushfit.commands.run"])
         ensure_running()
     pool = partial(ProcessPoolExecutor, processes, context, initializer=_start_worker)
     return Workers("this machine", pool, lambda: processes)

@@ -1,23 +1,19 @@
 """Evaluation of one row by a worker: the commands on a campaign, and a record of their results."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bushfit.batch import store
 from bushfit.batch.document import Estimate, RowFile
 from bushfit.batch.manifest import Row, RowSettings
 from bushfit.batch.quantities import FIT_QUALITY, LOSS_FACTOR, STIFFNESS, Point, measured_at, measured_curve
 from bushfit.campaign.campaign import Campaign, load_campaign
-from bushfit.commands.diagnose import diagnose
-from bushfit.commands.fit import fit
-from bushfit.commands.predict import predict
-from bushfit.commands.respond import respond
-from bushfit.commands.run import run
-from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import get_effect
 from bushfit.errors import BatchError, BushfitError, ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -29,6 +25,9 @@ from bushfit.reading.files import view_bytes
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.report.results import Formats, encode_all
 from bushfit.version import __version__
+
+if TYPE_CHECKING:
+    from bushfit.diagnosis.record import Diagnosis
 
 #: Amount of an added effect, relative to the typical value of its parameter, up to which the effect is zero.
 _ZERO = 1e-3
@@ -156,6 +155,12 @@ def run_commands(
     Returns:
         The last result, the diagnosis (None without diagnose), and the contents of the result files by name.
     """
+    from bushfit.commands.diagnose import diagnose  # only workers need the commands, which are slow to import
+    from bushfit.commands.fit import fit
+    from bushfit.commands.predict import predict
+    from bushfit.commands.respond import respond
+    from bushfit.commands.run import run
+
     commands, with_tables = settings.commands or (), replace(formats, tables=True)
     if "run" in commands:
         ran = run(campaign)

@@ -22,7 +22,6 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects import BASE
@@ -157,6 +156,8 @@ def likeliest_size(model: Model, data_sets: Sequence[MeasuredTest], names: Seque
         The log likelihood is -(ln|S| + r^T P r + ln|J S^-1 J^T|)/2 with the covariance S of noise and model error, the
         Jacobian J, (k, n), the residuals r, and P = S^-1 - S^-1 J^T (J S^-1 J^T)^-1 J S^-1.
     """
+    from scipy.optimize import minimize_scalar  # slow to import, and only a model that misses its tests needs it
+
     parts = [data_set.error_products(model, names) for data_set in data_sets]
     scale = np.append(1.0, Coordinates.of_parameters(model, names).slopes(model.values))
     of_priors = np.vstack(prior_rows(model, names))

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import next_fast_len
-from scipy.signal import hilbert
 
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.effects.history import History
@@ -152,6 +151,8 @@ def _force(result: Result, model: Model, place: Place, history: History, conditi
     force, slopes = force_and_slopes(model, place, history, errors.covariance.names, conditions)
     half = errors.scale.max() * errors.covariance.half_width(slopes)
     if errors.relative.size:
+        from scipy.signal import hilbert  # slow to import
+
         real, imaginary = np.abs(errors.relative).max(axis=-1)
         quadrature = hilbert(force, next_fast_len(force.size)).imag[: force.size]
         half = np.sqrt(half**2 + Z95**2 * ((real * force) ** 2 + (imaginary * quadrature) ** 2))

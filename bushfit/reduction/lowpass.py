@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt, welch
 
 #: Largest number of samples of a segment of the spectrum, share of the record, and ratio of the density to that of the
 #: noise above which a frequency has motion; chosen: eight segments or more do not reach this ratio by chance.
@@ -32,6 +31,8 @@ def noise_and_highest_frequency(value: NDArray[Any], step: float) -> tuple[float
         The fourth difference of a finely sampled motion is small compared with that of noise; its median magnitude
         excludes jumps of the motion.
     """
+    from scipy.signal import welch  # slow to import, and few results have histories
+
     noise = _NORMAL * float(np.median(np.abs(np.diff(value, n=4)))) / _FOURTH
     frequency, density = welch(value, 1.0 / step, nperseg=min(_SEGMENT, max(value.size // _SHARE, 8)))
     return noise, float(frequency[density > _ABOVE * 2.0 * noise**2 * step].max(initial=frequency[1]))
@@ -49,6 +50,8 @@ def low_pass(value: NDArray[Any], step: float, frequency: float, *, periodic: bo
     Returns:
         Displacement without higher frequencies, (n,).
     """
+    from scipy.signal import butter, sosfiltfilt
+
     sections = butter(_ORDER, frequency, fs=1.0 / step, output="sos")
     if periodic:
         return np.asarray(sosfiltfilt(sections, np.tile(value, 3))[value.size : 2 * value.size])
