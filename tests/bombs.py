@@ -1,7 +1,5 @@
 """Workbooks made part by part, such as one with a forgotten cell far away."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """A command line typed in this process: what it would do in its own, less the time to start."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import io

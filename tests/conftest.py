@@ -1,7 +1,5 @@
 """What the tests share: commands as typed, the paper's bushing and model, other bushings, and where the data lie."""
 
-from __future__ import annotations
-
 import os
 
 # Small matrices, and a worker a core: threads of the linear algebra would only stand in each other's way.

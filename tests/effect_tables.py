@@ -1,7 +1,5 @@
 """`python tests/effect_tables.py`: write the tables of the page on effects anew, from the library's records."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """FMUs for the tests: orders, and an FMU that is run sample by sample through FMPy."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from ctypes import c_double, c_int, c_uint
 from pathlib import Path

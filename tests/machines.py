@@ -1,7 +1,5 @@
 """The dialects of test machines and laboratories: our numbers in the form of their exports."""
 
-from __future__ import annotations
-
 from dialects import Dialect
 
 #: Exports of test machines and of laboratories, each with where such a file can be seen, or the description it follows.

@@ -1,7 +1,5 @@
 """A simulated production run: one design, scatter of its compound, a rig that drifts, and two parts that differ."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

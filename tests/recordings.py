@@ -1,7 +1,5 @@
 """Tests as instruments record them, made by the libraries of their formats from tables as rigs write them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any

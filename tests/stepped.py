@@ -1,7 +1,5 @@
 """Raw stepped-sine histories as a rig writes them, by the time-domain road: steps with soft ends, joined by pauses."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

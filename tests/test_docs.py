@@ -1,7 +1,5 @@
 """Stale documentation fails: commands, keys, effects, the map of the code, kept data; and what is built is whole."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 import json

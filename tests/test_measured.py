@@ -1,7 +1,5 @@
 """Measured rubber, as its page has it: coupons fitted, a mount predicted and measured; and the paper's own way."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,8 +1,6 @@
 """Stale documentation fails: every `$ bushfit ...` of every page and every example in Python runs, every link leads
 somewhere."""
 
-from __future__ import annotations
-
 import doctest
 import re
 import shlex

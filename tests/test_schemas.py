@@ -1,7 +1,5 @@
 """The JSON Schemas: what the commands write validates by a program that is not ours, and what is spoiled does not."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import tomllib

@@ -1,7 +1,5 @@
 """Units: known ones convert, others are refused, nothing is guessed."""
 
-from __future__ import annotations
-
 import math
 
 import pint

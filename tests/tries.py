@@ -1,7 +1,5 @@
 """Cases that a commit tries, those that wait for the slow tests, and how many campaigns a rate is taken over."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Collection, Iterable
 from typing import Any

@@ -1,7 +1,5 @@
 """Campaigns to work through in batches."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Manifests of every kind and the names they give, operating points in words, limits and the four verdicts."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

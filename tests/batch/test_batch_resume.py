@@ -1,7 +1,5 @@
 """batch that goes on: results that stand, what is torn or changed, a batch that was killed, and workers that die."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """`bushfit batch` as typed: rows equal single commands to the last digit, and nothing that is done is done again."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

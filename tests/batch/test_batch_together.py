@@ -1,7 +1,5 @@
 """A batch as a whole: who differs and by what, the measured curves, capability; how often a part is named by chance."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

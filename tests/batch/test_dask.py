@@ -1,7 +1,5 @@
 """On a Dask cluster of real processes on this machine: same results, and a lost worker loses nothing."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

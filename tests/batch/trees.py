@@ -1,7 +1,5 @@
 """Folders compared, and what tests of `batch` ask of one."""
 
-from __future__ import annotations
-
 import csv
 import sys
 import time

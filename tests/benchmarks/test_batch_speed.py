@@ -6,8 +6,6 @@ In the ordinary test run a few campaigns are taken, so that it cannot rot. BUSHF
 test of memory goes up to (20000 takes minutes). No time is asserted; the ratios are printed.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

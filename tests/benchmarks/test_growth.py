@@ -6,8 +6,6 @@ In the ordinary test run the smallest sizes are taken. BUSHFIT_PICTURE names a P
 processor times and peaks of resident memory of the command, imports included.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

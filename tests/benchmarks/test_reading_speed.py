@@ -6,8 +6,6 @@ Every run is a process of its own, which tells its seconds without its imports, 
 test run the loop has some thousand rows, so that this cannot rot. The long loop needs the dependency group bench.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

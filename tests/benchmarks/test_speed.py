@@ -7,8 +7,6 @@ was found and what is wanted. Times are processor times, the least of several ta
 machine does weighs little.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

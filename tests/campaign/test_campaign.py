@@ -3,8 +3,6 @@
 Most of what can be wrong with a campaign stands in cli/spoiled_campaigns.py, with the command that says it.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

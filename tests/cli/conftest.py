@@ -1,7 +1,5 @@
 """The campaign of the paper and its joint fit in a folder, and commands typed there or in an empty one."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Small damage to a table or a model file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

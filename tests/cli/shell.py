@@ -1,7 +1,5 @@
 """Commands typed in a folder, that end as they should, and what they leave there."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Spoiled inputs, one a row: the command line, what was done to its files, and what the one error has to say."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field

@@ -1,8 +1,6 @@
 """What is spoiled in a campaign, and what the one error has to say: problem, place and, where there is one, hint."""
 
 # fmt: off
-from __future__ import annotations
-
 BUSHING = '[bushing]\nname = "x"\ninner_radius = "10 mm"\nouter_radius = "18 mm"\nlength = "34 mm"\n'
 #: (text of the campaign, text instead of it, what the error says ...)
 IN_CAMPAIGN = [

@@ -1,8 +1,6 @@
 """What is spoiled in a model file, how, and what the one error has to say."""
 
 # fmt: off
-from __future__ import annotations
-
 import math
 
 from damage import entry, without

@@ -1,8 +1,6 @@
 """What is spoiled in the tables of tests, how, and what the one error has to say."""
 
 # fmt: off
-from __future__ import annotations
-
 import numpy as np
 from damage import added, column, every, kept, row, text, wide
 

@@ -1,8 +1,6 @@
 """Command lines, limits and manifests that are wrong, and what the one error has to say."""
 
 # fmt: off
-from __future__ import annotations
-
 #: (arguments parted by |, what the error says ...)
 USAGE = [
     ("fitt|campaign.toml", "No such command 'fitt'; did you mean \"fit\"?  (see bushfit -h)"),

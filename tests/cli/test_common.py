@@ -1,7 +1,5 @@
 """What all commands hold to: files, statuses, streams, help, the Tab key, how far long work is, and a Ctrl-C."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -1,7 +1,5 @@
 """The same data under two names, or as two repeats: named, and counted once, in a fit and in a diagnosis."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pandas as pd

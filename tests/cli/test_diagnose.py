@@ -1,7 +1,5 @@
 """`diagnose` as typed: its files and streams, options, look-alikes, and a mistake in the record of a test."""
 
-from __future__ import annotations
-
 import html
 import json
 import shutil

@@ -1,7 +1,5 @@
 """Exports, tables and pictures in the form asked for, and every warning of a result wherever its numbers stand."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

@@ -1,7 +1,5 @@
 """fit-static, fit-dynamic, fit and run as typed: files, warnings, parameters that are held, and equals as a set."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`init` as typed: a campaign that loads and fits, and an error with the option for what only the user knows."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -1,7 +1,5 @@
 """`init` of parts in files of their own, of folders in folders, and of names that no campaign can hold."""
 
-from __future__ import annotations
-
 import os
 import tomllib
 from pathlib import Path

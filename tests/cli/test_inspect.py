@@ -1,7 +1,5 @@
 """`inspect` as typed: told on standard error, the campaign's text on standard output, one error for what is bad."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

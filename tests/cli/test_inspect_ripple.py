@@ -1,7 +1,5 @@
 """Fast ripples on a slow motion: the loop is the slow motion, and the ripple is reported. The ripples are simulated."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

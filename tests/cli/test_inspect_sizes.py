@@ -1,7 +1,5 @@
 """Points far off the curve of a sweep without repeats, and sizes that no test of rubber has."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`manual` and `example`: what a new user has without the source tree."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Effects of the user's own: a file that is trusted, a package that is installed, and what is refused."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

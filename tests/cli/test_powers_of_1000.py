@@ -1,7 +1,5 @@
 """A unit that is wrong by a power of 1000: the test that no rubber could have given is the one to name."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """plan, predict and compare as typed: what is planned, grids, measurements laid over, results side by side."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from itertools import groupby

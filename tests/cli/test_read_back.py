@@ -1,7 +1,5 @@
 """Every model that a command writes is read back: by predict, plan, report, compare, diagnose --model and export."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Recordings of instruments: MATLAB, TDMS, UFF, MDF, Parquet and Arrow files give what the same rows give as CSV."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """respond: files that it writes, histories that it corrects or refuses, and how they are stated."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Files of which a column says which test a row belongs to, as typed, and exports with blanks and empty cells."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from collections.abc import Sequence

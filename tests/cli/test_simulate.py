@@ -1,7 +1,5 @@
 """simulate and reduce as typed: a campaign that the fits take, and what a laboratory records made into one."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

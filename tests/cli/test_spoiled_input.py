@@ -1,8 +1,6 @@
 """Spoiled input of every kind, to every command: status 2, one error that says what and where, nothing written, and
 no more memory or time than a command may take."""
 
-from __future__ import annotations
-
 import errno
 import json
 import re

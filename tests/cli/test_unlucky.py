@@ -1,7 +1,5 @@
 """Unlucky files, folders and machines: one clear error or a result, soon, and nothing of a file that is no test."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Validation records: simulated, never fitted, compared by run, diagnose and report."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`init` on the files of one laboratory visit, which are simulated: all of them at once make a campaign that fits."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Texts of short campaigns of the virtual rig: few frequencies, two repeats."""
 
-from __future__ import annotations
-
 MOUNT = """
 [bushing]
 name = "Mount"

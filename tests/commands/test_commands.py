@@ -1,7 +1,5 @@
 """Results compared: the one that is extrapolated, and bushings of another shape."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

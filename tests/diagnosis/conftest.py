@@ -1,7 +1,5 @@
 """Campaigns off the virtual rig with two loops and two sweeps, their fits and their diagnoses, each made once."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What the tests of this folder share: the tests of a rig, and campaigns cut down or tampered with."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 

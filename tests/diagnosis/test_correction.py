@@ -5,8 +5,6 @@ The data are the virtual rig's, with effects that the model of a fit lacks, or w
 stiffness in the frequency domain.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Sequence

@@ -1,8 +1,6 @@
 """Each effect of the library, known to be there, is found by the fit at the size the time-domain rig was given; of
 model families that which made the tests is found from any start, and wins where held out."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 Scores of effects are what a linear refit would gain.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The evidence of groups of columns is that of integrals done outright."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

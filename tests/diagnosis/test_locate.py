@@ -1,7 +1,5 @@
 """Where: the sentences name direction, part, trend and level of what was put there; held-out gaps are a refit's."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -3,8 +3,6 @@
 A sweep in one file, or with a file for each level as many rigs write it, is the same to a diagnosis.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

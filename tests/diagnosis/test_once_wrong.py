@@ -1,7 +1,5 @@
 """Simulated campaigns that earlier searches named wrongly, or not at all, each with the step that it taught."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise

@@ -4,8 +4,6 @@ And the paper's puzzle: the radial loss factor at 0.5 mm is off, and its authors
 and its rival, a radial strain that Eq. 8 has wrong, are simulated on the paper's bushing by the rig.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

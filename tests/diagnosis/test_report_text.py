@@ -3,8 +3,6 @@
 That is an entry of the menu that parts the models in question, and none where there is nothing to part.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Errors of the rig: what a run, a level or a loop shares does what it says to the residuals, and nothing is lost."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 Points left out that meet at one frequency tell of a disturbance there; points that go wrong singly do not.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From probabilities to a verdict, on hypotheses written by hand."""
 
-from __future__ import annotations
-
 from math import log
 from types import SimpleNamespace
 from typing import Any

@@ -1,7 +1,5 @@
 """The workflow: what is there is named, what is not is not, and with less data less is said."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """One law for the whole family: what every effect of the library has to obey, whatever it is."""
 
-from __future__ import annotations
-
 import itertools
 import pickle
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The friction branch against many-digit arithmetic and against a walk of Eq. 5 from point to point."""
 
-from __future__ import annotations
-
 import math
 
 import mpmath

@@ -1,7 +1,5 @@
 """Effects against simpler ones, and against numbers worked out without them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

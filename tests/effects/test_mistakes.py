@@ -1,7 +1,5 @@
 """Mistakes in the record: each mends what it says, nothing else, and only where it can have been made."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The paper's bushing to be exported over the whole grid of the kept computation, which bushfit did not make; FMUs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -3,8 +3,6 @@
 And the kept computation of the paper's bushing, level by level, as decks hold it.
 """
 
-from __future__ import annotations
-
 import re
 import warnings
 from pathlib import Path

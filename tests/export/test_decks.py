@@ -1,7 +1,5 @@
 """Decks read back by programs and parsers that are not bushfit's, against a computation that is not bushfit's."""
 
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """CSV files and the workbook, read back over the whole grid; no name does harm in any format."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable
 from pathlib import Path

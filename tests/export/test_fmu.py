@@ -1,7 +1,5 @@
 """The FMU against the rig: sweeps, loops and random motions in every direction, and each effect that runs in time."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

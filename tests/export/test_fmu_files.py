@@ -1,7 +1,5 @@
 """What an FMU holds, whom it lets in, and what is said or refused instead."""
 
-from __future__ import annotations
-
 import importlib.util
 import io
 import re

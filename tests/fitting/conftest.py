@@ -1,7 +1,5 @@
 """Campaigns off the virtual rig: the rig runs once a model, the noise is drawn once a seed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

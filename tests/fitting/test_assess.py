@@ -3,8 +3,6 @@
 And what a fit says of the tests it left out, and of tests that no rubber could have given.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

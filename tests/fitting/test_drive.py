@@ -1,7 +1,5 @@
 """Loops made ready: the motion behind a noisy displacement, whatever its waveform, sampling, length, run-in and end."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -4,8 +4,6 @@ The tests are the virtual rig's, of the paper's bushing; their stiffness is then
 of frequency and strain, which no law of the library makes and the fit's own process did not draw.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Noise: what scatters and what a block shares, told apart by repeats; and that of a loop's rows, whitened."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 

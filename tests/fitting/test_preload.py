@@ -4,8 +4,6 @@ The elastic stress is a power series, friction is Berg's law over ten cycles, an
 Friction and springpot follow the preload by straight lines, which the fit does not know.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """Residuals of loops and sweeps in units of noise, white where the model is right; and which tests count in a fit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

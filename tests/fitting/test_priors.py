@@ -1,7 +1,5 @@
 """Priors of parameters, which weigh as one more measurement of the parameters, and ties between parameters."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

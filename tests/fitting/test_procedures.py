@@ -4,8 +4,6 @@ Intervals and bands against the truth, over simulated campaigns that differ in n
 a level share, told from what a fit leaves.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Profile likelihood, honest where the data leave a side open; and what they leave open is said, and what helps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

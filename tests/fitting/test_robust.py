@@ -1,7 +1,5 @@
 """Robust fits: outliers are found and listed, move no parameter, and clean tests have none."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import product

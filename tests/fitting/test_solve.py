@@ -1,7 +1,5 @@
 """The least-squares problem: one minimum from anywhere, a fit that never climbs, bounds held, and effects added."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

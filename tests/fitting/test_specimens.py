@@ -6,8 +6,6 @@ formula, which tests/effects/test_limits.py holds against the constants of Willi
 follow another law are told apart from it, a test here says.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

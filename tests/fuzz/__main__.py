@@ -1,7 +1,5 @@
 """Mutations of files and options: `python -m tests.fuzz [COMMAND...] [--cases 2000] [--first 0] [--seconds 240]`."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

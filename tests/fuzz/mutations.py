@@ -1,7 +1,5 @@
 """Random mutations of files and options of every command: each ends right or with one clear error, and loses no file."""
 
-from __future__ import annotations
-
 import gc
 import json
 import random

@@ -1,7 +1,5 @@
 """Bytes as a file of the user's for the functions behind the commands: at worst they raise a short BushfitError."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Any bytes are a table, a campaign or a model file, or one clear error: kept inputs, random ones, and bombs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

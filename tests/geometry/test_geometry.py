@@ -1,7 +1,5 @@
 """Strain and stiffness per displacement, and the correction of the radial formulas: limits, many digits, energy."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

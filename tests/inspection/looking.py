@@ -1,7 +1,5 @@
 """What the tests of this folder share: simulated tests of good and bad rigs, written as files and looked at."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

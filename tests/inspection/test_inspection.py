@@ -1,7 +1,5 @@
 """Files looked at: what is recognised, each fault told with its figures, and clean files that raise nothing."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Maxwell arms: their number and error, that they give off no energy, and what they cannot stand for."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import example, given

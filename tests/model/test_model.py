@@ -1,8 +1,6 @@
 """Model: independent numbers, broadcasting, derivatives, the examples of docstrings; and the rig's steps through time,
 which share no formula with it."""
 
-from __future__ import annotations
-
 import doctest
 import pkgutil
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Results: covariance and intervals; and model files: what is written comes back, and older ones are read."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A plan as a campaign for simulate, what simulations show of it, the guess that it starts from, and bounds."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from pathlib import Path
 

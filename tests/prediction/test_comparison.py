@@ -1,7 +1,5 @@
 """Two results compared: known differences are found and covered, equal bushings are equal, m waits for alpha."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ The truths are laws of the library with random parameters, and a rubber that sha
 frequency and 40 sliders with yield strains at normal quantiles.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Force over time on motions that no other test has, for each law in time: against the rig at a tenth of the step."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

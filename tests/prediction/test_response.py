@@ -1,7 +1,5 @@
 """Force over time: against the virtual rig at a tenth of the step, its band, its ranges, and long histories."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

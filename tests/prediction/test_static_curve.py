@@ -1,7 +1,5 @@
 """Static curve: against the virtual rig, its band, its rate, and what has none."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

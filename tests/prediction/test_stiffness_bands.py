@@ -1,7 +1,5 @@
 """Prediction: the table of the interface, bands, the rig's faults left out, and what it says that it cannot."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A small harmonic on a large motion: against the virtual rig stepped through time, and what it cannot answer."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Files as laboratories and test machines write them, with the test in each or the question that it raises."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any

@@ -3,8 +3,6 @@
 `inspect --json` gives the values of each of these files in test_exports.py.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

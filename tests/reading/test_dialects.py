@@ -1,7 +1,5 @@
 """Every dialect reads to the same numbers; headers, their role, unit and counting; numbers as tables write them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Files as laboratories write them, through the command line: read with the right values, or asked about."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from datetime import datetime, timedelta

@@ -1,7 +1,5 @@
 """What the name of a file says of its test, and what lines above its table do."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Loops from files: every way to write a table reads the same, time is rebuilt, and damage has its one error."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Sweeps from files: every pair of columns gives the same stiffness, and every kind of damage has its one error."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What is stepped in a sweep, and the levels of amplitudes as they were reached."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

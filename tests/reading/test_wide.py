@@ -1,7 +1,5 @@
 """Wide tables and resonance tests: every form of a file reads to the same numbers."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Workbooks, and tables in every form: what is meant, what fills the memory, and what a spreadsheet does not run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A loop and a sweep as texts, with one line exchanged where a test asks for it, and the readers of both."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Records of several amplitudes or rates: the parts that are found, their order, and fits to them. All is simulated."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

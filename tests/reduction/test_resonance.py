@@ -1,7 +1,5 @@
 """Resonance tests, simulated with a known stiffness and reduced again; and the measured ones in data/measured."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

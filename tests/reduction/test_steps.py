@@ -1,7 +1,5 @@
 """Raw histories reduced to a sweep: found steps, accuracy against the closed form, and errors as large as stated."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Agreement with numbers of others, in digits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

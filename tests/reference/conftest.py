@@ -1,7 +1,5 @@
 """Agreement with numbers of others, held against what the README of this folder says of it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

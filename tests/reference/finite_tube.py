@@ -10,8 +10,6 @@ Lengths are in outer radii, moduli in shear moduli. `python tests/reference/fini
 convergence and the coefficients of `bushfit.geometry.shape`, fitted anew (a few minutes).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

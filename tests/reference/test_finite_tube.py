@@ -1,7 +1,5 @@
 """The finite elements against another's, against closed forms and finer meshes; the shipped correction against both."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -4,8 +4,6 @@ The springpot on both roads: from rest, as the rig steps it, and on the steady c
 against the branches of Eq. 5, Berg's loop area and first harmonic.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Levenberg-Marquardt against NIST's certified values, through the fits' own entry."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Result files: names and formats; the folder they go to, and files that are never replaced."""
 
-from __future__ import annotations
-
 import io
 import os
 import signal

@@ -1,7 +1,5 @@
 """Two baselines for the benchmark: what is known of regression, on bushfit's readers, noise and list of effects."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path

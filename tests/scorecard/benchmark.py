@@ -1,7 +1,5 @@
 """A benchmark of diagnosis: sealed campaigns made from a seed, tools run on them, and their answers scored."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

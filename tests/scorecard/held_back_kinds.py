@@ -1,7 +1,5 @@
 """Kinds of discrepancy that are held back: which these are was fixed before any was diagnosed."""
 
-from __future__ import annotations
-
 from functools import partial
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Rubbers that are held back: no result on them is looked at while the package is being improved."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.random import Generator
 from rubber_in_time import Array, StrainHistory, StressLaw, fractional_derivative, relax, sliders

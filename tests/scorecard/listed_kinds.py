@@ -1,7 +1,5 @@
 """Effects that the paper's model lacks and a library of laws lists, each written in time from its equation alone."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

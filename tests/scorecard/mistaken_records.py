@@ -1,7 +1,5 @@
 """Mistakes in what the files of a clean campaign state, each made here and mended nowhere."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Fits to rubber that does not follow the package's laws: `python -m tests.scorecard rubber --help`."""
 
-from __future__ import annotations
-
 import json
 import tempfile
 from collections.abc import Callable, Iterator

@@ -4,8 +4,6 @@ A law maps strain histories onto stress histories. All operating points are comp
 (n, samples), one row per operating point. Stresses and moduli are in Pa, strains are dimensionless.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

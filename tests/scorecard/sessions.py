@@ -1,7 +1,5 @@
 """Planned sessions judged: `python -m tests.scorecard sessions --help`."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor

@@ -1,7 +1,5 @@
 """The benchmark: made alike from a seed, sealed, and scored as its rules say."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 And the rig in time that makes them, against tables from outside and bushfit's closed forms: three roads to one number.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Simulated rubber of other laws: its building blocks against closed forms, and what its card measures."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from lab_campaign import RUBBERS, OtherRubber

@@ -1,7 +1,5 @@
 """How well a discrepancy can be seen at all: what the best clean model leaves of a noise-free campaign."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Kinds of discrepancy whose verdicts were looked at while diagnose was worked on."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

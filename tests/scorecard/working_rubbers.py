@@ -1,7 +1,5 @@
 """Rubbers whose laws are not those of the package, for use while the package is being improved."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.random import Generator
 from rubber_in_time import (

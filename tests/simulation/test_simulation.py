@@ -1,7 +1,5 @@
 """Simulated campaigns: the plan is what is measured, noise is as large as it was asked for, and files lead back."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

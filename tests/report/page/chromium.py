@@ -3,8 +3,6 @@
 The protocol is https://chromedevtools.github.io/devtools-protocol; messages end with a zero byte.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import os

@@ -1,7 +1,5 @@
 """The results of two campaigns, of comparisons, of a batch, and their pages."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A page as its reader's browser takes it: elements, texts, what it would load; and results that somebody spoiled."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections import Counter

@@ -1,7 +1,5 @@
 """The report of a result: the same from a run and from its folder, whole, escaped, small, and true to the tables."""
 
-from __future__ import annotations
-
 import base64
 import json
 import re

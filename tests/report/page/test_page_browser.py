@@ -3,8 +3,6 @@
 Where no Chromium is found, these tests are skipped, and say so.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path

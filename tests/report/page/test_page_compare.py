@@ -1,7 +1,5 @@
 """Pages of a comparison and of a batch: whole, escaped, small, and true to the tables; and charts, to the pixel."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

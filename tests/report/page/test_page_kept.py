@@ -1,7 +1,5 @@
 """Reports that are kept are current, results of older versions have a page, and of spoiled folders none is made."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Tests to draw: sweeps and loops of a model, with noise of a fixed seed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Predictions to draw, and what a figure shows: its lines, points and texts, and whether these have room."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import combinations
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Figures of predictions, fits, raw files, reductions and Maxwell arms, of few levels and of many."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The gap before and after: one scale, right signs and sizes; and the picture of a batch says what is out of limits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

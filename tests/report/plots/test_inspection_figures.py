@@ -1,7 +1,5 @@
 """Figures of inspect and reduce: each point, bar and cycle is drawn where it was measured."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
