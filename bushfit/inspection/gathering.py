@@ -24,9 +24,10 @@ from bushfit.inspection.record import Inspection
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.instruments import word_for_part
 from bushfit.reading.labelled import same_text
+from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names
-from bushfit.reading.parts import parts_of
+from bushfit.reading.parts import open_file
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ def split_sheets(file: TestSource, test_options: Mapping[str, Any]) -> tuple[lis
     """
     sheets, whole = [], distribute_options([file], test_options)
     with suppress(BushfitError):  # which the inspection of the file reports
-        sheets = [] if test_options.get("sheet") else list(parts_of(file.file))
+        sheets = [] if test_options.get("sheet") else list(open_file(file.file, FileFormat()).parts)
     parts = [replace(file, sheet=sheet.sheet) for sheet in sheets] if len(sheets) > 1 else [file]
     if len(parts) == 1 and file.is_named:
         return whole, []

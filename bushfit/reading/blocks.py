@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from itertools import islice
+from itertools import islice, pairwise
 
 from bushfit import units
 from bushfit.errors import UnitError
@@ -12,7 +12,7 @@ from bushfit.reading.headers import AmplitudeConvention, Column, Vocabulary, par
 from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row, is_units_row, split
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names, named_direction
 from bushfit.reading.numerals import is_like_number
-from bushfit.reading.source import Channels, Combined, RowSource, Text, cells_of
+from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 
 #: Largest text that is searched for blocks without their own headers [bytes]; chosen: some 100,000 rows.
 _MOST_BYTES = 1 << 22
@@ -47,128 +47,108 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     """
     if isinstance(source, Channels) or len(layout.headers) < 2 or layout.headerless:
         return source, layout
-    headers = layout.headers
-    first = next(index for index, header in enumerate(headers) if header)
-    starts = [index for index, header in enumerate(headers) if header == headers[first]]
-    sides = [slice(start, end) for start, end in zip(starts, [*starts[1:], len(headers)], strict=True)]
-    names = [[header for header in headers[side] if header] for side in sides]
-    unlike = any(layout.units[side][: len(names[0])] != layout.units[sides[0]][: len(names[0])] for side in sides)
-    if (
-        len(sides) > 1
-        and not unlike
-        and all(side == names[0] for side in names)
-        and 1 < len(names[0]) == len(set(names[0]))
-    ):
-        return _side_by_side(source, layout, sides, vocabulary)
-    if isinstance(source, Text):
-        start, end = source.offset(layout.header_line - 1), source.offset(layout.lines_before_data)
+    first = next(filter(None, layout.headers))
+    starts = [index for index, header in enumerate(layout.headers) if header == first]
+    columns = list(zip(layout.headers, layout.units, strict=True))
+    sides = [[one for one in columns[start:end] if one[0]] for start, end in pairwise([*starts, len(columns)])]
+    width, are_sides = len(sides[0]), len(sides) > 1 and all(side == sides[0] for side in sides)
+    are_sides = are_sides and 1 < width == len(dict(sides[0]))
+    if are_sides:
+        groups, rows = _side_by_side(source, layout, [slice(start, start + width) for start in starts])
+        headers, in_row = zip(*sides[0], strict=True)
+        layout = replace(layout, headers=headers, units=in_row)
+    elif isinstance(source, Text) and _is_one_block(source, layout):
+        return source, layout
+    else:
+        groups, rows = _stacked(source, layout, vocabulary)
+    if len(groups) < 2:
+        return _with_complex_parts(source, layout)
+    last = [lines[-1].content if lines else "" for lines in groups]
+    titles = [(text if isinstance(text, str) else " ".join(map(str, text))).strip() for text in last]
+    labels = [labels_above(lines) | labels_in_names(title) for lines, title in zip(groups, titles, strict=True)]
+    added = _label_columns(labels, titles, titles if are_sides else [], vocabulary.roles(layout.headers))
+    width, numbers = len(layout.headers), [number for number, *_ in rows]
+    content = [
+        [*cells, *[""] * (width - len(cells)), *(texts[block] for texts in added.values())]
+        if len(cells) <= width
+        else cells
+        for _, cells, block in rows
+    ]
+    layout = replace(layout, headers=(*layout.headers, *added), units=(*layout.units, *[""] * len(added)))
+    return _with_complex_parts(Sheet(source.sheet or "", content, numbers=numbers), layout)
+
+
+def _is_one_block(source: Text, layout: Layout) -> bool:
+    """Return True if the bytes of a text show that no second block follows its header."""
+    start, end = source.offset(layout.header_line - 1), source.offset(layout.lines_before_data)
+    if len(source.data) > _MOST_BYTES:
         header = source.data[start : source.offset(layout.header_line)].strip()
-        is_large = len(source.data) > _MOST_BYTES
-        if is_large and source.data.find(header, start + len(header)) < 0:
-            return source, layout
-        if not is_large and not source.data[end:].translate(None, _NUMERIC + layout.delimiter.encode()):
-            return source, layout
-    return _with_complex_parts(*_stacked(source, layout, vocabulary))
+        return source.data.find(header, start + len(header)) < 0
+    return not source.data[end:].translate(None, _NUMERIC + layout.delimiter.encode())
 
 
 def _side_by_side(
-    source: RowSource, layout: Layout, sides: Sequence[slice], vocabulary: Vocabulary
-) -> tuple[RowSource, Layout]:
-    """Combine blocks of columns side by side, each with the same headers and maybe a title above, into one table.
+    source: RowSource, layout: Layout, sides: Sequence[slice]
+) -> tuple[list[list[Line]], list[_BlockRow]]:
+    """Separate blocks of columns side by side, each with the same headers and maybe a title above.
 
-    Args:
-        source: lines or rows of the file.
-        layout: location and headers of the whole header line.
-        sides: columns of each block.
-        vocabulary: known column names.
+    Returns:
+        Title of each block, and rows of the blocks.
     """
-    above = [split(line.content, layout.delimiter) for line in source.head() if line.number < layout.header_line]
-    titles = [next(filter(None, (cell for row in reversed(above) for cell in row[side])), "") for side in sides]
-    width = len([header for header in layout.headers[sides[0]] if header])
+    head = [line for line in source.head() if line.number < layout.header_line]
+    above = [(line.number, split(line.content, layout.delimiter)) for line in reversed(head)]
+    groups = [[Line(number, cell) for number, cells in above for cell in cells[side] if cell][:1] for side in sides]
     lines = [
         (line.number, cells_of(line, layout))
         for line in source.lines(layout.lines_before_data)
         if not is_comment(line.content, layout.delimiter)
     ]
-    parts = [
-        (number, row[side.start : side.start + width], block)
-        for block, side in enumerate(sides)
-        for number, row in lines
-        if any(cell != "" for cell in row[side.start : side.start + width])
-    ]
-    start = sides[0].start
-    layout = replace(layout, headers=layout.headers[start : start + width], units=layout.units[start : start + width])
-    labels = [labels_in_names(title) for title in titles]
-    return _one_table(source, layout, parts, _label_columns(labels, titles, titles, vocabulary.roles(layout.headers)))
+    rows = ((number, cells[side], block) for block, side in enumerate(sides) for number, cells in lines)
+    return groups, [row for row in rows if any(cell != "" for cell in row[1])]
 
 
-def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple[RowSource, Layout]:
-    """Combine blocks one below the other, each with its header or lines that state a quantity, into one table.
+def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple[list[list[Line]], list[_BlockRow]]:
+    """Separate blocks one below the other, each with its header or lines that state a quantity.
+
+    The header of a later block may have other names, such as German ones, for the same quantities and units.
 
     Args:
         source: lines or rows of the file.
         layout: location and headers of the first block.
         vocabulary: known column names.
+
+    Returns:
+        Lines above each block, and rows of the blocks.
     """
+    has_meaning = len(vocabulary.roles(layout.headers)) > 1
+    meanings = [vocabulary.heading(header) or header for header in layout.headers]
     above = [line for line in source.head() if line.number < layout.header_line]
-    between: list[Line] = []
-    groups, repeated, parts = [above], False, list[_BlockRow]()
+    groups, rows, between, is_new = [above], list[_BlockRow](), list[Line](), False
     for line in source.lines(layout.lines_before_data):
         texts = [line.content] if isinstance(line.content, str) else [c for c in line.content if isinstance(c, str)]
         is_note = not layout.numbered and is_comment(line.content, layout.delimiter)
         if is_note or any(map(_LETTER.search, texts)):
             cells = [str(cell) for cell in cells_of(line, layout)]
-            if layout.is_repeated(cells):
-                repeated = True
+            is_same = has_meaning and [vocabulary.heading(cell) or cell for cell in cells] == meanings
+            if is_same or layout.is_repeated(cells):
+                is_new = True
                 continue
             is_units = is_units_row([cell.strip("[]() ") for cell in cells])
-            if parts and (is_summary_row(cells) or is_units or layout.is_header(cells)):  # left out later, or refused
-                parts.append((line.number, cells, len(groups) - 1))
+            if rows and (is_summary_row(cells) or is_units or layout.is_header(cells, vocabulary)):
+                rows.append((line.number, cells, len(groups) - 1))  # left out later, or refused
                 continue
             if is_note or not is_row(cells):
                 between.append(line)
                 continue
-        repeated = repeated or (bool(between) and labels_above(between) != NO_LABELS)
-        if repeated:
-            groups = [*groups, between] if parts else [[*above, *between]]
+        is_new = is_new or (bool(between) and labels_above(between) != NO_LABELS)
+        if is_new:
+            groups = [*groups, between] if rows else [[*above, *between]]
         else:  # rows that are left out later, with a note
-            parts += [
-                (part.number, cells_of(part, layout), len(groups) - 1)
-                for part in between
-                if not is_comment(part.content, layout.delimiter)
-            ]
-        parts.append((line.number, cells_of(line, layout), len(groups) - 1))
-        between, repeated = [], False
-    if len(groups) < 2:
-        return source, layout
-    parts += [(line.number, cells_of(line, layout), len(groups) - 1) for line in between]
-    last = [lines[-1].content if lines else "" for lines in groups]
-    titles = [(text if isinstance(text, str) else " ".join(map(str, text))).strip() for text in last]
-    labels = [labels_above(lines) | labels_in_names(title) for lines, title in zip(groups, titles, strict=True)]
-    directions = ["" if re.search(r"[\t;:=]", title) else title for title in titles]
-    return _one_table(source, layout, parts, _label_columns(labels, directions, [], vocabulary.roles(layout.headers)))
-
-
-def _one_table(
-    source: RowSource, layout: Layout, parts: Iterable[_BlockRow], added: dict[str, list[str]]
-) -> tuple[RowSource, Layout]:
-    """Build one table of the rows of all blocks, with added columns that show the block of each row.
-
-    Args:
-        source: lines or rows of the file.
-        layout: location and headers of the first block.
-        parts: rows of the blocks, each with the index of its block.
-        added: one text per block, by the header of the added column.
-    """
-    width = len(layout.headers)
-    numbers: list[int] = []
-    content: list[Sequence[str | float]] = []
-    for number, row, block in parts:
-        padded = [*row, *[""] * (width - len(row)), *(texts[block] for texts in added.values())]
-        content.append(padded if len(row) <= width else row)
-        numbers.append(number)
-    layout = replace(layout, headers=(*layout.headers, *added), units=(*layout.units, *[""] * len(added)))
-    return Combined(source.sheet or "", content, numbers=numbers), layout
+            notes = (part for part in between if not is_comment(part.content, layout.delimiter))
+            rows += [(part.number, cells_of(part, layout), len(groups) - 1) for part in notes]
+        rows.append((line.number, cells_of(line, layout), len(groups) - 1))
+        between, is_new = [], False
+    return groups, [*rows, *((line.number, cells_of(line, layout), len(groups) - 1) for line in between)]
 
 
 def _label_columns(
@@ -216,29 +196,28 @@ def _with_complex_parts(source: RowSource, layout: Layout) -> tuple[RowSource, L
     if not indices or max(indices) >= len(layout.headers):
         return source, layout
     headers, row_of_units = list(layout.headers), list(layout.units)
+    lines = [(line.number, list(cells_of(line, layout))) for line in source.lines(layout.lines_before_data)]
     for index in sorted(indices, reverse=True):
         name, unit = units.split_header(headers[index])
         headers[index : index + 1] = [f"{name} {part}{f' [{unit}]' if unit else ''}" for part in ("real", "imaginary")]
         row_of_units[index : index + 1] = [row_of_units[index]] * 2
-    content: list[Sequence[str | float]] = []
-    numbers: list[int] = []
-    for line in source.lines(layout.lines_before_data):
-        cells = list(cells_of(line, layout))
-        for index in sorted(indices & set(range(len(cells))), reverse=True):
-            match = _COMPLEX.fullmatch(str(cells[index]))
-            cells[index : index + 1] = [match[1], re.sub(r"\s|^\+", "", match[2])] if match else [cells[index], ""]
-        content.append(cells)
-        numbers.append(line.number)
+        for _, cells in lines:
+            if match := _COMPLEX.fullmatch(str(cells[index])) if index < len(cells) else None:
+                cells[index : index + 1] = [match[1], re.sub(r"\s|^\+", "", match[2])]
+            else:
+                cells.insert(index + 1, "")
     layout = replace(layout, headers=tuple(headers), units=tuple(row_of_units))
-    return Combined(source.sheet or "", content, numbers=numbers, above=source.head()), layout
+    numbers, content = zip(*lines, strict=True)
+    return Sheet(source.sheet or "", content, numbers=numbers, above=source.head()), layout
 
 
-def refuse_other_columns(table: Cells, left_out: Iterable[FaultyRow]) -> None:
+def refuse_other_columns(table: Cells, left_out: Iterable[FaultyRow], vocabulary: Vocabulary) -> None:
     """Refuse a header or row of units that states another order or other units for the rows below it.
 
     Args:
         table: table with its columns by role.
         left_out: rows of the table that are not data.
+        vocabulary: known column names.
 
     Raises:
         MeasurementError: a header repeats the columns in another order.
@@ -247,11 +226,13 @@ def refuse_other_columns(table: Cells, left_out: Iterable[FaultyRow]) -> None:
     first = table.layout.units_line or table.layout.header_line
     for line, cells, _ in left_out:
         texts = [str(cell) for cell in cells]
-        is_header, compatible, different = table.layout.is_header(texts), 0, list[Column]()
+        is_header, compatible, different = table.layout.is_header(texts, vocabulary), 0, list[Column]()
         for column in sorted(table.roles.values(), key=lambda column: column.index):
             text = texts[column.index]
+            heading = vocabulary.heading(text) if is_header else None
             name, unit, convention = split_unit(text) if is_header else ("", *parse_unit(text.strip("[]() "))[:2])
-            if is_header and plain(name) != plain(split_unit(column.header)[0]):
+            has_name = plain(name) == plain(split_unit(column.header)[0]) or (heading and heading.role == column.role)
+            if is_header and not has_name:
                 raise table.error(
                     "a header repeats the columns in another order",
                     line=line,
@@ -259,8 +240,7 @@ def refuse_other_columns(table: Cells, left_out: Iterable[FaultyRow]) -> None:
                     expected=f"the columns of line {table.layout.header_line}: {', '.join(table.headers)}",
                     hint="write all blocks with the same columns, or each to a file of its own",
                 )
-            is_unit = unit != "-" and not is_like_number(unit or "1")
-            if not (unit and column.unit and is_unit):
+            if not (unit and column.unit) or unit == "-" or is_like_number(unit):
                 continue
             degrees = [units.kelvin_scale(text) for text in (unit, column.unit)]
             if all(degrees) or units.is_compatible(unit, column.unit):

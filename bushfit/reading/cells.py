@@ -160,7 +160,7 @@ class Cells:
 
         Notes:
             All columns that begin with a number are parsed as numbers: a summary row such as "Mean" then fails, as it
-            must.
+            must. Texts in front of these columns are searched for such words.
         """
         if self.selected is not None or self.clocks & indices:
             return None
@@ -172,8 +172,10 @@ class Cells:
         numeric = [index for index, cell in enumerate(first) if notation.allows(cell)]
         if not indices <= {*numeric}:
             return None  # pandas takes TRUE for 1
-        frame = block.frame(self.layout, dict.fromkeys(numeric, float), len(first), notation.decimal)
-        if frame is None:
+        labels = range(numeric[0])
+        types = dict.fromkeys(numeric, float) | dict.fromkeys(labels, "category")
+        frame = block.frame(self.layout, types, len(first), notation.decimal)
+        if frame is None or any(is_summary_row([str(text)]) for index in labels for text in frame[index].unique()):
             return None
         block.clean.add((block.before, indices))
         return {index: frame[index].to_numpy() for index in indices}
@@ -322,15 +324,14 @@ class Cells:
         Raises:
             MeasurementError: the numbers have two notations, or can be read in two ways.
         """
-        layout, source = self.layout, self.source
         notations = self.possible_numerals()
-        if layout.delimiter == "," and isinstance(source, Text) and not source.may_have_comma(layout):
-            notations = tuple(way for way in notations if "," not in (way.decimal, way.thousands)) or notations
+        if isinstance(source := self.source, Text):
+            absent = [sign for sign in ",. '" if not source.may_contain(sign, self.layout)]
+            marks = "," if self.layout.delimiter == "," and "," in absent else ""
+            possible = (way for way in notations if way.thousands not in absent and way.decimal != marks)
+            notations = tuple(possible) or notations
         evidence = consistent_notations(self.number_texts(), notations)
-        may_have_thousands_separators = isinstance(source, Sheet) or source.may_have_thousands_separators(
-            layout, evidence.ways[0].decimal
-        )
-        if evidence.contrary is None and may_have_thousands_separators:
+        if evidence.contrary is None and any(way.thousands for way in evidence.ways):
             evidence = consistent_notations(self.number_texts(), notations, all_cells=True)
         columns = {column.index: column for column in self.roles.values()}
         if evidence.contrary:

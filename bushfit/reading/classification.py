@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bushfit import units
 from bushfit.errors import NoColumnError, UnitError
-from bushfit.geometry import STRAINING, Motion
+from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Motion
 from bushfit.reading.cells import Cells
 from bushfit.reading.headers import (
     LOOP_COLUMNS,
@@ -24,6 +24,7 @@ from bushfit.reading.headers import (
     of_motion,
     parse_unit,
     plain,
+    si_unit,
     split_convention,
     split_unit,
 )
@@ -44,6 +45,8 @@ _REPLACEABLE = ("force_amplitude", "damping_coefficient", "damping_ratio", "rela
 _LOSSES = {"phase", "loss_factor", "loss_stiffness", "damping_coefficient", "damping_ratio"}
 #: Words in a header that mark a set point or mean, a part of a complex number, or an amplitude; by these kinds.
 _QUALIFIERS = {kind: frozenset(map(plain, words)) for kind, words in WORDS["qualifiers"].items()}
+#: Names of a strain that may be part of a compound, such as Scherdeformation.
+_STRAINS = [name for name in map(plain, WORDS["straining"]["displacement"]) if len(name) > 4]
 #: Role of a column without a known name, by its unit and the words in its name; in this order.
 _BY_UNIT: tuple[tuple[str, tuple[str, ...], str | None], ...] = (
     ("time", ("s",), None),
@@ -88,14 +91,14 @@ def classify(
     roles: dict[str, Column] = {}
     rejected: set[str] = set()
     role_by_index = _stated_indices(cells, vocabulary, columns)
-    for index, header in sorted(enumerate(cells.headers), key=lambda column: _is_symbol_k(column[1])):
+    for index, header in sorted(enumerate(cells.headers), key=lambda column: _name(column[1]) == "k"):  # after K*
         heading = vocabulary.heading(header) if header else None
         if index in role_by_index:
             meaning = Vocabulary({"": [units.split_header(header)[0]]}, {"": header}).heading(header)
             heading = replace(meaning or Heading(""), role=role_by_index[index])
-        elif heading and heading.role in role_by_index.values():
-            heading = None
-        if heading is None or heading.role in rejected:
+        elif heading and heading.role in {*role_by_index.values(), *rejected}:
+            continue
+        if heading is None or (_name(header) == "k" and heading.role in roles):
             continue
         role, column = heading.role, _column_of(cells, heading, index, stated_units.get(heading.role))
         if role not in columns and not _is_fitting(column, stated=role in stated_units):
@@ -105,33 +108,30 @@ def classify(
         elif role in _REPLACEABLE:
             rejected.add(role)
             del roles[role]
-        elif _is_symbol_k(header) <= _is_symbol_k(roles[role].header):  # K* is more specific than K
+        else:
             roles[role] = _preferred(cells, roles[role], column)
     if "amplitude_reached" in roles and "amplitude" not in roles:
         roles["amplitude"] = replace(roles.pop("amplitude_reached"), role="amplitude")
     notes = _add_by_unit(cells, roles, names, motion)
     if {"force_amplitude", "stiffness"} & set(roles) and "amplitude" not in roles:
         notes += _add_motion_as_amplitude(cells, roles, stated_units)
-    times = {role: column for role, column in roles.items() if role == "time"}
-    clocks = {column.index for column in times.values() if clock(str(cells.first_row[column.index])) is not None}
-    return roles, tuple(notes), frozenset(clocks)
+    time = roles.get("time")
+    is_clock = time is not None and clock(str(cells.first_row[time.index])) is not None
+    return roles, tuple(notes), frozenset({time.index} if time and is_clock else ())
 
 
-def _is_symbol_k(header: str) -> bool:
-    """Return True if a header is the symbol K alone, with or without a unit."""
-    return plain(units.split_header(header)[0]) == "k"
+def _name(header: str) -> str:
+    """Name in a header without its unit and convention, in the spelling that `plain` returns."""
+    return plain(units.split_header(split_convention(header)[0])[0])
 
 
 def _is_fitting(column: Column, *, stated: bool) -> bool:
     """Return False if the unit of a column, or the lack of one, shows that its name means another role."""
-    role, unit, name = column.role, column.unit, units.split_header(split_convention(column.header)[0])[0]
-    if not stated and not fits(plain(name), role, unit):
-        return False
+    role, unit, name = column.role, column.unit, _name(column.header)
     if plain(column.header) == "t" and role == "temperature":
         return bool(units.kelvin_scale(unit or ""))  # else a time, or another quantity
-    if _is_symbol_k(column.header):
-        return any(units.is_compatible(unit or "", si) for si in ("N/m", "N*m/rad"))
-    return unit is not None or role not in ("damping_coefficient", "force_amplitude")
+    needs_unit = role in ("damping_coefficient", "force_amplitude") or name == "k"
+    return (unit is not None or not needs_unit) and (stated or fits(name, role, unit))
 
 
 def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, str]) -> dict[int, str]:
@@ -152,25 +152,24 @@ def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, 
     indices, role_by_text = dict[int, str](), dict[str, str]()
     named_roles = vocabulary.roles([header for header in cells.headers if header])
     for role, text in columns.items():
-        if first_role := role_by_text.get(plain(text)):
+        label, first_role = role.replace("_", " "), role_by_text.setdefault(plain(text), role)
+        if first_role != role:
             raise cells.header_error(
                 "one column is named for two roles",
-                found=f'"{text}" for the {first_role.replace("_", " ")} and the {role.replace("_", " ")}',
+                found=f'"{text}" for the {first_role.replace("_", " ")} and the {label}',
                 expected="a column for each",
                 hint=f'name another column for one of them: columns = {{ {role} = "..." }} in the campaign',
             )
-        role_by_text[plain(text)] = role
     for role, text in columns.items():
-        label, number = role.replace("_", " "), int(text) if text.isdecimal() and len(text) < 5 else 0
+        number = int(text) if text.isdecimal() and len(text) < 5 else 0
         if 1 <= number <= len(cells.headers):
             indices[number - 1] = role
         elif role not in named_roles:
-            headers = cells.headers if cells.is_table else ()
-            near = next(iter(get_close_matches(text, headers, n=1, cutoff=_ALIKE)), "")
+            near = next(iter(get_close_matches(text, cells.headers if cells.is_table else (), 1, _ALIKE)), "")
             raise cells.header_error(
                 f'there is no column "{text}"',
                 kind=NoColumnError,
-                expected=f"the header that was stated for the {label}, or its number",
+                expected=f"the header that was stated for the {role.replace('_', ' ')}, or its number",
                 hint=(f'did you mean "{near}"? ' if near else "name one of this file: ")
                 + f'columns = {{ {role} = "{near or "..."}" }} in the campaign',
             )
@@ -229,6 +228,9 @@ def _preferred(cells: Cells, first: Column, second: Column) -> Column:
     numbers = _first_numbers(cells, both)
     factors = np.array([ZERO_TO_PEAK[column.convention or "zero-to-peak"] for column in both])
     is_equal = all(row[first.index] == row[second.index] for row in cells.first_rows)
+    is_numbered = first.header == second.header
+    choices = [str(column.index + 1) if is_numbered else column.header for column in both]
+    keys = " or ".join(f'columns = {{ {role} = "{choice}" }}' for choice in choices)
     if factors[0] != factors[1] and first.unit == second.unit and len(numbers):
         sizes = factors * numbers
         if np.all(np.abs(sizes[:, 0] - sizes[:, 1]) <= _AGREEMENT * np.abs(sizes[:, 0])):
@@ -238,20 +240,15 @@ def _preferred(cells: Cells, first: Column, second: Column) -> Column:
                 "two columns contradict each other",
                 found=f'equal numbers for "{first.header}" and "{second.header}"',
                 expected=f'"{second.header}" to be {factors[0] / factors[1]:.3g} times "{first.header}"',
-                hint=f'choose the right one in the campaign: columns = {{ {role} = "{first.header}" }} or '
-                f'columns = {{ {role} = "{second.header}" }}',
+                hint=f"choose the right one in the campaign: {keys}",
             )
     if is_equal and all(row[first.index] == row[second.index] for _, row in cells.rows()):
         return first
-    numbered = first.header == second.header
-    choices = [str(column.index + 1) if numbered else column.header for column in both]
     raise cells.header_error(
         f"more than one column could be the {role.replace('_', ' ')}",
         found=f"{first.header}, {second.header}",
         expected="one",
-        hint=("give each column its own header, or " if numbered else "")
-        + "choose it in the campaign: "
-        + " or ".join(f'columns = {{ {role} = "{choice}" }}' for choice in choices),
+        hint=f"{'give each column its own header, or ' if is_numbered else ''}choose it in the campaign: {keys}",
     )
 
 
@@ -274,11 +271,8 @@ def _add_by_unit(
     """
     if len(roles) + len(cells.headers) < 3:
         return []
-    usual, strains = (
-        Vocabulary(of_motion({**LOOP_COLUMNS, **SWEEP_COLUMNS}, motion), {}),
-        WORDS["straining"]["displacement"],
-    )
-    free: dict[int, tuple[Column, set[str]]] = {}
+    usual = Vocabulary(of_motion({**LOOP_COLUMNS, **SWEEP_COLUMNS}, motion), {})
+    free: dict[Column, set[str]] = {}
     for index, header in enumerate(cells.headers):
         if not header or usual.heading(header) is not None:
             continue
@@ -287,35 +281,30 @@ def _add_by_unit(
         if not words & _QUALIFIERS["not_measured"]:
             in_row, of_row, _ = parse_unit(cells.layout.units[index])
             column = Column("", header, index, in_row or unit, 1.0, convention or of_row)
-            words |= {"amplitude"} if column.convention else set()
-            if motion is STRAINING and any(len(strain) > 4 and plain(strain) in plain(name) for strain in strains):
-                words |= {"amplitude"}  # a compound, such as Scherdeformation
-            free[index] = column, words
+            is_strain = motion is STRAINING and any(strain in plain(name) for strain in _STRAINS)
+            free[column] = words | ({"amplitude"} if column.convention or is_strain else set())
     notes, amplitude = [], _QUALIFIERS["amplitude"]
     for role, expected, qualifier in _BY_UNIT:
         if role in roles or role not in names or (role == "phase" and _LOSSES & set(roles)):
             continue
-        belongs_to_stiffness = role in ("frequency", "amplitude", "phase")
-        if belongs_to_stiffness and not {"stiffness", "storage_stiffness", "force_amplitude"} & set(roles):
+        is_beside_stiffness = role in ("frequency", "amplitude", "phase")
+        if is_beside_stiffness and not {"stiffness", "storage_stiffness", "force_amplitude"} & set(roles):
             continue
-        if not belongs_to_stiffness or role == "amplitude":
+        if not is_beside_stiffness or role == "amplitude":
             expected = tuple(si for si in expected if (si in ("1", "Pa")) == (motion is STRAINING))
         fitting = [
             column
-            for column, words in free.values()
-            if column.unit
-            and any(units.is_compatible(column.unit, si) for si in expected)
-            and (
-                bool(words & _QUALIFIERS[qualifier]) if qualifier else not (words & amplitude and role in LOOP_COLUMNS)
-            )
+            for column, words in free.items()
+            if (words & _QUALIFIERS[qualifier] if qualifier else role not in LOOP_COLUMNS or not words & amplitude)
+            and any(units.is_compatible(column.unit or "", si) for si in expected)
             and is_like_number(str(cells.first_row[column.index]))
         ]
         if len(fitting) == 1:
             roles[role] = replace(fitting[0], role=role)
-            del free[fitting[0].index]
+            del free[fitting[0]]
             notes.append(f'"{fitting[0].header}" is read as the {role.replace("_", " ")} by its unit')
     if "time" in names and "time" not in roles:
-        stamps = [column for column, _ in free.values() if clock(str(cells.first_row[column.index])) is not None]
+        stamps = [column for column in free if clock(str(cells.first_row[column.index])) is not None]
         roles |= {"time": replace(stamps[0], role="time")} if len(stamps) == 1 else {}
     return notes
 
@@ -344,13 +333,12 @@ def _add_motion_as_amplitude(cells: Cells, roles: dict[str, Column], stated_unit
         return []
     if "stiffness" in roles:
         columns = (fitting[0], roles["force_amplitude"], roles["stiffness"])
-        turns = units.is_compatible(fitting[0].unit or "", "rad")
-        expected = ("rad", "N*m", "N*m/rad") if turns else ("m", "N", "N/m")
-        if not all(units.is_compatible(c.unit or "", si) for c, si in zip(columns, expected, strict=True)):
+        motion = ROTATION if units.is_compatible(fitting[0].unit or "", "rad") else TRANSLATION
+        expected = [(column.unit or "", si_unit(column.role, motion)) for column in columns]
+        if not all(units.is_compatible(*pair) for pair in expected):
             return []
-        scales = [units.si_factor(column.unit or "", si) for column, si in zip(columns, expected, strict=True)]
-        x, force, stiffness = np.abs(scales * _first_numbers(cells, columns)).T
+        x, force, stiffness = np.abs([units.si_factor(*pair) for pair in expected] * _first_numbers(cells, columns)).T
         if x.size == 0 or not np.all(np.abs(stiffness * x - force) <= _STIFFNESS_AGREEMENT * force):
             return []
-    roles["amplitude"] = replace(fitting[0], role="amplitude")
+    roles["amplitude"] = fitting[0]
     return [f'"{fitting[0].header}" is read as the amplitude, because the file has the amplitude of the force, too']

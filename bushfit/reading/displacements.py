@@ -1,13 +1,13 @@
 """Displacement histories read from files: evenly sampled channels of one or more directions."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from bushfit.errors import MeasurementError, error_location
-from bushfit.geometry import TRANSLATION, Direction, Place, Specimen, get_places, strain_factor_of_files
+from bushfit.geometry import TRANSLATION, Direction, Place, Specimen, get_places
 from bushfit.reading.headers import LOOP_COLUMNS
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import increasing_time, time_column
@@ -98,7 +98,8 @@ def read_displacements(
     roles = {place: str(place.axis) for place in places if place.axis in headed}
     if not roles:
         turns = table.agrees("displacement", "rad")
-        column = table.column("displacement", motion.displacement_unit if motion else "rad" if turns else "m")
+        tested = stated[0] if motion else Direction.TORSION if turns else Direction.AXIAL
+        column = table.column("displacement", tested)
         axis = direction_of_file(table.file, [column.header], turns=turns, sheet=table.source.sheet)
         if axis and not motion:
             stated = [place for place in stated or get_places(axis, specimens) if place.axis == axis]
@@ -110,12 +111,8 @@ def read_displacements(
                 hint=f"state it: --direction {next(map(repr, map(str, stated)), 'axial (or radial, torsion)')}",
             )
         roles = dict.fromkeys(stated, "displacement")
-    wanted = {role: table.column(role, place.motion.displacement_unit) for place, role in roles.items()}
-    wanted = {
-        role: replace(wanted[role], scale=strain_factor_of_files(place) * wanted[role].scale)
-        for place, role in roles.items()
-    }
-    wanted["time"] = time_column(table)
+    wanted = {role: table.column(role, place) for place, role in roles.items()}
+    wanted["time"] = time_column(table, next(iter(roles)))
     values, notes = table.read_with_notes(wanted, fewest_rows=_FEWEST_ROWS)
     time, more = increasing_time(table.needing(wanted), wanted["time"], values["time"])
     with error_location(table.file, "time"):

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from bushfit import units
-from bushfit.geometry import STRAINING, Motion
+from bushfit.geometry import STRAINING, Direction, Motion
 
 #: Known words in column headers, names and labels, from words.toml, by table and key.
 WORDS: Mapping[str, Mapping[str, Sequence[str]]] = tomllib.loads(
@@ -56,6 +56,14 @@ PAIRS = (
     *(("stiffness", "damping_coefficient"), ("stiffness", "damping_ratio"), ("storage_stiffness", "damping_ratio")),
     *(("force_amplitude", "phase"), ("force_amplitude", "loss_factor"), ("force_amplitude", "damping_ratio")),
 )
+#: SI units of the roles that do not depend on the motion; other roles are ratios.
+_UNITS = {"time": "s", "frequency": "Hz", "temperature": "K"}
+#: Roles by the attribute of a motion that is their SI unit.
+_UNITS_OF_MOTION = {
+    **dict.fromkeys(("displacement", "amplitude", "amplitude_reached", *Direction), "displacement_unit"),
+    **dict.fromkeys(("force", "force_amplitude"), "force_unit"),
+    **dict.fromkeys(("stiffness", "storage_stiffness", "loss_stiffness"), "stiffness_unit"),
+}
 #: Starts of the names of an angular frequency.
 _ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsation", "角频率")
 #: Channel of a test rig in brackets: "Load(Linear:Load) (kN)".
@@ -182,6 +190,17 @@ def of_motion(names: Mapping[str, Sequence[str]], motion: Motion) -> dict[str, S
         Column names by role.
     """
     return {role: _STRAINING.get(role, usual) if motion is STRAINING else usual for role, usual in names.items()}
+
+
+def si_unit(role: str, motion: Motion) -> str:
+    """Return the SI unit of a role such as "force" in a test of a kind of motion; "1" for a ratio."""
+    if role in _UNITS_OF_MOTION:
+        return str(getattr(motion, _UNITS_OF_MOTION[role]))
+    if role == "damping_coefficient":
+        return "Pa*s" if motion is STRAINING else motion.stiffness_unit.replace("/", "*s/", 1)
+    if role.endswith("phase"):
+        return "rad"
+    return "m/s^2" if role.startswith(("base_", "mass_")) else _UNITS.get(role, "1")
 
 
 @dataclass(frozen=True)

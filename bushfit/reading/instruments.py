@@ -25,8 +25,6 @@ from bushfit.reading.layout import Layout, Line
 from bushfit.reading.source import Channel, Channels, Group
 from bushfit.reading.uff import uff
 
-#: Names of the base channel of a recording: time or frequency.
-_BASES = Vocabulary({"time": LOOP_COLUMNS["time"], "frequency": SWEEP_COLUMNS["frequency"]}, {})
 #: Names of channels whose values cannot be complex.
 _REAL = Vocabulary(
     {"time": LOOP_COLUMNS["time"], **{role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}}, {}
@@ -95,7 +93,7 @@ def format_of(data: bytes, file: Path) -> Format | None:
 
 
 @lru_cache(maxsize=1)
-def read_groups(data: bytes, file: Path, recording: Format) -> tuple[Channels, ...] | MeasurementError:
+def read_groups(data: bytes, file: Path, recording: Format) -> tuple[Channels, ...]:
     """Read the groups of channels in a recording; the last result is cached, because an inspection reads several times.
 
     Args:
@@ -104,27 +102,28 @@ def read_groups(data: bytes, file: Path, recording: Format) -> tuple[Channels, .
         recording: format of the file.
 
     Returns:
-        Groups of channels of equal length, with unique titles if there are several; or the error, not raised.
+        Groups of channels of equal length, with unique titles if there are several.
+
+    Raises:
+        MeasurementError: the file cannot be read, or has no channels of numbers.
     """
+    groups, details = list[Channels](), dict[str, str]()
     with _silenced():
         try:
             groups = [part for group in recording.read(data, file) for part in _split_by_length(*group, recording)]
             problem, details = "holds no channels", {"expected": "numbers", "hint": recording.hint}
         except MeasurementError as error:
             error.file = file
-            return error
+            raise
         except ImportError as error:
-            groups, problem = [], "takes a package that is not installed"
-            details = {"found": f"no package {error.name}", "hint": 'pip install "bushfit[instruments]"'}
+            problem, details = "takes a package that is not installed", {"found": f"no package {error.name}"}
+            details["hint"] = 'pip install "bushfit[instruments]"'
         except Exception as error:  # libraries raise any kind for broken files, struct.error and KeyError among them
-            groups, problem = [], "cannot be read"
-            details = {
-                "found": str(error) or type(error).__name__,
-                "hint": "it may be cut short: copy or export it again",
-            }
+            problem, details = "cannot be read", {"found": str(error) or type(error).__name__}
+            details["hint"] = "it may be cut short: copy or export it again"
         if not groups:
             gc.collect()  # finalizers of unfinished readers run here, where they print nothing
-            return MeasurementError(f"the {recording.name} file {problem}", file=file, **details)
+            raise MeasurementError(f"the {recording.name} file {problem}", file=file, **details)
     titles = [part.sheet or ("top level" if len(groups) > 1 else "") for part in groups]
     counts = [titles[: index + 1].count(title) for index, title in enumerate(titles)]
     titles = [f"{title} ({count})" if count > 1 else title for title, count in zip(titles, counts, strict=True)]
@@ -174,7 +173,7 @@ def _split_by_length(
         over = table[0].over
         _refuse_complex(table)
         several = sum(np.iscomplexobj(one.values) and bool(np.any(one.values.imag)) for one in table) > 1
-        if over and over.name not in _BASES.roles([one.name for one in table]):
+        if over and over.name not in _REAL.roles([one.name for one in table]):
             table.insert(0, over)
         if columns := [column for channel in table for column in _real_channels(channel, several)]:
             names, arrays, unit_texts, _ = zip(*columns, strict=True)
@@ -192,9 +191,9 @@ def _refuse_complex(channels: Sequence[Channel]) -> None:
     Raises:
         MeasurementError: a channel has complex values without a meaning.
     """
-    roles = {channel.name: heading.role for channel in channels if (heading := _REAL.heading(channel.name))}
+    is_record = "time" in _REAL.roles([channel.name for channel in channels])
     for channel in channels:
-        is_real = channel.name in roles or "time" in roles.values()
+        is_real = is_record or _REAL.heading(channel.name)
         if is_real and np.iscomplexobj(channel.values) and np.any(channel.values.imag):
             raise MeasurementError(
                 f'the channel "{channel.name}" holds complex numbers',

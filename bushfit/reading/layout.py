@@ -110,10 +110,11 @@ class Layout:
         texts = [plain(cell) for cell in cells]
         return any(texts) and any(texts == list(map(plain, row)) for row in (self.headers, self.units))
 
-    def is_header(self, cells: Sequence[str]) -> bool:
-        """Return True if at least two cells of a row name columns of the table, with these or other units."""
+    def is_header(self, cells: Sequence[str], vocabulary: Vocabulary) -> bool:
+        """Return True if at least two cells of a row name columns of the table, with these or other names and units."""
         names = {plain(split_unit(header)[0]) for header in self.headers} - {""}
-        return len(names & {plain(split_unit(cell)[0]) for cell in cells}) > 1
+        alike = names & {plain(split_unit(cell)[0]) for cell in cells}
+        return max(len(alike), len(vocabulary.roles(cells) & vocabulary.roles(self.headers))) > 1
 
 
 def split(content: Content, delimiter: str) -> list[str]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bushfit.geometry import Place, strain_factor_of_files
+from bushfit.geometry import Place
 from bushfit.reading.headers import LOOP_COLUMNS, Column
 from bushfit.reading.labelled import note_not_understood
 from bushfit.reading.measurement import Floats, Loop
@@ -90,8 +90,8 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
         MeasurementError: a column is missing, or displacement and force are swapped.
         UnitError: a unit is missing or does not fit.
     """
-    length, resistance = direction.motion.displacement_unit, direction.motion.force_unit
-    if table.agrees("displacement", resistance) and table.agrees("force", length):
+    swapped = {"displacement": direction.motion.force_unit, "force": direction.motion.displacement_unit}
+    if all(table.agrees(role, unit) for role, unit in swapped.items()):
         displacement, force = (table.roles[role].header for role in ("displacement", "force"))
         raise table.header_error(
             "displacement and force are swapped",
@@ -100,23 +100,21 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
             hint="correct the header, or name the columns in the campaign: columns = "
             f'{{ displacement = "{force}", force = "{displacement}" }}',
         )
-    column = table.column("displacement", length)
-    wanted = {"displacement": replace(column, scale=strain_factor_of_files(direction) * column.scale)}
-    column = table.column("force", resistance)
-    wanted["force"] = replace(column, scale=test.force_sign * column.scale)
+    wanted = {role: table.column(role, direction) for role in ("displacement", "force")}
+    wanted["force"] = replace(wanted["force"], scale=test.force_sign * wanted["force"].scale)
     if "time" in table.roles:
-        wanted["time"] = time_column(table)
+        wanted["time"] = time_column(table, direction)
     elif test.rate is None and test.frequency is None:
         hint = 'or state rate = "10 mm/min", or frequency = "0.1 Hz" and waveform = "sine", in the campaign'
-        table.column("time", "s", hint)
+        table.column("time", direction, hint)
     return wanted
 
 
-def time_column(table: Table) -> Column:
+def time_column(table: Table, place: Place) -> Column:
     """Return the time column with its factor to seconds; without a unit, it may contain day numbers."""
     time = table.roles.get("time")
     in_days = time and time.unit is None and time.index not in table.clocks and _has_day_numbers(table, time)
-    return replace(time, scale=DAY) if time and in_days else table.column("time", "s")
+    return replace(time, scale=DAY) if time and in_days else table.column("time", place)
 
 
 def _has_day_numbers(table: Table, time: Column) -> bool:

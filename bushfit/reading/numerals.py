@@ -12,17 +12,17 @@ from functools import cached_property
 from itertools import product
 
 #: Blanks that separate thousands: plain, unbreakable and thin ones.
-_BLANKS = " \u00a0\u2009\u202f"
+BLANKS = " \u00a0\u2009\u202f"
 #: Apostrophes that separate thousands.
-_APOSTROPHES = "'\u2019"
+APOSTROPHES = "'\u2019"
 #: Sign before a number or an exponent; there are two minus signs.
 _SIGN = "[+\\-\u2212]"
 #: Pattern of each thousands separator, by the sign with which a user states it.
-_SEPARATORS = {",": ",", ".": r"\.", " ": f"[{_BLANKS}]", "'": f"[{_APOSTROPHES}]"}
+_SEPARATORS = {",": ",", ".": r"\.", " ": f"[{BLANKS}]", "'": f"[{APOSTROPHES}]"}
 #: Largest number of characters of a number; chosen: the largest float written out has 309 digits.
 _LONGEST_NUMBER = 400
 #: Text with the characters of a number, in an order that numbers may have.
-_LIKE_NUMBER = re.compile(rf"{_SIGN}?[.,]?\d[\d.,{_BLANKS}{_APOSTROPHES}]*(?:[eE]{_SIGN}?\d+)?", re.ASCII)
+_LIKE_NUMBER = re.compile(rf"{_SIGN}?[.,]?\d[\d.,{BLANKS}{APOSTROPHES}]*(?:[eE]{_SIGN}?\d+)?", re.ASCII)
 #: Number whose point or comma may be the thousands separator or the decimal mark: 1.234.
 _ONE_GROUP = re.compile(rf"{_SIGN}?[1-9]\d{{0,2}}([.,])\d{{3}}", re.ASCII)
 #: Number without thousands separators: 1234.5.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from bushfit.errors import BushfitError, MeasurementError, did_you_mean
+from bushfit.errors import MeasurementError, did_you_mean
 from bushfit.reading.files import join_quoted, sha256, to_utf8, view_bytes
 from bushfit.reading.instruments import format_of, read_groups, word_for_part
 from bushfit.reading.layout import FileFormat
@@ -81,68 +81,45 @@ def open_file(file: Path, file_format: FileFormat) -> OpenedFile:
         MeasurementError: the file cannot be read, or has no part with this name.
     """
     data = view_bytes(file, MeasurementError)
-    checksum, parts = sha256(data), read_parts(data, file)
+    checksum, parts = sha256(data), _read_parts(data, file)
+    name = file_format.sheet
+    if not parts and name:
+        expected = "a workbook, or a file with groups of channels"
+        raise MeasurementError("this is no workbook", file=file, found=f'sheet = "{name}"', expected=expected)
     if not parts:
-        if file_format.sheet:
-            expected = "a workbook, or a file with groups of channels"
-            raise MeasurementError(
-                "this is no workbook", file=file, found=f'sheet = "{file_format.sheet}"', expected=expected
-            )
         text, encoding = to_utf8(data, file, file_format.encoding)
         return OpenedFile(file, checksum, file_format, [Text(join_quoted(text), encoding)])
-    if (name := file_format.sheet) is None:
-        return OpenedFile(file, checksum, file_format, [part for part, visible in parts if visible])
-    names = [part.sheet for part, _ in parts]
-    if name not in names:
-        problem = f"there is no such {word_for_part(file)}"
-        hint = did_you_mean(name, names)
+    chosen = [part for part, visible in parts if (visible if name is None else part.sheet == name)]
+    if not chosen:
+        problem, names = f"there is no such {word_for_part(file)}", [part.sheet for part, _ in parts]
+        hint = did_you_mean(name or "", names)
         raise MeasurementError(problem, file=file, found=f'"{name}"', expected=_listed(names), hint=hint)
-    return OpenedFile(file, checksum, file_format, [part for part, _ in parts if part.sheet == name])
+    return OpenedFile(file, checksum, file_format, chosen)
 
 
-def parts_of(file: Path) -> Sequence[Sheet]:
-    """Return the visible sheets of a workbook, or the groups of a recording; an empty list for a text.
-
-    Raises:
-        MeasurementError: a workbook or recording that cannot be read.
-    """
-    return [part for part, visible in read_parts(view_bytes(file, MeasurementError), file) if visible]
-
-
-def read_parts(data: bytes, file: Path) -> Sequence[tuple[Sheet, bool]]:
+def _read_parts(data: bytes, file: Path) -> Sequence[tuple[Sheet, bool]]:
     """Return the sheets of a workbook, or groups of a recording, each with True if visible; nothing for a text.
 
     Raises:
         MeasurementError: a workbook or recording that cannot be read.
     """
     if recording := format_of(data, file):
-        groups = read_groups(data, file, recording)
-        if isinstance(groups, MeasurementError):
-            raise groups
-        return [(group, True) for group in groups]
-    return read_sheets(data, file) if data.startswith(_WORKBOOKS) else ()
-
-
-def read_sheets(data: bytes, file: Path, kind: type[BushfitError] = MeasurementError) -> Sequence[tuple[Sheet, bool]]:
-    """Return the sheets of a workbook, each with True if it is visible; if none is visible, all are.
-
-    Args:
-        data: bytes of the file.
-        file: path, for errors.
-        kind: class of the exception to raise.
-
-    Raises:
-        kind: the file is not a workbook, or has more cells than can be read.
-    """
+        return [(group, True) for group in read_groups(data, file, recording)]
+    if not data.startswith(_WORKBOOKS):
+        return ()
     try:
         return _sheets(data)
     except OverflowError as error:
-        limit = f"at most {_MOST_CELLS} cells in all sheets, including empty ones between others"
-        hint = "save the sheet as CSV"
-        raise kind("the workbook is too large", file=file, found=str(error), expected=limit, hint=hint) from None
+        found, limit = str(error), f"at most {_MOST_CELLS} cells in all sheets, including empty ones between others"
+        problem, details = "the workbook is too large", {"expected": limit, "hint": "save the sheet as CSV"}
     except ValueError as error:
-        expected, hint = "a table as text, or a workbook: xlsx, xlsb, xls or ods", "save it again as xlsx, or as CSV"
-        raise kind("the workbook cannot be read", file=file, found=str(error), expected=expected, hint=hint) from error
+        found, problem, details = (
+            str(error),
+            "the workbook cannot be read",
+            {"hint": "save it again as xlsx, or as CSV"},
+        )
+        details["expected"] = "a table as text, or a workbook: xlsx, xlsb, xls or ods"
+    raise MeasurementError(problem, file=file, found=found, **details)
 
 
 @lru_cache(maxsize=1)
@@ -156,8 +133,7 @@ def _sheets(data: bytes) -> Sequence[tuple[Sheet, bool]]:
     import python_calamine as calamine
 
     try:
-        contents = dict(_sheets_in_xml(data))
-        _check_size(contents)
+        contents = _xml_of_sheets(data)
         book = calamine.load_workbook(io.BytesIO(data))
         visible_names = {
             sheet.name for sheet in book.sheets_metadata if sheet.visible == calamine.SheetVisibleEnum.Visible
@@ -169,34 +145,35 @@ def _sheets(data: bytes) -> Sequence[tuple[Sheet, bool]]:
             if cells_left < 0:
                 raise OverflowError(f'more, with sheet "{name}"')
             content = [_row(row) for row in sheet.to_python(skip_empty_area=False)]
-            lacks_values = lambda: any(map(_NOT_COMPUTED.search, contents.values()))  # noqa: E731
+            lacks_values = lambda: any(map(_NOT_COMPUTED.search, contents))  # noqa: E731
             sheets.append((Sheet(name, content, lacks_values), name in visible_names or not visible_names))
         return sheets
     except (calamine.CalamineError, zipfile.BadZipFile, OSError, NotImplementedError, RuntimeError) as error:
         raise ValueError(str(error)) from error
 
 
-def _sheets_in_xml(data: bytes) -> list[tuple[str, bytes]]:
-    """File name and XML of each sheet in an xlsx workbook; an empty list for other formats."""
+def _xml_of_sheets(data: bytes) -> list[bytes]:
+    """XML of each sheet in an xlsx workbook; an empty list for other formats.
+
+    Raises:
+        OverflowError: sheets that are too large, or have a cell too far out: the reader allocates all cells before it.
+    """
     if not data.startswith(b"PK"):
         return []
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         parts = [part for part in archive.infolist() if re.search(r"sheet[^/]*\.xml$", part.filename)]
-        whole = sum(part.file_size for part in parts) <= _MOST_BYTES
-        if not whole:
-            raise OverflowError(f"{sum(part.file_size for part in parts)} bytes in its sheets")
-        return [(part.filename, archive.read(part)) for part in parts]
-
-
-def _check_size(sheets: dict[str, bytes]) -> None:
-    """Raise an OverflowError if the last cell of a sheet is too far out: the reader allocates all cells before it."""
-    for name, content in sheets.items():
+        size = sum(part.file_size for part in parts)
+        if size > _MOST_BYTES:
+            raise OverflowError(f"{size} bytes in its sheets")
+        contents = {part.filename: archive.read(part) for part in parts}
+    for name, content in contents.items():
         if match := _DIMENSION.search(content[:10_000]):
             column = 0
             for letter in match[1]:
                 column = 26 * column + letter - 64
             if column * int(match[2]) > _MOST_CELLS:
                 raise OverflowError(f"{match[2].decode()} rows of {column} columns in {name}")
+    return list(contents.values())
 
 
 def _row(cells: Sequence[object]) -> list[str | float]:

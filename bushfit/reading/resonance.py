@@ -8,7 +8,7 @@ import numpy as np
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
-from bushfit.reading.headers import RESONANCE_COLUMNS, Column
+from bushfit.reading.headers import RESONANCE_COLUMNS, ZERO_TO_PEAK, Column
 from bushfit.reading.measurement import Complex, Floats, Source
 from bushfit.reading.table import Table
 
@@ -24,10 +24,6 @@ _COLUMN_SETS = (
 _SPECIFIC = {role for role in RESONANCE_COLUMNS if role not in ("frequency", "phase")}
 #: Roles whose values must be positive.
 _POSITIVE = ("frequency", "base_acceleration", "mass_acceleration", "transmissibility")
-#: SI unit of the roles that end with a word; other roles are ratios.
-_UNITS = {"phase": "rad", "frequency": "Hz"} | dict.fromkeys(
-    ("acceleration", "base_real", "base_imaginary", "mass_real", "mass_imaginary"), "m/s^2"
-)
 #: Smallest number of rows of a test; chosen: enough for a curve with five parameters and an estimate of its scatter.
 FEWEST_ROWS = 12
 
@@ -72,7 +68,7 @@ def read_resonance(table: Table, direction: Place, base_acceleration: float | No
     Raises:
         MeasurementError, UnitError: a column, a unit or a value cannot be used.
     """
-    wanted = _resonance_columns(table, has_stated_base=base_acceleration is not None)
+    wanted = _resonance_columns(table, direction, has_stated_base=base_acceleration is not None)
     values = table.read(wanted, fewest_rows=FEWEST_ROWS)
     table.check_positive(_POSITIVE, wanted, values)
     ratio, base = _transmissibility(values, base_acceleration)
@@ -83,7 +79,7 @@ def read_resonance(table: Table, direction: Place, base_acceleration: float | No
     return ResonanceTest(table.file.stem, direction, values["frequency"][order], ratio[order], base[order], source)
 
 
-def _resonance_columns(table: Table, *, has_stated_base: bool) -> dict[str, Column]:
+def _resonance_columns(table: Table, place: Place, *, has_stated_base: bool) -> dict[str, Column]:
     """Columns of a resonance test by role, with factors to SI: frequency, and the first of _COLUMN_SETS available."""
     columns = next((columns for columns in _COLUMN_SETS if set(columns) <= set(table.roles)), None)
     if columns is None:
@@ -108,14 +104,12 @@ def _resonance_columns(table: Table, *, has_stated_base: bool) -> dict[str, Colu
             expected="a column such as base acceleration [g]",
             hint='state it: --base-acceleration "0.1 g"',
         )
-    roles = dict.fromkeys(("frequency", *columns, "base_acceleration"))
-    wanted = {}
-    for role in (role for role in roles if role != "base_acceleration" or role in table.roles):
-        unit = next((unit for end, unit in _UNITS.items() if role.endswith(end)), "1")
-        column = table.column(role, unit)
-        to_peak = 0.5 if column.convention == "peak-to-peak" else 1.0
-        wanted[role] = replace(column, scale=to_peak * column.scale)
-    return wanted
+    roles = [role for role in ("base_acceleration",) if role in table.roles and role not in columns]
+    wanted = {role: table.column(role, place) for role in ("frequency", *columns, *roles)}
+    return {
+        role: replace(column, scale=ZERO_TO_PEAK[column.convention or "zero-to-peak"] * column.scale)
+        for role, column in wanted.items()
+    }
 
 
 def _transmissibility(values: Mapping[str, Floats], stated_base: float | None) -> tuple[Complex, Floats]:

@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 
 from bushfit.reading.files import CHUNK_BYTES, HEAD_BYTES
 from bushfit.reading.layout import MOST_HEAD_LINES, Layout, Line, split
+from bushfit.reading.numerals import APOSTROPHES, BLANKS
 from bushfit.units import SIZES
 
 #: Smallest positive value and largest magnitude of a number in a table [SI unit].
 LEAST_VALUE, LARGEST_VALUE = SIZES
 _LINE_END = re.compile(rb"\r\n|\n|\r")
-#: Thousands separators that cannot also be delimiters or decimal marks.
-_SEPARATORS = "'\u2019\u00a0\u2009\u202f"
 #: Rows of channels that are converted at a time; chosen: they take a few MiB.
 _CHUNK_ROWS = 1 << 14
 #: Thousands separated by a blank.
@@ -71,24 +70,14 @@ class Text:
             yield block
             start, after = end, after + block.data.count(b"\n")
 
-    def has(self, signs: str, layout: Layout) -> bool:
-        """Return True if the text below the header contains one of some characters."""
+    def may_contain(self, sign: str, layout: Layout) -> bool:
+        """Return True if cells below the header can contain a decimal mark or thousands separator."""
         start = self.offset(layout.lines_before_data)
-        return any(self.data.find(sign.encode(), start) >= 0 for sign in signs)
-
-    def may_have_comma(self, layout: Layout) -> bool:
-        """Return True if cells below the header can contain a comma."""
-        return self.has('"' if layout.delimiter == "," else ",", layout)
-
-    def may_have_thousands_separators(self, layout: Layout, decimal: str) -> bool:
-        """Return True if numbers below the header can have thousands separators, given their decimal mark."""
-        if self.has(_SEPARATORS if decimal == "." else _SEPARATORS + ".", layout):
-            return True
-        if decimal == "." and self.may_have_comma(layout):
-            return True
-        return layout.delimiter != " " and bool(
-            _GROUP_BY_BLANK.search(self.data, self.offset(layout.lines_before_data))
-        )
+        if sign == " ":
+            grouped = layout.delimiter != " " and _GROUP_BY_BLANK.search(self.data, start) is not None
+            return grouped or any(self.data.find(blank.encode(), start) >= 0 for blank in BLANKS[1:])
+        marks = APOSTROPHES if sign == "'" else '"' if sign == layout.delimiter == "," else sign
+        return any(self.data.find(mark.encode(), start) >= 0 for mark in marks)
 
     def frame(self, layout: Layout, types: Mapping[int, Any], width: int, decimal: str) -> Any:
         """Read columns of a block with pandas.
@@ -155,6 +144,7 @@ class Sheet:
         layout: header and units, if the file format defines them; None if they have to be found.
         numeric: indices of columns that contain only numbers.
         above: lines above the table, such as those above the first block, or properties of a recording.
+        numbers: line number in the file of each row, if the rows were rearranged below the header; None for a sheet.
     """
 
     sheet: str
@@ -164,31 +154,18 @@ class Sheet:
     layout: Layout | None = None
     numeric: frozenset[int] = frozenset()
     above: Sequence[Line] = ()
+    numbers: Sequence[int] | None = None
 
     def head(self) -> list[Line]:
         """Return the lines above the table, and the first non-empty rows, which can contain the header."""
         return [*self.above, *islice(self.lines(0), MOST_HEAD_LINES)]
 
     def lines(self, after: int) -> Iterator[Line]:
-        """Yield the non-empty rows of the sheet below the row with number `after`."""
-        for number, cells in enumerate(islice(self.content, after, None), start=after + 1):
+        """Yield the non-empty rows of the sheet below the row with number `after`; all rows of a rearranged table."""
+        rows = enumerate(islice(self.content, after, None), start=after + 1)
+        for number, cells in rows if self.numbers is None else zip(self.numbers, self.content, strict=True):
             if any(cell != "" for cell in cells):
                 yield Line(number, cells)
-
-
-@dataclass(frozen=True, eq=False)
-class Combined(Sheet):
-    """Table that was rearranged from blocks of a sheet or text.
-
-    Args:
-        numbers: original line number of each row.
-    """
-
-    numbers: Sequence[int] = ()
-
-    def lines(self, after: int) -> Iterator[Line]:  # noqa: ARG002
-        """Yield all rows, with their original line numbers; `after` is ignored: all rows are below the header."""
-        return (Line(number, cells) for number, cells in zip(self.numbers, self.content, strict=True))
 
 
 @dataclass(frozen=True, eq=False)

@@ -152,13 +152,19 @@ def complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tu
 
 
 def check_stiffness(
-    table: Table, pair: tuple[str, str], values: Mapping[str, Floats], stiffness: Complex, loss_factor: Floats
+    table: Table,
+    pair: tuple[str, str],
+    columns: Mapping[str, Column],
+    values: Mapping[str, Floats],
+    stiffness: Complex,
+    loss_factor: Floats,
 ) -> None:
     """Refuse an implausible loss, a loss factor in % that must be a ratio, and redundant columns that disagree.
 
     Args:
         table: table of the sweep, for errors.
         pair: roles of the two columns, one of PAIRS, that gave the stiffness.
+        columns: columns by role, with their factors to SI.
         values: values in SI by role, (n,) each, with those of redundant columns.
         stiffness: complex stiffness [N/m or N m/rad, or Pa], (n,).
         loss_factor: loss factor [-], (n,).
@@ -167,7 +173,7 @@ def check_stiffness(
         MeasurementError: the loss is implausible, or other columns give another stiffness; the sign of their loss is
             not compared.
     """
-    column = table.roles[pair[1]]
+    column = columns[pair[1]]
     if np.mean(loss_factor < -LEAST_LOSS_FACTOR) > _THROUGHOUT:
         raise table.error(
             "the loss has the opposite sign",
@@ -177,7 +183,7 @@ def check_stiffness(
             hint="take phase_sign out of the campaign, or state phase_sign = -1",
         )
     largest = float(np.nan_to_num(np.abs(loss_factor), nan=np.inf).max())
-    scale = table.column("loss_factor", "1").scale if pair[1] == "loss_factor" else 1.0
+    scale = column.scale if pair[1] == "loss_factor" else 1.0
     if scale != 1.0 and 0.0 < largest < LEAST_LOSS_FACTOR:
         raise table.error(
             "no rubber has a loss this small",

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit import units as si
-from bushfit.geometry import STRAINING, Place, strain_factor_of_files
-from bushfit.reading.headers import AGREEING_PAIRS, SWEEP_COLUMNS, ZERO_TO_PEAK, AmplitudeConvention, Column
+from bushfit.geometry import Place, strain_factor_of_files
+from bushfit.reading.headers import AGREEING_PAIRS, SWEEP_COLUMNS, ZERO_TO_PEAK, AmplitudeConvention, Column, si_unit
 from bushfit.reading.labelled import column_texts, note_not_understood
 from bushfit.reading.measurement import SAME_TEMPERATURE, Floats, Sweep
 from bushfit.reading.preload import parse_preload
@@ -94,8 +94,8 @@ def read_sweep(
     values, corrections = with_positive_loss(values, columns, test)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         stiffness, loss_factor = complex_stiffness(pair, values)
-    check_stiffness(table, pair, values, stiffness, loss_factor)
-    selected, temperature, degrees = _rows_at_temperature(table, values, test.temperature)
+    check_stiffness(table, pair, columns, values, stiffness, loss_factor)
+    selected, temperature, degrees = _rows_at_temperature(table, values, direction, test.temperature)
     repeat = _repeat_numbers(table, values)
     frequency, amplitude = values["frequency"][selected], values["amplitude"][selected]
     reached = values["amplitude_reached"][selected] if "amplitude_reached" in values else None
@@ -145,20 +145,15 @@ def sweep_columns(
         MeasurementError: a column is missing, or the convention of an amplitude is unknown or contradictory.
         UnitError: a unit is missing or does not fit.
     """
-    motion, roles = direction.motion, table.roles
-    seconds = "Pa*s" if motion is STRAINING else motion.stiffness_unit.replace("/", "*s/", 1)
-    units = dict.fromkeys(SWEEP_COLUMNS, "1") | {"frequency": "Hz", "phase": "rad", "temperature": "K"}
-    units |= dict.fromkeys(("amplitude", "amplitude_reached"), motion.displacement_unit)
-    units |= dict.fromkeys(("stiffness", "storage_stiffness", "loss_stiffness"), motion.stiffness_unit)
-    units |= {"force_amplitude": motion.force_unit, "damping_coefficient": seconds}
+    roles = table.roles
     numeric = {role for role, column in roles.items() if table.holds_numbers(column.index)}
     wanted = [role for role in ("frequency", "amplitude") if role in roles or role not in stated] + [*pair]
     wanted += [role for role in ("amplitude_reached", "relative_error") if role in roles]
     wanted += ["repeat"] if "repeat" in numeric else []
     wanted += ["temperature"] if "temperature" in numeric and roles["temperature"].unit else []
     redundant = (role for other_pair in AGREEING_PAIRS if set(other_pair) <= set(roles) for role in other_pair)
-    wanted += [role for role in redundant if units[role] == "1" or table.agrees(role, units[role])]
-    columns = {role: table.column(role, units[role], _HINTS.get(role)) for role in wanted}
+    wanted += [role for role in redundant if table.agrees(role, si_unit(role, direction.motion))]
+    columns = {role: table.column(role, direction, _HINTS.get(role)) for role in wanted}
     counted = columns["amplitude"].convention if "amplitude" in columns else None
     if counted and convention and counted != convention:
         raise table.header_error(
@@ -179,22 +174,21 @@ def sweep_columns(
             hint=" or ".join(f'units = {{ force_amplitude = "{force.unit} {end}" }}' for end in (form, "0-p"))
             + " in the campaign",
         )
-    strain = strain_factor_of_files(direction)
-    for role, factor in (("amplitude", strain), ("amplitude_reached", strain), ("force_amplitude", 1.0)):
+    for role in ("amplitude", "amplitude_reached", "force_amplitude"):
         if column := columns.get(role):
-            to_peak = ZERO_TO_PEAK[column.convention or counted]
-            columns[role] = replace(column, scale=to_peak * factor * column.scale)
+            columns[role] = replace(column, scale=ZERO_TO_PEAK[column.convention or counted] * column.scale)
     return {"temperature": roles["temperature"], **columns} if "temperature" in numeric else columns
 
 
 def _rows_at_temperature(
-    table: Table, values: Mapping[str, Floats], stated: float | None
+    table: Table, values: Mapping[str, Floats], direction: Place, stated: float | None
 ) -> tuple[NDArray[np.intp], float | None, Floats | float | None]:
     """Select the rows of a sweep at the temperature of the test.
 
     Args:
         table: table of the sweep, for errors.
         values: values in SI by role, (n,) each.
+        direction: direction of the bushing, or the specimen.
         stated: temperature that the campaign states [K]; None if it states none.
 
     Returns:
@@ -210,7 +204,7 @@ def _rows_at_temperature(
     unit = table.roles["temperature"].unit
     if unit is None and stated is None and np.ptp(values["temperature"]) <= ONE_TEST:
         return rows, None, None
-    column = table.column("temperature", "K")
+    column = table.column("temperature", direction)
     celsius = values["temperature"] + (si.kelvin_scale(unit or "") or (1.0, 0.0))[1] - si.CELSIUS
     kelvin = celsius + si.CELSIUS
     if stated is None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bushfit import units
 from bushfit.errors import MeasurementError, UnitError, error_location
-from bushfit.geometry import STRAINING, TRANSLATION, Motion
+from bushfit.geometry import STRAINING, TRANSLATION, Motion, Place, strain_factor_of_files
 from bushfit.reading.blocks import combined, refuse_other_columns
 from bushfit.reading.cells import Cells, FaultyRow
 from bushfit.reading.classification import classify
@@ -27,6 +27,7 @@ from bushfit.reading.headers import (
     Vocabulary,
     is_angular,
     of_motion,
+    si_unit,
     split_convention,
 )
 from bushfit.reading.labelled import Rows, find_labels, select_rows
@@ -142,12 +143,12 @@ class Table(Cells):
         """Columns that state direction, specimen_number and run of each row: index and texts, (n,), by these keys."""
         return find_labels(self)
 
-    def column(self, role: str, expected: str, hint: str | None = None) -> Column:
+    def column(self, role: str, tested: Place, hint: str | None = None) -> Column:
         """Return the column of a role with its factor to SI, after checking its unit; a ratio needs no unit.
 
         Args:
             role: role of the column, such as "force".
-            expected: SI unit of the role, such as "N"; "1" for a ratio.
+            tested: direction of the bushing, or the specimen; it determines the unit.
             hint: next step to suggest if there is no such column.
 
         Returns:
@@ -157,7 +158,7 @@ class Table(Cells):
             MeasurementError: there is no such column.
             UnitError: the unit is missing, unknown, or of another dimension.
         """
-        label = role.replace("_", " ")
+        label, expected = role.replace("_", " "), si_unit(role, tested.motion)
         if role not in self.roles:
             self.refuse_other_motion(role)
             ways = ", ".join(filter(None, (self.columns_key(role, expected), hint)))
@@ -203,12 +204,14 @@ class Table(Cells):
             if expected == "Hz" and is_angular(column.header, unit):
                 per_second = "rad/s" if units.is_compatible(unit, "rad/s") else "Hz"
                 return replace(column, scale=units.si_factor(unit, per_second) / (2.0 * math.pi))
-            return replace(column, scale=units.si_factor(unit, expected))
+            is_strain = role in ("displacement", "amplitude", "amplitude_reached")
+            strain_factor = strain_factor_of_files(tested) if is_strain else 1.0
+            return replace(column, scale=strain_factor * units.si_factor(unit, expected))
 
     def agrees(self, role: str, expected: str) -> bool:
-        """Return True if the table has a column for a role, and its unit has the dimension of the unit `expected`."""
+        """Return True if the table has a column for a role, and its unit, or 1, has the dimension of `expected`."""
         column = self.roles.get(role)
-        return column is not None and column.unit is not None and units.is_compatible(column.unit, expected)
+        return column is not None and units.is_compatible(column.unit or "1", expected)
 
     def columns_key(self, role: str, unit: str) -> str:
         """Return campaign keys for up to three unused headers with a fitting unit: 'columns = { force = "F1" }'."""
@@ -277,7 +280,8 @@ class Table(Cells):
             for values in table._read_block(block, wanted, left_out):
                 for role, numbers in values.items():
                     parts[role].append(numbers)
-        refuse_other_columns(table, left_out)
+        if left_out:
+            refuse_other_columns(table, left_out, Vocabulary(of_motion(self.names, self.motion), {}))
         values = {role: np.concatenate(parts.pop(role)) for role in wanted}
         count = len(next(iter(values.values())))
         notes = (*self.notes, *table.note_left_out(left_out, count))

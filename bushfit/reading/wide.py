@@ -21,7 +21,7 @@ from bushfit.reading.blocks import COUNTED
 from bushfit.reading.headers import AmplitudeConvention, Vocabulary, split_convention
 from bushfit.reading.layout import DELIMITERS, Layout, is_comment, is_row, split
 from bushfit.reading.numerals import is_like_number, plainest_value
-from bushfit.reading.source import Combined, RowSource
+from bushfit.reading.source import RowSource, Sheet
 
 #: Roles of the two stepped quantities: one varies down the rows and the other across the columns.
 _STEPPED = ("frequency", "amplitude")
@@ -294,5 +294,5 @@ def _long_table(
         for points in zip(*(points for *_, points in columns), strict=True):
             numbers.append(points[0][0])
             rows.append([points[0][1], level, *(cell for _, _, cell in points)])
-    sheet = Combined(source.sheet or "", rows, numbers=numbers)
+    sheet = Sheet(source.sheet or "", rows, numbers=numbers)
     return sheet, Layout("", tuple(headers), min(numbers) - 1, ("",) * len(headers), None)

@@ -193,6 +193,14 @@ EXPORTS: dict[str, Export] = {
         words=["7 rows left out", "Mean"],
     ),
     "means": Export(sweep(USUAL + "tan delta", F, A, K, ETA) + "Mean\t0.3\t1400\t0.13\nStd Dev\t0.1\t20\t0.01\n", words=["2 rows left out"]),
+    "a mean below a column of names": Export(
+        sweep("Specimen|" + USUAL + "tan delta", ["P1"] * F.size, F, A, K, ETA) + "Mean\t30\t0.3\t1400\t0.13\n", words=["1 row left out", "Mean"]
+    ),
+    "a second block in German": Export(loop() + loop("Zeit [s]|Weg [mm]|Kraft [N]"), "loop"),
+    "a second block in German, in N/m": Export(
+        sweep(USUAL + "tan delta", F[:5], A[:5], K[:5], ETA[:5]) + sweep("Frequenz [Hz]|Amplitude [mm]|Steifigkeit [N/m]|Verlustfaktor", F[5:], A[5:], 1e3 * K[5:], ETA[5:]),
+        None, ["the stiffness has two units", "N/mm on line 1"],
+    ),
     "missing values": Export(
         sweep(USUAL + "tan delta", F, A, K, ETA) + "90\t0.1\tNaN\t0.1\n100\t0.1\t#N/A\t0.1\n", words=["2 rows left out"]
     ),

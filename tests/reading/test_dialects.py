@@ -112,7 +112,7 @@ def test_what_can_be_read_in_two_ways_is_refused(case: str, tmp_path: Path) -> N
     file = tmp_path / "loop.csv"
     file.write_text("\n".join(["time [s];displacement [mm];force [N]", cells, *rows]))
     table = Table.open(file, LOOP_COLUMNS, file_format=FileFormat(**stated))  # type: ignore[arg-type]
-    wanted = {"force": table.column("force", "N")}
+    wanted = {"force": table.column("force", Direction.AXIAL)}
     if force is None:
         with pytest.raises(MeasurementError, match=r"two ways[\s\S]*decimal = "):
             table.read(wanted, fewest_rows=1)
