@@ -113,8 +113,8 @@ class Layout:
     def is_header(self, cells: Sequence[str], vocabulary: Vocabulary) -> bool:
         """Return True if at least two cells of a row name columns of the table, with these or other names and units."""
         names = {plain(split_unit(header)[0]) for header in self.headers} - {""}
-        alike = names & {plain(split_unit(cell)[0]) for cell in cells}
-        return max(len(alike), len(vocabulary.roles(cells) & vocabulary.roles(self.headers))) > 1
+        matching = names & {plain(split_unit(cell)[0]) for cell in cells}
+        return max(len(matching), len(vocabulary.roles(cells) & vocabulary.roles(self.headers))) > 1
 
 
 def split(content: Content, delimiter: str) -> list[str]:
