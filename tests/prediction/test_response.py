@@ -9,6 +9,7 @@ import pytest
 from bushfit.commands.respond import respond
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
+from bushfit.effects.rig_compliance import force as sleeve_force
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.covariance import Covariance
@@ -139,6 +140,23 @@ def test_a_low_pass_removes_the_noise_that_friction_would_follow(paper_model: Mo
     estimate, highest = noise_and_highest_frequency(measured, STEP)
     assert estimate == pytest.approx(noise * size, rel=0.1)
     assert 20.0 < highest < 45.0
+
+
+@pytest.mark.parametrize("compliance", [1e-7, 1e-6])
+def test_a_soft_sleeve_in_a_long_history_is_soon_in_equilibrium(paper_model: Model, compliance: float) -> None:
+    """Friction that a pulse leaves loaded once passed for a stiffness, and twice the forces were needed."""
+    history, motions = History.sampled(np.tile(random(TIME), 30), STEP), list[Array]()
+
+    def bushing(history: History) -> Array:
+        motions.append(history.value)
+        return paper_model.force("axial", history)
+
+    force = sleeve_force({"compliance": compliance}, bushing, history, paper_model.setting("axial"))
+    inner = bushing(history.with_value(history.value - compliance * force))
+    np.testing.assert_allclose(force, inner, atol=1e-5 * inner.max())
+    assert np.ptp(compliance * force) > 0.04 * np.ptp(history.value)
+    print(len(motions), "forces of the bushing")
+    assert len(motions) < 9
 
 
 def test_what_has_no_law_for_the_motion_is_named(paper_model: Model) -> None:
