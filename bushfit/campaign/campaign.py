@@ -131,10 +131,12 @@ def load_campaign(path: str | Path) -> Campaign:
         "logo": logo,
     }
     factors = tuple(f"stiffness_factor.{table.name}" for table in content.bushings if table.factor == "free")
-    priors = {name: ParameterSetting(prior=f"1 +- {FACTOR_SPREAD}") for name in factors}
-    stated = content.fit.effects
-    effects = (*stated, *(factor for factor in factors if factor not in stated))
-    found["fit"] = replace(content.fit, effects=effects, parameters={**priors, **content.fit.parameters})
+    parameters = {**{name: ParameterSetting() for name in factors}, **content.fit.parameters}
+    for name in factors:
+        if (stated := parameters[name]).vary and not (stated.prior or stated.tie):
+            parameters[name] = replace(stated, prior=f"1 +- {FACTOR_SPREAD}")
+    effects = (*content.fit.effects, *(name for name in factors if name not in content.fit.effects))
+    found["fit"] = replace(content.fit, effects=effects, parameters=parameters)
     settings = {key: value for key, value in vars(content).items() if key != "bushings"}
     return Campaign(**{**settings, **found}, path=path)
 

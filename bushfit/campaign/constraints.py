@@ -1,20 +1,21 @@
 """Priors and ties of parameters in [fit] of a campaign."""
 
 import re
-from collections.abc import Mapping
 
 import numpy as np
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.quantities import parameter_value
 from bushfit.campaign.schema import ParameterSetting
-from bushfit.effects import get_parameter
+from bushfit.effects import get_parameter, is_parameter, parameter_names, place_suffix
 from bushfit.errors import CampaignError, error_location
+from bushfit.geometry import get_places
 from bushfit.model.constraints import Constraints, Prior, Tie
 from bushfit.model.file import load_result
+from bushfit.validation import unknown_key
 
 #: Number of a prior, and its value and standard deviation, each with a unit; one unit may serve both.
-_NUMBER = r"(\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)"
+_NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
 _PLUS_MINUS = re.compile(rf"\s*{_NUMBER}\s*(|[^\d\s+].*?)\s*(?:\+-|±)\s*{_NUMBER}\s*(|[^\d\s].*?)\s*")
 
 
@@ -44,7 +45,7 @@ def constraints_of(campaign: Campaign) -> Constraints:
             fixed = [name for name, setting in settings.items() if not setting.vary or setting.tie]
             priors.append(_from_file(campaign, whole, without=(*stated, *fixed)))
     with error_location(campaign.path):
-        return Constraints(priors, _ties(settings))
+        return Constraints(priors, _ties(campaign))
 
 
 def _check(setting: ParameterSetting) -> None:
@@ -104,13 +105,35 @@ def _from_file(campaign: Campaign, file: str, only: str | None = None, without: 
     return Prior(covariance.names, mean, covariance.matrix, file)
 
 
-def _ties(settings: Mapping[str, ParameterSetting]) -> list[Tie]:
+def _tie(campaign: Campaign, name: str, setting: ParameterSetting) -> Tie:
+    """Parse the tie of a parameter; one that is equal to another has its unit."""
+    labels = [label for specimen in campaign.specimens for label in specimen.labels]
+    if other := (setting.equal or "").strip():
+        tie = Tie(name, other, (other,), "p0", campaign.path)
+        if not is_parameter(other):
+            error = unknown_key(other, parameter_names())
+            error.hint = error.hint or 'expression = "..." takes the value of an expression'
+            raise error
+    else:
+        tie = Tie.from_expression(name, setting.expression or "", labels, campaign.path)
+    for used in tie.names:
+        if place := place_suffix(used):
+            get_places(place, campaign.specimens)
+    units = [get_parameter(one).unit for one in (name, other or name)]
+    if units[0] != units[1]:
+        found, expected = f"{name} [{units[0]}], {other} [{units[1]}]", "two parameters of one unit"
+        hint = f'expression = "{other}" takes the value in SI units'
+        raise CampaignError("parameters of different units are not equal", found=found, expected=expected, hint=hint)
+    return tie
+
+
+def _ties(campaign: Campaign) -> list[Tie]:
     """Parse the ties and sort them: each after the ties of the parameters that it uses."""
     waiting, ordered = dict[str, Tie](), list[Tie]()
-    for name, setting in settings.items():
+    for name, setting in campaign.fit.parameters.items():
         if setting.tie:
             with error_location(place=f"fit.{name}"):
-                waiting[name] = Tie.from_expression(name, setting.tie)
+                waiting[name] = _tie(campaign, name, setting)
     while waiting:
         ready = [tie for tie in waiting.values() if not waiting.keys() & {*tie.names}]
         if not ready:

@@ -258,6 +258,7 @@ def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUs
             continue
         coordinates = Coordinates.of_parameters(model, known)
         mean = dict(zip(prior.names, prior.mean.tolist(), strict=True))
+        deviation = dict(zip(prior.names, np.sqrt(np.diag(prior.covariance)).tolist(), strict=True))
         before = np.diag(prior_covariance(prior, coordinates))
         changes = coordinate_changes(model, names, known)
         after = np.diag(changes.T @ linear @ changes)
@@ -268,7 +269,7 @@ def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUs
             share = float(after[i] / before[i])
             if np.any(changes[:, i]):
                 distance = float(distances[i] / spread[i]) if share < _ALL else 0.0
-                uses[name] = PriorUse(prior.source, mean[name], min(share, 1.0), distance)
+                uses[name] = PriorUse(prior.source, mean[name], deviation[name], min(share, 1.0), distance)
     return uses
 
 

@@ -299,10 +299,9 @@ def _result(
         *data.assumed,
         *prior_warnings(priors),
         *(
-            f"the tie {tie.name} = {tie.expression} is not used: the model lacks {name}"
+            f"the tie {tie.name} = {tie.expression} is not used: the model lacks {', '.join(lacking)}"
             for tie in data.constraints.ties
-            for name in tie.names
-            if tie.name in model.values and name not in model.values
+            if (lacking := [name for name in (tie.name, *tie.names) if name not in model.values])
         ),
         *(
             f"the prior {prior.source} is not used: the model lacks {', '.join(prior.names)}"

@@ -5,6 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,8 @@ from bushfit.validation import unknown_key
 _FUNCTIONS = {"exp": np.exp, "log": np.log, "sqrt": np.sqrt}
 #: Parts of Python's grammar that an expression may have; attributes, subscripts and texts are not among them.
 _GRAMMAR = {"module", "expr", "expression", "binop", "unaryop", "call", "name", "constant"}
-#: Name of a parameter or function in an expression, with dots.
-_NAME = re.compile(r"(?<![\w.])[A-Za-z_][\w.]*(?!\w*\s*\()")
+#: Name of a parameter in an expression, with the name of a body after a dot; a function has a bracket behind it.
+_NAME = r"(?<![\w.])[A-Za-z_]\w*(?:\.(?:(?:{bodies})(?!\w)|[\w.]*))?(?!\w*\s*\()"
 #: Relative step into the complex plane: a derivative so taken is exact to rounding.
 _STEP = 1e-30
 
@@ -49,19 +50,25 @@ class Tie:
         name: name of the tied parameter.
         expression: expression of other parameters [SI], such as "0.5 * mu".
         names: names of these parameters, in the order of their first use.
+        code: expression with p0, p1 and so on in place of these names.
+        file: campaign file of the tie, for errors.
     """
 
     name: str
     expression: str
     names: tuple[str, ...]
+    code: str
+    file: Path | None = None
 
     @classmethod
-    def from_expression(cls, name: str, expression: str) -> "Tie":
+    def from_expression(cls, name: str, expression: str, bodies: Sequence[str] = (), file: Path | None = None) -> "Tie":
         """Parse the expression of a tie.
 
         Args:
             name: name of the tied parameter.
             expression: numbers, parameters, + - * / ** and brackets, exp, log and sqrt.
+            bodies: names of bushings, specimens and directions, which may contain blanks and other characters.
+            file: campaign file of the tie.
 
         Returns:
             The tie.
@@ -70,11 +77,14 @@ class Tie:
             CampaignError: a name is unknown.
             ModelError: the expression has another element.
         """
-        names = tuple(dict.fromkeys(_NAME.findall(expression)))
+        longest_first = sorted(map(re.escape, bodies), key=len, reverse=True)
+        pattern = re.compile(_NAME.format(bodies="|".join(longest_first) or "(?!)"))
+        names = tuple(dict.fromkeys(pattern.findall(expression)))
         for used in names:
             if not is_parameter(used):
                 raise unknown_key(used, parameter_names())
-        tie = cls(name, expression, names)
+        code = pattern.sub(lambda match: f"p{names.index(match[0])}", expression)
+        tie = cls(name, expression, names, code, file)
         tie.value({used: get_parameter(used).typical + 0j for used in names})  # complex, as for derivatives
         return tie
 
@@ -87,17 +97,16 @@ class Tie:
         Raises:
             ModelError: the expression has no value, or no real value of real parameters.
         """
-        symbols = {name: f"p{i}" for i, name in enumerate(self.names)}
-        code = _NAME.sub(lambda match: symbols[match[0]], self.expression)
         try:
             with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-                given = {symbol: values[name] for name, symbol in symbols.items()}
-                value = _evaluate(code, given)
+                given = {f"p{i}": values[name] for i, name in enumerate(self.names)}
+                value = _evaluate(self.code, given)
             if not any(isinstance(number, complex) for number in given.values()) and not np.isfinite(float(value)):
                 raise ValueError(value)
         except Exception as error:
             raise ModelError(
                 "this expression has no value",
+                file=self.file,
                 place=f"fit.{self.name}",
                 found=self.expression,
                 expected="numbers, names of parameters, + - * / ** ( ), exp, log and sqrt",
@@ -143,10 +152,26 @@ class Constraints:
         return [tie for tie in self.ties if {tie.name, *tie.names} <= values.keys()]
 
     def tied_values(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Parameter values [SI] by name, with those of tied parameters computed from the others."""
+        """Parameter values [SI] by name, with those of tied parameters computed from the others.
+
+        Raises:
+            ModelError: an expression has no value, or a value outside the bounds of its parameter.
+        """
         tied = dict(values)
         for tie in self.active_ties(values):
-            tied[tie.name] = tie.value(tied)
+            tied[tie.name] = value = tie.value(tied)
+            parameter = get_parameter(tie.name)
+            low, high = parameter.bounds
+            if not isinstance(value, complex) and not (low <= value <= high or value == parameter.neutral):
+                unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+                raise ModelError(
+                    "a tie gives an impossible value",
+                    file=tie.file,
+                    place=f"fit.{tie.name}",
+                    found=f"{tie.name} = {tie.expression} = {value:g}{unit}",
+                    expected=f"{low:g} to {high:g}{unit} ({parameter.meaning})",
+                    hint="correct the expression, or limit its parameters by min and max in [fit]",
+                )
         return tied
 
     def slopes(self, values: Mapping[str, float], names: Sequence[str]) -> Array:

@@ -174,13 +174,14 @@ class PriorUse:
 
     Args:
         source: prior as the campaign states it, such as "0.24 +- 0.03".
-        mean: mean of the prior [SI].
+        mean, deviation: mean and standard deviation of the prior [SI].
         share: share of the information on the parameter that comes from the prior, 0 to 1.
         distance: difference of the tests from the prior, in standard deviations.
     """
 
     source: str
     mean: Number
+    deviation: Number
     share: Number
     distance: Number
 

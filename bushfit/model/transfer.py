@@ -10,18 +10,30 @@ from bushfit.geometry import Bushing, Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
+from bushfit.units import number
 
 #: Standard deviation of the stiffness of a bushing over its formula; chosen: 0.2 mm of 8 mm of rubber, as moulded parts
 #: vary, is 2.5 %, and the modulus varies by 2 % within a batch.
 FACTOR_SPREAD = 0.03
 
 
-def with_factor(result: Result, places: Sequence[str]) -> Result:
+def factor_spread(result: Result) -> float | None:
+    """Standard deviation of the factors of bushings about 1, by their priors; None if no bushing has a free factor."""
+    names = [f"stiffness_factor.{bushing.name}" for bushing in result.bushings]
+    priors = [result.priors[name] for name in names if name in result.priors]
+    stated = [(prior.mean - 1.0, prior.deviation) for prior in priors if not prior.source.endswith(".json")]
+    if not stated:  # a prior from a file is of one bushing, and not of their spread
+        return FACTOR_SPREAD if priors else None
+    return float(np.sqrt(np.mean(np.square(stated).sum(axis=1))))
+
+
+def with_factor(result: Result, places: Sequence[str], spread: float) -> Result:
     """Add a stiffness factor of 1, with the spread between bushings, at places without a test.
 
     Args:
         result: fitted model.
         places: names of directions or bushings.
+        spread: standard deviation of the factor.
 
     Returns:
         Result with the factors in its models and in its covariance.
@@ -33,12 +45,12 @@ def with_factor(result: Result, places: Sequence[str]) -> Result:
         return Model.with_defaults(model.bushing, effects, model.values, model.unnamed, model.constraints)
 
     padding = (0, len(names))
-    variance = np.diag([0.0] * len(known.names) + [FACTOR_SPREAD**2] * len(names))
-    spread = tuple(np.pad(part, padding) for part in known.spread)
+    variance = np.diag([0.0] * len(known.names) + [spread**2] * len(names))
+    spreads = tuple(np.pad(part, padding) for part in known.spread)
     return replace(
         result,
         model=with_factors(result.model),
-        covariance=Covariance((*known.names, *names), np.pad(known.matrix, padding) + variance, spread),
+        covariance=Covariance((*known.names, *names), np.pad(known.matrix, padding) + variance, spreads),
         alternatives=tuple(replace(record, model=with_factors(record.model)) for record in result.alternatives),
     )
 
@@ -85,7 +97,7 @@ def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, str]:
     sentence = f"{bushing.name}: the compound of {result.name}, of which no bushing of this shape was tested"
     if omitted := ", ".join(record.name for record in result.model.records if record.name not in model.effects):
         sentence += f"; left out, because they belong to {result.name} or its rig: {omitted}"
-    if any(f"stiffness_factor.{fitted.name}" in result.priors for fitted in result.bushings):
-        elsewhere = with_factor(elsewhere, [*Direction])
-        sentence += f"; the bands include {100 * FACTOR_SPREAD:g} % of stiffness, by which bushings differ"
+    if spread := factor_spread(result):
+        elsewhere = with_factor(elsewhere, [*Direction], spread)
+        sentence += f"; the bands include {number(100.0 * spread, 2)} % of stiffness, by which bushings differ"
     return elsewhere, sentence

@@ -13,7 +13,7 @@ from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Specimen
 from bushfit.model.covariance import Z95
 from bushfit.model.result import Result
-from bushfit.model.transfer import with_factor
+from bushfit.model.transfer import FACTOR_SPREAD, factor_spread, with_factor
 from bushfit.prediction.bands import uncertainty
 
 
@@ -64,7 +64,8 @@ def predict_each_bushing(
         kept = [effect for effect in effects if place_suffix(effect) not in labels]
         result = fit_joint(data, effects=kept, directions=others)
         misfits = [misfit for misfit in result.tests if misfit.held is None and misfit.place in labels]
-        result = with_factor(result, [name]) if f"stiffness_factor.{name}" in effects else result
+        if f"stiffness_factor.{name}" in effects:
+            result = with_factor(result, [name], factor_spread(result) or FACTOR_SPREAD)
         points = [misfit.points for misfit in misfits]
         predicted.append(
             OtherBushings(
