@@ -133,7 +133,7 @@ def _print_result(output: Output, result: BatchResult, folder: Path) -> None:
         "are not judged": [
             f"{part.name} is not judged: {part.poor_fit}" for part in parts if part.result == "not judged"
         ],
-        "failed": [f"{part.name} could not be evaluated: {part.error}" for part in parts if part.error],
+        "could not be evaluated": [f"{part.name} could not be evaluated: {part.error}" for part in parts if part.error],
         "differ": [f"{part.name} differs from the others: {part.differs}" for part in parts if part.differs],
         "pass conditionally": [
             f"{part.name} passes conditionally: {'; '.join(part.doubtful.values())}"
@@ -161,7 +161,8 @@ def _print_result(output: Output, result: BatchResult, folder: Path) -> None:
     from_before = f", {result.kept_count} of them from an earlier run" if result.kept_count else ""
     rate = len(parts) / max(result.seconds, 1e-9)
     output.print(
-        f"{document.done} done{from_before}, {len(document.failed)} failed; {result.seconds:.1f} s, {rate:.1f} a second"
+        f"{document.done} evaluated{from_before}, {len(document.failed)} with an error; {result.seconds:.1f} s, "
+        f"{rate:.1f} per second"
     )
     if document.limits:
         output.print("limits: " + ", ".join(f"{count} {word}" for word, count in document.limits.items()))

@@ -69,9 +69,9 @@ def command(
     from bushfit.effects import get_effect
 
     if families is None and not 2 <= len(sources) <= MOST:
-        raise click.UsageError(f"2 to {MOST} results are compared; one campaign alone with '--families' after it.")
+        raise click.UsageError(f"2 to {MOST} results are needed, or one campaign with '--families' after it.")
     if families is not None and len(sources) > 1:
-        raise click.UsageError("'--families' is of one campaign.")
+        raise click.UsageError("'--families' takes one campaign.")
     words = option_words(families=families, direction=directions, preload=preload, **grids)
     settings: dict[str, Any] = {**grid_values(directions, grids), "preload": preload}
     settings["command"] = command_line("compare", *map(str, sources), *words)
@@ -116,8 +116,8 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
             if not names and comparison.joint and comparison.joint[0] < _CHANCE:
                 names = ["all parameters together"]
             if names:
-                different.append(f"{label} in {', '.join(names)}")
-        verdict = f"differences from {first} beyond chance: {'; '.join(different)}"
+                different.append(f"{label} differs from {first} in {', '.join(names)}")
+        verdict = f"{'; '.join(different)}, by more than chance"
         action = "use each result for its own part; differences.csv lists stiffness and loss factor at each point"
         if not different:
             verdict = f"no parameter differs from that of {first} by more than chance"

@@ -89,12 +89,12 @@ def command(
     result, loaded = load_model(model), load_campaign(campaign) if campaign else None
     settings: dict[str, Any] = grid_values(directions, grids)
     if dialect and "nastran" not in formats:
-        raise click.UsageError("'--dialect' is of '--format nastran'.")
+        raise click.UsageError("'--dialect' requires '--format nastran'.")
     with error_location(place="--units"):
         settings["units"] = UnitSystem.parse(units) if units is not None else None
     settings["temperature"] = kelvin(temperature)
     if time_domain and "abaqus" not in formats:
-        raise click.UsageError("'--time-domain' is of '--format abaqus'.")
+        raise click.UsageError("'--time-domain' requires '--format abaqus'.")
     settings["time_domain"], settings["cardanic"] = time_domain, _cardanic(cardanic)
     settings["static_rates"] = displacement_rates(static_rate)
     settings["accuracy"] = positive(accuracy, "--accuracy", "1")
@@ -103,7 +103,7 @@ def command(
     exported = export(file, names, loaded, dialect=dialect or "nastran", decimal_comma=comma, **settings)
     for name, written in exported.exported.items():
         for loss in written.losses:
-            output.print(f"{name} leaves out: {loss}")
+            output.print(f"limit of {name}: {loss}")
     output.warn(exported.predicted.warnings)
     inputs = [file, *(input_files(loaded) if loaded else [])]
     output.write(output.folder((loaded or result).name), exported.files, exported.document, inputs)

@@ -16,7 +16,7 @@ from bushfit.errors import BushfitError, MeasurementError
 _OF_TESTS = {
     "amplitude": (
         "COUNTING",
-        "How the file counts amplitudes: zero-to-peak, peak-to-peak or rms [from the header].",
+        "Meaning of the amplitudes in the file: zero-to-peak, peak-to-peak or rms [from the header].",
     ),
     "at_amplitude": (
         "SIZE",
@@ -105,7 +105,7 @@ def metadata_options(*, sweeps: bool = True) -> Parameter:
     unit = option("--unit units", "ROLE=UNIT", 'Unit of a column, such as "force=kN".', multiple=True)
     words = 'Header of a column, such as "force=Fz"; an unknown ROLE prints the list of roles.'
     column = option("--column columns", "ROLE=HEADER", words, multiple=True)
-    words = "Reverse the sign of the force: use -1 if the force falls where the displacement rises."
+    words = "Reverse the sign of the force: use -1 if the force falls while the displacement rises."
     sign = _metadata_option("force_sign", "-1", words)
     further = [_metadata_option(key, *texts) for key, texts in keys.items()]
     missing = option_group("Information that is missing in the files", direction, unit, column, sign, *further)

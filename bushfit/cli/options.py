@@ -196,6 +196,6 @@ def format_options(*kinds: Written) -> list[Parameter]:
             envvar="BUSHFIT_PLOT_FORMAT",
             show_envvar=True,
         ),
-        "pages": flag("--no-report", "Do not write the report as an HTML page."),
+        "pages": flag("--no-report", "Do not write the HTML report."),
     }
     return [options[kind] for kind in kinds]

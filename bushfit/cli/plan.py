@@ -51,8 +51,8 @@ _MOST_VALUES = 6
         "--for aim",
         "AIM",
         (
-            "What the tests determine best: parameters, predictions, or which of several possible effects (rivals) "
-            "is right [predictions]."
+            "Purpose of the tests: predictions (small errors of the stiffness), parameters (small errors of the "
+            "parameters), or rivals (a decision between possible effects) [predictions]."
         ),
         type=click.Choice(["parameters", "predictions", "rivals"]),
     ),
@@ -104,9 +104,9 @@ def command(
     from bushfit.commands.plan import plan
 
     if aim not in (None, "rivals") and rivals:
-        raise click.UsageError("'--rivals' goes with '--for rivals'.")
+        raise click.UsageError("'--rivals' requires '--for rivals'.")
     if aim not in (None, "parameters") and parameters:
-        raise click.UsageError("'--parameters' goes with '--for parameters'.")
+        raise click.UsageError("'--parameters' requires '--for parameters'.")
     if targets and (aim or rivals or parameters):
         raise click.UsageError("'--target' cannot be combined with '--for', '--parameters' and '--rivals'.")
     implied = "targets" if targets else "rivals" if rivals else "parameters" if parameters else "predictions"
@@ -121,7 +121,7 @@ def command(
     }
     opened, settings_campaign = load_source(source), load_campaign(campaign) if campaign else None
     if settings_campaign and isinstance(opened, Campaign):
-        raise click.UsageError("'--campaign' goes with MODEL.json.")
+        raise click.UsageError("'--campaign' requires MODEL.json.")
     folder = output.checked_folder(opened.name, "plan.json", form="plan {}")
     with error_location(source):
         outcome = plan(opened, settings_campaign, **settings)
@@ -155,11 +155,12 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
         f"{place} from {number(100.0 * row['before'], 2)} to {number(100.0 * row['planned'], 2)} %"
         for place, row in document["stiffness"].items()
     )
-    output.print(f"{len(document['tests'])} runs in {hours} h: standard error of the stiffness: {', '.join(gains)}")
+    runs = f"{len(document['tests'])} runs in {hours} h"
+    output.print(f"{runs} reduce the standard error of the stiffness: {', '.join(gains)}")
     output.print(f"starting point: {document['source']}")
     _print_tests(output, outcome)
     standard = f"standard, {number(document['hours_standard'], 3)} h"
-    error_columns = ("of", "before", f"plan, {number(document['hours_planned'], 3)} h", standard)
+    error_columns = ("quantity", "before", f"plan, {number(document['hours_planned'], 3)} h", standard)
     rows = {**document["parameters"], **{f"stiffness, {place}": row for place, row in document["stiffness"].items()}}
     rows |= {f"loss factor, {place} [0.01]": row for place, row in document["loss_factor"].items()}
     title = "standard errors [%]: before these tests, after the plan, and after the standard programme"
@@ -167,7 +168,7 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
     if targets := document["targets"]:
         sizes = _percents(targets, ("asked", "before", "planned", "standard"))
         met = ("met" if target["met"] else "not met" for target in targets.values())
-        columns = ("of", "asked for", "before", "plan", "standard", "")
+        columns = ("quantity", "asked for", "before", "plan", "standard", "")
         title = "targets: half width of the 95 % interval at the widest point [%]"
         output.print_table(title, columns, [(*row, verdict) for row, verdict in zip(sizes, met, strict=True)])
         for name, target in targets.items():

@@ -40,21 +40,21 @@ _MOST_AMPLITUDES = 8
     option(
         "--preload",
         "LOAD",
-        'Such as "500 N" or "1.5 mm", within the tests; may be given again [none].',
+        'Preload such as "500 N" or "1.5 mm", within the tested preloads; may be given again [none].',
         multiple=True,
     ),
     option(
         "--bushing",
         "NAME",
-        "Predict one of several fitted bushings, or another of the same compound, from [bushing] of this TOML file.",
+        "Name of one of several fitted bushings, or a TOML file whose [bushing] is of the same compound.",
     ),
     option("--mass", "MASS"),
     option(
         "--base-acceleration",
         "ACCELERATION",
         (
-            'Also predict the resonance of a mass such as "1.2 kg" on the bushing, with a base acceleration such '
-            'as "0.1 g".'
+            'Also predict the resonance of this mass, such as "1.2 kg", on the bushing, if the base vibrates with '
+            'this acceleration, such as "0.1 g".'
         ),
     ),
     flag("--static", "Also write the static curve: force over displacement in a slow motion, and its slope."),
@@ -62,7 +62,7 @@ _MOST_AMPLITUDES = 8
     option(
         "--over",
         "MOTION",
-        'Predict for a small harmonic on a slow large motion, "0.5 Hz 1 mm", or on a static offset, "1 mm".',
+        'Predict a small vibration on a slow large motion, such as "0.5 Hz 1 mm", or on an offset, such as "1 mm".',
     ),
     flag("--wide", "Also write tables with one column per amplitude, without bands."),
     option(

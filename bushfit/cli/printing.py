@@ -55,7 +55,7 @@ def print_result(output: Output, title: str, result: Result) -> None:
     print_parameters(output, title, result)
     if quality := result.quality:
         gain = quality.loop_gain_error
-        loops = f", gain of a loop within {number(100 * gain, 2)} % ([rig] gain_error)" if gain else ""
+        loops = f", gain error of a loop {number(100 * gain, 2)} % ([rig] gain_error)" if gain else ""
         output.print(
             f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)} "
             f"over {quality.points} points, noise {number(100 * quality.noise, 2)} % per point{loops}"
@@ -79,8 +79,8 @@ def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Expe
     worst = sorted(tests, key=lambda test: -test.reduced_chi_square)[: len(tests) if output.verbose else _MOST_TESTS]
     if len(tests) > 1:
         title = (
-            "test by test: NRMSE and mean error of the model in |K| [%] (+: stiffer than measured), reduced "
-            "chi-square (chi2)"
+            "test by test: NRMSE [%], reduced chi-square (chi2), mean error of the model in |K| [%] (+: model stiffer "
+            "than measured)"
         )
         columns, rows = ("test", "direction", "points", "NRMSE", "chi2", "mean", ""), []
         for test in (test for test in tests if test in worst):
@@ -94,7 +94,7 @@ def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Expe
     if count := len(tests) - len(worst):
         output.print(f"and {count} more {'test has' if count == 1 else 'tests have'} a smaller misfit; -v lists them")
     for place in usable:
-        how = "each predicted without its own run" if place.held_out else "as fitted"
+        how = "each predicted without its own run" if place.held_out else "all fitted"
         error = f"{number(100 * place.stiffness, 2)} % in stiffness and {number(place.loss_factor, 2)} in loss factor"
         output.print(f"{place.place}: expected error {error} (95 % of {place.points} points, {how})")
 

@@ -236,7 +236,7 @@ def _print_steps(output: Output, reduction: Reduction) -> None:
         )
         errors = number(100 * line["gain_error"].max(), 1), number(100 * line["force_distortion"].max(), 2)
         rows.append((number(length * level, 4), f"{repeat}", f"{len(line)}", *spans, *errors))
-    title = f"{len(steps)} point{'s' * (len(steps) > 1)} found; noise and distortion: largest of each line"
+    title = f"{len(steps)} point{'s' * (len(steps) > 1)} found; noise and THD: the largest of each line"
     heads = ("repeat", "points", "f [Hz]", f"|K| [{stiffness_unit}]", "loss factor", "noise [%]", "THD [%]")
     output.print_table(title, (f"level [{unit}]", *heads), rows)
     output.warn(reduction.warnings)
@@ -271,7 +271,7 @@ def _print_resonance(output: Output, resonance: Resonance) -> None:
     frequency, largest = resonance.peak
     count = f"{len(points)} point{'s' * (len(points) > 1)} of {resonance.test.frequency.size} rows"
     title = f"{count}; resonance at {frequency:.1f} Hz, |T| {largest:.2f}"
-    title += "\n|K| and loss factor: median of each line; error: largest"
+    title += "\n|K| and loss factor: median of each line; error: the largest"
     heads = ("f [Hz]", "points", f"amplitude [{unit}]", "|T|", f"|K| [{stiffness_unit}]", "loss factor", "error [%]")
     output.print_table(title, heads, rows)
     output.warn(resonance.warnings)

@@ -24,11 +24,14 @@ if TYPE_CHECKING:
 @option_group(
     "Motion and conditions",
     direction_option("Direction of the motion (axial, radial, torsion) or specimen [from headers or the file name]."),
-    flag("--steady", "The history is whole cycles of a steady motion [it starts from rest]."),
+    flag("--steady", "Treat the history as whole cycles of a steady motion [as a motion from rest]."),
     option(
         "--lowpass",
         "FREQUENCY",
-        'Low-pass the displacement, such as at "200 Hz", against its noise, which friction follows [no filter].',
+        (
+            'Remove the noise of the displacement above this frequency, such as "200 Hz": the friction of the model '
+            "responds to noise [no filter]."
+        ),
     ),
     option(
         "--temperature",
@@ -62,7 +65,7 @@ def command(
 
     if len(directions) > 1:
         raise click.UsageError(
-            "'--direction' names one direction here; a file with several states them in its headers."
+            "'--direction' takes one direction; a file with several directions states them in its headers."
         )
     result = load_model(model)
     folder = output.checked_folder(result.name, output.formats.table("response"), form="{} response")

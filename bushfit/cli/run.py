@@ -137,4 +137,4 @@ def two_step_line(two_step: TwoStep, joint: Result) -> str:
         farthest = max(differences, key=differences.__getitem__)
         differs = f"does not agree with the joint fit; largest difference: {farthest}"
         parts.append(agrees if count <= _AGREED else differs)
-    return f"two-step procedure (the paper's): {', '.join(parts)} (static.json, dynamic.json; -v shows it)"
+    return f"two-step procedure (the paper's): {', '.join(parts)} (static.json, dynamic.json; -v shows the parameters)"

@@ -196,10 +196,10 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
     with error_location(place=option):
         if re.search(r"\d,\d", text):
             raise UnitError(
-                "a comma between two digits may part numbers or be a decimal comma",
+                "a comma between two digits can separate numbers or be a decimal comma",
                 found=repr(text),
                 expected=expected,
-                hint='write decimals with a point, "0.5", and numbers of a list apart, "1, 5"',
+                hint='write decimals with a point, "0.5", and a space after each comma of a list, "1, 5"',
             )
         parts = re.fullmatch(r"\s*([-+0-9.eE,:\s]*[0-9.])\s*([^-+\d\s:,.][^,]*)", text)
         if not parts or parts[1].count(":") not in (0, 2):

@@ -54,7 +54,7 @@ def simulate_campaign(truth: Model, settings: SimulateSettings, form: Form = "cs
     """
     warnings = []
     if truth.unnamed:
-        warnings.append("the correction without a name applies to steady states and has no law in time: it is left out")
+        warnings.append("the unnamed correction applies to steady states and has no law in time: it is left out")
         truth = truth.without(UNNAMED)
     simulated = simulate_tests(truth, settings)
     contents = to_files(simulated, form)

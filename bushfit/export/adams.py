@@ -97,8 +97,8 @@ class _Element(NamedTuple):
         element, model = np.concatenate(written), np.concatenate(exact)
         loss = number(float(np.max(np.abs(loss_factor(element) - loss_factor(model)))), 2)
         return (
-            f"{self.reference.direction}, {kind}: frequency, one damping, of {number(self.frequency, 4)} Hz: over "
-            f"the grid |K| is {format_deviation(np.abs(element / model))} off, the loss factor up to {loss}"
+            f"{self.reference.direction}, {kind}: one damping for all frequencies, that of {number(self.frequency, 4)} "
+            f"Hz: the error of |K| is {format_deviation(np.abs(element / model))}, of the loss factor up to {loss}"
         )
 
 

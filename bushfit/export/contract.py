@@ -157,7 +157,7 @@ class ExportRequest:
                 parts.append(format_range("degC", *temperatures) if temperatures else "temperature not stated")
                 parts.append("fitted there" if str(place) in measured.directions else "not fitted there")
                 yield "valid", ", ".join(parts)
-        yield from (("left out", loss) for loss in losses)
+        yield from (("limit", loss) for loss in losses)
         warnings = warnings_of(self.result, [prediction.warnings for prediction in self.predictions])
         yield from (("warning", line) for line in warnings)
 

@@ -26,7 +26,7 @@ DOFS = {Direction.AXIAL: (3,), Direction.RADIAL: (1, 2), Direction.TORSION: (6,)
 #: Degrees of freedom without a law: the rotations about x and y.
 CARDANIC = (4, 5)
 #: Sentence on the loss of every format with stiffness over frequency.
-NO_LOOPS = "no law in time: loops, overtones and transients need another format (fmu)"
+NO_LOOPS = "no law in time: for loops, overtones and transients, use the format fmu"
 
 
 class StiffnessTable(NamedTuple):
@@ -286,7 +286,7 @@ def band_losses(prediction: Prediction) -> Iterator[str]:
     """Generate sentences on the omitted 95 % band, and on the prediction if an unresolved effect belongs to the rig."""
     place, band = prediction.direction, prediction.stiffness
     if (width := float(np.max((band.high - band.low) / (2.0 * band.value)))) > 0.0:
-        yield f"{place}: the 95 % band, up to {number(100.0 * width, 2)} % of |K| either way"
+        yield f"{place}: no 95 % band, which is up to +/-{number(100.0 * width, 2)} % of |K|"
     if prediction.if_rigs:
         deviation = format_deviation(prediction.if_rigs.stiffness.value / band.value)
-        yield f"{place}: the other reading: |K| is {deviation} if the unresolved effect belongs to the rig"
+        yield f"{place}: no values for the case that the unresolved effect belongs to the rig, where |K| is {deviation}"

@@ -103,7 +103,7 @@ def time_model(request: ExportRequest) -> TimeModel:
     band = float(frequencies.min()) / 100.0, float(frequencies.max()) * 10.0
     arms = model_arms(model, band, request.accuracy, conditions)
     values, names = _values(request, model, arms)
-    losses = [f"the long memory of the rubber: {part.sentence}, fading below" for part in arms]
+    losses = [f"{part.sentence}; slower relaxation is left out" for part in arms]
     for prediction in request.predictions:
         losses += [*_steady_losses(model, omitted, prediction, conditions), *band_losses(prediction)]
     sizes = values_under(model, conditions)
@@ -227,4 +227,4 @@ def _steady_losses(model: Model, omitted: list[str], prediction: Prediction, con
     point = f"{number(frequency, 3)} Hz and {number(factor * amplitude, 3)} {unit}"
     parts = [f"{', '.join(fixed)}, fixed as at {point}" if fixed else "", ", ".join(omitted)]
     effects = "; ".join(filter(None, parts))
-    return [f"{place}: {effects}: stiffness off by up to {number(100.0 * error, 2)} % over the grid"]
+    return [f"{place}: {effects}: error of the stiffness up to {number(100.0 * error, 2)} % over the grid"]

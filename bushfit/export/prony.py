@@ -109,7 +109,9 @@ def prony_losses(series: Sequence[PronySeries]) -> list[str]:
     """
     low, high = (number(end, 3) for end in series[0].arms.band)
     worst = number(100.0 * max(one.arms.error for one in series), 2)
-    sentences = [f"compound: the Prony series has an error up to {worst} % of the modulus from {low} to {high} Hz only"]
+    sentences = [
+        f"compound: the Prony series is valid from {low} to {high} Hz only, error up to {worst} % of the modulus"
+    ]
     if len(series) > 1:
         middle = series[(len(series) - 1) // 2]
         ratios = np.concatenate([np.abs(middle.exact / one.exact) for one in series])
@@ -118,7 +120,7 @@ def prony_losses(series: Sequence[PronySeries]) -> list[str]:
             f"compound: one strain amplitude per series: with {strain} %, the error of |G| is "
             f"{format_deviation(ratios)} at {' to '.join(ends)} %"
         )
-    return [*sentences, "compound: friction is a viscous loss at that amplitude: its force at rest is left out"]
+    return [*sentences, "compound: friction is a viscous loss at that amplitude, without a force at rest"]
 
 
 def export(request: ExportRequest) -> Exported:

@@ -240,7 +240,7 @@ def describe_history(history: Loop, labels: Labels) -> Findings:
     frequencies = sorted({step.nominal_frequency for step in steps})
     rows = min(step.rows_per_cycle for step in steps)
     facts = {
-        "steps": f"{len(steps)} with steady cycles, {max(step.repeat for step in steps)} at most at one point",
+        "steps": f"{len(steps)} with steady cycles, at most {max(step.repeat for step in steps)} per point",
         "frequencies": format_frequencies(frequencies),
         "amplitudes": f"{', '.join(f'{factor * level:.4g}' for level in levels)} {unit} zero-to-peak, as reached",
         "sampling": f"{describe_sampling(history)}, {rows:.3g} rows per cycle at least",

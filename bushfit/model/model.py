@@ -245,7 +245,7 @@ class Model:
           mu = 1.09 MPa
         """
         branches = " + ".join(effect.equation for effect in self.structure.branches)
-        lines = [f"K = k ({branches}), k the stiffness of this shape per modulus"]
+        lines = [f"K = k ({branches}); k: stiffness of this shape for a modulus of 1"]
         lines += [f"  {effect.name}: {effect.equation}" for effect in self.records if not isinstance(effect, Branch)]
         for name, parameter in self.parameters.items():
             unit, factor = display_unit(parameter.unit, 1.0, self.values[name])

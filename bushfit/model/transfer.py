@@ -94,7 +94,7 @@ def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, str]:
         model_error=result.model_error or result.model.unnamed,
         alternatives=tuple(replace(record, model=transfer(record.model)) for record in result.alternatives),
     )
-    sentence = f"{bushing.name}: the compound of {result.name}, of which no bushing of this shape was tested"
+    sentence = f"{bushing.name}: predicted from the compound of {result.name}; no bushing of this shape was tested"
     if omitted := ", ".join(record.name for record in result.model.records if record.name not in model.effects):
         sentence += f"; left out, because they belong to {result.name} or its rig: {omitted}"
     if spread := factor_spread(result):

@@ -96,11 +96,11 @@ def caveats(result: Result) -> list[str]:
         lines.append("the model has no springpot: its stiffness does not depend on frequency")
     if unnamed := result.model.unnamed:
         lines.append(
-            "the correction without a name follows the measurement and no law: outside the measured range it fades, "
-            f"and the band widens by up to {number(100.0 * Z95 * unnamed.far_deviation, 2)} % either way"
+            "the unnamed correction follows the measurement and no law: outside the measured range it fades, "
+            f"and the band widens by up to +/-{number(100.0 * Z95 * unnamed.far_deviation, 2)} %"
         )
         lines.append(
-            "the correction without a name is assigned to the bushing, but these tests cannot distinguish it "
+            "the unnamed correction is assigned to the bushing, but these tests cannot distinguish it "
             "from one of the rig: if it belongs to the rig, the bushing in the car does not have it, up to "
             f"{number(100.0 * unnamed.largest, 2)} % of |K|"
         )

@@ -376,7 +376,7 @@ def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
     none = (band.low <= 0.0) & (band.high >= 0.0)
     if none.any():
         largest = number(float(np.maximum(-band.low, band.high)[none].max()), 2)
-        parts.append(f"{'elsewhere ' if parts else ''}no difference shown, none above {largest}{unit}")
+        parts.append(f"{'elsewhere ' if parts else ''}no difference detected, and none above {largest}{unit}")
     return ", ".join(parts)
 
 

@@ -196,7 +196,7 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
             f"{place}: strain rates of up to {rate} 1/s only, in {number(100.0 * beyond, 2)} % of the time: {BEYOND}"
         )
     if left_out:
-        warnings.append(f"{place}: {' and '.join(left_out)} left out, without a law for this motion")
+        warnings.append(f"{place}: {' and '.join(left_out)} left out, because no law describes this motion")
     if constant := result.model.constant_modifiers:
         unit, factor = place.display.displacement
         sine = f"{number(history.frequency, 3)} Hz and {number(factor * history.amplitude.item(), 3)} {unit}"

@@ -126,7 +126,7 @@ def superposed_stiffness_and_slopes(
 
 
 def untimed_effects(model: Model) -> list[str]:
-    """Names of the effects of the bushing without a law in time, except the correction without a name."""
+    """Names of the effects of the bushing without a law in time, except the unnamed correction."""
     return [name for name in model.without(Level.INSTRUMENT).without_time_law if name != UNNAMED]
 
 

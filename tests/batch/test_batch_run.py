@@ -110,7 +110,7 @@ def test_a_bad_row_costs_that_row(typed: Callable[..., Any], shop: Path) -> None
     )
     done = typed("batch", "m.csv", "-o", "all", "--junit", "all/report.xml")
     assert done.returncode == 1
-    assert "2 failed" in done.stderr
+    assert "2 with an error" in done.stderr
     assert "x could not be evaluated: " in done.stderr
     good, bad, absent = rows(shop / "all")
     assert good["name"].startswith("'="), "a spreadsheet must not run a name"
@@ -199,7 +199,7 @@ def test_a_campaign_that_kills_its_worker_is_told_once_and_the_others_go_on(
     monkeypatch.setattr(run, "run_rows", lambda rows, task, *others: done_by(rows, partial(deadly, task), *others))
     done = typed("batch", PATTERN, "-o", "all", "--no-plots", "--no-report", "--jobs", "2")
     assert done.returncode == 1
-    assert "4 done, 1 failed" in done.stderr
+    assert "4 evaluated, 1 with an error" in done.stderr
     assert not (shop / "all/index.html").exists()
     assert not {"Traceback", "\x1b"} & set(done.stderr.split()), "plain lines where there is no terminal"
     assert not (shop / f"all/{store.STAGE}").exists()

@@ -95,7 +95,7 @@ def test_the_gain_error_of_loops_is_said(own: Path) -> None:
         campaign = plain + f'\n[rig]\ngain_error = "{stated}"\n' * bool(stated)
         (own / CAMPAIGN).write_text(campaign, encoding="utf-8")
         done = typing(own)("fit", CAMPAIGN, "-o", "out", "--no-plots", "--force")
-        assert ("gain of a loop within 0.5 %" in done.stderr) is (stated != "0 %")
+        assert ("gain error of a loop 0.5 %" in done.stderr) is (stated != "0 %")
         errors[stated] = document(own / "out/model.json")["fit"]["loop_gain_error"]
     assert errors == {"": 0.005, "0.5 %": 0.005, "0 %": 0.0}
 
@@ -218,7 +218,7 @@ def test_run_and_diagnose_write_the_model_that_fit_writes_where_nothing_is_missi
         *("axial: 0.1 to 155 Hz, 0.1 to 1 mm", "radial: 5 to 155 Hz, 0.1 to 0.5 mm, not fitted"),
         *("axial, first and last", "radial, first and last"),
         "two-step procedure (the paper's): 10 passes, agrees with the joint fit within 1 standard error",
-        "(static.json, dynamic.json; -v shows it)",
+        "(static.json, dynamic.json; -v shows the parameters)",
         *("extrapolated outside this range", "wrote static.json"),
     )
     places = [ran.stderr.index(word) for word in words]

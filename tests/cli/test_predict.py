@@ -20,7 +20,7 @@ def test_a_folder_a_model_and_a_campaign_of_the_same_tests_differ_in_nothing(bus
     found = json.loads(done.stdout)
     assert done.stdout == (folder / "compare.json").read_text(encoding="utf-8")
     assert [entry["label"] for entry in found["compared"]] == ["A", "B", "C"]
-    assert all("no difference shown" in line for line in found["words"])
+    assert all("no difference detected" in line for line in found["words"])
     assert [len(pair["shared_inputs"]) for pair in found["pairs"]] == [2, 2]
     assert any(line.startswith("A and B were fitted to the same ") for line in found["warnings"])
     assert all(row["holm"] == 1.0 for pair in found["pairs"] for row in pair["parameters"] if row["p"] is not None)
@@ -76,7 +76,7 @@ def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_ampl
     assert dict(zip(measured["direction"], measured["fitted"], strict=True)) == {"axial": "yes", "radial": "no"}
     assert measured["model over measured [-]"].between(0.95, 1.05).all()
     axial, radial = (line for line in done.stderr.splitlines() if ": expected error " in line)
-    assert (axial.endswith("as fitted)"), radial.endswith("each predicted without its own run)")) == (True, True)
+    assert (axial.endswith("all fitted)"), radial.endswith("each predicted without its own run)")) == (True, True)
     table = pd.read_csv(tmp_path / "x" / "axial.csv")
     assert table["frequency [Hz]"].tolist() == [10, 20, 30] * 2
     assert table["amplitude [mm]"].tolist() == [0.1] * 3 + [0.3] * 3

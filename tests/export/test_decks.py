@@ -311,7 +311,7 @@ def test_every_deck_says_what_it_is_of_and_takes_directions_of_one_grid_alone(
     assert "specimens: DMA =1+1" in exported.losses
     for content in exported.files.values():
         text = content.decode("ascii")
-        for words in ("bushing: CMP 15 961", "model: model.json", f"sha256: {HASH}", "units: mm", "left out"):
+        for words in ("bushing: CMP 15 961", "model: model.json", f"sha256: {HASH}", "units: mm", "limit:"):
             assert words in text, words
     with pytest.raises(ModelError, match="no direction of a bushing"):
         export(replace(export_request, predictions=(body,)))

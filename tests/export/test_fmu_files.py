@@ -144,11 +144,11 @@ def test_effects_of_the_rig_are_left_out_and_what_is_held_is_said_with_its_error
     whole = model.stiffness("axial", frequency, np.array(LEVELS[Direction.AXIAL])[:, None])
     springpot = 0.5 * 2e5 * (2j * np.pi * frequency) ** 0.24 * model.stiffness_per_modulus(Direction.AXIAL)
     error = np.abs(springpot * ((middle / 0.01) ** -0.3 - (strain / 0.01) ** -0.3) / whole).max()
-    assert f"off by up to {100.0 * error:.2g} %" in line
+    assert f"error of the stiffness up to {100.0 * error:.2g} %" in line
     held = next(value for value in found.values if value.name == "m")
     assert held.value == pytest.approx(2e5 * (middle.item() / 0.01) ** -0.3)
     soft = time_model(request_of(paper_model.with_effect("mullins_softening", {"mullins_softening.share": 0.1})))
-    assert [line for line in soft.losses if "mullins_softening: stiffness off by up to" in line]
+    assert [line for line in soft.losses if "mullins_softening: error of the stiffness up to" in line]
 
 
 def test_without_a_compiler_it_is_said_how_to_get_one(paper_model: Model, monkeypatch: pytest.MonkeyPatch) -> None:

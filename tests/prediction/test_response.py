@@ -169,7 +169,7 @@ def test_what_has_no_law_for_the_motion_is_named(paper_model: Model) -> None:
     expected = plain.force("axial", History.steady(motion, 10.0, cycles=30))
     np.testing.assert_allclose(steady.force.value, expected, atol=2e-4 * expected.max())
     assert steady.warnings == (
-        "axial: mullins_softening left out, without a law for this motion",
+        "axial: mullins_softening left out, because no law describes this motion",
         "axial: rate_dependent_friction constant, as in a sine of 10 Hz and 0.1 mm",
     )
 

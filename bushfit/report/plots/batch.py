@@ -173,6 +173,4 @@ def curves_figure(headers: Sequence[str], usual: Array, singles: Mapping[str, Ar
     style.label_axes(axes, x_label, f"|K| [{unit}]", x)
     axes.legend()
     names = f" Single curves: {', '.join(named)}." if named else ""
-    return figure.explain(
-        f"Measured, without a model: median and range (grey) of the parts that are not drawn singly.{names}"
-    )
+    return figure.explain(f"Measured, without a model: median and range (grey) of the other parts.{names}")

@@ -30,7 +30,7 @@
     const count = document.createElement("output");
     filter.className = "controls";
     typed.type = "search";
-    filter.append("Rows with", typed, count);
+    filter.append("Show rows with", typed, count);
     table.parentElement.before(filter);
     typed.addEventListener("input", () => {
       const words = typed.value.toLowerCase().split(/\s+/);
