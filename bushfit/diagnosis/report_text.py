@@ -28,7 +28,7 @@ from bushfit.units import display_unit, format_aligned, number
 
 #: Reason for a candidate that is not part of the explanation; and summary if there is no gap.
 _LESS_LIKELY = "another explanation is more probable"
-_NOTHING = "nothing is missing beyond noise and tolerance"
+_NOTHING = "the tests show no missing effect beyond noise and tolerance"
 _NAMELESS = "something without a name"
 _LEVELS = "errors of levels beyond the class of the rig"
 _ONE_DIRECTION = (

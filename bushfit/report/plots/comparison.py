@@ -76,6 +76,6 @@ def comparison_figure(comparison: ComparisonDocument) -> style.Chart:
         names = [f"{label}: {style.file_name(name)}" for label, name in comparison.names.items()]
         style.legend(grid[2 * row, 1], lines, names, "", dict(zip(level_names, dashed, strict=True)))
     return figure.explain(
-        "Shaded: 95 % bands. Lower panels: the band of each point by itself; compare.json and the terminal state what "
-        "is valid for all points together."
+        "Shaded: 95 % band of each single point. compare.json and the terminal state the differences that are valid "
+        "for all points together."
     )

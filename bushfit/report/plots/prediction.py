@@ -78,7 +78,7 @@ def prediction_figure(
         draw_prediction(pair, fine, rig, points, axis, levels)
         for pair, (axis, levels) in zip(grid[len(free) :], panels, strict=True)
     ]
-    band = ["Lines: model.", "Lines: model; shaded: its 95 % band, where it is wider than the line."]
+    band = ["Lines: model.", "Lines: model; shaded: 95 % band, if it is wider than the line."]
     sentences = [band[bool(np.any(fine.stiffness.high > fine.stiffness.low))]]
     if any(laid) and rig:
         sentences.append("Thin lines: the model with the effects of the rig, as the points were measured.")
