@@ -37,6 +37,8 @@ _COMPOUND_LENGTHS, _COMPOUND_PATTERNS = (8.0, 3.0), 12
 _CURVE_LENGTHS = {"smooth": (1.5, 1.2), "rough": (0.5, 0.5)}
 #: Limits of a curve: number of its nodes and patterns, and least variance of a pattern relative to the largest.
 _CURVE_PATTERNS = {"nodes": 150, "count": 16, "minimum": 1e-4}
+#: Last overtone of a compound's deviation in a steady cycle, and number of waves of its deviation in the first cycle.
+_LAST_OVERTONE, _TRANSIENT_WAVES = 13, 6
 #: Number of phases of a cycle at which harmonics are summed: about six per period of the highest harmonic.
 _PHASES = 32
 
@@ -201,10 +203,33 @@ def compound(evidence: Evidence) -> Group | None:
         return None
     columns, share = _process(evidence, evidence.data_sets, _COMPOUND_LENGTHS, count=_COMPOUND_PATTERNS)
     for loops in group_repeats(split_by_kind(evidence.data_sets)[0]):
-        columns = np.concatenate((columns, _shared_by(evidence, loops, MeasuredLoop.compound_shapes)))
+        columns = np.concatenate((columns, _shared_by(evidence, loops, compound_shapes)))
     unit = np.zeros((len(columns), share.shape[-1]), dtype=complex)
     unit[: len(share)] = share
     return Group(columns, unit, act_together=True)
+
+
+def compound_shapes(loop: MeasuredLoop) -> Array:
+    """Deviations of the force's shape from the model's laws, of a compound whose stiffness deviates by 100 %.
+
+    Returns:
+        Changes of the whitened residuals by independent amounts of unit variance, (c, size).
+
+    Notes:
+        An isotropic compound is symmetric, so a steady cycle has odd overtones only. The h-th falls as 1/h^2, because
+        the force is continuous with kinks where the motion turns back. The first cycle from rest may deviate in
+        addition by as much as a third overtone without this decrease.
+    """
+    if loop.fundamental_only:
+        return np.empty((0, loop.size))
+    phase, order = loop.drive.phase, np.arange(3, _LAST_OVERTONE + 1, 2)[:, None]
+    angle = 2.0 * np.pi * order * phase
+    waves = np.concatenate([np.cos(angle) / order**2, np.sin(angle) / order**2])
+    if loop.drive.from_rest:
+        order = np.arange(_TRANSIENT_WAVES)[:, None]
+        first = np.cos(np.pi * order * phase) * (phase < 1.0)
+        waves = np.concatenate([waves, first / (3.0 * (1.0 + order))])
+    return loop.force_changes(waves)
 
 
 def unnamed_curves(evidence: Evidence) -> list[Explanation]:

@@ -10,6 +10,7 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import FaultyPart
 from bushfit.diagnosis.groups import Group
 from bushfit.effects.contract import Array
+from bushfit.fitting.measured_test import shown_amplitude
 from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
 
 #: Maximum number of neighbouring frequencies that one disturbance covers: mains hum and its sidebands.
@@ -45,6 +46,15 @@ def find_faulty_parts(evidence: Evidence) -> list[FaultyPart]:
     return faulty_parts
 
 
+def _line_label(sweep: MeasuredSweep, point: int) -> str:
+    """Text that names the line (runs at one held amplitude or frequency) of a point, given by its index."""
+    if sweep.sweep.stepped == "frequency":
+        return f"the {sweep.direction} level {shown_amplitude(sweep.direction, sweep.amplitude[point])}"
+    if sweep.sweep.stepped == "amplitude":
+        return f"the {sweep.direction} sweep of amplitudes at {sweep.frequency[point]:.4g} Hz"
+    return f"run {sweep.repeat[point]} of {sweep.name}, {sweep.direction}"
+
+
 def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
     """Suspected faults: each level of a direction with several levels, each repeat of a level with over two repeats."""
     for sweep in sweeps:
@@ -52,7 +62,7 @@ def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fau
         levels = np.concatenate(levels_of_direction)
         for level in np.unique(sweep.held_value):
             mask = sweep.held_value == level
-            label = sweep.line_words(int(np.argmax(mask)))
+            label = _line_label(sweep, int(np.argmax(mask)))
             if levels.size > 1:  # in this file or in others
                 part = _shifted(evidence, "level", label, [sweep], [mask], sloping=True)
                 yield replace(part, extreme=levels.size > 2 and level in (levels.min(), levels.max()))

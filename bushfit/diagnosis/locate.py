@@ -7,7 +7,7 @@ import numpy as np
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.record import MisfitRegion
 from bushfit.effects.contract import Array
-from bushfit.fitting.line_misfit import LineMisfit
+from bushfit.fitting.line_misfit import LineMisfit, line_misfits
 from bushfit.fitting.preparation import split_by_kind
 from bushfit.units import number
 
@@ -43,7 +43,7 @@ def find_regions(evidence: Evidence) -> tuple[MisfitRegion, ...]:
 def _sweep_regions(evidence: Evidence) -> Iterator[MisfitRegion]:
     """Yield regions of smooth deviation of sweeps from the model: one of storage, one of loss for each direction."""
     _, sweeps = split_by_kind(evidence.data_sets)
-    lines = [line for sweep in sweeps for line in sweep.lines(evidence.model)]
+    lines = [line for sweep in sweeps for line in line_misfits(sweep, evidence.model)]
     for direction, stepped in dict.fromkeys((line.direction, line.stepped) for line in lines):
         mine = [line for line in lines if line.direction == direction and line.stepped == stepped]
         for part, name in enumerate(_PARTS):

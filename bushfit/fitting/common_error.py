@@ -39,6 +39,13 @@ class CommonError:
         size = np.sqrt(variance[significant])
         return self.columns.T @ (mixed[:, significant] / size), size
 
+    def scaled(self, size: float) -> CommonError:
+        """Return the error multiplied by a size above zero, without another decomposition."""
+        error = CommonError(size * self.columns)
+        directions, deviations = self.principal_errors
+        error.__dict__["principal_errors"] = directions, size * deviations
+        return error
+
     @property
     def log_det_covariance(self) -> float:
         """Natural log of the determinant of the residuals' covariance S."""

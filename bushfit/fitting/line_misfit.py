@@ -1,14 +1,17 @@
 """Mean misfit of one line of a sweep over its repeats."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from bushfit.effects.contract import Array
+from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.fitting.measured_test import shown_amplitude
 from bushfit.fitting.repeats import unit
 from bushfit.geometry import Place
+from bushfit.model.model import Model
 from bushfit.reading.measurement import Stepped
 
 #: Degree of the Legendre polynomials, in the logarithm of the stepped quantity, that represent smooth misfit.
@@ -55,3 +58,18 @@ class LineMisfit:
         x = np.log(self.step)
         basis = np.polynomial.legendre.legvander(unit(x), min(_SMOOTH_DEGREE, np.unique(x).size - 1))
         return basis @ np.linalg.lstsq(basis.astype(complex), self.misfit, rcond=None)[0]
+
+
+def line_misfits(sweep: MeasuredSweep, model: Model) -> Iterator[LineMisfit]:
+    """Yield the mean difference between measurement and model along each line of a sweep, over its repeats."""
+    ratio = sweep.measured / sweep.stiffness(model) - 1.0
+    for held_value in np.unique(sweep.held_value):
+        mask = sweep.held_value == held_value
+        _, first, index, counts = np.unique(
+            sweep.step[mask], return_index=True, return_inverse=True, return_counts=True
+        )
+        mean = (np.bincount(index, ratio[mask].real) + 1j * np.bincount(index, ratio[mask].imag)) / counts
+        variance = np.square(sweep.noise.random[sweep.name, float(held_value)]) + np.square(sweep.noise.shared)
+        noise = np.sqrt(variance / np.median(counts) + np.square(sweep.noise.level))
+        frequency, amplitude = (values[mask][first] for values in (sweep.frequency, sweep.amplitude))
+        yield LineMisfit(sweep.name, sweep.direction, sweep.sweep.stepped, frequency, amplitude, mean, noise)

@@ -23,9 +23,6 @@ _ERROR_HARMONICS = 25
 _ERROR_SIZES = 1.0 / np.maximum(np.arange(1.0, _ERROR_HARMONICS + 1.0), SMOOTH_HARMONICS)
 _ERROR_SIZES /= np.linalg.norm(_ERROR_SIZES)
 
-#: Last overtone of a compound's deviation in a steady cycle, and number of waves of its deviation in the first cycle.
-_LAST_OVERTONE, _TRANSIENT_WAVES = 13, 6
-
 
 @dataclass(frozen=True, eq=False)
 class MeasuredLoop(MeasuredBase):
@@ -120,16 +117,7 @@ class MeasuredLoop(MeasuredBase):
         """Return the test with the weight of each row (of a sweep: point) multiplied by a factor, (n,)."""
         return replace(self, drive=replace(self.drive, weight=self.drive.weight * weight))
 
-    def without(self, points: Array) -> Self:
-        """Return the test with weight 0 at the given point indices (a loop has no weight at outliers anyway)."""
-        return self
-
-    def with_weight(self) -> Self:
-        """Return the test with only those points that have weight; a loop is unchanged."""
-        return self
-
     def fundamental(self) -> Self:
-        """Return the test reduced to its first harmonic, for an added stiffness that is known at one frequency only."""
         return replace(self, fundamental_only=True)
 
     def with_noise(self, relative: float) -> Self:
@@ -144,7 +132,7 @@ class MeasuredLoop(MeasuredBase):
                 |K|).
         """
         test = replace(self, model_error=size)
-        test.__dict__["_error_directions"] = self._error_directions
+        test.__dict__["_unit_error"] = self._unit_error
         return test
 
     def noise_free(self, model: Model) -> Self:
@@ -162,25 +150,12 @@ class MeasuredLoop(MeasuredBase):
         Returns:
             Force, (..., n).
         """
-        last = self._last.get("force")
-        if last and last[0] is model and values is None:
-            return last[2]
+        if values is None and (force := self._recall("force", model)) is not None:
+            return force
         history = self.drive.history(model.is_transient)
         force = model.force(self.direction, history, kind="loop", values=values, conditions=self.test_conditions)
         force = self.drive.interpolate_at_rows(force) + (self.drive.datum or 0.0)
         return force if values is not None else self._keep("force", model, (), force)
-
-    def residual(self, model: Model, values: Values | None = None) -> Array:
-        """Whitened residuals: model minus measured in units of noise; independent with variance 1 for a true model.
-
-        Args:
-            model: model to evaluate.
-            values: parameter values in place of the model's own; leading axes are added to the result.
-
-        Returns:
-            Residuals in the force of each row, (..., size); of a sweep of n points, n gains, then n phases.
-        """
-        return self._whitened((self.force(model, values) - self.drive.force) * self._per_noise)
 
     def residual_with(self, added: Array, model: Model) -> Array:
         """Whitened residuals, model minus measured in units of noise, of a model with an additional stiffness.
@@ -194,12 +169,8 @@ class MeasuredLoop(MeasuredBase):
         """
         return self.residual(model) + self.residual_change(added, model)
 
-    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the whitened residuals by parameter value, (len(names), size)."""
-        last = self._last.get("jacobian")
-        if last and last[0] is model and last[1] == tuple(names):
-            return last[2]
-        return self._keep("jacobian", model, tuple(names), self._whitened(self._slopes(model, names) * self._per_noise))
+    def slopes(self, model: Model, names: Sequence[str]) -> Array:
+        return self.whiten(self._slopes(model, names) * self._per_noise)
 
     def _slopes(self, model: Model, names: Sequence[str]) -> Array:
         """Derivatives of the force at the n rows by parameter value, (len(names), n); the force is cached too."""
@@ -239,9 +210,8 @@ class MeasuredLoop(MeasuredBase):
     def relative_difference(self, model: Model) -> Array:
         return ((self.force(model) - self.drive.force) / self.drive.half_range)[None]
 
-    def misfit(self, model: Model) -> Array:
-        """Residuals, model minus measured force at each row in units of noise, (size,); correlation is not removed."""
-        return (self.force(model) - self.drive.force) * self._per_noise
+    def misfit(self, model: Model, values: Values | None = None) -> Array:
+        return (self.force(model, values) - self.drive.force) * self._per_noise
 
     def distance(self, model: Model) -> Array:
         """Absolute difference between model and measured force at each row, in units of noise, (n,)."""
@@ -270,45 +240,15 @@ class MeasuredLoop(MeasuredBase):
         These are a constant, and cosine and sine of five harmonics; with `fundamental_only` all but the first harmonic
         are 0.
         """
-        rows = self._force_changes(self._waves)
+        rows = self.force_changes(self._waves)
         if self.fundamental_only:
             rows[[0, *range(3, len(rows))]] = 0.0
         return rows
 
-    def compound_shapes(self) -> Array:
-        """Deviations of the force's shape from the model's laws, of a compound whose stiffness deviates by 100 %.
-
-        Returns:
-            Changes of the whitened residuals by independent amounts of unit variance, (c, size).
-
-        Notes:
-            An isotropic compound is symmetric, so a steady cycle has odd overtones only. The h-th falls as 1/h^2,
-            because the force is continuous with kinks where the motion turns back. The first cycle from rest may
-            deviate in addition by as much as a third overtone without this decrease.
-        """
-        if self.fundamental_only:
-            return np.empty((0, self.size))
-        order = np.arange(3, _LAST_OVERTONE + 1, 2)[:, None]
-        angle = 2.0 * np.pi * order * self.drive.phase
-        waves = np.concatenate([np.cos(angle) / order**2, np.sin(angle) / order**2])
-        if self.drive.from_rest:
-            order = np.arange(_TRANSIENT_WAVES)[:, None]
-            first = np.cos(np.pi * order * self.drive.phase) * (self.drive.phase < 1.0)
-            waves = np.concatenate([waves, first / (3.0 * (1.0 + order))])
-        return self._force_changes(waves)
-
-    def smooth_misfit(self, model: Model) -> float:
-        """Largest absolute difference between model and force in the first five harmonics, relative to half the range.
-
-        For a sweep: largest magnitude of the smooth relative difference of the complex stiffness, `LineMisfit.smooth`.
-        """
-        sizes = np.linalg.lstsq(self.smooth_changes().T, self.residual(model), rcond=None)[0]
-        return float(np.abs(sizes @ self._waves[:, self.weights > 0.0]).max())
-
     def gain_and_offset(self) -> Array:
         """Change of the whitened residuals by a gain error of 100 %, and by an offset of half the range, (2, size)."""
         offset = np.full(self.drive.force.size, self.drive.half_range)
-        return np.array([self._less_shared(self.unit_gain), self._whitened(offset * self._per_noise)])
+        return np.array([self._less_shared(self.unit_gain), self.whiten(offset * self._per_noise)])
 
     def columns(self) -> dict[str, Any]:
         """Table columns by header that identify the point of each residual, such as time [s] and amplitude."""
@@ -341,33 +281,19 @@ class MeasuredLoop(MeasuredBase):
 
     def _less_shared(self, white: Array) -> Array:
         """Whiten rows of uncorrelated noise, (..., n), by the error that all rows share: model error or gain error."""
-        if self.model_error:
-            directions, size = self._error_directions
-            share = 1.0 - 1.0 / np.hypot(1.0, self.model_error * size)
-            return white - (white @ directions * share) @ directions.T
-        return self._gain.whiten(white) if self._gain else white
+        return self._shared.whiten(white) if self._shared else white
 
-    def _force_changes(self, waves: Array) -> Array:
+    def force_changes(self, waves: Array) -> Array:
         """Changes of the whitened residuals, (c, size), by changes of the force relative to half its range, (c, n)."""
-        return self._whitened(waves * (self._per_noise * self.drive.half_range))
+        return self.whiten(waves * (self._per_noise * self.drive.half_range))
 
-    def _whitened(self, rows: Array) -> Array:
-        """Whiten rows of force in units of noise: remove the correlation of their noise, and errors shared by all rows.
-
-        Args:
-            rows: differences or derivatives of the force at the n rows, divided by the noise of each row, (..., n).
-
-        Returns:
-            Whitened rows, (..., size), whose noise is independent with unit variance.
-        """
-        return self._less_shared(self._in_noise(rows))
+    def whiten(self, misfit: Array) -> Array:
+        return self._less_shared(self._in_noise(misfit))
 
     @property
     def log_det_covariance(self) -> float:
         """ln det S of the covariance S = 1 + (error shared by all rows) of the uncorrelated rows in units of noise."""
-        if self.model_error:
-            return float(np.sum(np.log1p(np.square(self.model_error * self._error_directions[1]))))
-        return self._gain.log_det_covariance if self._gain else 0.0
+        return self._shared.log_det_covariance if self._shared else 0.0
 
     @cached_property
     def _fundamental(self) -> Array:
@@ -379,7 +305,7 @@ class MeasuredLoop(MeasuredBase):
     def _unit_changes(self) -> Array:
         """Change of the whitened residuals by a change of the stiffness by 1 and by i [N/m or N m/rad], (2, size)."""
         wave = self.drive.coefficients[1] * np.exp(2j * np.pi * self.drive.phase)
-        return self._whitened(np.array([wave.real, -wave.imag]) * self._per_noise)
+        return self.whiten(np.array([wave.real, -wave.imag]) * self._per_noise)
 
     @cached_property
     def unit_gain(self) -> Array:
@@ -394,8 +320,10 @@ class MeasuredLoop(MeasuredBase):
         return self._in_noise(smooth * self._per_noise)
 
     @cached_property
-    def _gain(self) -> CommonError | None:
-        """Gain error of the record as an error that all its rows share; None if the weights of residuals exclude it."""
+    def _shared(self) -> CommonError | None:
+        """Error that all rows share: of the model, or else of the gain if the weights of residuals include it."""
+        if self.model_error:
+            return self._unit_error.scaled(self.model_error)
         return CommonError(self.gain_error * self.unit_gain[None]) if self.gain_weighs and self.gain_error else None
 
     @cached_property
@@ -416,14 +344,9 @@ class MeasuredLoop(MeasuredBase):
         return self._in_noise(waves * (self._per_noise * self.drive.half_range))
 
     @cached_property
-    def _error_directions(self) -> tuple[Array, Array]:
-        """Directions and sizes of a model error of 100 % of half the force range, among the n uncorrelated rows.
-
-        Returns:
-            c orthonormal directions, (n, c), and the standard deviation of the error along each, in units of noise,
-            (c,).
-        """
-        return CommonError(self._error_waves[2 * (self.first_error - 1) :]).principal_errors
+    def _unit_error(self) -> CommonError:
+        """Model error of 100 % of half the force range, among the n uncorrelated rows."""
+        return CommonError(self._error_waves[2 * (self.first_error - 1) :])
 
     def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
         """Inner products of the residual and its derivatives, from which the size of a model error is estimated.
@@ -435,7 +358,7 @@ class MeasuredLoop(MeasuredBase):
         slopes = self._slopes(model, names)
         misfit = (self.force(model) - self.drive.force)[None]
         white = self._in_noise(np.concatenate((misfit, slopes)) * self._per_noise)
-        directions, size = self._error_directions
+        directions, size = self._unit_error.principal_errors
         return ErrorProducts(white @ white.T, white @ directions * size, np.square(size))
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:

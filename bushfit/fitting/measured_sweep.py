@@ -10,8 +10,7 @@ import numpy as np
 from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Values
 from bushfit.fitting.common_error import ErrorProducts
-from bushfit.fitting.line_misfit import LineMisfit
-from bushfit.fitting.measured_test import MeasuredBase, shown_amplitude
+from bushfit.fitting.measured_test import MeasuredBase
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.outliers import contradictions, outlying_points
 from bushfit.fitting.repeats import FLOOR
@@ -133,9 +132,6 @@ class MeasuredSweep(MeasuredBase):
         step = -(-self.order.size // maximum)
         return self if step == 1 else self.select(np.arange(self.order.size) % step == 0)
 
-    def fundamental(self) -> Self:
-        return self
-
     def with_model_error(self, size: float) -> Self:
         return replace(self, model_error=size)
 
@@ -220,27 +216,23 @@ class MeasuredSweep(MeasuredBase):
         Returns:
             Complex stiffness, (..., n) [N/m or N m/rad].
         """
-        last = self._last.get("stiffness")
-        if last and last[0] is model and values is None:
-            return last[2]
+        if values is None and (stiffness := self._recall("stiffness", model)) is not None:
+            return stiffness
         frequency, amplitude, conditions, place = self._operating_points(model)
         stiffness = model.stiffness(self.direction, frequency, amplitude, values=values, conditions=conditions)[
             ..., place
         ]
         return stiffness if values is not None else self._keep("stiffness", model, (), stiffness)
 
-    def residual(self, model: Model, values: Values | None = None) -> Array:
+    def misfit(self, model: Model, values: Values | None = None) -> Array:
         with np.errstate(divide="ignore", invalid="ignore"):  # not finite where there is no stiffness: within free play
-            return self.whiten(self.deviation(self.stiffness(model, values)))
+            return self.deviation(self.stiffness(model, values))
 
     def residual_with(self, added: Array, model: Model) -> Array:
         return self.whiten(self.deviation(self.stiffness(model) + added))
 
-    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        last = self._last.get("jacobian")
-        if last and last[0] is model and last[1] == tuple(names):
-            return last[2]
-        return self._keep("jacobian", model, tuple(names), self.residual_change(self._slopes(model, names), model))
+    def slopes(self, model: Model, names: Sequence[str]) -> Array:
+        return self.residual_change(self._slopes(model, names), model)
 
     def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
         """Derivatives by k parameters of the whitened residuals, gains then phases, of a model with an added stiffness.
@@ -321,16 +313,17 @@ class MeasuredSweep(MeasuredBase):
         points = np.unique(self.frequency + 1j * self.amplitude, return_inverse=True)[1]
         return Whitening(self.block_starts, line_starts, random, self.noise, self.weights, points, self.model_error)
 
-    def whiten(self, deviation: Array) -> Array:
+    def whiten(self, misfit: Array) -> Array:
         """Whiten deviations by the scatter and the errors that points share.
 
         Args:
-            deviation: relative differences in magnitude + i differences in phase [rad], complex (..., n).
+            misfit: relative differences in magnitude + i differences in phase [rad], complex (..., n).
 
         Returns:
             Whitened residuals in units of noise, (..., 2 n): n gains, then n phases.
         """
-        return self.covariance.whiten(deviation)
+        with np.errstate(invalid="ignore"):
+            return self.covariance.whiten(misfit)
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
         return self.covariance.noise_sensitivity(influence)
@@ -366,9 +359,6 @@ class MeasuredSweep(MeasuredBase):
         """
         return self.scaled_distance(self.deviation(self.stiffness(model))) / np.sqrt(2.0)
 
-    def misfit(self, model: Model) -> Array:
-        return self.residual(model)
-
     def displayed_residual(self, model: Model) -> Array:
         deviation = self.deviation(self.stiffness(model))
         distances = self.covariance.scaled(deviation).ravel()
@@ -384,42 +374,6 @@ class MeasuredSweep(MeasuredBase):
         distance = self.distance(model)[points].tolist()
         for row, noise_units in sorted(zip((self.order[points] + 1).tolist(), distance, strict=True)):
             yield Outlier(self.name, file, row, "stiffness", noise_units)
-
-    def lines(self, model: Model) -> list[LineMisfit]:
-        """Mean difference between measurement and model along each line, over the repeats of the line.
-
-        A line consists of the runs at one held amplitude or frequency.
-
-        Args:
-            model: model to compare.
-
-        Returns:
-            One record for each line, with the complex relative difference K_measured/K_model - 1 at each step.
-        """
-        ratio, lines = self.measured / self.stiffness(model) - 1.0, []
-        for held_value in np.unique(self.held_value):
-            chosen = self.held_value == held_value
-            _, first, place, counts = np.unique(
-                self.step[chosen], return_index=True, return_inverse=True, return_counts=True
-            )
-            mean = (np.bincount(place, ratio[chosen].real) + 1j * np.bincount(place, ratio[chosen].imag)) / counts
-            of_one = np.square(self.noise.random[self.name, float(held_value)]) + np.square(self.noise.shared)
-            frequency, amplitude = (values[chosen][first] for values in (self.frequency, self.amplitude))
-            noise = np.sqrt(of_one / np.median(counts) + np.square(self.noise.level))
-            test = self.name, self.direction, self.sweep.stepped
-            lines.append(LineMisfit(*test, frequency, amplitude, mean, noise))
-        return lines
-
-    def smooth_misfit(self, model: Model) -> float:
-        return max(float(np.abs(line.smooth).max()) for line in self.lines(model))
-
-    def line_words(self, point: int) -> str:
-        """Text that names the line (runs at one held amplitude or frequency) of a point, given by its index."""
-        if self.sweep.stepped == "frequency":
-            return f"the {self.direction} level {shown_amplitude(self.direction, self.amplitude[point])}"
-        if self.sweep.stepped == "amplitude":
-            return f"the {self.direction} sweep of amplitudes at {self.frequency[point]:.4g} Hz"
-        return f"run {self.repeat[point]} of {self.name}, {self.direction}"
 
     def shared_error_columns(self, chosen: Array) -> list[Array]:
         """Change of the whitened residuals, (2 n,), by an error of gain of 100 %, and by an error of phase of 1 rad.

@@ -1,12 +1,13 @@
 """Base class of measured loops and sweeps: one test with its noise."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from bushfit.effects.contract import Array
+from bushfit.effects.contract import Array, Values
 from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model
 from bushfit.reading.measurement import Loop, Source, Sweep
@@ -45,6 +46,59 @@ class MeasuredBase(ABC):
             Real and imaginary part of the stiffness difference of a sweep, (2, n), or force difference of a loop, (1,
             n).
         """
+
+    @abstractmethod
+    def misfit(self, model: Model, values: Values | None = None) -> Array:
+        """Model minus measured at each row or point in units of noise, before shared errors are removed.
+
+        Args:
+            model: model to evaluate.
+            values: parameter values in place of the model's own; leading axes are added to the result.
+
+        Returns:
+            Differences in force, (..., n); of a sweep in gain + i phase, complex (..., n), not yet in units of noise.
+        """
+
+    @abstractmethod
+    def whiten(self, misfit: Array) -> Array:
+        """Whiten a misfit, (..., n): remove the correlation of its noise, and the errors that rows or points share.
+
+        Returns:
+            Whitened residuals, (..., size), whose noise is independent with unit variance.
+        """
+
+    @abstractmethod
+    def slopes(self, model: Model, names: Sequence[str]) -> Array:
+        """Derivatives of the whitened residuals by parameter value, (len(names), size); the response is cached too."""
+
+    def residual(self, model: Model, values: Values | None = None) -> Array:
+        """Whitened residuals: model minus measured in units of noise; independent with variance 1 for a true model.
+
+        Args:
+            model: model to evaluate.
+            values: parameter values in place of the model's own; leading axes are added to the result.
+
+        Returns:
+            Residuals in the force of each row, (..., size); of a sweep of n points, n gains, then n phases.
+        """
+        return self.whiten(self.misfit(model, values))
+
+    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
+        """Derivatives of the whitened residuals by parameter value, (len(names), size)."""
+        rows = self._recall("jacobian", model, tuple(names))
+        return self._keep("jacobian", model, tuple(names), self.slopes(model, names)) if rows is None else rows
+
+    def without(self, points: Array) -> Self:  # noqa: ARG002
+        """Return the test with weight 0 at the given point indices (a loop has no weight at outliers anyway)."""
+        return self
+
+    def with_weight(self) -> Self:
+        """Return the test with only those points that have weight; a loop is unchanged."""
+        return self
+
+    def fundamental(self) -> Self:
+        """Return the test reduced to its first harmonic, for an added stiffness that is known at one frequency only."""
+        return self
 
     @property
     def residuals_per_point(self) -> int:
@@ -86,6 +140,11 @@ class MeasuredBase(ABC):
     def _last(self) -> dict[str, tuple[Model, Any, Array]]:
         """Cache of the last force or stiffness and its derivatives by key, each with its model and parameter names."""
         return {}
+
+    def _recall(self, key: str, model: Model, names: Any = ()) -> Array | None:
+        """Return the array that was cached for the same key, model and parameter names; None if there is none."""
+        last = self._last.get(key)
+        return last[2] if last and last[0] is model and last[1] == names else None
 
     def _keep(self, key: str, model: Model, names: Any, values: Array) -> Array:
         """Cache an array, read-only, for the next call with the same key, model and parameter names, and return it.

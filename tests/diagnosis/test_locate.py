@@ -24,7 +24,6 @@ def one(found: tuple[MisfitRegion, ...], direction: str, component: str) -> Misf
 def test_a_clean_campaign_has_no_place(measured: Measured, fitted: Fitted) -> None:
     evidence = fitted(measured(plan=SHARED))
     assert find_regions(evidence) == ()
-    assert max(test.smooth_misfit(evidence.model) for test in evidence.data_sets) < 0.01
 
 
 @pytest.fixture(scope="module")

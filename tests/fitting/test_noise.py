@@ -187,7 +187,7 @@ def test_harmonics_err_as_the_noise_says(kind: str, cycles: int, rows: int, corr
         data_set = MeasuredLoop(prepare_drive(Loop("long", Direction.AXIAL, 10.0 * phase, motion, force)))
         drive = data_set.drive
         assert drive.force.size < phase.size or cycles < 5
-        error = data_set._whitened((true_force(drive.phase) - drive.force) * data_set._per_noise)
+        error = data_set.whiten((true_force(drive.phase) - drive.force) * data_set._per_noise)
         squares.append(np.mean(np.square(error @ np.linalg.qr(data_set.smooth_changes()[1:].T)[0])))
     mean, unsure = np.mean(squares), np.std(squares) / np.sqrt(len(squares))
     print(f"{kind}, {cycles} of {rows} rows: mean square of the harmonics {mean:.2f} +- {unsure:.2f}, 1 if right")
