@@ -18,7 +18,7 @@ from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP
 from bushfit.diagnosis.record import CandidateResult, Diagnosis, MisfitRegion, NamedCause, Odds, format_probability
 from bushfit.diagnosis.search import Search
-from bushfit.diagnosis.verdict import Composition, Finding
+from bushfit.diagnosis.verdict import Composition, Finding, decide_verdict
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.coordinates import Bounds
@@ -91,8 +91,10 @@ class DiagnosisWriter:
         company = " with the other named effects" if len(names) > 1 else ""
         why = f"lowers chi-square by {base.chi_square - plain.chi_square:.0f}{company}; {self._probability(first)}"
         entries = [NamedCause(name, why) for name in names]
-        doubt = _doubt(base, plain, names, request.bounds) if self.finding.verdict == "named" else ""
-        if self.finding.verdict == "named" and not doubt:
+        if self.finding.verdict == "named":
+            if _gap_stays(base, plain, names, request.bounds):
+                finding = decide_verdict(self.hypotheses, request.tolerance, gap_stays=True)
+                return replace(self, finding=finding).diagnosis()
             summary = f"{' and '.join(names)} {'closes' if len(names) == 1 else 'close'} the gap"
             return self._finished("named", summary, after, entries, places=first.best)
         excess = [
@@ -108,7 +110,6 @@ class DiagnosisWriter:
             rest.append(f"{_NAMELESS}, {gap.sentence}")
         elif first.unnamed:
             rest.append(_NAMELESS)
-        rest += [doubt] if doubt else []
         summary += f"; the rest: {', '.join(rest)}" if rest else ""
         return self._finished("partly", summary, gap.after if gap else after, entries, places=first.best, gap=gap)
 
@@ -122,8 +123,13 @@ class DiagnosisWriter:
 
     def _mistaken_record(self, first: Composition) -> Diagnosis:
         """Diagnosis in which a mistake in the record explains the gap; the model to use is unchanged."""
-        data, best, claim = self.request.data, first.best, first.best.claim
+        data, best, claim, bounds = self.request.data, first.best, first.best.claim, self.request.bounds
         assert claim is not None
+        base, after = map(self._with_free_gains, (self.request.base, best.state.evidence))
+        holdout = hold_out(base, after, bounds)
+        if holdout.before and holdout.after and holdout.after > max(holdout.before, LARGEST_CLOSED_GAP):
+            finding = replace(self.finding, verdict="described", leads=(claim.mistake.name, *best.effects))
+            return replace(self, finding=finding)._without_name()
         command = " ".join(["bushfit diagnose CAMPAIGN", *(f"--adopt {name}" for name in claim.labels(data))])
         corrections = "; ".join(claim.corrections(data))
         advice = f"if the records of the tests confirm this mistake, state {corrections} (or {command})"
@@ -134,12 +140,11 @@ class DiagnosisWriter:
             self.finding.verdict, summary, self.request.base, entries, places=best, next_test=advice
         )
         warning = f"fitted to the tests as they are, which only agree if {claim.words(data)}: {advice}"
-        after = self._with_free_gains(best.state.evidence)
         return replace(
             diagnosis,
             after=after,
             remainder=find_regions(after),
-            holdout=hold_out(diagnosis.before, after, self.request.bounds),
+            holdout=holdout,
             result=replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning)),
         )
 
@@ -350,8 +355,8 @@ class DiagnosisWriter:
         return [*notes, *([_ONE_DIRECTION] if self.first and self.first.unnamed and len(directions) == 1 else [])]
 
 
-def _doubt(before: Evidence, after: Evidence, names: Sequence[str], bounds: Bounds) -> str:
-    """Reason to doubt that the named effects explain the whole gap; "" without doubt.
+def _gap_stays(before: Evidence, after: Evidence, names: Sequence[str], bounds: Bounds) -> bool:
+    """True if held-out tests show a gap beside the named effects, or if one of the effects may be absent.
 
     Args:
         before: fit without the effects.
@@ -361,15 +366,15 @@ def _doubt(before: Evidence, after: Evidence, names: Sequence[str], bounds: Boun
     """
     holdout = hold_out(before, after, bounds)
     if holdout.after is not None and holdout.after > LARGEST_CLOSED_GAP:
-        return f"a held-out gap of {number(holdout.after, 3)} times the noise"
+        return True
     result = result_of(after, bounds, after.model.effects, lacking=False)
     for name in names:
         effect = get_effect(name)
         amount = qualified_name(effect, effect.amount) if effect.replaces is None else ""
         low, high = (result.interval(amount) if amount in result.model.values else None) or (1.0, 1.0)
         if effect.amount.neutral is not None and low <= effect.amount.neutral <= high:
-            return f"{name} may be absent: the 95 % interval of its amount includes zero"
-    return ""
+            return True
+    return False
 
 
 def _format_amount(name: str, result: Result) -> str:

@@ -78,19 +78,22 @@ class Finding:
     names: tuple[str, ...] = ()
 
 
-def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float) -> Finding:
+def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float, *, gap_stays: bool = False) -> Finding:
     """Decide the verdict from the probabilities of hypotheses.
 
     Args:
         hypotheses: all hypotheses that were compared, the most probable first.
         tolerance: relative change of |K| below which an explanation is neglected.
+        gap_stays: True if held-out tests show a gap beside the most probable explanation. The compound then deviates
+            from the model's laws in a way that no effect describes, and only hypotheses with a deviation are compared.
 
     Returns:
         Verdict, probability that nothing is missing, and the explanations behind the verdict.
     """
+    hypotheses = [hypothesis for hypothesis in hypotheses if hypothesis.compound_deviates or not gap_stays]
     log_posteriors = np.array([hypothesis.log_posterior for hypothesis in hypotheses])
     weights = np.exp(log_posteriors - logsumexp(log_posteriors)).tolist()
-    small = [hypothesis.change <= tolerance or not hypothesis.key for hypothesis in hypotheses]
+    small = [not gap_stays and (h.change <= tolerance or not h.key) for h in hypotheses]
     nothing = sum(weight for weight, is_small in zip(weights, small, strict=True) if is_small)
     large = [(h, weight) for h, weight, is_small in zip(hypotheses, weights, small, strict=True) if not is_small]
     if nothing >= NOTHING or not large:
@@ -112,12 +115,12 @@ def decide_verdict(hypotheses: Sequence[Hypothesis], tolerance: float) -> Findin
     if common and all(part.startswith("part: ") for part in common):  # whatever else there is, this has to go first
         return Finding("unexplained", nothing, reported, leads)
     nameless = sum(composition.probability for composition in likely if composition.parts == {"unnamed"})
-    fits = first.best.claim is not None or first.best.p_value >= DOES_NOT_FIT
+    fits = first.best.p_value >= DOES_NOT_FIT
     if len(likely) <= MOST_REPORTED and nameless < 0.5 and fits:
         return Finding("ambiguous", nothing, reported)
     share = {name: sum(c.probability for c in compositions if name in c.names) for name in first.names}
     names = tuple(name for name in first.names if share[name] >= NAMED)
-    if names and first.unnamed:  # whatever the compound does beside them
+    if names and first.unnamed and fits:  # whatever the compound does beside them
         return Finding("partly", nothing, reported, leads, names)
     return Finding("described", nothing, reported, leads)
 
@@ -131,11 +134,12 @@ def _single(first: Composition, nothing: float, leads: Sequence[str]) -> Finding
         leads: names of effects that reduce the gap but do not explain it.
     """
     best, names = first.best, first.names
-    leads = tuple(dict.fromkeys((*names, *leads)))
+    mistakes = (best.claim.mistake.name,) if best.claim else ()
+    leads = tuple(dict.fromkeys((*mistakes, *names, *leads)))
     if first.may_mislead or not (names or best.claim or first.unnamed):
         return Finding("unexplained", nothing, (first,), leads)
     curve = best.unnamed not in ("", COMPOUND) and best.last_change >= (1.0 - LEAST_NAMED_SHARE) * best.change
-    if not best.claim and (not names or curve or best.p_value < DOES_NOT_FIT):
+    if not (names or best.claim) or curve or best.p_value < DOES_NOT_FIT:
         return Finding("described", nothing, (first,), leads)
     partly = first.unnamed or best.levels or first.faulty_parts
     return Finding("partly" if partly else "named", nothing, (first,), names=names)

@@ -14,17 +14,18 @@ TOLERANCE = 0.01
 
 
 def one(parts: str, odds: float, *, size: float = 0.05, last: float = 0.0, p_value: float = 0.5) -> Hypothesis:
-    """Of parts joined by +: effects, "unnamed", "levels", places as "kind:name", a mistake by its name; "" of none."""
+    """Of parts joined by +: effects, "unnamed", "compound", "levels", "kind:place", a mistake by its name; or ""."""
     names = parts.split("+") if parts else []
     spots = [name.split(":") for name in names if ":" in name]
     places: Any = tuple(SimpleNamespace(family=family, name=name, extreme=False) for family, name in spots)
     claims: list[Any] = [SimpleNamespace(mistake=MISTAKES[name], key=name) for name in names if name in MISTAKES]
-    others = {"unnamed", "levels", *MISTAKES}
+    others = {"unnamed", "compound", "levels", *MISTAKES}
     effects = tuple(name for name in names if ":" not in name and name not in others)
     state: Any = SimpleNamespace(effects=effects, linear=SimpleNamespace(p_value=lambda **_: p_value))
     claim, curve = claims[0] if claims else None, "smooth all" if "unnamed" in names else ""
-    size = size if names else 0.0
-    return Hypothesis(effects, claim, places, curve, "levels" in names, log(odds), size, last, state)
+    size, bent = size if names else 0.0, "compound" in names
+    curve = "compound" if bent else curve
+    return Hypothesis(effects, claim, places, curve, "levels" in names, log(odds), size, last, state, bent)
 
 
 def of(**odds: float) -> Finding:
@@ -85,3 +86,27 @@ def test_names_stand_beside_what_has_none_where_they_change_most(last: float, ve
     assert finding.verdict == verdict
     assert finding.leads == (("inertia",) if verdict == "described" else ())
     assert told(finding) == {"inertia+unnamed": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("odds", "named", "beside_a_gap"),
+    [
+        ({"inertia": 0.99, "inertia+compound": 0.0099, "compound": 0.0001}, "inertia", ("partly", ("inertia",))),
+        ({"inertia": 0.99, "inertia+compound": 0.006, "compound": 0.004}, "inertia", ("described", ())),
+        ({"kraus": 0.99, "kraus+compound": 0.01}, "kraus", ("described", ())),
+    ],
+    ids=str,
+)
+def test_beside_a_gap_that_stays_a_name_must_be_sure_in_a_compound_that_deviates(
+    odds: dict[str, float], named: str, beside_a_gap: tuple[str, tuple[str, ...]]
+) -> None:
+    hypotheses = [one(parts, share) for parts, share in odds.items()]
+    assert decide_verdict(hypotheses, TOLERANCE).names == (named,)
+    finding = decide_verdict(hypotheses, TOLERANCE, gap_stays=True)
+    assert (finding.verdict, finding.names) == beside_a_gap
+
+
+@pytest.mark.parametrize("parts", ["inertia+compound", "peak_to_peak", "peak_to_peak+compound"])
+def test_what_does_not_fit_the_tests_is_a_lead_and_no_name(parts: str) -> None:
+    finding = decide_verdict([one(parts, 0.99, p_value=1e-4)], TOLERANCE)
+    assert (finding.verdict, finding.names, finding.leads) == ("described", (), (parts.partition("+")[0],))
