@@ -2,8 +2,8 @@
 
     pytest tests/benchmarks/test_growth.py --benchmark-enable --dist no -m slow -s
 
-In the ordinary test run the smallest sizes are taken. BUSHFIT_PICTURE names a PNG to draw the curves to. Times are
-processor times and peaks of resident memory of the command, imports included.
+In the ordinary test run the smallest sizes are taken. Times are processor times and peaks of resident memory of the
+command, imports included.
 """
 
 import os
@@ -15,8 +15,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from bushfit.campaign.schema import SimulateSettings
@@ -60,24 +58,6 @@ def used(campaign: Path, output: Path) -> tuple[float, float]:
     return found.ru_utime + found.ru_stime, found.ru_maxrss / 1024
 
 
-def drawn(curves: Mapping[str, Curve], file: Path) -> None:
-    figure = Figure(figsize=(7.0, 2.6), dpi=150, layout="constrained")
-    for axes, (label, unit) in zip(figure.subplots(1, 2), (("time [s]", 0), ("memory [MB]", 1)), strict=True):
-        for name, curve in curves.items():
-            axes.loglog([*curve], [point[unit] for point in curve.values()], "o-", ms=3.5, lw=1.2, label=name)
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_locator(LogLocator(subs=(1, 2, 5)) if axis is axes.yaxis else LogLocator(100))
-            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
-            axis.set_minor_formatter(NullFormatter())
-        axes.set_ylim(1 if unit == 0 else 100, 20 if unit == 0 else 1000)
-        axes.set_xlabel("tests, or rows of the one loop", fontsize=8)
-        axes.set_ylabel(label, fontsize=8)
-        axes.tick_params(labelsize=7)
-        axes.grid(color="#d9d9d9", lw=0.5)
-    axes.legend(fontsize=7, frameon=False, loc="lower right")
-    figure.savefig(file)
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="os.wait4")
 def test_growth_of_a_run(benchmark: BenchmarkFixture, tests: tuple[Path, str], tmp_path: Path) -> None:
     folder, head = tests
@@ -107,6 +87,4 @@ def test_growth_of_a_run(benchmark: BenchmarkFixture, tests: tuple[Path, str], t
     print()
     for name, curve in curves.items():
         print(f"{name}: " + ", ".join(f"{n}: {s:.1f} s {mb:.0f} MB" for n, (s, mb) in curve.items()))
-    if picture := os.environ.get("BUSHFIT_PICTURE"):
-        drawn(curves, Path(picture))
     benchmark.pedantic(used, (folder / "tests.toml", tmp_path / "run"), rounds=1)

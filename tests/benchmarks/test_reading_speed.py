@@ -43,14 +43,14 @@ BUSHFIT = (
     "from bushfit import units\n"
     "units.si_factor('mm', 'm')  # imports what knows units\n"
     "from bushfit.campaign.campaign import Campaign\n"
-    "from bushfit.fitting.prepared_campaign import Data\n"
+    "from bushfit.fitting.prepared_campaign import PreparedCampaign\n"
     "from bushfit.fitting.procedures import fit_static\n"
     "from bushfit.geometry import Bushing, Direction\n"
     "from bushfit.reading.loops import read_loop\n"
     "from bushfit.reading.stated import LoopFile",
     "loop = read_loop(file, Direction.AXIAL, LoopFile(file='loop.csv'))\n"
     "bushing = Bushing('CMP 15 961', 0.010, 0.018, 0.034)\n"
-    "result = fit_static(Data.of(Campaign('c', file, bushing, (loop,))))\n"
+    "result = fit_static(PreparedCampaign.from_campaign(Campaign('c', file, bushing, (loop,))))\n"
     "found = dict(result.model.values)",
 )
 

@@ -26,17 +26,12 @@ from scipy.optimize import leastsq
 from bushfit.campaign.campaign import load_campaign
 from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.effects import BASE, History
 from bushfit.fitting.coordinates import Coordinates, jacobian, residual
-from bushfit.fitting.preparation import prepare_loops, prepare_sweeps
 from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import fit_joint
-from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
-from bushfit.reading.measurement import Loop, Sweep
 
 pytestmark = pytest.mark.slow
 
@@ -184,66 +179,6 @@ def test_diagnose(
     if benchmark.enabled:
         (once,) = seconds([work], 3)
         table.append((f"diagnose where {kind} is hidden, seconds", f"{once:.2f}", "<= 2"))
-
-
-def sweep(model: Model, frequencies: int, amplitudes: int) -> Sweep:
-    """Half a per cent of noise on a grid, each point three times."""
-    axes = np.linspace(5.0, 155.0, frequencies), np.geomspace(1e-4, 5e-4, amplitudes), np.arange(1, 4)
-    frequency, amplitude, repeat = (axis.ravel() for axis in np.meshgrid(*axes, indexing="ij"))
-    random = np.random.default_rng(0)
-    noise = 1.0 + 0.005 * (random.standard_normal(frequency.size) + 1j * random.standard_normal(frequency.size))
-    stiffness = model.stiffness(Direction.AXIAL, frequency, amplitude) * noise
-    return Sweep("grid", Direction.AXIAL, frequency, amplitude, stiffness, repeat)
-
-
-def loop(model: Model, rows: int) -> Loop:
-    """One cycle of 1 mm at 0.1 Hz with 0.3 % of noise."""
-    phase = np.arange(rows) / rows
-    motion = 1e-3 * np.sin(2.0 * np.pi * phase)
-    force = model.force(Direction.AXIAL, History.steady(motion, 0.1))
-    force = force + 0.003 * force.max() * np.random.default_rng(0).standard_normal(rows)
-    return Loop("loop", Direction.AXIAL, 10.0 * phase, motion, force)
-
-
-def fitted(model: Model, loops: Sequence[Loop], sweeps: Sequence[Sweep]) -> Callable[[], object]:
-    """From measurements to a solution."""
-    return lambda: solve(FitProblem(model, [*prepare_loops(loops), *prepare_sweeps(sweeps)], FIVE))
-
-
-@pytest.mark.parametrize("axis", ["rows of a loop", "frequencies", "amplitudes"])
-def test_growth(benchmark: BenchmarkFixture, paper_model: Model, table: Rows, axis: str) -> None:
-    """Where time is fixed cost + n times something, its slope in a log-log plot rises to 1 and stays there."""
-    standard = loop(paper_model, 1000)
-    start = paper_model.with_values({name: 1.2 * value for name, value in paper_model.values.items()})
-    match axis:
-        case "rows of a loop":
-            works = {n: fitted(start, [loop(paper_model, n)], []) for n in (4000, 16000, 64000, 256000)}
-        case "frequencies":
-            works = {n: fitted(start, [standard], [sweep(paper_model, n, 3)]) for n in (100, 400, 1600, 6400)}
-        case _:
-            works = {n: fitted(start, [standard], [sweep(paper_model, 16, n)]) for n in (20, 80, 320, 1280)}
-    benchmark.pedantic(works[min(works)], rounds=1)
-    chosen = works if benchmark.enabled else {min(works): works[min(works)]}
-    times = seconds(list(chosen.values()), 3 if benchmark.enabled else 1)
-    shown = ", ".join(f"{n}: {1e3 * t:.0f} ms" for n, t in zip(chosen, times, strict=True))
-    slopes = np.diff(np.log(times)) / np.diff(np.log(list(chosen)))
-    figure = f"{slopes.max():.2f}" if slopes.size else "-"
-    table.append((f"growth with {axis} ({shown}), steepest exponent", figure, "about 1"))
-
-
-def test_growth_with_effects(benchmark: BenchmarkFixture, paper_model: Model, table: Rows) -> None:
-    """An effect costs among others what it costs alone."""
-    grid, added = sweep(paper_model, 1000, 10), ("viscous", "second_friction", "inertia", "delay")
-
-    def asked(*names: str) -> Callable[[], object]:
-        model = Model.with_defaults(paper_model.bushing, (*BASE, *names), paper_model.values)
-        return lambda: [model.stiffness(Direction.AXIAL, grid.frequency, grid.amplitude) for _ in range(5)]
-
-    works = [asked(), *map(asked, added), asked(*added)]
-    benchmark.pedantic(works[0], rounds=1)
-    base, *each, every = seconds(works, 9 if benchmark.enabled else 1)
-    share = (every - base) / sum(one - base for one in each)
-    table.append(("growth with effects: four together over the sum of each alone", f"{share:.2f}", "about 1"))
 
 
 #: Communication step [s]: usual in multibody codes, 16 in a cycle of the highest frequency of the motion, 60 Hz.

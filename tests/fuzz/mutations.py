@@ -199,39 +199,40 @@ def tried(command: str, seed: int, folder: Path) -> tuple[list[str], str]:
     if rng.random() < 0.8:
         files |= {name: mutated(rng, name, INPUTS[name]) for name in rng.sample(used, rng.randint(1, 2))}
     files["x/mine.txt"] = b"mine"
+    words = [command, *line, *(options(rng, command) if rng.random() < 0.5 else [])]
+    words += ["-o", "x/c" if command == "init" else "x", *(["--jobs", "1"] if command == "batch" else [])]
+    words += [] if command in ("schema", "report") else ["--no-plots"]
+    return words, wrong_end(words, folder, files)
+
+
+def wrong_end(words: list[str], folder: Path, files: dict[str, bytes]) -> str:
+    """What is wrong with the end of a command line in a folder with these files; "" where nothing is."""
     for name, content in files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)
-    words = [
-        command,
-        *line,
-        *(options(rng, command) if rng.random() < 0.5 else []),
-        "-o",
-        "x/c" if command == "init" else "x",
-    ]
-    words += ["--jobs", "1"] if command == "batch" else []
-    words += [] if command in ("schema", "report") else ["--no-plots"]
     try:
         with time_limit():
             done = call(folder, *words)
     except Exception as error:
-        return words, f"{type(error).__name__}: {error}"
+        return f"{type(error).__name__}: {error}"
     finally:
         gc.unfreeze()  # a command freezes its objects, since its process ends with it
         gc.collect()
     said = done.stdout + done.stderr + "".join(file.read_text("utf-8") for file in folder.glob("x/batch.csv"))
     if "internal error" in said or "Traceback" in said:
-        return words, said[-500:]
+        return said[-500:]
     if (done.returncode == 2 and done.stderr.count("rror: ") < 1) or done.returncode not in (0, 1, 2):
-        return words, f"status {done.returncode} without an error: {done.stderr}"
+        return f"status {done.returncode} without an error: {done.stderr}"
+    if done.returncode == 2 and len(done.stderr) > 5000:
+        return "an error that nobody reads to its end"
     if any(sign in said for sign in "\x1b\x9b\u202e\x00"):
-        return words, "a character that steers the terminal"
+        return "a character that steers the terminal"
     lost = [
         name
         for name, content in files.items()
         if not (folder / name).exists() or (folder / name).read_bytes() != content
     ]
-    return words, f"lost: {lost}" if lost else ""
+    return f"lost: {lost}" if lost else ""
 
 
 def faults(command: str, seeds: range, folder: Path, budget: float = float("inf")) -> tuple[int, list[str]]:
