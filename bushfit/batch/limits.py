@@ -34,14 +34,14 @@ from bushfit.batch.quantities import (
     PointText,
 )
 from bushfit.campaign.quantities import convert_limits
-from bushfit.campaign.toml import read_toml
+from bushfit.campaign.toml import parse_toml
 from bushfit.diagnosis import document
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
 from bushfit.reduction.arrays import scatter
 from bushfit.report.batch_document import LimitResult
 from bushfit.units import number, parse_quantity
-from bushfit.validation import ParameterValue, Share, converter, table, text
+from bushfit.validation import ParameterValue, Share, converter, table, text, validate_tables
 
 #: Results in the order from good to bad.
 RESULTS: Sequence[LimitResult] = ("pass", "conditional pass", "not judged", "conditional fail", "fail")
@@ -194,7 +194,7 @@ def read_limits(path: Path, rows: Sequence[Row]) -> Limits:
     Raises:
         CampaignError: invalid keys or values, no limit at all, or `verdicts` with a row that does not run diagnose.
     """
-    limits = read_toml(path, Limits, description="a limits file")
+    limits = validate_tables(parse_toml(path, "a limits file"), path, Limits)
     if not (limits.bounds or limits.verdicts):
         raise CampaignError(
             "the file contains no limit", file=path, expected='such as [parameters.mu] with max = "2 MPa"'

@@ -4,16 +4,13 @@ import re
 import tomllib
 from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from bushfit.errors import CONTROL, CampaignError
 from bushfit.geometry import Bushing, Place, Specimen
 from bushfit.reading.files import line_of, read_utf8
 from bushfit.reading.preload import Preload
 from bushfit.units import CELSIUS
-from bushfit.validation import validate_tables
-
-T = TypeVar("T")
 
 #: A key of more than 16 parts, such as a.b.c; parsing one takes time in proportion to the square of their number.
 _DEEP_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}""")
@@ -23,25 +20,6 @@ _WAYS = {
     ("Unescaped", "Invalid hex"): "write / for each \\ of a path, or the text in single quotes",
     ("Cannot",): "name each table and key once; list several tests under [[loops]] or [[sweeps]], in two brackets",
 }
-
-
-def read_toml(path: Path, schema: type[T], *, description: str = "a campaign file", largest: int = 1_000_000) -> T:
-    """Read a TOML file and check it against a schema.
-
-    Args:
-        path: TOML file.
-        schema: dataclass of the file with annotations of pydantic; unknown keys are refused.
-        description: kind of file, for error messages.
-        largest: maximum size of the file [bytes]; the default is enough for thousands of tests.
-
-    Returns:
-        Content as an instance of `schema`, with quantities in SI.
-
-    Raises:
-        CampaignError: the file is missing, too large, not TOML, or has invalid keys or values.
-        UnitError: a quantity without a unit, or with an incompatible unit.
-    """
-    return validate_tables(parse_toml(path, description, largest), path, schema)
 
 
 def parse_toml(path: Path, description: str = "a campaign file", largest: int = 1_000_000) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bushfit.cli.options import command_called, direction_option, effect_option, file_option, flag, option, option_group
+from bushfit.cli.options import command_called, direction_option, file_option, flag, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.errors import error_location
 from bushfit.units import format_aligned, number, split_header
@@ -34,7 +34,7 @@ _MOST_SHOWN = 10
         multiple=True,
     ),
     direction_option("Fit only the tests in this direction (axial, radial, torsion) or of this specimen."),
-    effect_option("Add this effect to each model, as in `bushfit fit`."),
+    option("--effect effects", "NAME", "Add this effect to each model, as in `bushfit fit`.", multiple=True),
     option(
         "--at operating_points",
         "POINT",

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bushfit.cli.options import command_called, direction_option, effect_option, file_option, flag, option_group
+from bushfit.cli.options import command_called, direction_option, file_option, flag, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.printing import print_step
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
@@ -75,7 +75,12 @@ def dynamic(
         "Fit the tests in this direction (axial, radial, torsion) or of this specimen; may be given again "
         "[axial, and all specimens]."
     ),
-    effect_option("Add an effect to the model, such as inertia; may be given again. An unknown NAME prints the list."),
+    option(
+        "--effect effects",
+        "NAME",
+        "Add an effect to the model, such as inertia; may be given again. An unknown NAME prints the list.",
+        multiple=True,
+    ),
     flag("--profile", "Compute additional 95 % intervals by profile likelihood; takes some seconds."),
 )
 @campaign_options()

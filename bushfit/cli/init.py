@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from bushfit.cli.file_options import STATED, TYPES, direction_error, metadata_options, options_named
-from bushfit.cli.inspect import print_left_out
 from bushfit.cli.options import command_called, flag, option, option_group, option_of
 from bushfit.cli.output import Output, with_output
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, error_location, quote_path
@@ -95,7 +94,8 @@ def command(
     from bushfit.geometry import Specimen
     from bushfit.inspection.record import campaign_text, campaigns_of_parts, with_specimens_named
 
-    questions = Questions.for_command(output, no_input=no_input)
+    at_terminal = sys.stdin is not None and sys.stdin.isatty()
+    questions = Questions(output, at_terminal and not (no_input or output.quiet or output.as_json))
     usual = (files[0].resolve() if files[0].is_dir() else files[0].resolve().parent).name
     if name is None and questions.enabled and not any(sizes.values()):
         name = click.prompt("name of the bushing", default=usual, err=True)
@@ -127,7 +127,8 @@ def command(
     for sentence, count in Counter(inspection.assumed for inspection in inspections).items():
         if sentence:
             output.print(f"{count} test{'s' * (count > 1)}: {sentence}")
-    print_left_out(output, left_out)
+    for sentence in left_out:
+        output.print(f"left out: {sentence}")
     document: InspectionDocument = {
         "campaign": written[target],
         "files": [inspection.to_document() for inspection in inspections],
@@ -296,12 +297,6 @@ class Questions:
     enabled: bool
     _answers: dict[_Key, Any] = field(default_factory=lambda: dict.fromkeys(_ONCE))
 
-    @classmethod
-    def for_command(cls, output: Output, *, no_input: bool) -> Questions:
-        """Create the questions of a command; disabled without a terminal and with --no-input, --quiet or --json."""
-        enabled = not (no_input or output.quiet or output.as_json) and sys.stdin is not None and sys.stdin.isatty()
-        return cls(output, enabled)
-
     def complete(self, options: Mapping[str, Any], read: Callable[[Mapping[str, Any]], _Read]) -> _Read:
         """Call a function with options; ask for the options that its errors name, until it succeeds.
 
@@ -324,7 +319,9 @@ class Questions:
                 if not self.enabled:
                     raise
                 bare_error = type(error)(**{**vars(error), "hint": None})
-                wanted = wanted_options(error)
+                named = [(kind or key.replace("-", "_"), role) for kind, role, key in _NAMED.findall(error.hint or "")]
+                wanted = [(name, role) for name, role in named if role or name in STATED or name in _WORDS]
+                wanted.sort(key=lambda key: key[0] == "column")  # which is rarely needed
                 new = [key for key in wanted if key not in answers and not options.get(key[0])]
                 wrong = [key for key, answer in answers.items() if key in wanted or is_about(bare_error, key, answer)]
                 if not (new or wrong):
@@ -353,13 +350,6 @@ class Questions:
             key = ("frequency", "") if name == "rate" and "Hz" in answer else key
         self._answers[key] = answer
         return {key: answer}
-
-
-def wanted_options(error: BushfitError) -> list[_Key]:
-    """Keys and roles of the options that the hint of an error names; columns are last, as they are rarely needed."""
-    options = [(kind or option.replace("-", "_"), role) for kind, role, option in _NAMED.findall(error.hint or "")]
-    known_options = [(name, role) for name, role in options if role or name in STATED or name in _WORDS]
-    return sorted(known_options, key=lambda key: key[0] == "column")
 
 
 def is_about(error: BushfitError, key: _Key, answer: Any) -> bool:

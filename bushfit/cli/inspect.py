@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -44,7 +44,8 @@ def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Ou
     from bushfit.inspection.record import pasted_text, with_specimens_named
 
     sources, left_out = gather(files, test_options)
-    print_left_out(output, left_out)
+    for sentence in left_out:
+        output.print(f"left out: {sentence}")
     last = math.ceil(len(sources) / _FILES_A_PICTURE)
     pages = ["inspect", *(f"inspect_{page}" for page in range(2, last + 1))]
     folder = output.folder(files[0].stem)
@@ -105,9 +106,3 @@ def print_inspection(output: Output, inspection: Inspection) -> None:
         console.print(f"  [yellow]unusual:[/yellow] {escape(sentence)}")
     if not inspection.odd:
         console.print("  nothing unusual")
-
-
-def print_left_out(output: Output, left_out: Sequence[str]) -> None:
-    """Print a line for each file or sheet without a test."""
-    for sentence in left_out:
-        output.print(f"left out: {sentence}")

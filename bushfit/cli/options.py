@@ -159,16 +159,6 @@ def direction_option(words: str) -> Parameter:
     return option("--direction directions", "PLACE", words, type=str, multiple=True, callback=check)
 
 
-def effect_option(words: str) -> Parameter:
-    """Create the option --effect for names of effects to add, with the help text `words`."""
-    return option(
-        "--effect effects",
-        "NAME",
-        words,
-        multiple=True,
-    )
-
-
 def file_option(name: str, words: str) -> Parameter:
     """Create an option whose value is a file, with the help text `words`."""
     return option(name, "FILE", words, type=FILE)

@@ -28,7 +28,6 @@ from bushfit.export.deck import (
     exported_directions,
     format_real,
     heading,
-    middle,
     stiffness_tables,
 )
 from bushfit.geometry import ROTATION, TRANSLATION
@@ -132,7 +131,8 @@ def _element(request: ExportRequest, prediction: Prediction) -> _Element:
     if frequencies.size == 1:
         rate = 4.0 * reach * float(frequencies[0])
     curve = static_curve(request.result, place, reach, rate, temperature=request.temperature)
-    reference, row = middle(tables), (frequencies.size - 1) // 2  # of two middle frequencies, the lower
+    # of two middle amplitudes or frequencies, the lower
+    reference, row = tables[(len(tables) - 1) // 2], (frequencies.size - 1) // 2
     return _Element(tables, curve, reference, float(frequencies[row]), complex(reference.stiffness[row]))
 
 

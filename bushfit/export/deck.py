@@ -2,7 +2,7 @@
 
 import re
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -132,11 +132,6 @@ class Form(NamedTuple):
         return frequency, *self.parts(frequency, table.stiffness * factor)
 
 
-def middle(rows: Sequence[StiffnessTable]) -> StiffnessTable:
-    """Return the table of the middle amplitude of an ordered sequence; the lower one for an even number of tables."""
-    return rows[(len(rows) - 1) // 2]
-
-
 def comment_lines(mark: str, lines: Iterable[str]) -> list[str]:
     """Wrap comments to lines of 80 ASCII characters.
 
@@ -238,7 +233,7 @@ def table_losses(request: ExportRequest, form: Form) -> Iterator[str]:
     for prediction in exported_directions(request):
         tables, place = stiffness_tables(prediction), prediction.direction
         if len(tables) > 1:
-            reference = middle(tables)
+            reference = tables[(len(tables) - 1) // 2]
             ratios = np.concatenate([np.abs(reference.stiffness / table.stiffness) for table in tables])
             unit, factor = place.display.displacement
             low, value, high = (number(table.amplitude * factor, 4) for table in (tables[0], reference, tables[-1]))

@@ -44,6 +44,8 @@ class PronySeries:
         long_term: modulus at rest G_inf [Pa].
         arms: the terms, as Maxwell arms in parallel with G_inf.
         exact: complex modulus of the model at frequencies over the band [Pa].
+        instantaneous: instantaneous modulus G_0 [Pa], the sum of the moduli of all terms and G_inf.
+        relative_moduli: modulus of each of the k terms relative to G_0, g_i, (k,).
     """
 
     amplitude: float
@@ -51,16 +53,8 @@ class PronySeries:
     long_term: float
     arms: Arms
     exact: Array
-
-    @property
-    def instantaneous(self) -> float:
-        """Instantaneous modulus G_0 [Pa]: long-term modulus plus the moduli of all terms."""
-        return self.long_term + float(self.arms.modulus.sum())
-
-    @property
-    def relative_moduli(self) -> Array:
-        """Moduli of the k terms relative to the instantaneous modulus, g_i = G_i/G_0, (k,)."""
-        return self.arms.modulus / self.instantaneous
+    instantaneous: float
+    relative_moduli: Array
 
 
 def shear_strain(request: ExportRequest, amplitude: float) -> float:
@@ -92,12 +86,12 @@ def prony_series(request: ExportRequest) -> list[PronySeries]:
         strain = shear_strain(request, amplitude)
 
         def beyond_rest(omega: Array, strain: float = strain) -> Array:
-            total = model.stiffness(COMPOUND, omega / (2.0 * np.pi), strain, conditions=request.conditions)
-            return total - long_term
+            return model.stiffness(COMPOUND, omega / (2.0 * np.pi), strain, conditions=request.conditions) - long_term
 
         arms = fitted_arms(beyond_rest, band, request.accuracy, spring=long_term, beyond=_BEYOND, closest=True)
         exact = long_term + beyond_rest(2.0 * np.pi * frequency)
-        series.append(PronySeries(float(amplitude), strain, long_term, arms, exact))
+        total = long_term + float(arms.modulus.sum())
+        series.append(PronySeries(float(amplitude), strain, long_term, arms, exact, total, arms.modulus / total))
     return series
 
 

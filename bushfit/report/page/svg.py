@@ -117,15 +117,11 @@ def _rewrite(root: ElementTree.Element, name: str) -> None:
             element.set("id", names[identifier])
             decimals = 2 if len(element.get("d", "")) < _SMALL_SHAPE else 1
         for key in {"x", "y", "width", "height", "transform", "d"}.intersection(element.keys()):
-            value = _NUMBER.sub(partial(_rounded, decimals), element.attrib[key])
+            numbers = partial(lambda count, digits: f"{float(digits[0]):.{count}f}".rstrip("0").rstrip("."), decimals)
+            value = _NUMBER.sub(numbers, element.attrib[key])
             element.set(key, re.sub(r"\s*([A-Za-z])\s*", r"\1", value).strip() if key == "d" else value)
         if element.get("transform", "").startswith("rotate(-0 "):
             del element.attrib["transform"]
-
-
-def _rounded(decimals: int, digits: re.Match[str]) -> str:
-    """Round a matched number to at most `decimals` decimals."""
-    return f"{float(digits[0]):.{decimals}f}".rstrip("0").rstrip(".")
 
 
 def _share_attributes(root: ElementTree.Element) -> None:

@@ -69,7 +69,7 @@ class Panel:
         return min(float(near.min()), *limits, middle - half), max(float(near.max()), *limits, middle + half)
 
 
-@style.in_own_style
+@style.fixed_settings()
 def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> style.Chart:
     """Figure of the scatter of a batch: one panel per quantity, with a point per bushing in the order of the manifest.
 
@@ -143,7 +143,7 @@ def _draw_panel(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     axes.set_title(title, loc="left", pad=3, **look)
 
 
-@style.in_own_style
+@style.fixed_settings()
 def curves_figure(headers: Sequence[str], usual: Array, singles: Mapping[str, Array]) -> style.Chart:
     """Figure of the measured stiffness curves of a batch: median and range of the usual parts, and unusual parts.
 

@@ -16,7 +16,7 @@ _MARKS = 5
 _LEAST_PERCENT, _LEAST_LOSS = 1.0, 0.005
 
 
-@style.in_own_style
+@style.fixed_settings()
 def comparison_figure(comparison: ComparisonDocument) -> style.Chart:
     """Figure of stiffness and loss factor of all compared results, and of their differences from the first result.
 

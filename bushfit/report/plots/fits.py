@@ -41,7 +41,7 @@ _WORST_DRAWN = 0.05
 _OUTLIERS = "Crosses: outliers, drawn at the edge if they are beyond it."
 
 
-@style.in_own_style
+@style.fixed_settings()
 def sweeps_figure(result: Result, table: pd.DataFrame, title: str) -> style.Chart:
     """Figure of stiffness magnitude and loss factor of sweeps, measured and modelled, with the residuals below.
 
@@ -210,7 +210,7 @@ def _draw_residuals(strips: Sequence[Axes], group: SweepGroup) -> None:
         style.mark_outliers(strip, outliers[group.x_header].to_numpy(), outliers[header].to_numpy())
 
 
-@style.in_own_style
+@style.fixed_settings()
 def loops_figure(result: Result, table: pd.DataFrame, title: str) -> style.Chart:
     """Figure of force over displacement of loops, measured and modelled, and of residuals over the phase of the cycle.
 

@@ -42,7 +42,7 @@ _BARRED = 1.0
 _ROW_NAME: dict[str, Any] = {"rotation": 0, "ha": "right", "va": "center", "ma": "center"}
 
 
-@style.in_own_style
+@style.fixed_settings()
 def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any], title: str) -> style.Chart:
     """Figure of the gap, measured minus model in percent, of all tests before and after a diagnosis.
 

@@ -32,7 +32,7 @@ _STRIP, _NOISE_ROW = 2.7, 4.2
 _MOST_HISTORIES = 4
 
 
-@style.in_own_style
+@style.fixed_settings()
 def inspection_figure(files: Sequence[Inspection], first: int = 0, count: int = 5) -> style.Chart:
     """Figure of test files as recorded: loops over displacement and time, histories over time, sweeps over their steps.
 
@@ -117,7 +117,7 @@ def _draw_sweep(pair: Sequence[Axes], sweep: Sweep) -> Axes:
     return pair[0]
 
 
-@style.in_own_style
+@style.fixed_settings()
 def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str) -> style.Chart:
     """Figure of raw time histories and the operating points that they were reduced to, with noise and distortion.
 
@@ -219,7 +219,7 @@ def _draw_points(
     style.legend(pair[-1], handles, [format_range(unit, length * level) for level in looks], "amplitude")
 
 
-@style.in_own_style
+@style.fixed_settings()
 def resonance_figure(resonance: Resonance, title: str) -> style.Chart:
     """Figure of a resonance test: transmissibility, amplitude reached, stiffness and loss factor over frequency.
 

@@ -17,7 +17,7 @@ _FINE = 200
 _NEAR = 1.3
 
 
-@style.in_own_style
+@style.fixed_settings()
 def master_curve_figure(model: Model, shifted_sweeps: Sequence[ShiftedSweep], title: str) -> style.Chart:
     """Figure of the master curve: stiffness and loss factor over reduced frequency at 23 degC, measured and modelled.
 
@@ -30,7 +30,9 @@ def master_curve_figure(model: Model, shifted_sweeps: Sequence[ShiftedSweep], ti
         Figure with two panels per direction or specimen, at the amplitude with most points.
     """
     places = list(dict.fromkeys(shifted.sweep.direction for shifted in shifted_sweeps))
-    degrees = sorted({_degree(shifted) for shifted in shifted_sweeps})
+    rounded = {shifted.sweep.name: float(np.round(shifted.temperature - CELSIUS)) for shifted in shifted_sweeps}
+    degrees = sorted({*rounded.values()})
+    looks = dict(zip(degrees, style.styles(len(degrees), "temperature"), strict=True))
     figure = style.Chart(title, style.ROW * len(places))
     grid, levels = figure.subplots(len(places), 2, squeeze=False), []
     for place, (stiffness, loss) in zip(places, grid, strict=True):
@@ -48,10 +50,9 @@ def master_curve_figure(model: Model, shifted_sweeps: Sequence[ShiftedSweep], ti
         line = model.stiffness(place, frequency, level)
         for axes, part in ((stiffness, lambda k, by=factor: by * np.abs(k)), (loss, loss_factor)):
             for shifted in of_place:
-                look = style.styles(len(degrees), "temperature")[degrees.index(_degree(shifted))]
                 near_level = np.abs(np.log(shifted.sweep.amplitude / level)) < np.log(_NEAR)
                 points = shifted.reduced_frequency[near_level], part(shifted.reduced_stiffness[near_level])
-                axes.plot(*points, "o", color=look.color, **style.DOT)
+                axes.plot(*points, "o", color=looks[rounded[shifted.sweep.name]].color, **style.DOT)
             axes.plot(frequency, part(line), color=style.INK, lw=1.1, zorder=3)
             style.logarithmic(axes, reach)
         style.label_axes(stiffness, "reduced frequency f a_T [Hz]", f"{place}\n|{words(place)[2]}| [{unit}]")
@@ -61,8 +62,3 @@ def master_curve_figure(model: Model, shifted_sweeps: Sequence[ShiftedSweep], ti
         f"Line: model at 23 °C, {', '.join(levels)}. Points: measured at the temperatures in the legend [°C], shifted",
         "to 23 °C by the model.",
     )
-
-
-def _degree(shifted: ShiftedSweep) -> float:
-    """Mean temperature of a sweep, rounded to 1 degC."""
-    return float(np.round(shifted.temperature - CELSIUS))

@@ -45,6 +45,7 @@ class SweepGroup(NamedTuple):
     Args:
         place: direction or specimen.
         axis: stepped quantity, drawn along x.
+        x_header: header of the table column of this quantity.
         palette: colour scale, named after the quantity that distinguishes the curves: "amplitude", "frequency",
             "temperature" or, for parts and free sweeps, "loop".
         curves: a curve per level, ascending.
@@ -52,13 +53,9 @@ class SweepGroup(NamedTuple):
 
     place: Place
     axis: Axis
+    x_header: str
     palette: str
     curves: Sequence[Curve]
-
-    @property
-    def x_header(self) -> str:
-        """Header of the table column (frequency or amplitude) that is drawn along x."""
-        return header_of(self.place, self.axis)
 
     @property
     def shares_levels(self) -> bool:
@@ -102,8 +99,8 @@ def sweep_groups(table: pd.DataFrame, result: Result) -> list[SweepGroup]:
             temperature = rows.groupby("test")["temperature [degC]"].transform("mean")
             if temperature.max() - temperature.min() > SAME_TEMPERATURE:
                 levels, palette, units = [temperature.round(1), *levels], "temperature", ["°C", *units]
-        for header in [] if free else preload_headers(rows):
-            if rows[header].min() < rows[header].max():
+        for header in map(str, () if free else rows):
+            if header.startswith("preload [") and rows[header].min() < rows[header].max():
                 levels, palette, units = [rows[header], *levels], "loop", [header[9:-1], *units]
         curves = []
         by_level = rows.groupby([level.to_numpy() for level in levels], sort=not free, dropna=False)
@@ -116,13 +113,8 @@ def sweep_groups(table: pd.DataFrame, result: Result) -> list[SweepGroup]:
             texts.append(level if isinstance(level, str) else format_range(unit, level))
             sorted_rows = of_level.sort_values(header_of(place, axis), kind="stable")
             curves.append(Curve(", ".join(texts), np.nan if isinstance(level, str) else level, sorted_rows))
-        groups.append(SweepGroup(place, axis, palette, curves))
+        groups.append(SweepGroup(place, axis, header_of(place, axis), palette, curves))
     return sorted(groups, key=lambda group: order.index(str(group.place)))
-
-
-def preload_headers(table: pd.DataFrame) -> list[str]:
-    """Headers of the columns with preloads, such as "preload [N]"."""
-    return [str(header) for header in table.columns if str(header).startswith("preload [")]
 
 
 def rows_at_preload(table: pd.DataFrame, prediction: Prediction) -> pd.DataFrame:

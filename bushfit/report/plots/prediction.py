@@ -30,7 +30,7 @@ _LINE, _THIN, _DOUBLE, _CORE = 1.3, 0.6, 2.4, 0.7
 _SAME = 0.01
 
 
-@style.in_own_style
+@style.fixed_settings()
 def prediction_figure(
     result: Result,
     prediction: Prediction,
@@ -91,7 +91,7 @@ def prediction_figure(
     return figure.explain(*sentences, note=note)
 
 
-@style.in_own_style
+@style.fixed_settings()
 def static_figure(curve: StaticCurve, title: str) -> style.Chart:
     """Figure of a static curve: force over displacement, and its slope, with 95 % bands.
 

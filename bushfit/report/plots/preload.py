@@ -18,7 +18,7 @@ _FINE = 25
 _MOST_LEVELS = 6
 
 
-@style.in_own_style
+@style.fixed_settings()
 def preload_figure(
     result: Result, predictions: Sequence[Prediction], title: str, temperature: float | None = None
 ) -> style.Chart:

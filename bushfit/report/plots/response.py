@@ -14,7 +14,7 @@ _STRIP = 3.4
 PREDICTED, MEASURED = "#3b528b", "#c1121f"
 
 
-@style.in_own_style
+@style.fixed_settings()
 def response_figure(title: str, table: pd.DataFrame, note: str = "") -> style.Chart:
     """Figure of a response: for each direction displacement and force over time, and force over displacement.
 

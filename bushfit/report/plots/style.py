@@ -1,17 +1,16 @@
 """Common style of all figures: size, fonts, colours and legends, and their encoding as image files.
 
-The user's matplotlibrc has no influence: `in_own_style` draws with matplotlib's defaults.
+The user's matplotlibrc has no influence: `fixed_settings` draws with matplotlib's defaults.
 """
 
 import io
 import re
 import textwrap
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import wraps
 from threading import RLock
-from typing import Any, Literal, NamedTuple, ParamSpec, Self, TypeVar
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from matplotlib import colormaps, rc_context, rcParamsDefault
@@ -99,27 +98,19 @@ _SETTINGS: dict[Any, Any] = {
 }
 #: matplotlib's settings belong to the process: one figure at a time changes them.
 _LOCK = RLock()
-_P = ParamSpec("_P")
-_Drawn = TypeVar("_Drawn", bound="Chart | None")
 
 
 @contextmanager
-def _own_settings(**settings: Any) -> Iterator[None]:
+def fixed_settings(**settings: Any) -> Iterator[None]:
+    """Context, or decorator of a function that makes a figure, without influence of the user's matplotlibrc.
+
+    Args:
+        settings: settings of matplotlib that differ from those of all figures.
+    """
     merged: dict[Any, Any] = {**_SETTINGS, **settings}
     with _LOCK, rc_context(merged), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         yield
-
-
-def in_own_style(make: Callable[_P, _Drawn]) -> Callable[_P, _Drawn]:
-    """Decorate a function that makes a figure, so that the user's matplotlibrc has no influence on the figure."""
-
-    @wraps(make)
-    def styled(*args: _P.args, **kwargs: _P.kwargs) -> _Drawn:
-        with _own_settings():
-            return make(*args, **kwargs)
-
-    return styled
 
 
 class Chart(Figure):
@@ -376,7 +367,7 @@ def to_image(figure: Figure, form: str = "png", *, outlines: bool = True) -> byt
     """
     buffer = io.BytesIO()
     figure.set_dpi(_DPI)  # SVG and PDF change the resolution of the figure
-    with _own_settings(**{"svg.fonttype": "path" if outlines else "none"}):
+    with fixed_settings(**{"svg.fonttype": "path" if outlines else "none"}):
         canvas = get_registered_canvas_class(form)(figure)
         options = {"pil_kwargs": {"compress_level": _COMPRESSION}} if form == "png" else {}
         getattr(canvas, f"print_{form}")(buffer, metadata=dict.fromkeys(_OMITTED_METADATA[form]), **options)

@@ -21,7 +21,7 @@ from bushfit.report.diagnosed import gap_table
 from bushfit.report.plots.fits import loops_figure, sweeps_figure
 from bushfit.report.plots.gap import gap_figure
 from bushfit.report.plots.prediction import prediction_figure
-from bushfit.report.plots.style import in_own_style
+from bushfit.report.plots.style import fixed_settings
 from bushfit.report.tables import loops_table, sweeps_table
 
 Swept = Callable[..., MeasuredSweep]
@@ -104,7 +104,7 @@ def note(figure: Figure) -> str:
     return " ".join(figure.get_supxlabel().split())
 
 
-@in_own_style
+@fixed_settings()
 def inside(figure: Figure) -> Figure:
     """The figure, once it is seen that nothing leaves it."""
     figure.draw_without_rendering()
