@@ -1,11 +1,11 @@
 """Options of the commands on test files for metadata that the files do not contain, and errors that name them."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
@@ -87,61 +87,51 @@ _PAIRED = re.compile(r"(column|unit)s = \{([^}]*)\}")
 _ENTRY = re.compile(r'(\w+) = "([^"]*)"')
 
 
-def metadata_options(*, sweeps: bool = True) -> Parameter:
-    """Decorator that adds the argument `files` and the metadata options to a command, which receives `test_options`.
+def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tests") -> Parameter:
+    """Decorator that adds the metadata options to a command, which receives them in one argument `test_options`.
 
     Args:
-        sweeps: True for loops and sweeps, with the metadata of a campaign; False for histories and resonance tests.
+        kind: "tests" for loops and sweeps, with the metadata of a campaign; "histories" for raw histories and resonance
+            tests; both add the argument `files`. "displacements" for one displacement history.
     """
-    keys = _OF_TESTS if sweeps else {}
-
-    def column_roles() -> Iterable[str]:
-        from bushfit.reading.headers import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
-
-        return {**LOOP_COLUMNS, **(SWEEP_COLUMNS if sweeps else RESONANCE_COLUMNS)}
-
-    files = click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_tests_alone)
-    direction = _metadata_option("direction", "DIRECTION", "Direction: axial, radial or torsion [from file names].")
-    unit = option("--unit units", "ROLE=UNIT", 'Unit of a column, such as "force=kN".', multiple=True)
-    words = 'Header of a column, such as "force=Fz"; an unknown ROLE prints the list of roles.'
-    column = option("--column columns", "ROLE=HEADER", words, multiple=True)
-    words = "Reverse the sign of the force: use -1 if the force falls while the displacement rises."
-    sign = _metadata_option("force_sign", "-1", words)
-    further = [_metadata_option(key, *texts) for key, texts in keys.items()]
-    missing = option_group("Information that is missing in the files", direction, unit, column, sign, *further)
-    return _gathered(("direction", "force_sign", *keys), column_roles, files, missing)
-
-
-def history_options() -> Parameter:
-    """Decorator that adds the options on columns and format of a displacement history to a command.
-
-    The command receives their values in one argument `test_options`, by campaign key.
-    """
-
-    def column_roles() -> Iterable[str]:
-        from bushfit.reading.displacements import DISPLACEMENT_COLUMNS
-
-        return DISPLACEMENT_COLUMNS
-
-    unit = option("--unit units", "ROLE=UNIT", 'Unit of a column: "axial=mm".', multiple=True)
-    column = option("--column columns", "ROLE=HEADER", 'Header of a column: "radial=Sy".', multiple=True)
-    return _gathered((), column_roles, option_group("Information that is missing in the file", unit, column))
-
-
-def _gathered(keys: Sequence[str], column_roles: Callable[[], Iterable[str]], *parameters: Parameter) -> Parameter:
-    """Decorator that adds options to a command, and passes their values in one argument `test_options`.
-
-    Args:
-        keys: campaign keys of the options, except those of the file format, which are added.
-        column_roles: function that returns the valid roles of columns for --column and --unit, such as "force".
-        parameters: options and arguments to add.
-    """
+    if kind == "displacements":
+        keys: tuple[str, ...] = ()
+        parameters = [
+            option_group(
+                "Information that is missing in the file",
+                option("--unit units", "ROLE=UNIT", 'Unit of a column: "axial=mm".', multiple=True),
+                option("--column columns", "ROLE=HEADER", 'Header of a column: "radial=Sy".', multiple=True),
+            )
+        ]
+    else:
+        words = 'Header of a column, such as "force=Fz"; an unknown ROLE prints the list of roles.'
+        sign = "Reverse the sign of the force: use -1 if the force falls while the displacement rises."
+        further = _OF_TESTS if kind == "tests" else {}
+        keys = ("direction", "force_sign", *further)
+        parameters = [
+            click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_tests_alone),
+            option_group(
+                "Information that is missing in the files",
+                _metadata_option("direction", "DIRECTION", "Direction: axial, radial or torsion [from file names]."),
+                option("--unit units", "ROLE=UNIT", 'Unit of a column, such as "force=kN".', multiple=True),
+                option("--column columns", "ROLE=HEADER", words, multiple=True),
+                _metadata_option("force_sign", "-1", sign),
+                *(_metadata_option(key, *texts) for key, texts in further.items()),
+            ),
+        ]
     written = [_metadata_option(key, metavar) for key, metavar in _AS_WRITTEN.items()]
 
     def decorate(function: Function) -> Function:
         @wraps(function)
         def wrapped(**arguments: Any) -> Any:
-            roles = tuple(column_roles())
+            from bushfit.reading.displacements import DISPLACEMENT_COLUMNS
+            from bushfit.reading.headers import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
+
+            roles = {
+                "tests": (*LOOP_COLUMNS, *SWEEP_COLUMNS),
+                "histories": (*LOOP_COLUMNS, *RESONANCE_COLUMNS),
+                "displacements": tuple(DISPLACEMENT_COLUMNS),
+            }[kind]
             test_options = {key: arguments.pop(key) for key in (*keys, *_AS_WRITTEN)}
             test_options["columns"] = _pairs(arguments.pop("columns"), "--column", "force=Kraft", roles)
             test_options["units"] = _pairs(arguments.pop("units"), "--unit", "force=kN", roles)
@@ -209,7 +199,7 @@ def _pairs(texts: Sequence[str], option: str, example: str, roles: Sequence[str]
                 "not a column's role with a value",
                 place=option,
                 found=f'"{text}"',
-                expected=f'such as "{example}"; roles: {", ".join(roles)}',
+                expected=f'such as "{example}"; roles: {", ".join(dict.fromkeys(roles))}',
             )
         pairs[role] = value.strip()
     return pairs

@@ -3,12 +3,9 @@
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import click
-
-from bushfit.reading.tablefile import Form
-from bushfit.report.results import Picture
 
 #: Names of the directions of a bushing test; copied from `geometry`, which is slow to import.
 DIRECTIONS = ("axial", "radial", "torsion")
@@ -19,8 +16,6 @@ Parameter = Callable[[Function], Function]
 FILE = click.Path(path_type=Path)
 #: Maximum width of option names in help texts [characters]; the text of longer names starts on the next line.
 _NAMES = 26
-#: Kinds of result files whose format can be chosen by an option.
-Written = Literal["tables", "pictures", "pages"]
 
 
 class Option(click.Option):
@@ -162,30 +157,3 @@ def direction_option(words: str) -> Parameter:
 def file_option(name: str, words: str) -> Parameter:
     """Create an option whose value is a file, with the help text `words`."""
     return option(name, "FILE", words, type=FILE)
-
-
-def format_options(*kinds: Written) -> list[Parameter]:
-    """Create the format options for some kinds of result files: table format, figure format, or no HTML page."""
-    options: dict[Written, Parameter] = {
-        "tables": option(
-            "--table-format",
-            "FORM",
-            "Format of tables: csv, decimal-comma (German Excel) or xlsx [csv].",
-            type=click.Choice(get_args(Form)),
-            default="csv",
-            envvar="BUSHFIT_TABLE_FORMAT",
-            show_envvar=True,
-        ),
-        "pictures": option(
-            "--plot-format",
-            "FORM",
-            "Format of plots: png, svg or pdf; may be given again [png].",
-            type=click.Choice(get_args(Picture)),
-            multiple=True,
-            default=["png"],
-            envvar="BUSHFIT_PLOT_FORMAT",
-            show_envvar=True,
-        ),
-        "pages": flag("--no-report", "Do not write the HTML report."),
-    }
-    return [options[kind] for kind in kinds]

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, fields
 from functools import wraps
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import Any, Literal, get_args
 
 import click
 from rich import box
@@ -26,22 +26,40 @@ from bushfit.cli.options import (
     Folder,
     Function,
     Parameter,
-    Written,
     add_parameters,
     flag,
-    format_options,
     option,
     option_group,
 )
 from bushfit.errors import printable
 from bushfit.progress import report_progress_to
-from bushfit.reading.tablefile import folder_name
-from bushfit.report.results import Formats, ResultFile, check_free, to_json, write_results
+from bushfit.reading.tablefile import Form, folder_name
+from bushfit.report.results import Formats, Picture, ResultFile, check_free, to_json, write_results
 
-if TYPE_CHECKING:
-    from bushfit.reading.tablefile import Form
-    from bushfit.report.results import Picture
-
+#: Kinds of result files whose format can be chosen by an option, and these options.
+Written = Literal["tables", "pictures", "pages"]
+_FORMAT_OPTIONS: dict[Written, Parameter] = {
+    "tables": option(
+        "--table-format",
+        "FORM",
+        "Format of tables: csv, decimal-comma (German Excel) or xlsx [csv].",
+        type=click.Choice(get_args(Form)),
+        default="csv",
+        envvar="BUSHFIT_TABLE_FORMAT",
+        show_envvar=True,
+    ),
+    "pictures": option(
+        "--plot-format",
+        "FORM",
+        "Format of plots: png, svg or pdf; may be given again [png].",
+        type=click.Choice(get_args(Picture)),
+        multiple=True,
+        default=["png"],
+        envvar="BUSHFIT_PLOT_FORMAT",
+        show_envvar=True,
+    ),
+    "pages": flag("--no-report", "Do not write the report as an HTML page."),
+}
 #: Seconds after which a command shows its progress.
 _PATIENCE = 2.0
 #: Width of tables if standard error is no terminal, in characters.
@@ -242,7 +260,7 @@ def with_output(folder: str, *written: Written) -> Parameter:
                     "-o --output", "DIR", f"Write the results to this folder [{folder}].", type=Folder(path_type=Path)
                 ),
                 flag("--force", "Replace earlier results in this folder."),
-                *format_options(*written),
+                *(_FORMAT_OPTIONS[kind] for kind in written),
                 flag("--no-plots", "Do not write plots.", hidden="pictures" not in written),
                 flag("--json as_json", "Print the result as JSON on standard output."),
                 flag("-v --verbose"),

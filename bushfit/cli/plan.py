@@ -26,7 +26,7 @@ from bushfit.units import display_unit, number
 
 if TYPE_CHECKING:
     from bushfit.commands.plan import PlanOutput
-    from bushfit.planning.document import DetectableEntry, PlanFile
+    from bushfit.planning.document import PlanFile
 
 #: Maximum of --hours; larger values are typing errors.
 _MOST_HOURS = 2000.0
@@ -216,11 +216,9 @@ def _percents(rows: Mapping[str, Mapping[str, Any]], keys: Sequence[str]) -> lis
 
 def _print_effects(output: Output, document: PlanFile) -> None:
     """Print the smallest detectable amounts of effects with the plan and with the standard tests."""
-
-    def ratio(amounts: DetectableEntry) -> float:
-        return (amounts["standard"] or math.inf) / (amounts["planned"] or math.inf)
-
-    ranked = sorted(document["visible"].items(), key=lambda item: ratio(item[1]))
+    amounts_of = document["visible"]
+    ratios = {name: (row["standard"] or math.inf) / (row["planned"] or math.inf) for name, row in amounts_of.items()}
+    ranked = sorted(amounts_of.items(), key=lambda item: ratios[item[0]])
     printed = ranked if output.verbose else ranked[:_MOST_EFFECTS]
     title = f"smallest amount that is detected in nine of ten cases, for {len(printed)} of {len(ranked)} effects"
     rows = []

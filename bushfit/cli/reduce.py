@@ -37,7 +37,7 @@ _DISPLAYED = ("displacement", "stiffness")
     "data/cmp_15961_raw/stepped_sine_axial.csv",
     'data/measured/epdm_70/shaker_1g_573g.csv --mass "0.5878 kg" --specimen mount',
 )
-@metadata_options(sweeps=False)
+@metadata_options("histories")
 @option_group(
     "Raw histories",
     option("--levels", "GRID", 'Nominal amplitudes of the steps, zero-to-peak, such as "0.1, 0.2 mm" [detected].'),

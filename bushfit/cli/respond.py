@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.file_options import history_options, options_named
+from bushfit.cli.file_options import metadata_options, options_named
 from bushfit.cli.options import FILE, command_called, direction_option, flag, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import kelvin, positive
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
         'Temperature, such as "40 degC", if the model was fitted with --effect temperature [23 degC].',
     ),
 )
-@history_options()
+@metadata_options("displacements")
 @with_output("results/<name> response", "tables", "pictures")
 def command(
     model: Path,

@@ -11,7 +11,6 @@ import click
 
 from bushfit.cli.options import (
     FILE,
-    Function,
     Parameter,
     Size,
     add_parameters,
@@ -38,29 +37,25 @@ def campaign_options(soft_l1: str = "points far from the model have less weight,
     Args:
         soft_l1: help text on the loss function soft_l1.
     """
-
-    def decorate(function: Function) -> Function:
-        return add_parameters(
-            function,
-            click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=FILE),
-            option_group(
-                "Fit",
-                option(
-                    "--loss",
-                    "LOSS",
-                    f"linear: least squares; soft_l1: {soft_l1} [from the campaign, else linear].",
-                    type=click.Choice(["linear", "soft_l1"]),
-                ),
-                option(
-                    "--max-nrmse",
-                    "SHARE",
-                    "Exit with status 1 if the misfit (NRMSE) exceeds this share of the stiffness, such as 2 %.",
-                    type=Size("share up to 1, such as 0.02 or 2 %", 1.0),
-                ),
+    return lambda function: add_parameters(
+        function,
+        click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=FILE),
+        option_group(
+            "Fit",
+            option(
+                "--loss",
+                "LOSS",
+                f"linear: least squares; soft_l1: {soft_l1} [from the campaign, else linear].",
+                type=click.Choice(["linear", "soft_l1"]),
             ),
-        )
-
-    return decorate
+            option(
+                "--max-nrmse",
+                "SHARE",
+                "Exit with status 1 if the misfit (NRMSE) exceeds this share of the stiffness, such as 2 %.",
+                type=Size("share up to 1, such as 0.02 or 2 %", 1.0),
+            ),
+        ),
+    )
 
 
 def open_campaign(campaigns: Sequence[Path]) -> Campaign:

@@ -12,7 +12,7 @@ from bushfit.commands.loading import HasResult, as_result
 from bushfit.commands.provenance import campaign_document, option_words, result_document
 from bushfit.commands.respond import validation_files
 from bushfit.diagnosis import workflow
-from bushfit.diagnosis.document import DiagnosisFile, ValidationEntry
+from bushfit.diagnosis.document import DiagnosisFile
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.errors import FitError, quote_path
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -107,7 +107,18 @@ def diagnose(
     validations = validate(diagnosis.result, records)
     before = validate((joint or fit(data)).result, records) if records and diagnosis.added else []
     if validations:
-        document["validation"] = [_validation_entry(*pair) for pair in zip_longest(validations, before)]
+        document["validation"] = [
+            {
+                "test": validation.record.name,
+                "direction": str(validation.record.direction),
+                "nrmse": validation.nrmse,
+                "nrmse_before": plain_validation.nrmse if plain_validation else None,
+                "peak_error": validation.peak_error,
+                "energy_error": validation.energy_error,
+                "share_inside": validation.share_inside,
+            }
+            for validation, plain_validation in zip_longest(validations, before)
+        ]
     files = [
         ResultFile("diagnosis", "json", document),
         ResultFile("model", "json", result_document(diagnosis.result, origin)),
@@ -116,19 +127,6 @@ def diagnose(
     files += validation_files(validations, before, data.campaign.name)
     files.append(ResultFile("report", "page", partial(report_page, files)))
     return DiagnosisOutput(data.campaign.name, data, diagnosis, document, files, validations, before)
-
-
-def _validation_entry(validation: Validation, before: Validation | None) -> ValidationEntry:
-    """Make the entry of a validation record in diagnosis.json; `before` is without the added effects."""
-    return {
-        "test": validation.record.name,
-        "direction": str(validation.record.direction),
-        "nrmse": validation.nrmse,
-        "nrmse_before": before.nrmse if before else None,
-        "peak_error": validation.peak_error,
-        "energy_error": validation.energy_error,
-        "share_inside": validation.share_inside,
-    }
 
 
 def diagnosis_files(diagnosis: Diagnosis, document: DiagnosisFile, title: str) -> list[ResultFile]:

@@ -4,6 +4,7 @@ import importlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,12 +14,13 @@ from typing_extensions import TypedDict
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.commands.loading import model_source
-from bushfit.commands.predict import PredictionOutput, arms_files, predict
+from bushfit.commands.predict import PredictionOutput, predict
 from bushfit.export.contract import Dialect, Exported, ExportRequest, UnitSystem
 from bushfit.model.arms import ACCURACY
 from bushfit.model.file import load_result
 from bushfit.progress import track
 from bushfit.report.results import ResultFile
+from bushfit.report.tables import arms_table
 
 #: Module below bushfit and function that write each format; imported when the format is asked for.
 FORMATS = {
@@ -58,21 +60,14 @@ class ExportOutput:
     Args:
         predicted: prediction over the exported grid.
         exported: files and limitations of each format, by its name.
+        document: content of `export --json`.
         files: files of all formats, and table of the Maxwell arms.
     """
 
     predicted: PredictionOutput
     exported: Mapping[str, Exported]
+    document: ExportDocument
     files: Sequence[ResultFile]
-
-    @property
-    def document(self) -> ExportDocument:
-        """Content of `export --json`: files of each format, and properties of the model that it cannot represent."""
-        formats: dict[str, FormatEntry] = {
-            name: {"files": list(exported.files), "left_out": list(exported.losses)}
-            for name, exported in self.exported.items()
-        }
-        return {"formats": formats, "warnings": self.predicted.warnings}
 
 
 def export(
@@ -124,8 +119,15 @@ def export(
     for name in track("formats written", formats):
         module, _, function = FORMATS[name].partition(":")
         exported[name] = getattr(importlib.import_module(f"bushfit.{module}"), function)(request)
+    document: ExportDocument = {
+        "formats": {
+            name: {"files": list(written.files), "left_out": list(written.losses)} for name, written in exported.items()
+        },
+        "warnings": predicted.warnings,
+    }
     contents = {name: content for written in exported.values() for name, content in written.files.items()}
-    arms = tuple(part for written in exported.values() for part in written.arms)
-    places = [prediction.direction for prediction in predicted.predictions]
     files = [ResultFile(name, "raw", content) for name, content in contents.items()]
-    return ExportOutput(replace(predicted, arms=arms), exported, [*files, *arms_files(result, arms, places)])
+    if arms := tuple(part for written in exported.values() for part in written.arms):
+        places = [prediction.direction for prediction in predicted.predictions]
+        files.append(ResultFile("arms", "table", partial(arms_table, result.model, arms, places)))
+    return ExportOutput(replace(predicted, arms=arms), exported, document, files)

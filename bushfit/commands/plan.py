@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from itertools import chain
 
 import numpy as np
@@ -40,25 +40,17 @@ _COLUMNS = (
 
 @dataclass(frozen=True, eq=False)
 class PlanOutput:
-    """Output of the command plan: planned tests with their expected results, and result files."""
+    """Output of the command plan: planned tests with their expected results, and result files.
+
+    Args:
+        plan: planned tests.
+        document: content of plan.json: planned tests and their expected results.
+        files: document and table of tests; and a campaign file, if the plan has tests.
+    """
 
     plan: Plan
-
-    @property
-    def files(self) -> list[ResultFile]:
-        """Document and table of tests; and a campaign file, if the plan has tests."""
-        files = [
-            ResultFile("plan", "json", self.document),
-            ResultFile("plan", "table", partial(plan_sheet, self.plan)),
-        ]
-        if self.plan.planned.tests:
-            files.append(ResultFile(CAMPAIGN_FILE, "raw", campaign_toml(self.plan).encode()))
-        return files
-
-    @cached_property
-    def document(self) -> PlanFile:
-        """Content of plan.json: planned tests and their expected results."""
-        return plan_document(self.plan)
+    document: PlanFile
+    files: Sequence[ResultFile]
 
 
 def plan(
@@ -123,7 +115,12 @@ def plan(
     named = (_targets(name, half, knowledge, points) for name, half in (targets or {}).items())
     wanted = tuple(chain.from_iterable(named))
     request = PlanRequest(aim, hours, rig, places, points, tuple(parameters) or knowledge.names, wanted)
-    return PlanOutput(choose_tests(knowledge, request))
+    chosen = choose_tests(knowledge, request)
+    document = plan_document(chosen)
+    files = [ResultFile("plan", "json", document), ResultFile("plan", "table", partial(plan_sheet, chosen))]
+    if chosen.planned.tests:
+        files.append(ResultFile(CAMPAIGN_FILE, "raw", campaign_toml(chosen).encode()))
+    return PlanOutput(chosen, document, files)
 
 
 def _knowledge(source: Campaign | Result | Knowledge, rivals: Sequence[str] | None) -> Knowledge:

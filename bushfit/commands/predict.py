@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
@@ -81,7 +81,7 @@ class PredictionOutput:
     def document(self) -> Mapping[str, Any]:
         """Content of `predict --json`: tables of the predictions by direction, Maxwell arms, tests and warnings."""
         document: dict[str, Any] = {
-            str(place): table_columns(joined_table([p for p in self.predictions if p.direction == place]))
+            str(place): table_columns(joined_table(p for p in self.predictions if p.direction == place))
             for place in dict.fromkeys(prediction.direction for prediction in self.predictions)
         }
         for resonance in self.resonances:
@@ -212,7 +212,13 @@ def predict(
             result,
             place,
             *requested_grid(default_grid(result, place, sweeps), settings, place),
-            sweeps=sweeps_at(drawn_sweeps, place, preload) if measured else None,
+            sweeps=[
+                sweep
+                for sweep in drawn_sweeps
+                if sweep.direction == place and (preload is None or preload.equals(sweep.sweep.preload))
+            ]
+            if measured
+            else None,
             temperature=temperature,
             preload=preload if preloads else None,
             over=over,
@@ -292,18 +298,6 @@ def requested_preloads(result: Result, place: Place, preloads: Sequence[str]) ->
     return [tested_preload(result, place, preload) for preload in parsed]
 
 
-def sweeps_at(sweeps: Sequence[MeasuredSweep], place: Place, preload: Preload | None) -> list[MeasuredSweep]:
-    """Select the sweeps of a direction or specimen at a preload.
-
-    Args:
-        sweeps: measured sweeps.
-        place: direction or specimen.
-        preload: preload of the tests; None for tests at any preload.
-    """
-    of_place = [sweep for sweep in sweeps if sweep.direction == place]
-    return [sweep for sweep in of_place if preload is None or preload.equals(sweep.sweep.preload)]
-
-
 def grid_of(directions: Sequence[str] | None, *axes: Numbers | None) -> PredictSettings:
     """Make the grid settings of a prediction; None selects the default of an axis.
 
@@ -367,12 +361,6 @@ def _files(
         note = plots.style.warnings_note(warnings_of(result, [], (*prediction.warnings, *output.notes)))
         return plots.prediction.prediction_figure(result, prediction, table, title, note, temperature)
 
-    def measured_table() -> pd.DataFrame:
-        fitted, not_fitted = split_by_fit(result, output.measured)
-        rows = tables.sweeps_table(result.model, [*fitted, *not_fitted])
-        counts = [sum(sweep.frequency.size for sweep in part) for part in (fitted, not_fitted)]
-        return rows.assign(fitted=np.repeat(["yes", "no"], counts))
-
     files = list[ResultFile]()
     for name, predictions in zip(names, by_place.values(), strict=True):
         files.append(ResultFile(name, "table", partial(joined_table, predictions)))
@@ -380,7 +368,8 @@ def _files(
         if len(predictions) > 1:
             over_preload = partial(plots.preload.preload_figure, result, predictions, result.name, temperature)
             files.append(ResultFile(f"{name}_preload", "figure", over_preload))
-    files += arms_files(result, output.arms, places)
+    if output.arms:
+        files.append(ResultFile("arms", "table", partial(tables.arms_table, result.model, output.arms, places)))
     suffixes: Sequence[tuple[str, Callable[[Any], pd.DataFrame], Sequence[Any]]] = [
         ("wide", tables.wide_table, output.predictions if wide else ()),
         ("static", tables.static_table, output.static),
@@ -395,24 +384,20 @@ def _files(
             if isinstance(part, StaticCurve):
                 title = f"{result.name}: {part.label}, static curve"
                 files.append(ResultFile(stem, "figure", partial(plots.prediction.static_figure, part, title)))
-    return [*files, *([ResultFile("measured", "table", measured_table)] if output.measured else [])]
+    if output.measured:
+        files.append(ResultFile("measured", "table", partial(measured_table, result, output.measured)))
+    return files
 
 
-def arms_files(result: Result, arms: Sequence[Arms], places: Sequence[Place]) -> list[ResultFile]:
-    """Table of Maxwell arms; nothing without arms.
-
-    Args:
-        result: fitted result.
-        arms: Maxwell arms of each part of the model.
-        places: directions or specimens of the table.
-
-    Returns:
-        File arms.csv, not yet rendered.
-    """
-    return [ResultFile("arms", "table", lambda: tables.arms_table(result.model, arms, places))] if arms else []
+def measured_table(result: Result, sweeps: Sequence[MeasuredSweep]) -> pd.DataFrame:
+    """Table of measured sweeps with the model, those to which the model was fitted first."""
+    fitted, not_fitted = split_by_fit(result, sweeps)
+    counts = [sum(sweep.frequency.size for sweep in part) for part in (fitted, not_fitted)]
+    table = tables.sweeps_table(result.model, [*fitted, *not_fitted])
+    return table.assign(fitted=np.repeat(["yes", "no"], counts))
 
 
-def joined_table(predictions: Sequence[Prediction]) -> pd.DataFrame:
+def joined_table(predictions: Iterable[Prediction]) -> pd.DataFrame:
     """Table of the predictions of one direction at several preloads, one below the other."""
     return pd.concat([prediction_table(prediction) for prediction in predictions], ignore_index=True)
 

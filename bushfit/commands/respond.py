@@ -52,38 +52,20 @@ class ResponseOutput:
         result: the model with its uncertainty.
         time: time of each sample [s], (n,).
         responses: force of each direction or specimen at these times.
-        notes: sentences on corrections of the history.
+        warnings: corrections of the history, and warnings of the model and of each response.
+        document: content of `respond --json`: peak and rms force, energy, strain and strain rate of each direction.
+        files: table response.csv and figure response.png.
     """
 
     result: Result
     time: Array
     responses: Sequence[TimeResponse]
-    notes: Sequence[str] = ()
+    warnings: Sequence[str]
+    document: Mapping[str, Any]
+    files: Sequence[ResultFile]
 
     def __repr__(self) -> str:
         return f"Response of {self.result.name}: {', '.join(str(response.direction) for response in self.responses)}"
-
-    @property
-    def warnings(self) -> list[str]:
-        """Corrections of the history, and warnings of the model and of each response."""
-        return warnings_of(self.result, [response.warnings for response in self.responses], self.notes)
-
-    @property
-    def document(self) -> Mapping[str, Any]:
-        """Content of `respond --json`: peak and rms force, energy, strain and strain rate of each direction."""
-        figures = {str(response.direction): response_figures(response) for response in self.responses}
-        return {"directions": figures, "warnings": self.warnings}
-
-    @property
-    def files(self) -> list[ResultFile]:
-        """Table response.csv and figure response.png."""
-        return table_with_figure(
-            "response",
-            lambda: response_table(self.time, self.responses),
-            lambda table: plots.response.response_figure(
-                f"{self.result.name}: force over time", table, plots.style.warnings_note(self.warnings)
-            ),
-        )
 
 
 def respond(
@@ -148,7 +130,15 @@ def respond(
         for channel in channels
     ]
     notes = dict.fromkeys(note for channel in channels for note in channel.notes)
-    return ResponseOutput(result, channels[0].time, responses, [*notes])
+    warnings = warnings_of(result, [response.warnings for response in responses], [*notes])
+    figures = {str(response.direction): response_figures(response) for response in responses}
+    title, time = f"{result.name}: force over time", channels[0].time
+    files = table_with_figure(
+        "response",
+        partial(response_table, time, responses),
+        lambda table: plots.response.response_figure(title, table, plots.style.warnings_note(warnings)),
+    )
+    return ResponseOutput(result, time, responses, warnings, {"directions": figures, "warnings": warnings}, files)
 
 
 def _without_offset(channel: DisplacementHistory, *, steady: bool) -> DisplacementHistory:

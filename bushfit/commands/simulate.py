@@ -27,18 +27,15 @@ class SimulationOutput:
 
     Args:
         simulated: the simulated tests and the true model.
+        document: content of `simulate --json`: the true model and the names of the files.
         files: campaign file, tables, and truth.json.
         warnings: sentences on parts of the model that the simulation leaves out.
     """
 
     simulated: Simulated
+    document: Mapping[str, Any]
     files: Sequence[ResultFile]
     warnings: Sequence[str] = ()
-
-    @property
-    def document(self) -> Mapping[str, Any]:
-        """Content of `simulate --json`: the true model and the names of the files."""
-        return {"truth": to_document(self.simulated.result), "files": sorted(file.name for file in self.files)}
 
 
 def simulate_campaign(truth: Model, settings: SimulateSettings, form: Form = "csv") -> SimulationOutput:
@@ -58,8 +55,9 @@ def simulate_campaign(truth: Model, settings: SimulateSettings, form: Form = "cs
         truth = truth.without(UNNAMED)
     simulated = simulate_tests(truth, settings)
     contents = to_files(simulated, form)
+    document = {"truth": to_document(simulated.result), "files": sorted(contents)}
     files = [ResultFile(name, "raw", content) for name, content in contents.items()]
-    return SimulationOutput(simulated, files, warnings)
+    return SimulationOutput(simulated, document, files, warnings)
 
 
 def simulate(
