@@ -94,12 +94,12 @@ def _read_stiffness(raw: object, info: ValidationInfo) -> object:
     return parse_quantity(raw, point.motion.stiffness_unit) if isinstance(point, Point) else 0.0
 
 
-def _read_ratio(raw: object, _: ValidationInfo) -> object:
-    return raw if isinstance(raw, int | float) and not isinstance(raw, bool) else parse_quantity(raw, "1")
-
-
 _LIMIT = Field(ge=0, allow_inf_nan=False)
-Ratio = Annotated[float, converter(_read_ratio, text("a share, or a number") | {"type": ["string", "number"]}), _LIMIT]
+_RATIO = converter(
+    lambda raw, _: raw if isinstance(raw, int | float) and not isinstance(raw, bool) else parse_quantity(raw, "1"),
+    text("a share, or a number") | {"type": ["string", "number"]},
+)
+Ratio = Annotated[float, _RATIO, _LIMIT]
 Stiffness = Annotated[
     float, converter(_read_stiffness, text("a number with a unit of N/m, N*m/rad or Pa, by the point")), _LIMIT
 ]
@@ -165,11 +165,6 @@ class Limits:
             if count > 1:
                 problem = CampaignError(f"{count} tables for one point", found=name, hint="put them in one table")
                 raise ValueError(problem)
-
-    @property
-    def points(self) -> tuple[Point, ...]:
-        tables: tuple[StiffnessBounds | LossFactorBounds, ...] = (*self.stiffness, *self.loss_factor)
-        return tuple(dict.fromkeys(table.at for table in tables))
 
     @property
     def bounds(self) -> dict[str, Bounds]:

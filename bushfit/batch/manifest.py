@@ -8,11 +8,11 @@ import io
 import os
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field
 
@@ -48,12 +48,8 @@ def _check_name(lookup: Callable[[str], Effect], raw: object, _: object) -> obje
     return raw
 
 
-def _split_words(raw: object) -> object:
-    """Split the text of a CSV cell, such as "fit; predict", into words; return lists from TOML unchanged."""
-    return tuple(word for word in re.split(r"[;,\s]+", raw) if word) if isinstance(raw, str) else raw
-
-
-Words = BeforeValidator(_split_words)
+#: Words as a list, or as the text of a CSV cell, such as "fit; predict".
+Words = BeforeValidator(lambda raw: tuple(re.findall(r"[^;,\s]+", raw)) if isinstance(raw, str) else raw)
 Effects = Annotated[tuple[Annotated[str, converter(partial(_check_name, get_effect))], ...], Words]
 Candidates = Annotated[tuple[Annotated[str, converter(partial(_check_name, get_candidate))], ...], Words]
 
@@ -175,7 +171,11 @@ def read_manifest(source: str, settings: RowSettings, *more: str) -> Manifest:
         title, base, entries = "batch", Path(), [Entry(campaign=name) for name in (source, *more)]
     elif path.suffix.lower() == ".toml":
         tables = parse_toml(path, "a manifest", _LARGEST_MANIFEST)
-        if is_campaign(tables):  # a batch of one
+        bushings = tables.get("bushings")
+        sizes = (
+            [row for row in bushings if isinstance(row, dict) and "length" in row] if isinstance(bushings, list) else []
+        )
+        if sizes or not tables.keys().isdisjoint(("bushing", "specimens")):  # a campaign: a batch of one
             tables = {"bushings": [{"campaign": path.name}]}
         content = validate_tables(tables, path, ManifestFile)
         settings, points, entries = settings.with_defaults(content), content.at, list(content.bushings)
@@ -189,15 +189,6 @@ def read_manifest(source: str, settings: RowSettings, *more: str) -> Manifest:
     if not listed:
         raise CampaignError("the manifest has no rows", file=source, expected="a campaign on each line")
     return Manifest(title, make_rows(listed, base, settings, source), points)
-
-
-def is_campaign(tables: Mapping[str, Any]) -> bool:
-    """True if a TOML file is a campaign: it has a body that was tested, or [[bushings]] with a length."""
-    bushings = tables.get("bushings")
-    rows = bushings if isinstance(bushings, list) else []
-    return not tables.keys().isdisjoint(("bushing", "specimens")) or any(
-        isinstance(row, dict) and "length" in row for row in rows
-    )
 
 
 def read_csv_entries(path: Path) -> list[Entry]:

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -22,9 +22,6 @@ from bushfit.progress import track
 from bushfit.report.batch_document import BatchFile
 from bushfit.report.results import Picture, ResultFile, check_free, encode_all, unwritable, write_files
 from bushfit.validation import to_json_data
-
-if TYPE_CHECKING:
-    from bushfit.report.plots.batch import Panel
 
 #: Names of all possible files of the whole batch.
 FILES = [*(f"batch.{ending}" for ending in ("json", "csv", "xlsx", *get_args(Picture))), "index.html"]
@@ -86,8 +83,15 @@ def run_batch(
             for name in FILES:  # they belong to the results that are about to be replaced
                 (output / name).unlink(missing_ok=True)
             notes = clear_earlier(plan)
-            records, kept_count = run_parts(plan, workers, warn)
-            result = BatchResult(plan, records, kept_count, time.perf_counter() - start, notes)
+            records, counts = [RowFile(status="failed")] * len(plan.rows), Counter[str]()
+            lost = lambda reason: (RowFile(status="failed", error=reason), False)  # noqa: E731
+            finished = run_rows(plan.rows, plan.task, lost, workers, warn)
+            remark = lambda: f"{counts['failed']} failed" if counts["failed"] else ""  # noqa: E731
+            for number, (record, was_kept) in track("bushings", finished, len(records), remark):
+                records[number] = replace(record, inputs={}, files={})  # only a later run asks for these
+                counts[record.status] += 1
+                counts["kept"] += was_kept
+            result = BatchResult(plan, records, counts["kept"], time.perf_counter() - start, notes)
             files = encode_all(batch_files(result), plan.formats)
             before_writing(result)
             if plan.junit:
@@ -115,65 +119,22 @@ def clear_earlier(plan: BatchPlan) -> list[str]:
     )
 
 
-def run_parts(plan: BatchPlan, workers: Workers, warn: Callable[[str], object]) -> tuple[list[RowFile], int]:
-    """Evaluate all rows on the workers and report the progress.
-
-    Args:
-        plan: settings of the batch.
-        workers: workers of this machine or of a cluster.
-        warn: function that is called with a sentence when a cluster has no workers.
-
-    Returns:
-        Records of the rows in the order of the manifest, and the number of records kept from an earlier run.
-    """
-    count, counts = len(plan.rows), Counter[str]()
-    records = [RowFile(status="failed")] * count
-    finished = run_rows(plan.rows, plan.task, lambda why: (RowFile(status="failed", error=why), False), workers, warn)
-    for number, (record, was_kept) in track(
-        "bushings", finished, count, lambda: f"{counts['failed']} failed" if counts["failed"] else ""
-    ):
-        records[number] = replace(record, inputs={}, files={})  # only a later run asks for these
-        counts[record.status] += 1
-        counts["kept"] += was_kept
-    return records, counts["kept"]
-
-
 def batch_files(result: BatchResult) -> list[ResultFile]:
     """Result files of the whole batch, not yet written.
 
+    The figure has a panel for each quantity that has limits or is known for at least three parts.
+
     Args:
         result: results of all rows.
 
     Returns:
-        Document, table, and page and picture if the formats include them.
+        Document, table, and page and figure if the formats include them.
     """
     from bushfit.report.page.index import index_page
-    from bushfit.report.plots.batch import batch_figure
+    from bushfit.report.plots.batch import Panel, batch_figure
 
-    plan, panels = result.plan, make_panels(result) if result.plan.formats.pictures else []
-    names = [row.name for row in plan.rows]
-    document = ResultFile("batch", "json", to_json_data(result.document, BatchFile))
-    files = [document, ResultFile("batch", "table", result.table)]
-    if plan.formats.pages:
-        files.append(ResultFile("index", "page", partial(index_page, result.document, plan.task.output)))
-    if panels:
-        files.append(ResultFile("batch", "figure", partial(batch_figure, panels, plan.title, names)))
-    return files
-
-
-def make_panels(result: BatchResult) -> list[Panel]:
-    """Panels of the batch picture: one for each quantity that has limits or is known for at least three parts.
-
-    Args:
-        result: results of all rows.
-
-    Returns:
-        Panels in the order of the table, in display units.
-    """
-    from bushfit.report.plots.batch import Panel
-
-    panels = []
-    for name, quantity in result.quantities.items():
+    plan, panels = result.plan, list[Panel]()
+    for name, quantity in result.quantities.items() if plan.formats.pictures else ():
         allowed = result.allowed[0].get(name, ())
         values, low, high, _ = result.figures.get(name, np.full((4, 1), np.nan))
         is_known = np.isfinite(values)
@@ -184,4 +145,11 @@ def make_panels(result: BatchResult) -> list[Panel]:
         limits, ends = tuple(limit * displayed.factor for limit in allowed), np.stack((low, high)) * displayed.factor
         interval = ends if np.isfinite(ends).all(axis=0).any() else None
         panels.append(Panel(displayed.header, values * displayed.factor, limits, missed, interval))
-    return panels
+    document = ResultFile("batch", "json", to_json_data(result.document, BatchFile))
+    files = [document, ResultFile("batch", "table", result.table)]
+    if plan.formats.pages:
+        files.append(ResultFile("index", "page", partial(index_page, result.document, plan.task.output)))
+    if panels:
+        names = [row.name for row in plan.rows]
+        files.append(ResultFile("batch", "figure", partial(batch_figure, panels, plan.title, names)))
+    return files

@@ -4,11 +4,23 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from bushfit.errors import CampaignError
 from bushfit.geometry import Bushing, CouponKind, Direction, Shape, Specimen, StatedStrain
 from bushfit.validation import Count, Length, Name, si
+
+
+def _check_name(name: str) -> str:
+    """Raise a ValueError if a body has the name of a direction or of another table of the results."""
+    if name in (*Direction, "loops", "sweeps", "gap", "candidates", "measured", "shear"):
+        expected = "a name of its own: its tables are named after it"
+        raise ValueError(CampaignError("another table has this name", found=name, expected=expected))
+    return name
+
+
+#: Name of a body whose result tables are named after it.
+BodyName = Annotated[Name, AfterValidator(_check_name)]
 
 
 @dataclass(frozen=True)
@@ -56,11 +68,8 @@ class SeveralBushings(BushingSettings):
         factor: "free" to fit the measured over the computed stiffness of this bushing; "one" if they are equal.
     """
 
+    name: BodyName
     factor: Literal["one", "free"] = "one"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check_name(self.name)
 
 
 @dataclass(frozen=True)
@@ -76,22 +85,12 @@ class SpecimenSettings:
         elements: number of blocks in parallel.
     """
 
-    name: Name
+    name: BodyName
     kind: CouponKind
     strain: StatedStrain = "engineering"
     area: Annotated[float, si("m^2"), Field(gt=0)] | None = None
     thickness: Length | None = None
     elements: Count = 1
-
-    def __post_init__(self) -> None:
-        _check_name(self.name)
-
-
-def _check_name(name: str) -> None:
-    """Raise a ValueError if a body has the name of a direction or of another table of the results."""
-    if name in (*Direction, "loops", "sweeps", "gap", "candidates", "measured", "shear"):
-        expected = "a name of its own: its tables are named after it"
-        raise ValueError(CampaignError("another table has this name", place="name", found=name, expected=expected))
 
 
 def specimens_of(bushings: Iterable[SeveralBushings], coupons: Iterable[SpecimenSettings]) -> list[Specimen]:

@@ -58,11 +58,6 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
         return parse_quantity(_S_TO_ALPHA.sub("", raw) if unit != file_unit and isinstance(raw, str) else raw, unit)
 
 
-def parameter_values(raw: dict[str, Any]) -> dict[str, float]:
-    """Convert a table of texts or numbers by parameter name to SI values."""
-    return {name: parameter_value(name, name, value) for name, value in raw.items()}
-
-
 def effect_values(raw: dict[str, Any]) -> dict[str, Any]:
     """Convert tables of parameter values by effect to SI; pydantic checks entries that are not tables."""
     return {

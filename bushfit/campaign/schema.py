@@ -14,7 +14,7 @@ from bushfit.campaign.quantities import (
     ReportSettings,
     effect_values,
     parameter_settings,
-    parameter_values,
+    parameter_value,
 )
 from bushfit.effects import is_parameter, parameter_names
 from bushfit.effects.contract import Array
@@ -350,7 +350,10 @@ class SimulateSettings:
         validation: validation records.
     """
 
-    parameters: Annotated[Mapping[str, ParameterValue], table(parameter_values)] = field(default_factory=dict)
+    parameters: Annotated[
+        Mapping[str, ParameterValue],
+        table(lambda raw: {name: parameter_value(name, name, value) for name, value in raw.items()}),
+    ] = field(default_factory=dict)
     effects: Annotated[Mapping[str, Mapping[str, ParameterValue]], table(effect_values)] = field(default_factory=dict)
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     repeats: Repeats = 1

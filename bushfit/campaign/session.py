@@ -45,14 +45,13 @@ def measured_session(bushing: Bushing | None, tests: Sequence[Loop | Sweep]) -> 
     Returns:
         Conditions of each test: one entry per row of a sweep, one entry for a loop.
     """
-
-    def visit(test: Loop | Sweep) -> SessionTest:
+    visits = []
+    for test in tests:
         order = test.source.conditions.get("order") if test.source else None
         reached = test.amplitude_reached if isinstance(test, Sweep) else np.array([np.ptp(test.displacement) / 2.0])
         number = None if order is None else float(order)
-        return SessionTest(test.direction, reached, test.temperature, number, test.preload)
-
-    return session(bushing, [visit(test) for test in tests])
+        visits.append(SessionTest(test.direction, reached, test.temperature, number, test.preload))
+    return session(bushing, visits)
 
 
 def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], repeats: int) -> list[RubberConditions]:
@@ -68,19 +67,17 @@ def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], rep
     Returns:
         Conditions of each test: one entry per row of a sweep or resonance test, one per part of a loop.
     """
-
-    def amplitudes(test: SimulatedTest) -> Array:
+    visits = []
+    for test in tests:
         if isinstance(test, SimulatedSweep):
-            return np.repeat(test.points[1], test.repeats or repeats, axis=0).ravel()
-        if isinstance(test, SimulatedLoop):
-            return np.array([amplitude for _, amplitude in test.parts])
-        assert isinstance(test, SimulatedResonance)
-        return np.zeros(repeats * len(test.frequencies))
-
-    return session(
-        bushing,
-        [SessionTest(test.direction, amplitudes(test), test.temperature, preload=test.static) for test in tests],
-    )
+            amplitudes = np.repeat(test.points[1], test.repeats or repeats, axis=0).ravel()
+        elif isinstance(test, SimulatedLoop):
+            amplitudes = np.array([amplitude for _, amplitude in test.parts])
+        else:
+            assert isinstance(test, SimulatedResonance)
+            amplitudes = np.zeros(repeats * len(test.frequencies))
+        visits.append(SessionTest(test.direction, amplitudes, test.temperature, preload=test.static))
+    return session(bushing, visits)
 
 
 def session(bushing: Bushing | None, visits: Sequence[SessionTest]) -> list[RubberConditions]:

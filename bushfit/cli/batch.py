@@ -108,7 +108,9 @@ def command(
     listed = read_manifest(manifest[0], settings, *manifest[1:])
     judged_by = read_limits(limits, listed.rows) if limits else None
     with error_location(place="--at"):
-        points = (*listed.points, *map(parse_point, operating_points), *(judged_by.points if judged_by else ()))
+        points = [*listed.points, *map(parse_point, operating_points)]
+    if judged_by:
+        points += [*(limit.at for limit in judged_by.stiffness), *(limit.at for limit in judged_by.loss_factor)]
     formats = replace(output.formats, tables=tables, pictures=plots and output.formats.pictures, pages=reports)
     folder = output.folder(listed.title)
     task = RowTask(folder.absolute(), tuple(dict.fromkeys(points)), formats, resume)

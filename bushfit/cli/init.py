@@ -323,7 +323,14 @@ class Questions:
                 wanted = [(name, role) for name, role in named if role or name in STATED or name in _WORDS]
                 wanted.sort(key=lambda key: key[0] == "column")  # which is rarely needed
                 new = [key for key in wanted if key not in answers and not options.get(key[0])]
-                wrong = [key for key, answer in answers.items() if key in wanted or is_about(bare_error, key, answer)]
+                wrong = [
+                    key
+                    for key, answer in answers.items()
+                    if key in wanted
+                    or option_of(key[0]) in (error.place or "")
+                    or f'"{answer}"' in error.problem
+                    or (error.found or "").strip('"') == str(answer)
+                ]
                 if not (new or wrong):
                     raise
                 for key in [] if new else [*answers][[*answers].index(wrong[0]) :]:  # and the answers after it
@@ -350,9 +357,3 @@ class Questions:
             key = ("frequency", "") if name == "rate" and "Hz" in answer else key
         self._answers[key] = answer
         return {key: answer}
-
-
-def is_about(error: BushfitError, key: _Key, answer: Any) -> bool:
-    """Return True if an error concerns the answer to a question: it names the option `key` or quotes the answer."""
-    is_placed, is_quoted = option_of(key[0]) in (error.place or ""), f'"{answer}"' in error.problem
-    return is_placed or is_quoted or (error.found or "").strip('"') == str(answer)

@@ -112,7 +112,10 @@ def print_parameters(output: Output, title: str, result: Result) -> None:
     from bushfit.report.parameters import interval_kind, parameter_rows
 
     columns = ("parameter", "value", "std error", interval_kind(result), "unit")
-    rows = ((row.label, row.value, row.error, row.interval, row.unit) for row in parameter_rows(result))
+    rows = []
+    for row in parameter_rows(result):
+        label = f"{row.name} ({row.state})" if row.state else row.name
+        rows.append((label, row.value, row.error, row.interval, row.unit))
     output.print_table(title, columns, rows)
     for name, expression in result.ties.items():
         output.print(f"{name} is tied: {name} = {expression}")

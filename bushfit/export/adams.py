@@ -33,7 +33,6 @@ from bushfit.export.deck import (
 from bushfit.geometry import ROTATION, TRANSLATION
 from bushfit.prediction.caveats import format_deviation
 from bushfit.prediction.static_curve import StaticCurve, static_curve, static_rate
-from bushfit.prediction.stiffness import Prediction
 from bushfit.reading.measurement import loss_factor
 from bushfit.units import number
 
@@ -62,22 +61,14 @@ class _Element(NamedTuple):
         curve: static curve.
         reference: table of the middle amplitude.
         frequency: middle frequency [Hz], at which the damping is exact.
-        exact: complex stiffness at the middle frequency and amplitude [N/m or N m/rad].
+        damping: damping coefficient [N s/m or N m s/rad] for Adams Car, and loss angle [rad] for Adams Car Ride.
     """
 
     tables: Sequence[StiffnessTable]
     curve: StaticCurve
     reference: StiffnessTable
     frequency: float
-    exact: complex
-
-    def damping(self, kind: Kind) -> float:
-        """Damping coefficient [N s/m or N m s/rad] for Adams Car, or loss angle [rad] for Adams Car Ride.
-
-        Args:
-            kind: "car" for Adams Car, "ride" for Adams Car Ride.
-        """
-        return float(self.exact.imag / (2.0 * np.pi * self.frequency) if kind == "car" else np.angle(self.exact))
+    damping: Mapping[Kind, float]
 
     def loss(self, kind: Kind) -> str:
         """Sentence on the errors of |K| and loss factor over the grid, due to a single static curve and damping.
@@ -85,7 +76,7 @@ class _Element(NamedTuple):
         Args:
             kind: "car" for Adams Car, "ride" for Adams Car Ride.
         """
-        damping, written, exact = self.damping(kind), [], []
+        damping, written, exact = self.damping[kind], [], []
         for table in self.tables:
             force = np.interp(table.amplitude * _COSINE, self.curve.displacement, self.curve.mean.value)
             storage = 2.0 * np.mean(force * _COSINE) / table.amplitude
@@ -110,8 +101,19 @@ def export(request: ExportRequest) -> Exported:
     Returns:
         Files bushing_car.bus and bushing_ride.bus, and sentences on properties that the format cannot represent.
     """
-    predictions = exported_directions(request)
-    elements = [_element(request, prediction) for prediction in predictions]
+    predictions, elements = exported_directions(request), []
+    for prediction in predictions:
+        tables, place = stiffness_tables(prediction), prediction.direction
+        reach, frequencies = tables[-1].amplitude, tables[-1].frequency
+        rate = static_rate(request.result, place, request.static_rates)
+        if frequencies.size == 1:  # the curve has the rate of this frequency
+            rate = 4.0 * reach * float(frequencies[0])
+        curve = static_curve(request.result, place, reach, rate, temperature=request.temperature)
+        # of two middle amplitudes or frequencies, the lower
+        reference, row = tables[(len(tables) - 1) // 2], (frequencies.size - 1) // 2
+        frequency, exact = float(frequencies[row]), complex(reference.stiffness[row])
+        damping: dict[Kind, float] = {"car": exact.imag / (2.0 * np.pi * frequency), "ride": float(np.angle(exact))}
+        elements.append(_Element(tables, curve, reference, frequency, damping))
     shared = [line for prediction in predictions for line in band_losses(prediction)] + list(common_losses(request))
     if request.units:
         shared.append(f"the requested units, {request.units}: the file states its own units, which Adams converts")
@@ -121,19 +123,6 @@ def export(request: ExportRequest) -> Exported:
         for kind in _KINDS
     }
     return Exported(files, (*losses["car"], *losses["ride"], *shared))
-
-
-def _element(request: ExportRequest, prediction: Prediction) -> _Element:
-    """Make the element of one direction; with a single frequency, its curve has the rate of this frequency."""
-    tables, place = stiffness_tables(prediction), prediction.direction
-    reach, frequencies = tables[-1].amplitude, tables[-1].frequency
-    rate = static_rate(request.result, place, request.static_rates)
-    if frequencies.size == 1:
-        rate = 4.0 * reach * float(frequencies[0])
-    curve = static_curve(request.result, place, reach, rate, temperature=request.temperature)
-    # of two middle amplitudes or frequencies, the lower
-    reference, row = tables[(len(tables) - 1) // 2], (frequencies.size - 1) // 2
-    return _Element(tables, curve, reference, float(frequencies[row]), complex(reference.stiffness[row]))
 
 
 def _property_file(
@@ -158,7 +147,7 @@ def _property_file(
         displacement, force = _SCALES[element.reference.direction.motion]
         scale = force / displacement if kind == "car" else float(np.degrees(1.0))
         for dof in DOFS[element.reference.direction]:
-            damping[dof - 1] = scale * element.damping(kind)
+            damping[dof - 1] = scale * element.damping[kind]
             curves[dof - 1] = element.curve.displacement * displacement, element.curve.mean.value * force
     if (stated := request.cardanic) is not None:
         rate = stated.imag / (2.0 * np.pi * elements[0].frequency)

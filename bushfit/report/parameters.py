@@ -40,11 +40,6 @@ class ParameterRow(NamedTuple):
     unit: str
     meaning: str
 
-    @property
-    def label(self) -> str:
-        """Name of the parameter, followed in brackets by its state, such as "held", if it has one."""
-        return f"{self.name} ({self.state})" if self.state else self.name
-
 
 def interval_kind(result: Result) -> str:
     """Column heading of the intervals of a result: by profile likelihood or from the standard errors."""

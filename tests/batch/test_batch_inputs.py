@@ -132,7 +132,7 @@ parameters = { mu = { min = "1 MPa", max = "1.2 MPa" }, alpha = { nominal = 0.24
 def judged(read: Limits, **record: object) -> tuple[str, dict[str, str], dict[str, str]]:
     """Result, misses and doubtful limits of a part."""
     allowed, _ = resolve_limits(read, {})
-    quantities = list_quantities(["mu", "alpha"], read.points)
+    quantities = list_quantities(["mu", "alpha"], [bounds.at for bounds in (*read.stiffness, *read.loss_factor)])
     return judge_part(RowFile(status="done", **record), read, allowed, quantities)  # type: ignore[arg-type]
 
 

@@ -140,17 +140,12 @@ def draw_points(
     values = scale * rows[header].to_numpy()[np.argsort(index, kind="stable")]
     counts = np.bincount(index)
     starts = np.cumsum(counts) - counts
-    thinned = slice(None, None, _thinning(x.size, curves))
+    thinned = slice(None, None, max(1, -(-x.size // max(_CURVE_POINTS, _PANEL_POINTS // curves))))
     if x.size < len(rows):
         low, high = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
         axes.vlines(x[thinned], low[thinned], high[thinned], color=look.color, lw=0.7, alpha=0.7)
     points = style.POINT if x.size <= _MANY_POINTS else style.DOT | {"alpha": 0.5}
     axes.plot(x[thinned], (np.add.reduceat(values, starts) / counts)[thinned], look.marker, color=look.color, **points)
-
-
-def _thinning(count: int, curves: int) -> int:
-    """Step between the drawn points of a curve of `count` points, for a readable panel of `curves` curves."""
-    return max(1, -(-count // max(_CURVE_POINTS, _PANEL_POINTS // curves)))
 
 
 def points_note(table: pd.DataFrame) -> str:
@@ -201,7 +196,7 @@ def _draw_residuals(strips: Sequence[Axes], group: SweepGroup) -> None:
         header = f"{part} residual [noise]"
         for curve, look in zip(group.curves, looks, strict=True):
             points = points_to_draw(curve.rows)
-            points = points[:: _thinning(len(points), len(looks))]
+            points = points[:: max(1, -(-len(points) // max(_CURVE_POINTS, _PANEL_POINTS // len(looks))))]
             strip.plot(points[group.x_header], points[header], look.marker, color=look.color, alpha=0.8, **style.DOT)
         style.label_axes(strip, group.x_header, f"{part} residual\n/ noise", x)
         if group.axis == "amplitude" and x.max() > 3.0 * x.min():
