@@ -58,7 +58,7 @@ _FORMAT_OPTIONS: dict[Written, Parameter] = {
         envvar="BUSHFIT_PLOT_FORMAT",
         show_envvar=True,
     ),
-    "pages": flag("--no-report", "Do not write the report as an HTML page."),
+    "pages": flag("--no-report", "Do not write the HTML report."),
 }
 #: Seconds after which a command shows its progress.
 _PATIENCE = 2.0
