@@ -105,8 +105,10 @@ def jacobian(
     by_value = np.concatenate(list(map(methodcaller("jacobian", model, moving), data_sets)), axis=-1)
     if model.tied:
         by_value = by_value[: len(names)] + model.constraints.slopes(model.values, names) @ by_value[len(names) :]
-    of_priors = [prior_rows(model, names)[1]] if with_priors else []
-    return whiten_together(data_sets, np.concatenate([by_value * slopes[:, None], *of_priors], axis=-1))
+    by_value *= slopes[:, None]
+    if with_priors and model.constraints.priors:
+        by_value = np.concatenate([by_value, prior_rows(model, names)[1]], axis=-1)
+    return whiten_together(data_sets, by_value)
 
 
 def prior_rows(model: Model, names: Sequence[str]) -> tuple[Array, Array]:

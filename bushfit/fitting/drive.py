@@ -88,7 +88,7 @@ class Drive:
     first_row: int = 0
     row_noise: RowNoise = field(default_factory=RowNoise)
     # by length of a response: the samples before and after each row, and the part of the way between
-    _places: dict[int, tuple[Array, Array, Array]] = field(default_factory=dict, init=False, repr=False)
+    _places: dict[int, tuple[Array, Array, Array, Array]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def amplitude(self) -> float:
@@ -161,9 +161,11 @@ class Drive:
             position = self.phase * GRID
             index = position.astype(np.intp)
             ahead = np.minimum(index + 1, length - 1) if self.from_rest else (index + 1) % length
-            self._places[length] = index % length, ahead, position - index
-        index, ahead, part = self._places[length]
-        rows = response.take(index, axis=-1) * (1.0 - part) + response.take(ahead, axis=-1) * part
+            self._places[length] = index % length, ahead, position - index, 1.0 - (position - index)
+        index, ahead, part, rest = self._places[length]
+        rows = response.take(index, axis=-1)
+        rows *= rest
+        rows += response.take(ahead, axis=-1) * part
         if self.datum is not None and self.from_rest:
             rows = rows - np.average(rows, axis=-1, weights=self.weight)[..., None]
         return rows

@@ -14,7 +14,7 @@ from bushfit.fitting.loop_harmonics import SMOOTH_HARMONICS, smooth_waves
 from bushfit.fitting.measured_test import MeasuredBase
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
-from bushfit.model.sensitivity import force_and_slopes, stiffness_and_slopes
+from bushfit.model.sensitivity import force_and_slopes, force_slopes_of_branches, stiffness_and_slopes
 from bushfit.reading.measurement import Loop
 
 #: Harmonics that the model error of a loop has: alike up to the last smooth one, beyond they fall as 1/h.
@@ -173,8 +173,10 @@ class MeasuredLoop(MeasuredBase):
         return self.whiten(self._slopes(model, names) * self._per_noise)
 
     def _slopes(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the force at the n rows by parameter value, (len(names), n); the force is cached too."""
+        """Derivatives of the force at the n rows by parameter value, (len(names), n); may cache the force, too."""
         history = self.drive.history(model.is_transient)
+        if model.only_branches:
+            return self.drive.interpolate_at_rows(force_slopes_of_branches(model, self.direction, history, names))
         force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
         self._keep("force", model, (), self.drive.interpolate_at_rows(force) + (self.drive.datum or 0.0))
         return self.drive.interpolate_at_rows(slopes)
@@ -276,7 +278,8 @@ class MeasuredLoop(MeasuredBase):
 
         If only the first harmonic is used, the result has the two components along it, (..., 2).
         """
-        white = self.drive.row_noise.whiten(rows) * self._counting
+        white = self.drive.row_noise.whiten(rows)
+        white *= self._counting
         return white @ self._fundamental if self.fundamental_only else white
 
     def _less_shared(self, white: Array) -> Array:

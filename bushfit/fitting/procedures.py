@@ -138,16 +138,16 @@ def fit_static(data: PreparedCampaign, springpot: Result | None = None) -> Resul
     Raises:
         FitError: there is no loop, or the data cannot support the fit.
     """
-    loops, uncertainty, notes = data.static_loops(), None, []
+    uncertainty, notes = None, []
     fixed = {name: data.given_values[name] for name in DYNAMIC if name in data.given_values}
     if springpot:
         fixed = {name: springpot.model.values[name] for name in DYNAMIC}
         uncertainty = springpot.covariance.restricted(DYNAMIC)
     if len(fixed) < len(DYNAMIC):
-        found = _fit_step(data, loops, ("elastic", "friction"), {})
+        found = _fit_without_springpot(data)
         notes = [_without_springpot(data, found)]
     else:
-        found = _fit_step(data, loops, BASE, fixed)
+        found = _fit_step(data, data.static_loops(), BASE, fixed)
     return _result(data, [found], uncertainty, notes)
 
 
@@ -192,7 +192,7 @@ def fit_two_step(data: PreparedCampaign) -> TwoStep:
     springpot, passes = dict[str, float](), list[Mapping[str, float]]()
     points, images = list[Array](), list[Array]()
     while len(passes) < _MOST_PASSES:
-        static = _fit_step(data, loops, BASE if springpot else ("elastic", "friction"), springpot)
+        static = _fit_step(data, loops, BASE, springpot) if springpot else _fit_without_springpot(data)
         dynamic = _fit_step(data, [sweep], BASE, {name: static.model.values[name] for name in STATIC})
         model, before = dynamic.model, passes[-1] if passes else {}
         passes.append(dict(model.values))
@@ -216,6 +216,11 @@ def fit_two_step(data: PreparedCampaign) -> TwoStep:
         found=f"{_MOST_PASSES} passes",
         hint="bushfit fit fits all five parameters together",
     )
+
+
+@lru_cache(maxsize=1)  # the static fit, and the first pass of the two steps
+def _fit_without_springpot(data: PreparedCampaign) -> FitResult:
+    return _fit_step(data, data.static_loops(), ("elastic", "friction"), {})
 
 
 def _without_springpot(data: PreparedCampaign, static: FitResult) -> str:

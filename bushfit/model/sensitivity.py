@@ -90,12 +90,27 @@ def force_and_slopes(
             names,
             lambda values: model.force(direction, displacement, kind="loop", values=values, conditions=conditions),
         )
+    force = model.force(direction, displacement, kind="loop", conditions=conditions)
+    return force, force_slopes_of_branches(model, direction, displacement, names)
+
+
+def force_slopes_of_branches(model: Model, direction: Place, displacement: History, names: Sequence[str]) -> Array:
+    """Derivatives by parameters of the force of a model of branches alone, which do not need the force itself.
+
+    Args:
+        model: model without modifiers and layers.
+        direction: direction or specimen.
+        displacement: displacement history [m or rad] of n samples.
+        names: names of k parameters.
+
+    Returns:
+        Derivatives per SI unit of each parameter, (k, n).
+    """
     per_displacement = model.unit_strain(direction)
     slopes, test = np.zeros((len(names), displacement.value.shape[-1])), (displacement.scaled(per_displacement),)
     for branch in model.structure.branches:
         _add_slopes(slopes, model, names, branch, branch.stress, branch.stress_sensitivities, test)
-    force = model.force(direction, displacement, kind="loop", conditions=conditions)
-    return force, model.stiffness_per_modulus(direction) / (2.0 * per_displacement) * slopes
+    return model.stiffness_per_modulus(direction) / (2.0 * per_displacement) * slopes
 
 
 def _add_slopes(

@@ -151,6 +151,8 @@ def sha256(data: bytes) -> Future[str]:
 def join_quoted(data: bytes) -> bytes:
     """Replace line ends inside quoted header cells of a UTF-8 text by blanks, so that the header is one line."""
     head = data[:HEAD_BYTES]
+    if b'"' not in head:
+        return data
     joined = _QUOTED_LINE_END.sub(lambda match: b" ".join(match[0].split()), head)
     return data if joined == head else joined + data[HEAD_BYTES:]
 

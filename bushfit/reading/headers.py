@@ -254,6 +254,11 @@ class Vocabulary:
         self._known: dict[str, Heading | None] = {}
         self._names = {role: usual[0] for role, usual in names.items()} | dict(columns)
 
+    @classmethod
+    def shared(cls, names: Mapping[str, Sequence[str]], columns: Mapping[str, str]) -> "Vocabulary":
+        """Return the vocabulary of some names; it is built once for all files with these names."""
+        return _shared(tuple((role, tuple(usual)) for role, usual in names.items()), tuple(columns.items()))
+
     def heading(self, header: str) -> Heading | None:
         """Return the meaning of a header cell; None if the header names no known role."""
         if header not in self._known:
@@ -301,6 +306,11 @@ class Vocabulary:
             word, symbol = plain(name[: blank.start()]), plain(name[blank.end() :])
             if word in self._roles and set(self._roles[word]) & set(self._roles.get(symbol, ())):
                 yield word
+
+
+@lru_cache(maxsize=64)
+def _shared(names: tuple[tuple[str, tuple[str, ...]], ...], columns: tuple[tuple[str, str], ...]) -> Vocabulary:
+    return Vocabulary(dict(names), dict(columns))
 
 
 def fits(word: str, role: str, unit: str | None) -> bool:

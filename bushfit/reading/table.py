@@ -92,7 +92,7 @@ class Table(Cells):
         opened = file if isinstance(file, OpenedFile) else open_file(file, file_format or FileFormat())
         file_format, columns = opened.stated, dict(columns or {})
         numbered = {role: "\0" if text.isdecimal() else text for role, text in columns.items()}
-        vocabulary = Vocabulary(of_motion(names, motion), numbered)
+        vocabulary = Vocabulary.shared(of_motion(names, motion), numbered)
 
         def lay_out(source: RowSource) -> tuple[RowSource, Layout]:
             """Return source and layout of the table in a part of the file, as a long table without blocks."""
