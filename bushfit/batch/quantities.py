@@ -55,7 +55,7 @@ class Point:
 def parse_point(text: str) -> Point:
     """Parse an operating point such as "axial 25 Hz 0.1 mm".
 
-    A first word that resembles no direction is the name of a specimen.
+    A direction of one of several bushings is "long axial"; a name that resembles no direction is that of a specimen.
 
     Returns:
         The point in SI units.
@@ -65,12 +65,13 @@ def parse_point(text: str) -> Point:
     """
     expected = 'direction, frequency and amplitude, such as "axial 25 Hz 0.1 mm" or "torsion 10 Hz 1 deg"'
     match = _POINT.fullmatch(text)
-    if not match or (match[1] not in set(Direction) and did_you_mean(match[1].lower(), list(Direction))):
+    axis = match[1].split()[-1] if match else ""
+    if not match or (axis not in set(Direction) and did_you_mean(match[1].lower(), list(Direction))):
         hint = "write numbers with a decimal point" if re.search(r"\d,\d", text) else None
         raise UnitError("this is no operating point", found=repr(text), expected=expected, hint=hint)
     strain = is_compatible(match[3].lstrip("+-.0123456789eE "), STRAINING.displacement_unit)
     of_specimen = STRAINING if strain else TRANSLATION
-    motion = Direction(match[1]).motion if match[1] in set(Direction) else of_specimen
+    motion = Direction(axis).motion if axis in set(Direction) else of_specimen
     frequency, amplitude = parse_quantity(match[2], "Hz"), parse_quantity(match[3], motion.displacement_unit)
     if not (frequency > 0.0 and amplitude > 0.0):
         raise UnitError("frequency and amplitude have to be above zero", found=repr(text), expected=expected)

@@ -17,6 +17,7 @@ from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.effects import get_effect
 from bushfit.errors import BatchError, BushfitError, ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.geometry import get_places
 from bushfit.model.file import load_result
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import warnings_of
@@ -207,7 +208,10 @@ def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[s
     if result.quality:
         estimates |= {quantity.name: Estimate(getattr(result.quality, key)) for key, quantity in FIT_QUALITY.items()}
     for point in points:
-        place = result.place(point.place)
+        place, *others = get_places(point.place, result.specimens)
+        if others:
+            expected = " or ".join(f'"{one} ..."' for one in (place, *others))
+            raise BatchError("this operating point is of several places", found=str(point), expected=expected)
         if place.motion != point.motion:
             expected = f"an amplitude in {place.display.displacement.name}"
             raise BatchError(

@@ -22,7 +22,7 @@ from bushfit.campaign.schema import (
 from bushfit.campaign.toml import parse_toml
 from bushfit.effects import effect_name_of, place_suffix, with_base
 from bushfit.errors import CampaignError, error_location, quote_path
-from bushfit.geometry import Bushing, Specimen, get_places
+from bushfit.geometry import Bushing, Direction, Specimen, get_places
 from bushfit.model.laws import register_file
 from bushfit.model.model import FIVE, Model
 from bushfit.model.transfer import FACTOR_SPREAD
@@ -175,12 +175,13 @@ def _check_bodies(content: CampaignFile) -> None:
     if content.bushing and content.bushings:
         expected = "[bushing] for one bushing, or [[bushings]] for several of one compound"
         raise CampaignError("two lists of bushings", found="[bushing] and [[bushings]]", expected=expected)
-    if doubles := {name for name in names if names.count(name) > 1}:
+    taken = [*names, *(f"{table.name} {axis}" for table in content.bushings for axis in Direction)]
+    if doubles := {name for name in taken if taken.count(name) > 1}:
         table = "[[bushings]]" if content.bushings else "[[specimens]]"
         raise CampaignError("two bodies have one name", place=table, found=", ".join(sorted(doubles)))
-    tests = (*content.loops, *content.sweeps)
-    untested = [table.name for table in content.bushings if all(test.bushing != table.name for test in tests)]
-    if tests and untested:
+    tested = {test.bushing or test.specimen for test in (*content.loops, *content.sweeps)}
+    untested = [table.name for table in content.bushings if table.name not in tested]
+    if tested and untested and tested <= {*names}:  # a test of no body is refused where it is read
         hint = "bushfit predict --bushing FILE predicts a bushing that was not tested from its [bushing] in a file"
         expected = f'a test with bushing = "{untested[0]}"'
         raise CampaignError("a bushing has no tests", found=untested[0], expected=expected, hint=hint)

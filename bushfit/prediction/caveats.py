@@ -147,7 +147,7 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[str]:
             yield f"{direction}: fitted with the paper's formula, {error}. The parameters carry that error"
             yield from _compressible(result, bushing, direction)
         return
-    of_bushing = direction.axis is Direction.AXIAL and not axes.isdisjoint(Direction)
+    of_bushing = direction.axis is Direction.AXIAL and Direction.AXIAL not in axes and not axes.isdisjoint(Direction)
     if not (of_bushing or direction.axis in (Direction.RADIAL, Direction.TORSION)):
         if corrected.isdisjoint(direction.labels):
             yield (

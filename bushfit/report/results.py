@@ -79,7 +79,8 @@ def place_names(places: Iterable[Place]) -> list[str]:
     names: list[str] = []
     for place in places:
         name = folder_name(str(place))
-        names.append(name if name not in names else f"{name}_{len(names) + 1}")
+        taken = [other.casefold() for other in names]
+        names.append(name if name.casefold() not in taken else f"{name}_{len(names) + 1}")
     return names
 
 

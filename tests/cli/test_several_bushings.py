@@ -118,3 +118,64 @@ def test_bushings_that_do_not_fit_the_model_are_refused(
     done = typing(shapes)("predict", "model", *stated, "-o", tmp_path / "x", status=2)
     assert problem in done.stderr
     assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize(
+    ("commands", "tables"),
+    [("'run'", set()), ("'fit', 'diagnose', 'predict', 'respond'", {"response.csv", "measured.csv"})],
+)
+def test_a_batch_of_several_bushings_has_their_columns_files_and_limits(
+    shapes: Path, root: Path, tmp_path: Path, commands: str, tables: set[str]
+) -> None:
+    campaign, history = root / "configs/three_shapes.toml", shapes / "road.csv" if tables else None
+    settings = f"commands = [{commands}]\nat = ['long axial 25 Hz 0.1 mm', 'thick torsion 5 Hz 1 deg']\n"
+    settings += f"history = '{history}'\n" if history else ""
+    (tmp_path / "batch.toml").write_text(f"{settings}[[bushings]]\ncampaign = '{campaign}'\n", encoding="utf-8")
+    factor, stiffness = (
+        '[parameters."stiffness_factor.long"]\nmax = 1.1',
+        'at = "long axial 25 Hz 0.1 mm"\nmax = "1 N/mm"',
+    )
+    (tmp_path / "limits.toml").write_text(f"{factor}\n[[stiffness]]\n{stiffness}\n", encoding="utf-8")
+    batch = ("batch", "batch.toml", "--limits", "limits.toml", "-o", "out", "--jobs", 1)
+    done = typing(tmp_path)(*batch, status=1)
+    assert "three_shapes fails: stiffness long axial 25 Hz 0.1 mm 1095 N/mm" in " ".join(done.stderr.split())
+    (row,) = pd.read_csv(tmp_path / "out/batch.csv").to_dict("records")
+    assert row["verdict"] == "consistent"
+    assert row["stiffness_factor.long [-]"] == pytest.approx(1.033, abs=0.002)
+    predicted = pd.read_csv(tmp_path / "out/bushings/three_shapes/long axial.csv")
+    largest = predicted["stiffness [N/mm]"].max()
+    assert 0.5 * largest < row["stiffness long axial 25 Hz 0.1 mm [N/mm]"] < largest
+    assert row["stiffness thick torsion 5 Hz 1 deg [N m/rad]"] > 10.0
+    written = {file.name for file in (tmp_path / "out/bushings/three_shapes").iterdir()}
+    axes = {f"{name} {axis}.csv" for name in ("short", "long", "thick") for axis in ("axial", "radial")}
+    assert {"model.json", "diagnosis.json", *axes, *tables} <= written
+
+
+@pytest.mark.parametrize(
+    ("at", "problem"),
+    [
+        (
+            "axial 25 Hz 0.1 mm",
+            'this operating point is of several places; found: axial 25 Hz 0.1 mm; expected: "short',
+        ),
+        ("lung axial 25 Hz 0.1 mm", "no such direction or specimen; found: lung axial"),
+    ],
+)
+def test_an_operating_point_is_of_one_bushing(root: Path, tmp_path: Path, at: str, problem: str) -> None:
+    batch = ("batch", root / "configs/three_shapes.toml", "--at", at, "-o", "out", "--jobs", 1)
+    done = typing(tmp_path)(*batch, status=1)
+    assert problem in " ".join(done.stderr.split())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ('bushing = "long"\n', "", "long.csv: a test of no bushing of the campaign"),
+        ('bushing = "long"\n', 'bushing = "lang"\n', "found: lang"),
+        ('"thick"', '"long axial"', "two bodies have one name"),
+    ],
+)
+def test_a_test_of_another_name_is_refused(root: Path, tmp_path: Path, old: str, new: str, problem: str) -> None:
+    text = (root / "configs/three_shapes.toml").read_text(encoding="utf-8").replace("../data", f"{root}/data")
+    (tmp_path / "c.toml").write_text(text.partition("[simulate]")[0].replace(old, new), encoding="utf-8")
+    assert problem in typing(tmp_path)("fit", "c.toml", "-o", "x", status=2).stderr
