@@ -23,7 +23,7 @@ from bushfit.effects.mistakes import get_candidate
 from bushfit.errors import CampaignError
 from bushfit.reading.files import read_utf8
 from bushfit.reading.tablefile import folder_name
-from bushfit.validation import Share, Text, converter, unknown_key, validate_tables
+from bushfit.validation import Frequency, Share, Text, converter, unknown_key, validate_tables
 
 Command = Literal["run", "fit", "diagnose", "predict", "respond"]
 
@@ -36,7 +36,7 @@ _COMMANDS_USING: dict[str, tuple[Command, ...]] = {
     **dict.fromkeys(("directions", "effects"), ("fit",)),
     **dict.fromkeys(("adopt", "without", "max_effects", "tolerance"), ("diagnose",)),
     "model": ("diagnose", "predict", "respond"),
-    "history": ("respond",),
+    **dict.fromkeys(("history", "lowpass"), ("respond",)),
 }
 #: Characters that make a path a pattern.
 _PATTERN = re.compile(r"[*?\[]")
@@ -64,6 +64,7 @@ class RowSettings:
         adopt, without, max_effects, tolerance: settings of diagnose, as its options.
         model: model file from which predict and respond predict, or from which diagnose starts.
         history: displacement history for respond, as `bushfit respond`.
+        lowpass: cut-off frequency of a low-pass filter for the history [Hz], as `bushfit respond --lowpass`.
     """
 
     commands: Annotated[tuple[Command, ...], Words, Field(min_length=1)] | None = None
@@ -75,6 +76,7 @@ class RowSettings:
     tolerance: Share | None = None
     model: Text | None = None
     history: Text | None = None
+    lowpass: Frequency | None = None
 
     def with_defaults(self, defaults: RowSettings) -> RowSettings:
         """Copy of these settings in which None is replaced by the value in `defaults`; other keys are dropped."""

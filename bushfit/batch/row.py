@@ -187,7 +187,7 @@ def run_commands(
     if "predict" in commands:
         files |= encode_all(predict(result, campaign).files, with_tables)
     if "respond" in commands and settings.history:
-        files |= encode_all(respond(result, settings.history).files, with_tables)
+        files |= encode_all(respond(result, settings.history, lowpass=settings.lowpass).files, with_tables)
     return result, diagnosis, files
 
 

@@ -32,6 +32,7 @@ from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.stated import LoopFile, SweepFile, place_tested
 from bushfit.reading.sweeps import read_sweep
+from bushfit.reduction.displacement import prepare_record
 from bushfit.reduction.programme import programme
 from bushfit.units import CELSIUS, parse_quantity
 from bushfit.validation import validate_tables
@@ -126,7 +127,7 @@ def load_campaign(path: str | Path) -> Campaign:
             without_copied_repeats(sweep)
             for sweep in without_copied_tests([read_sweep(**keywords) for keywords in sweeps])
         ),
-        "validation": tuple(read_loop(**keywords) for keywords in records),
+        "validation": tuple(prepare_record(read_loop(**keywords), keywords["test"].lowpass) for keywords in records),
         "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
         "logo": logo,
     }

@@ -23,7 +23,7 @@ from bushfit.geometry import TRANSLATION, Place
 from bushfit.reading.measurement import Stepped, Waveform
 from bushfit.reading.preload import Preload, parse_preload
 from bushfit.reading.resonance import FEWEST_ROWS
-from bushfit.reading.stated import PLACE_KEYS, Displacement, LoopFile, SweepFile, with_places
+from bushfit.reading.stated import PLACE_KEYS, Displacement, LoopFile, SweepFile, ValidationFile, with_places
 from bushfit.validation import (
     LARGEST_SHAKEN,
     SHAKEN,
@@ -401,7 +401,7 @@ class CampaignFile:
     specimens: tuple[SpecimenSettings, ...] = ()
     loops: tuple[LoopFile, ...] = ()
     sweeps: tuple[SweepFile, ...] = ()
-    validation: tuple[LoopFile, ...] = ()
+    validation: tuple[ValidationFile, ...] = ()
     rig: RigSettings = field(default_factory=RigSettings)
     compound: Compound | None = None
     fit: Annotated[FitSettings, table(_fit_table)] = field(default_factory=FitSettings)

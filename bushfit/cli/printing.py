@@ -31,6 +31,10 @@ def print_validations(output: Output, validations: Sequence[Validation], before:
         rows = [(*row[:2], *(number(value, 3) for value in row[2:])) for row in table.itertuples(index=False)]
         title = "validation records, never fitted: predicted compared with measured force"
         output.print_table(title, list(table.columns), rows, text_columns=2)
+    for validation in validations:
+        source = validation.record.source
+        sentences = (*(source.notes if source else ()), *validation.response.warnings)
+        output.warn(f"{validation.record.name}: {sentence}" for sentence in sentences)
 
 
 def print_step(output: Output, title: str, result: Result) -> None:

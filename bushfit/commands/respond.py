@@ -1,7 +1,7 @@
 """respond: force of a fitted model over time for a displacement history."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -22,16 +22,10 @@ from bushfit.prediction.validation import Validation
 from bushfit.reading.displacements import DisplacementHistory, read_displacements
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.tablefile import folder_name
-from bushfit.reduction.lowpass import low_pass
+from bushfit.reduction.displacement import prepare_displacements
 from bushfit.report import plots
 from bushfit.report.response import record_table, response_figures, response_table, validation_table
 from bushfit.report.results import ResultFile, table_with_figure
-from bushfit.units import number
-
-#: Ratio of mean to range of a displacement above which the mean is the zero of a transducer; chosen: no rubber follows.
-_OFFSET = 10.0
-#: Largest distance between the ends of a cycle, relative to its range.
-_CLOSED = 0.01
 
 
 class ResponseDocument(TypedDict):
@@ -115,11 +109,7 @@ def respond(
             for name, values in history.items()
             for place in get_places(name, result.specimens)
         )
-    channels = tuple(_without_offset(channel, steady=steady) for channel in channels)
-    if steady:
-        channels = tuple(_one_cycle(channel) for channel in channels)
-    if lowpass:
-        channels = tuple(_smoothed(channel, lowpass, steady=steady) for channel in channels)
+    prepared = prepare_displacements(channels, steady=steady, lowpass=lowpass)
     responses = [
         time_response(
             result,
@@ -127,72 +117,18 @@ def respond(
             History.sampled(channel.displacement, channel.step, periodic=steady),
             temperature=temperature,
         )
-        for channel in channels
+        for channel in prepared
     ]
-    notes = dict.fromkeys(note for channel in channels for note in channel.notes)
+    notes = dict.fromkeys(note for channel in prepared for note in channel.notes)
     warnings = warnings_of(result, [response.warnings for response in responses], [*notes])
     figures = {str(response.direction): response_figures(response) for response in responses}
-    title, time = f"{result.name}: force over time", channels[0].time
+    title, time = f"{result.name}: force over time", prepared[0].time
     files = table_with_figure(
         "response",
         partial(response_table, time, responses),
         lambda table: plots.response.response_figure(title, table, plots.style.warnings_note(warnings)),
     )
     return ResponseOutput(result, time, responses, warnings, {"directions": figures, "warnings": warnings}, files)
-
-
-def _without_offset(channel: DisplacementHistory, *, steady: bool) -> DisplacementHistory:
-    """Remove an offset far larger than the motion: the mean of a steady state, or the first value of a motion."""
-    motion, span = channel.displacement, np.ptp(channel.displacement)
-    if not np.all(np.isfinite(motion)) or not span:
-        raise MeasurementError(
-            "this is no motion", place=str(channel.direction), expected="finite displacements that change"
-        )
-    if abs(motion.mean()) <= _OFFSET * span:
-        return channel
-    offset = float(motion.mean() if steady else motion[0])
-    unit, factor = channel.direction.display.displacement
-    which = "mean" if steady else "first value"
-    note = f"{channel.direction}: {number(factor * offset, 4)} {unit}, the {which}, is subtracted as an offset"
-    return replace(channel, displacement=motion - offset, notes=(*channel.notes, note))
-
-
-def _one_cycle(channel: DisplacementHistory) -> DisplacementHistory:
-    """Check that a history can be repeated endlessly; a last sample equal to the first is left out."""
-    motion, span = channel.displacement, np.ptp(channel.displacement)
-    jump = max(_CLOSED * span, 2.0 * np.abs(np.diff(motion)).max())
-    if abs(motion[-1] - motion[0]) > jump:
-        unit, factor = channel.direction.display.displacement
-        first, last = (f"{number(factor * end, 4)} {unit}" for end in (motion[0], motion[-1]))
-        raise MeasurementError(
-            "a steady state needs whole cycles",
-            place=str(channel.direction),
-            found=f"{first} at the start, {last} at the end",
-            expected="a history that ends where it begins",
-            hint="cut it to whole cycles, or leave --steady out",
-        )
-    is_repeated = abs(motion[-1] - motion[0]) < 0.5 * abs(motion[1] - motion[0])
-    return replace(channel, displacement=motion[:-1]) if is_repeated else channel
-
-
-def _smoothed(channel: DisplacementHistory, frequency: float, *, steady: bool) -> DisplacementHistory:
-    """Remove frequencies of a displacement above a cut-off frequency [Hz], and note the size of what is removed."""
-    lowest, nyquist = 1.0 / (channel.step * channel.displacement.size), 0.5 / channel.step
-    if not lowest <= frequency < nyquist:
-        low, high = number(lowest, 4), number(nyquist, 4)
-        expected = f"from {low} Hz, one cycle in the history, to below {high} Hz, half of the sampling rate"
-        raise MeasurementError(
-            "the low-pass does not suit the history",
-            place="--lowpass",
-            found=f"{number(frequency, 4)} Hz",
-            expected=expected,
-        )
-    smooth = low_pass(channel.displacement, channel.step, frequency, periodic=steady)
-    unit, factor = channel.direction.display.displacement
-    removed = number(factor * float(np.std(channel.displacement - smooth)), 2)
-    cut_off = f"{channel.direction}: low-passed at {number(frequency, 3)} Hz without delay"
-    notes = (*channel.notes, f"{cut_off}, which removes {removed} {unit} rms")
-    return replace(channel, displacement=smooth, notes=notes)
 
 
 def validation_files(validations: Sequence[Validation], before: Sequence[Validation], title: str) -> list[ResultFile]:

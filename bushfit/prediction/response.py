@@ -16,7 +16,7 @@ from bushfit.model.sensitivity import force_and_slopes
 from bushfit.prediction.bands import Band, envelope, uncertainty
 from bushfit.prediction.caveats import BEYOND, MARGIN, extrapolations, unfitted_warnings
 from bushfit.prediction.superposed import timed_candidates
-from bushfit.reduction.lowpass import noise_and_highest_frequency
+from bushfit.reduction.displacement import noise_and_highest_frequency
 from bushfit.units import number
 
 #: Largest stroke, relative to the range, that noise of the displacement may cause, and largest share of such strokes

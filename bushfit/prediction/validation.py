@@ -7,10 +7,8 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
-from bushfit.errors import error_location
 from bushfit.model.result import Result
 from bushfit.prediction.response import TimeResponse, time_response, work
-from bushfit.reading.displacements import even_time
 from bushfit.reading.measurement import Loop
 
 
@@ -19,14 +17,12 @@ class Validation:
     """Comparison of the measured force of a record with the force that a model predicts for its displacement.
 
     Args:
-        record: record as read, in SI.
-        time: evenly sampled time [s], (n,).
+        record: record with even times, in SI, (n,).
         response: predicted force at these times, with effects of the rig, as in the test.
         measured: measured force [N, N m or Pa], without the zero error of the force, (n,).
     """
 
     record: Loop
-    time: Array
     response: TimeResponse
     measured: Array
 
@@ -59,7 +55,7 @@ def validate(result: Result, records: Sequence[Loop]) -> list[Validation]:
 
     Args:
         result: fitted result.
-        records: records of time, displacement and force under any motion.
+        records: records of time, displacement and force under any motion, from `prepare_record`.
 
     Returns:
         Comparison for each record.
@@ -69,11 +65,8 @@ def validate(result: Result, records: Sequence[Loop]) -> list[Validation]:
     """
     validations = []
     for record in records:
-        with error_location(record.source.file if record.source else None, "time"):
-            time, _ = even_time(record.time)
-        displacement, force = (np.interp(time, record.time, values) for values in (record.displacement, record.force))
-        history = History.sampled(displacement, float(time[1] - time[0]))
+        history = History.sampled(record.displacement, float(record.time[1] - record.time[0]))
         response = time_response(result, record.direction, history, temperature=record.temperature, rig=True)
-        measured = force - np.mean(force - response.force.value)
-        validations.append(Validation(record, time, response, measured))
+        measured = record.force - np.mean(record.force - response.force.value)
+        validations.append(Validation(record, response, measured))
     return validations

@@ -232,6 +232,17 @@ class LoopFile(TestFile):
 
 
 @dataclass(frozen=True)
+class ValidationFile(LoopFile):
+    """Table [[validation]]: a file of displacement and force under any motion, and its missing information.
+
+    Args:
+        lowpass: cut-off frequency of a low-pass filter for the displacement [Hz], against noise; None for no filter.
+    """
+
+    lowpass: Frequency | None = None
+
+
+@dataclass(frozen=True)
 class SweepFile(TestFile):
     """Table [[sweeps]]: a file and its missing information, for `sweeps.read_sweep`.
 

@@ -57,7 +57,7 @@ def validation_table(validations: Sequence[Validation], before: Sequence[Validat
 
 def record_table(validation: Validation) -> pd.DataFrame:
     """Table of a validation record over time: displacement, predicted force with its band, and measured force."""
-    table, place = response_table(validation.time, [validation.response]), validation.record.direction
+    table, place = response_table(validation.record.time, [validation.response]), validation.record.direction
     unit, factor = place.display.force
     return table.assign(**{f"measured {place.motion.words[1]} [{unit}]": factor * validation.measured})
 

@@ -111,9 +111,9 @@ def test_a_batch_responds_for_each_part(bushfit: Run, work: Path, tmp_path: Path
     model, campaign = work / "model/model.json", work / "configs/cmp_15961.toml"
     settings = f"commands = ['respond']\nmodel = '{model}'\n"
     manifest = tmp_path / "batch.toml"
-    manifest.write_text(f"{settings}history = 'road.csv'\n[[bushings]]\ncampaign = '{campaign}'\n")
+    manifest.write_text(f"{settings}history = 'road.csv'\nlowpass = '40 Hz'\n[[bushings]]\ncampaign = '{campaign}'\n")
     bushfit("batch", manifest, "-o", tmp_path / "batch", "--jobs", 1)
-    bushfit("respond", model, tmp_path / "road.csv", "-o", tmp_path / "single", "--no-plots")
+    bushfit("respond", model, tmp_path / "road.csv", "--lowpass", "40 Hz", "-o", tmp_path / "single", "--no-plots")
     written = (tmp_path / "batch/bushings/cmp_15961/response.csv").read_text()
     assert written == (tmp_path / "single/response.csv").read_text()
     manifest.write_text(f"{settings}[[bushings]]\ncampaign = '{campaign}'\n")

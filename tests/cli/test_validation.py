@@ -125,6 +125,35 @@ def test_a_gain_of_the_force_is_visible(campaign: Path, bushfit: Run, tmp_path: 
     assert found["NRMSE [%]"][0] > 5.0 * found["NRMSE [%]"][1]
 
 
+def test_a_low_pass_and_corrections_of_a_record_are_stated(campaign: Path, bushfit: Run, tmp_path: Path) -> None:
+    """Noise of the displacement, its offset of a metre, and missing rows."""
+    for file in campaign.parent.glob("*.*"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    record = tmp_path / "record_axial_1.csv"
+    table = pd.read_csv(record)
+    noise = 0.0005 * np.random.default_rng(1).standard_normal(len(table))
+    table["displacement [mm]"] += 1000.0 + noise - noise[0]
+    table.drop(index=range(200, 220)).to_csv(record, index=False)
+    plan = tmp_path / "campaign.toml"
+    entry = f'file = "{record.name}"\n'
+    errors = []
+    for name, key in (("plain", ""), ("smooth", 'lowpass = "150 Hz"\n')):
+        changed = tmp_path / f"{name}.toml"
+        changed.write_text(plan.read_text().replace(entry, entry + key, 1))
+        done = bushfit("diagnose", changed, "-o", tmp_path / name, "--no-plots", "--max-effects", 0, "-v")
+        assert "record_axial_1: 20 rows are missing" in done.stderr
+        assert "1000 mm, the first value, is subtracted" in done.stderr
+        assert ("low-passed at 150 Hz without delay, which removes" in done.stderr) == bool(key)
+        written = pd.read_csv(tmp_path / name / "validation_record_axial_1.csv")
+        assert abs(written["displacement [mm]"]).max() < 1.0
+        errors.append(written["force [N]"] - written["measured force [N]"])
+    assert errors[0].std() > 1.001 * errors[1].std()
+    changed.write_text(plan.read_text().replace(entry, entry + 'lowpass = "1 MHz"\n', 1))
+    done = bushfit("diagnose", changed, "-o", tmp_path / "none", status=2)
+    assert "record_axial_1.csv" in done.stderr
+    assert "the low-pass does not suit the history" in done.stderr
+
+
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [

@@ -16,7 +16,7 @@ from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
 from bushfit.prediction.response import time_response
-from bushfit.reduction.lowpass import noise_and_highest_frequency
+from bushfit.reduction.displacement import noise_and_highest_frequency
 
 STEP, ROWS, FINER = 1e-3, 3000, 10
 TIME = np.arange(ROWS) * STEP

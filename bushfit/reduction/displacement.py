@@ -1,0 +1,170 @@
+"""Preparation of displacement histories: offset, whole cycles, and a low-pass filter against noise."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bushfit.errors import MeasurementError, error_location
+from bushfit.reading.displacements import DisplacementHistory, even_time
+from bushfit.reading.measurement import Loop
+from bushfit.units import number
+
+#: Ratio of mean to range of a displacement above which the mean is the zero of a transducer; chosen: no rubber follows.
+_OFFSET = 10.0
+#: Largest distance between the ends of a cycle, relative to its range.
+_CLOSED = 0.01
+#: Largest number of samples of a segment of the spectrum, share of the record, and ratio of the density to that of the
+#: noise above which a frequency has motion; chosen: eight segments or more do not reach this ratio by chance.
+_SEGMENT, _SHARE, _ABOVE = 4096, 8, 4.0
+#: Order of the filter: at half of the cut-off frequency, it changes the motion by 0.4 %.
+_ORDER = 4
+#: Standard deviation of the fourth difference of white noise over that of the noise, and of a normal distribution over
+#: its median magnitude.
+_FOURTH, _NORMAL = np.sqrt(70.0), 1.4826
+#: Cycles of the cut-off frequency by which the filter extends a record, point-symmetric about its ends.
+_EXTENSION = 3.0
+
+
+def noise_and_highest_frequency(value: NDArray[Any], step: float) -> tuple[float, float]:
+    """Estimate the white noise of a displacement, and the highest frequency of the motion above it.
+
+    Args:
+        value: displacement in any unit, evenly sampled, (n,).
+        step: time between samples [s].
+
+    Returns:
+        Standard deviation of the noise, in the unit of the displacement, and the frequency [Hz].
+
+    Notes:
+        The fourth difference of a finely sampled motion is small compared with that of noise; its median magnitude
+        excludes jumps of the motion.
+    """
+    from scipy.signal import welch  # slow to import, and few results have histories
+
+    noise = _NORMAL * float(np.median(np.abs(np.diff(value, n=4)))) / _FOURTH
+    frequency, density = welch(value, 1.0 / step, nperseg=min(_SEGMENT, max(value.size // _SHARE, 8)))
+    return noise, float(frequency[density > _ABOVE * 2.0 * noise**2 * step].max(initial=frequency[1]))
+
+
+def low_pass(value: NDArray[Any], step: float, frequency: float, *, periodic: bool) -> NDArray[Any]:
+    """Filter a displacement by a Butterworth low-pass of fourth order, forward and backward, so without delay.
+
+    Args:
+        value: displacement in any unit, evenly sampled, (n,).
+        step: time between samples [s].
+        frequency: cut-off frequency [Hz], at which half of the amplitude remains; below half of the sampling rate.
+        periodic: True if the samples are repeated endlessly.
+
+    Returns:
+        Displacement without higher frequencies, (n,).
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    sections = butter(_ORDER, frequency, fs=1.0 / step, output="sos")
+    if periodic:
+        return np.asarray(sosfiltfilt(sections, np.tile(value, 3))[value.size : 2 * value.size])
+    extension = min(value.size - 1, round(_EXTENSION / (frequency * step)))
+    return np.asarray(sosfiltfilt(sections, value, padlen=extension))
+
+
+def prepare_displacements(
+    channels: Sequence[DisplacementHistory], *, steady: bool = False, lowpass: float | None = None
+) -> list[DisplacementHistory]:
+    """Prepare the channels of a history for a model; notes state what was changed.
+
+    Args:
+        channels: evenly sampled displacements at the same times.
+        steady: True for whole cycles of a steady state, False for a motion from rest.
+        lowpass: cut-off frequency of a low-pass filter [Hz]; None for no filter.
+
+    Returns:
+        Channels without an offset far larger than the motion (the mean of a steady state, or the first value of a
+        motion), and in a steady state without a last sample that repeats the first.
+
+    Raises:
+        MeasurementError: no motion, a steady state that does not end where it begins, or a low-pass that does not suit
+            the history.
+    """
+    channels = [_without_offset(channel, steady=steady) for channel in channels]
+    if steady:
+        ends = np.array([channel.displacement[[-1, 0, 1]] / np.ptp(channel.displacement) for channel in channels])
+        for channel in channels:
+            _require_cycle(channel)
+        if np.abs(ends[:, 0] - ends[:, 1]).sum() < 0.5 * np.abs(ends[:, 2] - ends[:, 1]).sum():
+            channels = [replace(channel, displacement=channel.displacement[:-1]) for channel in channels]
+    return [_smoothed(channel, lowpass, steady=steady) for channel in channels] if lowpass else channels
+
+
+def prepare_record(record: Loop, lowpass: float | None = None) -> Loop:
+    """Prepare a validation record for a model: even times, and the displacement as by `prepare_displacements`.
+
+    Args:
+        record: record of time, displacement and force, in SI.
+        lowpass: cut-off frequency of a low-pass filter for the displacement [Hz]; None for no filter.
+
+    Returns:
+        Record with even times; the notes of its source state what was changed.
+    """
+    with error_location(record.source.file if record.source else None, "time"):
+        time, notes = even_time(record.time)
+    displacement, force = (np.interp(time, record.time, values) for values in (record.displacement, record.force))
+    channel = DisplacementHistory(record.direction, displacement, float(time[1] - time[0]), notes=notes)
+    with error_location(record.source.file if record.source else None):
+        (channel,) = prepare_displacements([channel], lowpass=lowpass)
+    source = record.source and replace(record.source, notes=(*record.source.notes, *channel.notes))
+    return replace(record, time=time, displacement=channel.displacement, force=force, source=source)
+
+
+def _without_offset(channel: DisplacementHistory, *, steady: bool) -> DisplacementHistory:
+    """Remove an offset far larger than the motion: the mean of a steady state, or the first value of a motion."""
+    motion, span = channel.displacement, np.ptp(channel.displacement)
+    if not np.all(np.isfinite(motion)) or not span:
+        raise MeasurementError(
+            "this is no motion", place=str(channel.direction), expected="finite displacements that change"
+        )
+    if abs(motion.mean()) <= _OFFSET * span:
+        return channel
+    offset = float(motion.mean() if steady else motion[0])
+    unit, factor = channel.direction.display.displacement
+    which = "mean" if steady else "first value"
+    note = f"{channel.direction}: {number(factor * offset, 4)} {unit}, the {which}, is subtracted as an offset"
+    return replace(channel, displacement=motion - offset, notes=(*channel.notes, note))
+
+
+def _require_cycle(channel: DisplacementHistory) -> None:
+    """Raise a MeasurementError if a history does not end where it begins."""
+    motion, span = channel.displacement, np.ptp(channel.displacement)
+    jump = max(_CLOSED * span, 2.0 * np.abs(np.diff(motion)).max())
+    if abs(motion[-1] - motion[0]) > jump:
+        unit, factor = channel.direction.display.displacement
+        first, last = (f"{number(factor * end, 4)} {unit}" for end in (motion[0], motion[-1]))
+        raise MeasurementError(
+            "a steady state needs whole cycles",
+            place=str(channel.direction),
+            found=f"{first} at the start, {last} at the end",
+            expected="a history that ends where it begins",
+            hint="cut it to whole cycles, or leave --steady out",
+        )
+
+
+def _smoothed(channel: DisplacementHistory, frequency: float, *, steady: bool) -> DisplacementHistory:
+    """Remove frequencies of a displacement above a cut-off frequency [Hz], and note the size of what is removed."""
+    lowest, nyquist = 1.0 / (channel.step * channel.displacement.size), 0.5 / channel.step
+    if not lowest <= frequency < nyquist:
+        low, high = number(lowest, 4), number(nyquist, 4)
+        expected = f"from {low} Hz, one cycle in the history, to below {high} Hz, half of the sampling rate"
+        raise MeasurementError(
+            "the low-pass does not suit the history",
+            place="lowpass",
+            found=f"{number(frequency, 4)} Hz",
+            expected=expected,
+        )
+    smooth = low_pass(channel.displacement, channel.step, frequency, periodic=steady)
+    unit, factor = channel.direction.display.displacement
+    removed = number(factor * float(np.std(channel.displacement - smooth)), 2)
+    cut_off = f"{channel.direction}: low-passed at {number(frequency, 3)} Hz without delay"
+    notes = (*channel.notes, f"{cut_off}, which removes {removed} {unit} rms")
+    return replace(channel, displacement=smooth, notes=notes)
