@@ -123,28 +123,23 @@ class DiagnosisWriter:
 
     def _mistaken_record(self, first: Composition) -> Diagnosis:
         """Diagnosis in which a mistake in the record explains the gap; the model to use is unchanged."""
-        data, best, claim, bounds = self.request.data, first.best, first.best.claim, self.request.bounds
+        data, best, claim = self.request.data, first.best, first.best.claim
         assert claim is not None
-        base, after = map(self._with_free_gains, (self.request.base, best.state.evidence))
-        holdout = hold_out(base, after, bounds)
-        if holdout.before and holdout.after and holdout.after > max(holdout.before, LARGEST_CLOSED_GAP):
-            finding = replace(self.finding, verdict="described", leads=(claim.mistake.name, *best.effects))
-            return replace(self, finding=finding)._without_name()
         command = " ".join(["bushfit diagnose CAMPAIGN", *(f"--adopt {name}" for name in claim.labels(data))])
         corrections = "; ".join(claim.corrections(data))
         advice = f"if the records of the tests confirm this mistake, state {corrections} (or {command})"
-        companions = " and ".join([*best.effects, *(part.name for part in best.faulty_parts)])
-        summary = f"these tests agree if {claim.words(data)}" + (f", and with {companions}" if companions else "")
+        summary = f"these tests agree if {claim.words(data)}"
         entries = self._claim_entries(first)
         diagnosis = self._finished(
             self.finding.verdict, summary, self.request.base, entries, places=best, next_test=advice
         )
         warning = f"fitted to the tests as they are, which only agree if {claim.words(data)}: {advice}"
+        after = self._with_free_gains(best.state.evidence)
         return replace(
             diagnosis,
             after=after,
             remainder=find_regions(after),
-            holdout=holdout,
+            holdout=hold_out(diagnosis.before, after, self.request.bounds),
             result=replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning)),
         )
 

@@ -106,6 +106,12 @@ def test_beside_a_gap_that_stays_a_name_must_be_sure_in_a_compound_that_deviates
     assert (finding.verdict, finding.names) == beside_a_gap
 
 
+@pytest.mark.parametrize("companion", ["inertia", "frequency:50 Hz+frequency:90 Hz"])
+def test_a_mistake_that_does_not_close_the_gap_alone_is_a_lead(companion: str) -> None:
+    finding = decide_verdict([one(f"peak_to_peak+{companion}", 0.99)], TOLERANCE)
+    assert (finding.verdict, finding.leads[0]) == ("described", "peak_to_peak")
+
+
 @pytest.mark.parametrize("parts", ["inertia+compound", "peak_to_peak", "peak_to_peak+compound"])
 def test_what_does_not_fit_the_tests_is_a_lead_and_no_name(parts: str) -> None:
     finding = decide_verdict([one(parts, 0.99, p_value=1e-4)], TOLERANCE)
