@@ -93,7 +93,7 @@ def _from_file(campaign: Campaign, file: str, only: str | None = None, without: 
     sources = [loop.source for loop in campaign.loops] + [sweep.source for sweep in campaign.sweeps]
     hashes = {source.sha256 for source in sources if source}
     if twice := [str(source.file) for source in result.inputs if source.sha256 in hashes]:
-        expected = "a model of other tests: a test that counts twice makes intervals too narrow"
+        expected = "a model fitted to other tests: a test that is used twice makes intervals too narrow"
         raise CampaignError("the prior was fitted to tests of this campaign", found=", ".join(twice), expected=expected)
     names = [name for name in result.fitted if name not in result.at_bound and name not in without]
     names = [name for name in names if only in (None, name) and result.covariance.stderr(name)]

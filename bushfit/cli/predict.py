@@ -123,7 +123,7 @@ def command(
     for resonance in predicted.resonances:
         frequency, largest = resonance.peak
         peak = f"resonance at {frequency:.4g} Hz, |T| {largest:.3g}"
-        output.print(f"{resonance.place} under {mass}, base at {base_acceleration}: {peak}")
+        output.print(f"{resonance.place} with a mass of {mass}, base acceleration {base_acceleration}: {peak}")
     for curve in predicted.static:
         _print_static(output, curve)
     for part in predicted.arms:

@@ -75,7 +75,7 @@ def command(
     direction make one sweep. A resonance test, given by one FILE and --mass, contains the accelerations and phases of
     a shaken base and of a mass on the mount, or their ratio (transmissibility). Each point gets a standard error.
 
-    Writes sweep.csv, which init and campaigns read as a sweep, and reduce.png.
+    Writes reduce.png and sweep.csv, which init and campaigns read as a sweep.
     """
     from bushfit.reduction.steps import reduce
     from bushfit.report.reduced import reduced_table, resonance_table

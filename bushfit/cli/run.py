@@ -89,7 +89,7 @@ def _model_description(outcome: RunOutput) -> str:
     """Phrase that describes the model that the user should use, and how it differs from the plain joint fit."""
     if outcome.diagnosed and outcome.added:
         effects = ", ".join(effect.label for effect in outcome.diagnosed.diagnosis.effects)
-        return f"with {effects}; joint.json is the fit without"
+        return f"with {effects}; joint.json: the fit without effects"
     if outcome.diagnosed and outcome.diagnosed.diagnosis.changed:  # a mistake in the record is named
         return "the joint fit to the uncorrected tests: correct the record first, then run again"
     return "the joint fit"

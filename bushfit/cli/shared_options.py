@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _UNITS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
 
 
-def campaign_options(soft_l1: str = "points far from the model have less weight, outliers none") -> Parameter:
+def campaign_options(soft_l1: str = "less weight for points far from the model, none for outliers") -> Parameter:
     """Create the argument CAMPAIGN (`campaigns`) and the options of all commands that fit a campaign.
 
     Args:

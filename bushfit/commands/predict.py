@@ -189,7 +189,7 @@ def predict(
             hint="fit tests at several temperatures with --effect temperature",
         )
     if len(preloads) > 1 and (wide or mass or static or static_rates):
-        problem = "wide tables, resonances and static curves are of one preload"
+        problem = "wide tables, resonances and static curves require a single preload"
         raise ModelError(problem, found=", ".join(preloads), expected="one, or none")
     if preloads and directions is None and result.measured:
         directions = [stated.place for stated in result.measured.preloads] or None

@@ -66,7 +66,7 @@ def exported_directions(request: ExportRequest) -> list[Prediction]:
     predictions = [prediction for prediction in request.predictions if prediction.direction.axis]
     if len(bodies := dict.fromkeys(prediction.direction.body for prediction in predictions)) > 1:
         expected, hint = "one bushing", f'--direction "{next(iter(bodies))}" selects one'
-        raise ModelError("this format is of one bushing", found=", ".join(bodies), expected=expected, hint=hint)
+        raise ModelError("this format represents one bushing", found=", ".join(bodies), expected=expected, hint=hint)
     if not predictions:
         raise ModelError(
             "there is no direction of a bushing to export",

@@ -165,7 +165,7 @@ def cut_off_ends(channel: RecordedChannel) -> list[str]:
         below = int(np.count_nonzero(depth <= width)) - flat_rows
         if flat_rows >= max(_FLAT_ROWS, _FLAT_RATIO * below):
             extreme = f"{channel.format_row(row)} {channel.unit}"
-            odd.append(f"the {channel.name} is cut off at its {side}: {flat_rows} rows hold exactly {extreme}")
+            odd.append(f"the {channel.name} is cut off at its {side}: {flat_rows} rows are exactly {extreme}")
     return odd
 
 
@@ -216,7 +216,7 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     if _SMALLEST_OFFSET * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and drive.datum is not None:
         odd.append(
             f"the mean displacement is {number(to_length * mean_motion, 3)} {length}, "
-            f"{number(100 * mean_motion / half_motion, 2)} % of its amplitude: the fit uses the loop about its own mean"
+            f"{number(100 * mean_motion / half_motion, 2)} % of its amplitude: the fit uses the loop about its mean"
         )
     return facts, odd
 

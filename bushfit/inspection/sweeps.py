@@ -133,7 +133,7 @@ def odd_levels(sweep: Sweep) -> Iterator[str]:
     if relative_miss[row] > MISSED_LEVEL:
         both = sweep.amplitude_reached[row], sweep.amplitude[row]
         reached, level = (shown_amplitude(sweep.direction, size) for size in both)
-        yield f"{reached} was reached where the level is {level} ({sweep.frequency[row]:.4g} Hz)"
+        yield f"{reached} was reached instead of the nominal {level} ({sweep.frequency[row]:.4g} Hz)"
 
 
 def missing_frequencies(sweep: Sweep) -> Iterator[str]:

@@ -127,7 +127,7 @@ def describe_purpose(search: PlanSearch, test: int) -> str:
     if request.aim == "rivals":
         chi_square, closer = problem.nearest_rivals(counts), problem.nearest_rivals(reduced)
         if closer * _NOTABLE_RATIO <= chi_square:
-            return f"rivals expected chi-square {number(closer, 2)} without it, {number(chi_square, 2)} with it"
+            return f"expected chi-square of rivals {number(chi_square, 2)}, {number(closer, 2)} without this run"
     elif problem.goals:
         widened = [
             goal for goal in problem.goals if goal.half_width(wider) >= _NOTABLE_RATIO * goal.half_width(covariance)
@@ -135,7 +135,7 @@ def describe_purpose(search: PlanSearch, test: int) -> str:
         if widened:
             goal = max(widened, key=lambda goal: goal.half_width(wider) / goal.target.half_width)
             without, planned = (percent(goal.half_width(errors), 3) for errors in (wider, covariance))
-            return f"{goal.target}: {without} without it, {planned} with it"
+            return f"{goal.target}: {planned}, {without} without this run"
     else:
         if request.aim == "predictions":
             name, ratio = "stiffness", np.sqrt(np.sum(wider * problem.weight) / np.sum(covariance * problem.weight))
@@ -143,7 +143,7 @@ def describe_purpose(search: PlanSearch, test: int) -> str:
             ratios = zip(np.sqrt(np.diag(wider) / np.diag(covariance)), problem.knowledge.names, strict=False)
             ratio, name = max(pair for pair in ratios if pair[1] in request.parameters)
         if ratio >= _NOTABLE_RATIO:
-            return f"{name}: error {number(100.0 * (ratio - 1.0), 2)} % larger without it"
+            return f"{name}: error {number(100.0 * (ratio - 1.0), 2)} % larger without this run"
     return "shows effects that the model lacks"
 
 
@@ -201,11 +201,11 @@ def plan_warnings(search: PlanSearch, planned: Programme, missed: Sequence[str |
             yield f"{target}: {percent(target.half_width)} asked for, {percent(half)} planned: {reason}"
     if knowledge.bounded:
         yield (
-            f"{' and '.join(knowledge.bounded)} ended at a bound: the errors of the others include half of the "
-            "error that it would add"
+            f"{' and '.join(knowledge.bounded)} ended at a bound: the planned errors of the other parameters "
+            "include half of the additional error of a fit without the bound"
         )
     if missed and not search.determines_scatter(search.counts):
-        yield "too few repeats determine the scatter of sweeps: intervals may become half as wide again as planned"
+        yield "too few repeats determine the scatter of sweeps: intervals may become 1.5 times as wide as planned"
     if effects := search.less_visible_effects(search.counts):
         yield f"the standard programme shows these effects better: {', '.join(effects)}"
     for pair in np.argwhere(np.triu(~problem.separable_rivals, 1)).tolist():

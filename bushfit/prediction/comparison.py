@@ -268,11 +268,11 @@ def compare_parameters(
         if not note and not np.isfinite(difference[i]):
             note = "zero in one"
         if not note and not error[i]:
-            note = "held in both"
+            note = "fixed in both"
         if not note and exponent is None:
             tested.append(i)
             if rows[i + 1 : i + 2] == [(name, exponent_of(name, parameter))]:
-                note = f"only at equal {exponent_of(name, parameter)}"
+                note = f"comparable only at equal {exponent_of(name, parameter)}"
         label = f"{name} at {number(frequency, 3)} Hz" if exponent else name
         unit = _EXPONENT.sub("", parameter.unit).removesuffix("*s") if exponent else parameter.unit
         values = [float(np.exp(value) if of_ratio else value) for value in (one[i], two[i])]

@@ -256,7 +256,7 @@ class Cells:
             hint = "open it in a spreadsheet program and save it again"
             return self.error("the workbook has formulas whose values were not saved", hint=hint)
         return self.error(
-            "the cell is empty" if cell == "" else "this is no finite number, or one beyond every rig",
+            "the cell is empty" if cell == "" else "this is not a finite number, or beyond the range of every rig",
             line=line,
             column=column,
             found=f'"{cell}"{also}',

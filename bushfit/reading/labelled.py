@@ -183,6 +183,6 @@ def note_not_understood(
             listed = ", ".join(values[:4]) + ", ..." * (len(values) > 4)
             yield (
                 f'"{header}" (column {index + 1}) varies from row to row ({listed}) and is not understood: all '
-                f'rows count as one test; rows = {{ "{header}" = "{values[0]}" }} in the campaign selects '
+                f'rows are one test; rows = {{ "{header}" = "{values[0]}" }} in the campaign selects '
                 "those alone"
             )

@@ -133,9 +133,8 @@ class Reduction:
             if np.abs(miss).max() > MISSED_LEVEL:
                 low, high = (factor * level * (1.0 + end) for end in (miss.min(), miss.max()))
                 sentences.append(
-                    f"the rig reached {low:.4g} to {high:.4g} {unit} at the level of {factor * level:.4g} {unit}: |K| "
-                    f"there is up to {number(100 * steepest * np.abs(miss).max(), 2)} % from that at the level "
-                    "(fits use the amplitude that was reached)"
+                    f"the rig reached {low:.4g} to {high:.4g} {unit} instead of {factor * level:.4g} {unit}: "
+                    f"this changes |K| by up to {number(100 * steepest * np.abs(miss).max(), 2)} % (fits use the reached amplitude)"
                 )
         coarse = [step for step in steps if step.rows_per_cycle < _FEW_ROWS_PER_CYCLE]
         if coarse:
@@ -149,7 +148,7 @@ class Reduction:
         if bent:
             worst = max(bent, key=lambda step: step.displacement_distortion)
             sentences.append(
-                f"the displacement is no clean sine at {len(bent)} of {len(steps)} points: up to "
+                f"the displacement is not a clean sine at {len(bent)} of {len(steps)} points: up to "
                 f"{number(100 * worst.displacement_distortion, 2)} % harmonic distortion ({worst.frequency:.4g} Hz, "
                 f"{factor * worst.amplitude:.3g} {unit})"
             )

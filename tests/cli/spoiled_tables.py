@@ -31,7 +31,7 @@ IN_LOOP = [
     ("newtons for kilonewtons", every("force [N]", "force [kN]"), "campaign.toml: the moduli of these tests are outside those of all rubbers", "MPa is that of no rubber: check the units"),
     ("no time", lambda lines: text([line.partition(",")[2] for line in lines]), "loop.csv, line 1: there is no column for the time", 'name the column in the campaign: columns = { time = "..." }, or state rate = "10 mm/min",'),
     ("an amplitude of its own for every cycle", lambda lines: text([lines[0], *(f"{n / 50},{a * np.sin(n * np.pi / 25):.5f},{400 * a * np.sin(n * np.pi / 25 + 0.1):.3f}" for n in range(300) for a in [1 + n // 50])]), "loop.csv: no part of the record is a loop", "record more cycles of each amplitude, best five"),
-    ("displacements of 1e300", column(1, "1e300"), 'loop.csv, line 2, column "displacement [mm]": this is no finite number, or one beyond every rig'),
+    ("displacements of 1e300", column(1, "1e300"), 'loop.csv, line 2, column "displacement [mm]": this is not a finite number, or beyond the range of every rig'),
     ("displacements of 1e-300", lambda lines: "\n".join([lines[0], *(f"{cells[0]},{cells[1]}e-300,{cells[2]}" for cells in (line.split(",") for line in lines[1:]))]), 'loop.csv, column "displacement [mm]": the displacement never changes'),
     ("a time of 1e-300", lambda lines: "\n".join([lines[0], *(f"{number}e-300,{line.partition(',')[2]}" for number, line in enumerate(lines[1:]))]), 'loop.csv, column "time [s]": the record takes no time'),
     ("zeros far behind the head", lambda lines: ("\n".join(lines) + "\n").encode() * 40 + bytes(5), "loop.csv, line ", "this is not text", "found: byte 0x00"),

@@ -193,7 +193,7 @@ def test_run_with_an_effect_shows_what_diagnose_shows(root: Path, tmp_path: Path
         assert done.stderr.count(words) == 1
     assert "model with the added effects" in done.stderr
     assert "was not fitted, and the model misses it" not in done.stderr, "of the joint fit, which is not the one to use"
-    assert f"{tmp_path / 'x/model.json'}, with sleeve_compliance; joint.json is the fit without" in done.stderr
+    assert f"{tmp_path / 'x/model.json'}, with sleeve_compliance; joint.json: the fit without effects" in done.stderr
 
 
 def both(bushfit: Run, campaign: str, folder: Path) -> tuple[Done, Done]:

@@ -137,7 +137,7 @@ def test_m_is_compared_at_a_frequency_where_alpha_is_free_and_alone_where_it_is_
     one = known(paper_model, np.diag([1e8, 1e6, 1e-6, 1e4, 1e-8]))
     other = replace(one, model=paper_model.with_values({"alpha": 0.25, "m": 1.9e5}))
     found = rows(against(one, other))
-    assert found["m"].note == "only at equal alpha"
+    assert found["m"].note == "comparable only at equal alpha"
     assert found["m"].p is None
     omega = 2.0 * np.pi * np.sqrt(155.0)
     row = found["m at 12.4 Hz"]
@@ -147,7 +147,7 @@ def test_m_is_compared_at_a_frequency_where_alpha_is_free_and_alone_where_it_is_
     found = rows(against(*held))
     assert list(found) == list(FIVE)
     assert found["m"].p == pytest.approx(1.0)
-    assert found["alpha"].note == "held in both"
+    assert found["alpha"].note == "fixed in both"
 
 
 def test_holm_is_holm() -> None:
