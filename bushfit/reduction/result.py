@@ -134,7 +134,8 @@ class Reduction:
                 low, high = (factor * level * (1.0 + end) for end in (miss.min(), miss.max()))
                 sentences.append(
                     f"the rig reached {low:.4g} to {high:.4g} {unit} instead of {factor * level:.4g} {unit}: "
-                    f"this changes |K| by up to {number(100 * steepest * np.abs(miss).max(), 2)} % (fits use the reached amplitude)"
+                    f"this changes |K| by up to {number(100 * steepest * np.abs(miss).max(), 2)} % (fits use the "
+                    "reached amplitude)"
                 )
         coarse = [step for step in steps if step.rows_per_cycle < _FEW_ROWS_PER_CYCLE]
         if coarse:
