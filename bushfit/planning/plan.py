@@ -127,7 +127,7 @@ def describe_purpose(search: PlanSearch, test: int) -> str:
     if request.aim == "rivals":
         chi_square, closer = problem.nearest_rivals(counts), problem.nearest_rivals(reduced)
         if closer * _NOTABLE_RATIO <= chi_square:
-            return f"expected chi-square of rivals {number(chi_square, 2)}, {number(closer, 2)} without this run"
+            return f"chi-square of rivals: {number(closer, 2)} without this run, {number(chi_square, 2)} with this run"
     elif problem.goals:
         widened = [
             goal for goal in problem.goals if goal.half_width(wider) >= _NOTABLE_RATIO * goal.half_width(covariance)
@@ -135,7 +135,7 @@ def describe_purpose(search: PlanSearch, test: int) -> str:
         if widened:
             goal = max(widened, key=lambda goal: goal.half_width(wider) / goal.target.half_width)
             without, planned = (percent(goal.half_width(errors), 3) for errors in (wider, covariance))
-            return f"{goal.target}: {planned}, {without} without this run"
+            return f"{goal.target}: {without} without this run, {planned} with this run"
     else:
         if request.aim == "predictions":
             name, ratio = "stiffness", np.sqrt(np.sum(wider * problem.weight) / np.sum(covariance * problem.weight))

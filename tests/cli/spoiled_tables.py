@@ -19,7 +19,7 @@ IN_LOOP = [
     ("unit of another kind", every("force [N]", "force [mm]"), 'loop.csv, line 1, column "force [mm]": the unit does not fit', "a force, such as N"),
     ("unknown columns", every("force [N]", "gadget"), "loop.csv, line 1: there is no column for the force", 'name the column in the campaign: columns = { force = "..." }'),
     ("two force columns", lambda lines: text([line + "," + (line.split(",")[2] if at == 0 else "1") for at, line in enumerate(lines)]), "loop.csv, line 1: more than one column could be the force", "give each column its own header"),
-    ("cells of text", lambda lines: text([lines[0], *(line.replace("0.", "abc", 1) for line in lines[1:])]), 'loop.csv, line ', 'column "time [s]": this is no finite number', "a number such as 12.5", "more such rows"),
+    ("cells of text", lambda lines: text([lines[0], *(line.replace("0.", "abc", 1) for line in lines[1:])]), 'loop.csv, line ', 'column "time [s]": this is not a finite number', "a number such as 12.5", "more such rows"),
     ("cells too many", lambda lines: text([lines[0], *(line + ",1" * (at % 2) for at, line in enumerate(lines[1:]))]), "the row does not match the header", "3 cells", "more such rows"),
     ("decimal commas in a comma file", every(".", ","), "loop.csv, line 2: the row does not match the header", "separate the columns by semicolons if numbers have a decimal comma"),
     ("time stands still", column(0, "1.0"), 'loop.csv, line 3, column "time [s]": time does not increase', "a later time on every row"),
