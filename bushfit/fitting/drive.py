@@ -108,6 +108,7 @@ class Drive:
         """Displacement without noise [m or rad], (n,), at phases in cycles, (n,)."""
         return series(self.coefficients, phase)
 
+    @cached_property
     def first_harmonic(self) -> complex:
         """Complex stiffness of the loop at its fundamental, force over displacement [N/m or N m/rad]."""
         root = np.sqrt(self.weight)
@@ -234,7 +235,7 @@ def prepare_drive(loop: Loop, *, without_outliers: bool = False) -> Drive:
 
 def _check_loses_energy(drive: Drive) -> None:
     """Raise a FitError if the force lags behind the displacement by more than noise and the rig's delay explain."""
-    stiffness = drive.first_harmonic()
+    stiffness = drive.first_harmonic
     rows = drive.weight.sum() / drive.row_noise.rows_as_one
     chance = drive.noise * np.sqrt(2.0 / rows) / abs(drive.coefficients[1])
     if stiffness.imag < -max(_CERTAIN * chance, _NO_LOSS * abs(stiffness)):

@@ -87,7 +87,7 @@ class MeasuredLoop(MeasuredBase):
     @cached_property
     def measured(self) -> Array:
         """Complex stiffness of the loop's first harmonic [N/m or N m/rad], (1,); of a sweep, of each point, (n,)."""
-        return np.array([self.drive.first_harmonic()])
+        return np.array([self.drive.first_harmonic])
 
     @property
     def size(self) -> int:

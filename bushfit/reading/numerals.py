@@ -8,7 +8,7 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import product
 
 #: Blanks that separate thousands: plain, unbreakable and thin ones.
@@ -83,8 +83,9 @@ class NumeralEvidence:
     contrary: tuple[Place, str] | None = None
 
 
+@lru_cache(maxsize=4096)
 def is_like_number(text: str) -> bool:
-    """Return True if a cell is a number in any notation."""
+    """Return True if a cell is a number in any notation; cached, because each first row is looked at several times."""
     return _LIKE_NUMBER.fullmatch(text) is not None and any(way.allows(text) for way in ALL_NUMERALS)
 
 

@@ -125,7 +125,7 @@ def test_many_rows_are_binned_without_loss(paper_model: Model) -> None:
     print(f"{loop.force.size} rows in {drive.force.size} bins: reduced chi-square {reduced:.3f}")
     assert 0.9 < reduced < 1.15
     few = prepare_drive(measured(paper_model, cycles=5.0, rows=500))
-    assert drive.first_harmonic() == pytest.approx(few.first_harmonic(), rel=2e-3)
+    assert drive.first_harmonic == pytest.approx(few.first_harmonic, rel=2e-3)
 
 
 def with_hole(loop: Loop, begin: float, end: float) -> Loop:
