@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from bushfit.campaign.campaign import Campaign, load_campaign, model_of
-from bushfit.campaign.schema import SimulateSettings
+from bushfit.campaign.simulated import SimulateSettings
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint, fit_two_step

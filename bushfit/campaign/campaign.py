@@ -11,14 +11,8 @@ from typing import Any
 from bushfit.campaign.bodies import specimens_of
 from bushfit.campaign.copies import without_copied_repeats, without_copied_tests
 from bushfit.campaign.quantities import Compound, EffectsSettings, ReportSettings, embedded
-from bushfit.campaign.schema import (
-    CampaignFile,
-    FitSettings,
-    ParameterSetting,
-    PredictSettings,
-    RigSettings,
-    SimulateSettings,
-)
+from bushfit.campaign.schema import CampaignFile, FitSettings, ParameterSetting, PredictSettings, RigSettings
+from bushfit.campaign.simulated import SimulateSettings
 from bushfit.campaign.toml import parse_toml
 from bushfit.effects import effect_name_of, place_suffix, with_base
 from bushfit.errors import CampaignError, error_location, quote_path

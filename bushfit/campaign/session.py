@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulatedTest
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulatedTest
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.geometry import Bushing, Place, unit_strain
 from bushfit.reading.measurement import Loop, Sweep

@@ -189,7 +189,7 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
 
 def _print_tests(output: Output, outcome: PlanOutput) -> None:
     """Print a table of the planned tests with the number of runs of each."""
-    from bushfit.campaign.schema import SimulatedLoop
+    from bushfit.campaign.simulated import SimulatedLoop
     from bushfit.planning.contract import motions
 
     programme, rows = outcome.plan.planned, []

@@ -14,7 +14,7 @@ from bushfit.errors import ModelError, UnitError, error_location
 from bushfit.units import is_number, parse_quantity
 
 if TYPE_CHECKING:
-    from bushfit.campaign.schema import SimulateSettings
+    from bushfit.campaign.simulated import SimulateSettings
     from bushfit.model.model import Model
 
 
@@ -59,7 +59,7 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
     Writes campaign.toml, its test files, and truth.json (the model that was simulated).
     """
     from bushfit.campaign.campaign import load_campaign, model_of
-    from bushfit.campaign.schema import SimulateSettings
+    from bushfit.campaign.simulated import SimulateSettings
     from bushfit.commands.loading import load_model
     from bushfit.commands.simulate import simulate_campaign
 

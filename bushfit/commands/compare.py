@@ -1,29 +1,25 @@
 """compare: several results compared with the first, or model families on one campaign."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import partial
 from string import ascii_uppercase
 from typing import Any
 
-import numpy as np
-
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
-from bushfit.commands.fit import fit, prepare_tests
+from bushfit.commands.families import COMPOUND, family_to_use, fit_campaign_families
+from bushfit.commands.fit import fit
 from bushfit.commands.loading import HasResult, as_result
 from bushfit.commands.predict import Numbers, grid_of, requested_preloads, table_columns
-from bushfit.diagnosis.evidence import result_of
-from bushfit.diagnosis.families import FittedFamily, fit_families
-from bushfit.effects import Level
+from bushfit.diagnosis.families import FittedFamily
 from bushfit.errors import BushfitError, ModelError
-from bushfit.fitting.assess import lack_of_fit
-from bushfit.geometry import Place, Specimen, default_places, get_places
+from bushfit.geometry import Place, default_places, get_places
 from bushfit.model.document import BushingTable
 from bushfit.model.file import model_document, versions
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import warnings_of
-from bushfit.prediction.comparison import Comparison, holm, with_holm
+from bushfit.prediction.comparison import Comparison, with_holm
 from bushfit.prediction.comparison import compare as compare_two
 from bushfit.prediction.grid import common_grid, requested_grid
 from bushfit.reading.measurement import Source, Sweep
@@ -32,20 +28,11 @@ from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFil
 from bushfit.report.compared import ComparisonDocument, contrast_table
 from bushfit.report.page.comparison import comparison_page
 from bushfit.report.results import ResultFile
-from bushfit.units import format_range, number
 from bushfit.validation import to_json_data
 from bushfit.version import __version__
 
 #: Maximum number of results, limited by the colours of a figure and the columns of a table.
 MOST = 8
-#: Specimen whose modulus over strain is compared if the results have no direction in common.
-_COMPOUND = Specimen("compound", "modulus")
-#: Probability from which on a family is a possible explanation.
-_LIKELY = 0.05
-#: Relative difference of moduli below which families agree: the scatter of bushings of one batch.
-_AGREED = 0.05
-#: Factor by which the comparison of families extends the tested range, and number of points in it.
-_BEYOND, _POINTS = 10.0, 400
 #: `asdict` for records whose type the type checker does not know.
 _plain: Callable[[Any], Any] = asdict
 
@@ -139,7 +126,12 @@ def compare(
     """
     grid = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
     if families is not None and isinstance(reference, Campaign) and not others:
-        entries, fitted, notes = _fit_families(reference, families, directions)
+        fitted, results, notes = fit_campaign_families(reference, families, directions)
+        origin = str(reference.path), reference.sweeps, reference.sha256
+        entries = [
+            ComparedResult(family.name, origin[0], result, *origin[1:])
+            for family, result in zip(fitted, results, strict=True)
+        ]
         return _compared(entries, grid, families=fitted, notes=notes, preload=preload, command=command)
     if families is not None or not 1 <= len(others) < MOST:
         raise BushfitError(
@@ -209,7 +201,7 @@ def _compared(
     )
     pairs = list(zip(labels[1:], comparisons, strict=True))
     words = [f"{label} against A, {line}" for label, comparison in pairs for line in comparison.sentences()]
-    advice = [_family_to_use(families, entries)] if families else []
+    advice = [family_to_use(families, results)] if families else []
     advice += [
         f"{label}, {family.name}: {family.words}" for label, family in zip(labels[1:], families[1:], strict=False)
     ]
@@ -305,68 +297,7 @@ def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> li
     common = [name for name in known[0] if all(name in places for places in known)]
     places = [[result.place(name) for result in results] for name in common]
     matching = [bodies for bodies in places if all(body.motion is bodies[0].motion for body in bodies)]
-    return matching or [[_COMPOUND] * len(results)]
-
-
-def _fit_families(
-    campaign: Campaign, names: Sequence[str], directions: Sequence[str] | None
-) -> tuple[list[ComparedResult], list[FittedFamily], list[str]]:
-    """Fit model families to a campaign: the model of [fit], then the named families, or all families of the library.
-
-    Args:
-        campaign: the campaign.
-        names: names of families; empty or None for all.
-        directions: directions or specimens whose tests are fitted; None for the default.
-
-    Returns:
-        Entries for the comparison, the fitted families in the same order, and notes.
-    """
-    data = prepare_tests(campaign)
-    data_sets = [data_set.with_weight() for data_set in data.select_tests(directions or None)]
-    model = data.starting_model(data.effects, data_sets, {})
-    fixed = [name for name, setting in campaign.fit.parameters.items() if not setting.vary]
-    families, unlikely = fit_families(model, data_sets, names, fixed, data.bounds)
-    adjusted = iter(holm([family.p for family in families if family.p is not None]))
-    families = [family if family.p is None else replace(family, p=next(adjusted)) for family in families]
-    entries = []
-    for family in families:
-        result = result_of(family.evidence, data.bounds, model.effects, rig=campaign.rig)
-        result = replace(result, specimens=campaign.specimens)
-        entries.append(ComparedResult(family.name, str(campaign.path), result, campaign.sweeps, campaign.sha256))
-    first, notes = families[0].evidence, list[str]()
-    if lack_of_fit(first.model, data_sets, first.parameters) is None:
-        notes.append("the first family meets these tests within their noise: the tests need no other family")
-    if unlikely:
-        percent = number(100.0 * sum(unlikely.values()), 2)
-        notes.append(f"{len(unlikely)} more families have a probability of {percent} % together: {', '.join(unlikely)}")
-    return entries, families, notes
-
-
-def _family_to_use(families: Sequence[FittedFamily], entries: Sequence[ComparedResult]) -> str:
-    """Sentence that names the most probable family, and the range over which all probable ones agree."""
-    rows = list(zip(ascii_uppercase, families, entries, strict=False))
-    label, family, entry = max(rows, key=lambda row: row[1].probability)
-    likely = [row for row in rows if row[1].probability >= _LIKELY and row[0] != label]
-    sentence = f"use {label}, {family.name}: probability {number(100.0 * family.probability, 2)} %"
-    if not likely or entry.result.measured is None:
-        return f"{sentence}; every other family is below {100.0 * _LIKELY:g} %"
-    models = [row.result.model.without(Level.INSTRUMENT) for row in (entry, *(row[2] for row in likely))]
-    ends = np.array([entry.result.measured.frequency, entry.result.measured.strain])
-    ends[1] /= entry.result.model.unit_strain(_COMPOUND)  # as laboratories state strain
-    middle, reach = np.sqrt(ends.prod(axis=1)), []
-    for axis, (low, high) in enumerate(ends):
-        points = np.repeat(middle[:, None], _POINTS, axis=1)
-        values = points[axis] = np.geomspace(low / _BEYOND, high * _BEYOND, _POINTS)
-        moduli = np.abs([model.stiffness(_COMPOUND, *points) for model in models])
-        differing = values[moduli.max(axis=0) > (1.0 + _AGREED) * moduli.min(axis=0)]
-        below, above = differing[differing < middle[axis]], differing[differing > middle[axis]]
-        reach.append((below.max(initial=values[0]), above.min(initial=values[-1])))
-    frequencies, strains = format_range("Hz", *reach[0]), format_range("%", *(100.0 * end for end in reach[1]))
-    return (
-        f"{sentence}; {', '.join(row[0] for row in likely)} (at least {100.0 * _LIKELY:g} %) have the same modulus "
-        f"within {100.0 * _AGREED:g} % over {frequencies} and {strains} shear strain; beyond that these tests cannot "
-        "distinguish them"
-    )
+    return matching or [[COMPOUND] * len(results)]
 
 
 def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:

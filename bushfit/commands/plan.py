@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from bushfit.campaign.campaign import Campaign, model_of
-from bushfit.campaign.schema import PredictSettings, RigSettings, SimulatedLoop
+from bushfit.campaign.schema import PredictSettings, RigSettings
+from bushfit.campaign.simulated import SimulatedLoop
 from bushfit.commands.fit import prepare_tests
 from bushfit.commands.predict import Numbers, grid_of
 from bushfit.effects.contract import Array

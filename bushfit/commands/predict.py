@@ -206,43 +206,34 @@ def predict(
         or (tested := sweep.conditions.temperature) is None
         or abs(np.mean(tested) - (temperature or REFERENCE)) <= SAME_TEMPERATURE
     ]
+    predictions, resonances, curves = list[Prediction](), list[PredictedResonance](), list[StaticCurve]()
     loads = [(place, preload) for place in places for preload in requested_preloads(result, place, preloads)]
-    predictions = [
-        predict_stiffness(
+    for place, preload in loads:
+        drawn = [
+            sweep
+            for sweep in drawn_sweeps
+            if sweep.direction == place and (preload is None or preload.equals(sweep.sweep.preload))
+        ]
+        prediction = predict_stiffness(
             result,
             place,
             *requested_grid(default_grid(result, place, sweeps), settings, place),
-            sweeps=[
-                sweep
-                for sweep in drawn_sweeps
-                if sweep.direction == place and (preload is None or preload.equals(sweep.sweep.preload))
-            ]
-            if measured
-            else None,
+            sweeps=drawn if measured else None,
             temperature=temperature,
             preload=preload if preloads else None,
             over=over,
         )
-        for place, preload in loads
-    ]
-    resonances = [
-        predict_resonance(
-            result, place, mass, base_acceleration, settings.frequencies, temperature=temperature, preload=preload
-        )
-        for place, preload in loads
-        if mass and base_acceleration
-    ]
-    curves = [
-        static_curve(
-            result,
-            prediction.direction,
-            static_reach(result, prediction.direction, prediction.amplitude, settings),
-            static_rate(result, prediction.direction, static_rates),
-            temperature=temperature,
-            preload=prediction.preload if preloads else None,
-        )
-        for prediction in (predictions if static or static_rates else ())
-    ]
+        predictions.append(prediction)
+        if mass and base_acceleration:
+            shaken = mass, base_acceleration, settings.frequencies
+            resonances.append(predict_resonance(result, place, *shaken, temperature=temperature, preload=preload))
+        if static or static_rates:
+            motion = (
+                static_reach(result, place, prediction.amplitude, settings),
+                static_rate(result, place, static_rates),
+            )
+            load = prediction.preload if preloads else None
+            curves.append(static_curve(result, place, *motion, temperature=temperature, preload=load))
     maxwell: tuple[Arms, ...] = ()
     if arms:
         frequency = np.concatenate([prediction.frequency for prediction in predictions])

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from bushfit.campaign.campaign import Campaign, load_campaign, model_of
-from bushfit.campaign.schema import SimulateSettings
+from bushfit.campaign.simulated import SimulateSettings
 from bushfit.commands.loading import HasResult, as_result
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.model.file import to_document

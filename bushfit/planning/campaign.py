@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.campaign.toml import body_lines, place_lines, toml_value
 from bushfit.effects import BASE, qualified_name
 from bushfit.geometry import Specimen

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
+from bushfit.campaign.schema import RigSettings
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.next_test import within_limits
 from bushfit.errors import ModelError
 from bushfit.geometry import TRANSLATION, Direction, Place, bushing_at

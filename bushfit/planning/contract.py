@@ -13,7 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
+from bushfit.campaign.schema import RigSettings
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.effects.contract import Array
 from bushfit.fitting.rig_class import ASSUMED
 from bushfit.geometry import Place, Specimen

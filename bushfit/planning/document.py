@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 from typing_extensions import TypedDict
 
-from bushfit.campaign.schema import SimulatedLoop
+from bushfit.campaign.simulated import SimulatedLoop
 from bushfit.planning.contract import Aim, Plan, motions
 from bushfit.planning.problem import RIVALS_APART
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.propose import missing_effects, sensitivity
 from bushfit.effects import Effect
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions

@@ -7,7 +7,8 @@ from itertools import chain
 
 import numpy as np
 
-from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
+from bushfit.campaign.schema import RigSettings
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.evidence import Evidence, fit, result_of
 from bushfit.diagnosis.propose import proposals
 from bushfit.diagnosis.record import Diagnosis

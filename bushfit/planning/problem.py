@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bushfit.campaign.schema import SimulatedLoop
+from bushfit.campaign.simulated import SimulatedLoop
 from bushfit.diagnosis.priors import DECISIVE_CHI_SQUARE
 from bushfit.effects import Effect
 from bushfit.effects.contract import Array

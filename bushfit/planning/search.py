@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from bushfit.campaign.schema import SimulatedSweep
+from bushfit.campaign.simulated import SimulatedSweep
 from bushfit.effects import qualified_name
 from bushfit.effects.contract import Array
 from bushfit.fitting.repeats import FEWEST_STEPS

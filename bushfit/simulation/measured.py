@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulatedTest, SimulateSettings
 from bushfit.campaign.session import planned_session
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulatedTest, SimulateSettings
 from bushfit.effects.contract import Array, RubberConditions
 from bushfit.geometry import Specimen
 from bushfit.model.model import Model

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bushfit.campaign.schema import (
+from bushfit.campaign.session import planned_session
+from bushfit.campaign.simulated import (
     SimulatedLoop,
     SimulatedRecord,
     SimulatedResonance,
     SimulatedSweep,
     SimulateSettings,
 )
-from bushfit.campaign.session import planned_session
 from bushfit.effects import Level, Modifier, friction
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
 from bushfit.effects.history import History

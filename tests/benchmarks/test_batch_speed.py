@@ -22,7 +22,7 @@ from bushfit.batch.manifest import RowSettings, read_manifest
 from bushfit.batch.row import RowTask
 from bushfit.batch.run import run_batch
 from bushfit.batch.summary import BatchPlan
-from bushfit.campaign.schema import SimulateSettings
+from bushfit.campaign.simulated import SimulateSettings
 from bushfit.model.model import Model
 from bushfit.report.results import Formats
 from bushfit.simulation.files import to_files

@@ -10,7 +10,7 @@ import pytest
 from shell import Run, values
 
 from bushfit.campaign.campaign import load_campaign
-from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Sweep

@@ -8,7 +8,7 @@ import pytest
 from rigged import PLAN, SHARED, Diagnosed, Effects, Fitted, Measured
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import SimulateSettings
+from bushfit.campaign.simulated import SimulateSettings
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.rig_errors import in_scatter_units

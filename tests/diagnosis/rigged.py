@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.workflow import diagnose

@@ -16,7 +16,7 @@ from rigged import said
 from tries import some
 
 from bushfit.campaign.campaign import load_campaign, model_of
-from bushfit.campaign.schema import SimulateSettings
+from bushfit.campaign.simulated import SimulateSettings
 from bushfit.commands.diagnose import diagnose as diagnose_campaign
 from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.workflow import diagnose

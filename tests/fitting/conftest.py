@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import SimulateSettings
+from bushfit.campaign.simulated import SimulateSettings
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.model import Model
 from bushfit.simulation.measured import measure

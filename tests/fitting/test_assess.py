@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.assess import FitStage, covariance
 from bushfit.fitting.coordinates import jacobian

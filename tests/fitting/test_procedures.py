@@ -13,7 +13,8 @@ import pytest
 from tries import SEEDS
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import UNSTATED, FitSettings, ParameterSetting, RigSettings, SimulateSettings
+from bushfit.campaign.schema import UNSTATED, FitSettings, ParameterSetting, RigSettings
+from bushfit.campaign.simulated import SimulateSettings
 from bushfit.errors import FitError
 from bushfit.fitting.levels import level_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign

@@ -9,7 +9,8 @@ import pytest
 from tries import SEEDS
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
+from bushfit.campaign.schema import RigSettings
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import fit_joint

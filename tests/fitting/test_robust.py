@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import FitSettings, SimulatedSweep
+from bushfit.campaign.schema import FitSettings
+from bushfit.campaign.simulated import SimulatedSweep
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction

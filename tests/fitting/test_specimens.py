@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import FitSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.campaign.schema import FitSettings
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.commands.fit import campaign_files, fit
 from bushfit.commands.predict import predict as predict_campaign
 from bushfit.diagnosis.workflow import diagnose

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from looking import NOISE, SEEDS, look, plan, without
 
-from bushfit.campaign.schema import SimulatedLoop, SimulateSettings
+from bushfit.campaign.simulated import SimulatedLoop, SimulateSettings
 from bushfit.errors import BushfitError, FitError
 from bushfit.geometry import Direction, Specimen
 from bushfit.inspection.gathering import gather

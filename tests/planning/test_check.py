@@ -8,7 +8,8 @@ import pytest
 
 from bushfit.campaign.campaign import load_campaign, model_of
 from bushfit.campaign.quantities import Compound, Polymer
-from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.campaign.schema import RigSettings
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction, Specimen

@@ -8,7 +8,8 @@ import pytest
 
 from bushfit.campaign.campaign import load_campaign
 from bushfit.campaign.quantities import Compound
-from bushfit.campaign.schema import RigSettings, SimulatedLoop, SimulatedSweep
+from bushfit.campaign.schema import RigSettings
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.commands.plan import plan as plan_tests
 from bushfit.effects import get_effect
 from bushfit.effects.contract import Array

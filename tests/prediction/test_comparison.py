@@ -8,7 +8,7 @@ from scipy.stats import binom, false_discovery_control
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
-from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.effects.contract import Array
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bushfit.campaign.schema import SimulatedSweep, SimulateSettings
+from bushfit.campaign.simulated import SimulatedSweep, SimulateSettings
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction, Shape

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bushfit.campaign.schema import SimulateSettings
+from bushfit.campaign.simulated import SimulateSettings
 from bushfit.effects.contract import Array
 from bushfit.fitting.drive import prepare_drive
 from bushfit.geometry import Direction

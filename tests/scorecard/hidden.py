@@ -13,7 +13,7 @@ import numpy as np
 from numpy.random import Generator
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.diagnosis.evidence import fit
 from bushfit.effects import BASE, LIBRARY, Effect, get_effect, qualified_name
 from bushfit.effects.contract import Array

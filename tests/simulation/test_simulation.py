@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bushfit.campaign.schema import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulateSettings
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedResonance, SimulatedSweep, SimulateSettings
 from bushfit.effects import BASE, LIBRARY, get_effect, qualified_name
 from bushfit.geometry import Direction, Specimen
 from bushfit.model import rig
