@@ -177,7 +177,7 @@ def split_rows(source: TestSource) -> tuple[list[TestSource], list[str]]:
         table, _ = recognize_table(source.file, source.without("direction", "specimen_number").test_options)
         columns = dict(table.row_labels)
         if "run" in columns and "time" in table.roles:
-            time = table.read({"time": table.roles["time"]}, fewest_rows=1)["time"]
+            time = table.read({"time": table.roles["time"]}, fewest_rows=1)[0]["time"]
             if np.all(np.diff(time) > 0.0):
                 del columns["run"]
     except BushfitError:  # which the inspection of the file reports

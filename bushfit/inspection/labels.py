@@ -26,7 +26,7 @@ def count_temperatures(table: Table) -> int:
     """Number of temperatures in a table: 0 without a temperature column, 1 for one temperature, 2 for several."""
     if (column := table.roles.get("temperature")) is None:
         return 0
-    found = table.read({"temperature": column}, fewest_rows=1)["temperature"]
+    found = table.read({"temperature": column}, fewest_rows=1)[0]["temperature"]
     return 1 if np.ptp(found) <= ONE_TEST else 2
 
 

@@ -62,15 +62,15 @@ def inspect_file(file: Path, test_options: Mapping[str, Any], of_book: Labels = 
     kind: Kind = "sweep"
     measured: Loop | Sweep
     if is_sweep:
-        measured = read_sweep(**reader_arguments(file, read_as, entry, SweepFile))
+        measured = read_sweep(**reader_arguments(table, read_as, entry, SweepFile))
         facts, odd = describe_sweep(measured, by_name)
         if amplitude := table.roles.get("amplitude"):
             counted = amplitude.convention is not None
             if "peak-to-peak" in (amplitude.convention, entry.get("amplitude")):
                 facts["amplitudes"] += f', half of "{amplitude.header}", which is peak-to-peak'
     else:
-        measured, entry, turned = read_either_sign(file, read_as, entry, table)
-        settings = reader_arguments(file, read_as, entry, LoopFile)["test"]
+        measured, entry, turned = read_either_sign(table, read_as, entry)
+        settings = reader_arguments(table, read_as, entry, LoopFile)["test"]
         kind, (facts, odd) = classify_recording(measured, by_name, settings)
         odd = turned + odd
         if "preload" in facts:
@@ -102,7 +102,7 @@ def read_history(file: Path, test_options: Mapping[str, Any]) -> tuple[Loop, Dir
         )
     direction = test_direction(file, table, test_options)
     entry = campaign_entry(table, direction, test_options, is_sweep=False)
-    return read_loop(**reader_arguments(file, direction or Direction.AXIAL, entry, LoopFile)), direction
+    return read_loop(**reader_arguments(table, direction or Direction.AXIAL, entry, LoopFile)), direction
 
 
 def campaign_entry(
@@ -133,12 +133,12 @@ def campaign_entry(
 
 
 def reader_arguments(
-    file: Path, place: Place, entry: Mapping[str, Any], schema: type[LoopFile] | type[SweepFile]
+    table: Table, place: Place, entry: Mapping[str, Any], schema: type[LoopFile] | type[SweepFile]
 ) -> dict[str, Any]:
     """Keyword arguments of `read_loop` or `read_sweep` for a test file with the given campaign keys.
 
     Args:
-        file: test file.
+        table: table of the file, which is not opened again.
         place: direction or specimen.
         entry: keys of the test's table in a campaign.
         schema: dataclass of the table, for a loop or a sweep.
@@ -146,35 +146,32 @@ def reader_arguments(
     Returns:
         Keyword arguments of the reader.
     """
-    specimens = [place] if isinstance(place, Specimen) else []
+    file, specimens = table.file, [place] if isinstance(place, Specimen) else []
     tested = {} if specimens else {"direction": str(place)}
     test = validate_tables({**entry, "file": str(file), **tested}, file, schema)
     with error_location(file, "at_amplitude"):  # which alone is converted there
-        return {**next(reader_keywords(Path(), [test], specimens)), "name": file.stem}
+        return {**next(reader_keywords(Path(), [test], specimens)), "file": table.opened, "name": file.stem}
 
 
-def read_either_sign(
-    file: Path, place: Place, entry: dict[str, Any], table: Table
-) -> tuple[Loop, dict[str, Any], list[str]]:
+def read_either_sign(table: Table, place: Place, entry: dict[str, Any]) -> tuple[Loop, dict[str, Any], list[str]]:
     """Read a loop, and reverse the sign of its force if the force falls while the displacement rises.
 
     Args:
-        file: test file.
+        table: table of the file.
         place: direction or specimen.
         entry: keys of the test's table in a campaign.
-        table: table of the file.
 
     Returns:
         The loop, its keys in a campaign, and a list with a sentence on the reversed force, if any.
     """
     try:
-        return read_loop(**reader_arguments(file, place, entry, LoopFile)), entry, []
+        return read_loop(**reader_arguments(table, place, entry, LoopFile)), entry, []
     except MeasurementError as error:
         turned = {**entry, "force_sign": -1}
         try:
             if "force_sign" in entry:
                 raise
-            loop = read_loop(**reader_arguments(file, place, turned, LoopFile))
+            loop = read_loop(**reader_arguments(table, place, turned, LoopFile))
         except BushfitError:
             raise error from None
     odd = (
@@ -222,7 +219,7 @@ def describe_columns(table: Table, *, is_sweep: bool) -> tuple[ColumnDescription
     wanted = {
         role: column for role, column in table.roles.items() if role in ranged and table.holds_numbers(column.index)
     }
-    values = table.read(wanted, fewest_rows=1)  # the scales of `roles` are 1: not in SI
+    values, _ = table.read(wanted, fewest_rows=1)  # the scales of `roles` are 1: not in SI
     columns = [ColumnDescription(header, None, None) for header in table.headers]
     for key, (index, _) in table.row_labels.items():
         columns[index] = ColumnDescription(table.headers[index], key.replace("_", " "), None)

@@ -99,7 +99,7 @@ def _side_by_side(
     above = [(line.number, split(line.content, layout.delimiter)) for line in reversed(head)]
     groups = [[Line(number, cell) for number, cells in above for cell in cells[side] if cell][:1] for side in sides]
     lines = [
-        (line.number, cells_of(line, layout))
+        (line.number, cells_of(line, layout.delimiter))
         for line in source.lines(layout.lines_before_data)
         if not is_comment(line.content, layout.delimiter)
     ]
@@ -128,7 +128,7 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
         texts = [line.content] if isinstance(line.content, str) else [c for c in line.content if isinstance(c, str)]
         is_note = not layout.numbered and is_comment(line.content, layout.delimiter)
         if is_note or any(map(_LETTER.search, texts)):
-            cells = [str(cell) for cell in cells_of(line, layout)]
+            cells = [str(cell) for cell in cells_of(line, layout.delimiter)]
             is_same = has_meaning and [vocabulary.heading(cell) or cell for cell in cells] == meanings
             if is_same or layout.is_repeated(cells):
                 is_new = True
@@ -145,10 +145,10 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
             groups = [*groups, between] if rows else [[*above, *between]]
         else:  # rows that are left out later, with a note
             notes = (part for part in between if not is_comment(part.content, layout.delimiter))
-            rows += [(part.number, cells_of(part, layout), len(groups) - 1) for part in notes]
-        rows.append((line.number, cells_of(line, layout), len(groups) - 1))
+            rows += [(part.number, cells_of(part, layout.delimiter), len(groups) - 1) for part in notes]
+        rows.append((line.number, cells_of(line, layout.delimiter), len(groups) - 1))
         between, is_new = [], False
-    return groups, [*rows, *((line.number, cells_of(line, layout), len(groups) - 1) for line in between)]
+    return groups, [*rows, *((line.number, cells_of(line, layout.delimiter), len(groups) - 1) for line in between)]
 
 
 def _label_columns(
@@ -191,12 +191,12 @@ def _label_columns(
 
 def _with_complex_parts(source: RowSource, layout: Layout) -> tuple[RowSource, Layout]:
     """Replace each column of complex numbers by two columns, real and imaginary part."""
-    first = [cells_of(line, layout) for line in islice(source.lines(layout.lines_before_data), _FIRST)]
+    first = [cells_of(line, layout.delimiter) for line in islice(source.lines(layout.lines_before_data), _FIRST)]
     indices = {n for row in first for n, cell in enumerate(row) if isinstance(cell, str) and _COMPLEX.fullmatch(cell)}
     if not indices or max(indices) >= len(layout.headers):
         return source, layout
     headers, row_of_units = list(layout.headers), list(layout.units)
-    lines = [(line.number, list(cells_of(line, layout))) for line in source.lines(layout.lines_before_data)]
+    lines = [(line.number, list(cells_of(line, layout.delimiter))) for line in source.lines(layout.lines_before_data)]
     for index in sorted(indices, reverse=True):
         name, unit = units.split_header(headers[index])
         headers[index : index + 1] = [f"{name} {part}{f' [{unit}]' if unit else ''}" for part in ("real", "imaginary")]

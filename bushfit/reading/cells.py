@@ -11,9 +11,10 @@ from typing import Any
 from bushfit.errors import MeasurementError
 from bushfit.reading.headers import WORDS, Column
 from bushfit.reading.instruments import word_for_part
-from bushfit.reading.layout import FileFormat, Layout, is_comment, is_row, is_summary_row
+from bushfit.reading.layout import Layout, is_comment, is_row, is_summary_row
 from bushfit.reading.measurement import Floats
 from bushfit.reading.numerals import ALL_NUMERALS, Numerals, Place, consistent_notations, is_like_number
+from bushfit.reading.parts import OpenedFile
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 from bushfit.reading.times import clock
 
@@ -39,24 +40,27 @@ class Cells:
     """Header and rows of a table as in its file, before conversion to numbers.
 
     Args:
-        file: path of the test file.
+        opened: test file, with its format as the user states it.
         source: part of the file that contains the table.
         layout: location of the table, with its headers, units row and delimiter.
-        stated: format of the file as the user states it.
         roles: recognised columns, by role such as "force".
         selected: positions of the rows of the test among those of `all_rows`, from 0; None for all.
         needed: indices of columns that must contain a number; a row without one is not a row of data.
         clocks: indices of columns that contain times as texts, such as 20:07:10.
     """
 
-    file: Path
+    opened: OpenedFile
     source: RowSource
     layout: Layout
-    stated: FileFormat
     roles: Mapping[str, Column] = field(default_factory=dict, kw_only=True)
     selected: frozenset[int] | None = field(default=None, kw_only=True)
     needed: frozenset[int] = field(default=frozenset(), kw_only=True)
     clocks: frozenset[int] = field(default=frozenset(), kw_only=True)
+
+    @property
+    def file(self) -> Path:
+        """Path of the test file."""
+        return self.opened.file
 
     @property
     def headers(self) -> tuple[str, ...]:
@@ -107,7 +111,7 @@ class Cells:
         try:
             for line in (block or self.source).lines(self.layout.lines_before_data):
                 if self.layout.numbered or not is_comment(line.content, self.layout.delimiter):
-                    cells = cells_of(line, self.layout)
+                    cells = cells_of(line, self.layout.delimiter)
                     if any(cell != "" for cell in cells):
                         cells = [*cells, *[""] * (len(self.headers) - len(cells))]
                         yield line.number, cells, self.fault(cells)
@@ -172,10 +176,9 @@ class Cells:
         numeric = [index for index, cell in enumerate(first) if notation.allows(cell)]
         if not indices <= {*numeric}:
             return None  # pandas takes TRUE for 1
-        labels = range(numeric[0])
-        types = dict.fromkeys(numeric, float) | dict.fromkeys(labels, "category")
-        frame = block.frame(self.layout, types, len(first), notation.decimal)
-        if frame is None or any(is_summary_row([str(text)]) for index in labels for text in frame[index].unique()):
+        frame = block.frame(self.layout, dict.fromkeys(numeric, float), len(first), notation.decimal)
+        words = block.first_words(self.layout.delimiter) if numeric[0] else ()
+        if frame is None or any(is_summary_row([word]) for word in words):
             return None
         block.clean.add((block.before, indices))
         return {index: frame[index].to_numpy() for index in indices}
@@ -360,7 +363,7 @@ class Cells:
 
     def possible_numerals(self) -> tuple[Numerals, ...]:
         """Return the notations of numbers that agree with the decimal mark and thousands separator the user states."""
-        decimal, thousands = self.stated.decimal, self.stated.thousands
+        decimal, thousands = self.opened.stated.decimal, self.opened.stated.thousands
         fitting = (way for way in ALL_NUMERALS if decimal in (None, way.decimal))
         notations = tuple(way for way in fitting if thousands in (None, way.thousands or "none"))
         if not notations:

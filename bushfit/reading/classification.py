@@ -47,19 +47,12 @@ _LOSSES = {"phase", "loss_factor", "loss_stiffness", "damping_coefficient", "dam
 _QUALIFIERS = {kind: frozenset(map(plain, words)) for kind, words in WORDS["qualifiers"].items()}
 #: Names of a strain that may be part of a compound, such as Scherdeformation.
 _STRAINS = [name for name in map(plain, WORDS["straining"]["displacement"]) if len(name) > 4]
-#: Role of a column without a known name, by its unit and the words in its name; in this order.
-_BY_UNIT: tuple[tuple[str, tuple[str, ...], str | None], ...] = (
-    ("time", ("s",), None),
-    ("displacement", ("m", "rad"), None),
-    ("force", ("N", "N*m"), None),
-    ("storage_stiffness", ("N/m", "N*m/rad", "Pa"), "real"),
-    ("loss_stiffness", ("N/m", "N*m/rad", "Pa"), "imaginary"),
-    ("stiffness", ("N/m", "N*m/rad"), None),
-    ("force_amplitude", ("N", "N*m"), "amplitude"),
-    ("frequency", ("Hz",), None),
-    ("amplitude", ("m", "rad", "1"), "amplitude"),
-    ("phase", ("rad",), None),
-)
+#: Roles of columns without a known name, found by their unit; and the kind of word that the name must contain, if any.
+_BY_UNIT: dict[str, str | None] = {
+    **dict.fromkeys(("time", "displacement", "force")),
+    **{"storage_stiffness": "real", "loss_stiffness": "imaginary", "stiffness": None, "force_amplitude": "amplitude"},
+    **{"frequency": None, "amplitude": "amplitude", "phase": None},
+}
 
 
 def classify(
@@ -190,7 +183,7 @@ def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | No
     conventions = {convention for convention in (heading.convention, *(part[1] for part in parsed)) if convention}
     logarithm = next((base for *_, base in reversed(parsed) if base), heading.logarithm)
     unit, convention = next(iter(texts), None), next(iter(conventions), None)
-    column = Column(heading.role, cells.headers[index], index, unit, 1.0, convention, logarithm)
+    column = Column(heading.role, unit, convention, logarithm, header=cells.headers[index], index=index)
     if len(texts) > 1 or len(conventions) > 1:
         raise UnitError(
             f"two units for the {heading.role.replace('_', ' ')}",
@@ -280,18 +273,20 @@ def _add_by_unit(
         words = {plain(word) for word in name.replace("_", " ").replace("/", " ").split()}
         if not words & _QUALIFIERS["not_measured"]:
             in_row, of_row, _ = parse_unit(cells.layout.units[index])
-            column = Column("", header, index, in_row or unit, 1.0, convention or of_row)
+            column = Column("", in_row or unit, convention or of_row, header=header, index=index)
             is_strain = motion is STRAINING and any(strain in plain(name) for strain in _STRAINS)
             free[column] = words | ({"amplitude"} if column.convention or is_strain else set())
     notes, amplitude = [], _QUALIFIERS["amplitude"]
-    for role, expected, qualifier in _BY_UNIT:
+    motions = (STRAINING,) if motion is STRAINING else (TRANSLATION, ROTATION)
+    for role, qualifier in _BY_UNIT.items():
         if role in roles or role not in names or (role == "phase" and _LOSSES & set(roles)):
             continue
         is_beside_stiffness = role in ("frequency", "amplitude", "phase")
         if is_beside_stiffness and not {"stiffness", "storage_stiffness", "force_amplitude"} & set(roles):
             continue
-        if not is_beside_stiffness or role == "amplitude":
-            expected = tuple(si for si in expected if (si in ("1", "Pa")) == (motion is STRAINING))
+        if motion is STRAINING and not (qualifier or is_beside_stiffness):
+            continue  # a ratio or a pressure may be any quantity
+        expected = {si_unit(role, kind) for kind in motions}
         fitting = [
             column
             for column, words in free.items()

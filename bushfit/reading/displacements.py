@@ -113,7 +113,7 @@ def read_displacements(
         roles = dict.fromkeys(stated, "displacement")
     wanted = {role: table.column(role, place) for place, role in roles.items()}
     wanted["time"] = time_column(table, next(iter(roles)))
-    values, notes = table.read_with_notes(wanted, fewest_rows=_FEWEST_ROWS)
+    values, notes = table.read(wanted, fewest_rows=_FEWEST_ROWS)
     time, more = increasing_time(table.needing(wanted), wanted["time"], values["time"])
     with error_location(table.file, "time"):
         even, correction = even_time(time)

@@ -204,36 +204,35 @@ def si_unit(role: str, motion: Motion) -> str:
 
 
 @dataclass(frozen=True)
-class Column:
-    """Column of a table, with its meaning.
+class Heading:
+    """Meaning of a header cell.
 
     Args:
         role: quantity in the column, such as "displacement".
-        header: text of the header cell.
-        index: position of the column, from 0.
         unit: unit as written in the file or campaign; None if there is none.
-        scale: factor from the unit to SI.
         convention: convention of an amplitude; None if neither header nor unit states it.
         logarithm: base of the logarithm if the column contains logarithms; 0 for plain values, NaN for an unknown base.
     """
 
     role: str
-    header: str
-    index: int
-    unit: str | None
-    scale: float = 1.0
-    convention: AmplitudeConvention | None = None
-    logarithm: float = 0.0
-
-
-@dataclass(frozen=True)
-class Heading:
-    """Meaning of a header cell: role of its column (such as "force"), unit, amplitude convention, and logarithm."""
-
-    role: str
     unit: str | None = None
     convention: AmplitudeConvention | None = None
     logarithm: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column(Heading):
+    """Column of a table, with its meaning.
+
+    Args:
+        header: text of the header cell.
+        index: position of the column, from 0.
+        scale: factor from the unit to SI.
+    """
+
+    header: str
+    index: int
+    scale: float = 1.0
 
 
 class Vocabulary:

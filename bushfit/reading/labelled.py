@@ -171,15 +171,12 @@ def note_not_understood(
     ]
     for index, texts in zip(unclear, column_texts(cells, *unclear), strict=True):
         header, is_number = cells.headers[index], cells.holds_numbers(index)
-        number, counts = np.unique(
-            texts.codes if rows is None else texts.codes[rows], return_inverse=True, return_counts=True
-        )[1:]
+        codes = texts.codes if rows is None else texts.codes[rows]
+        distinct, number, counts = np.unique(codes, return_inverse=True, return_counts=True)
         depends_on = [settled] if is_number else [(quantity,) for quantity in settled]
         explained = any(all(np.ptp(number[alike]) == 0 for alike in group_rows(*keys)) for keys in depends_on)
         if counts.size > 1 and not explained and not (is_number and counts.min() < _FEWEST_ROWS):
-            values = sorted(
-                texts.values[code] for code in np.unique(texts.codes if rows is None else texts.codes[rows])
-            )
+            values = sorted(texts.values[code] for code in distinct)
             listed = ", ".join(values[:4]) + ", ..." * (len(values) > 4)
             yield (
                 f'"{header}" (column {index + 1}) varies from row to row ({listed}) and is not understood: all '

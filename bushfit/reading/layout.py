@@ -34,6 +34,7 @@ _LONGEST_LINE = 1 << 20
 _LONGEST_HEADER = 10_000
 #: Non-empty lines below a header that are searched for its units row and first numbers; chosen: room for comments.
 _LINES_BELOW_HEADER = 8
+_DIGIT = re.compile(r"\d")
 _COMMENT_SIGNS = ("#", "%", "//")
 #: A number with a number sign: "#1".
 _NUMBERED = re.compile(r"#\s?\d+\b")
@@ -341,4 +342,4 @@ def is_units_row(cells: Sequence[str]) -> bool:
 def is_summary_row(cells: Sequence[str]) -> bool:
     """Return True if the first text of a row is a word such as "Mean" or "Std", so that it summarises other rows."""
     first = next(filter(None, cells), "")
-    return plain(first) in _SUMMARIES and not is_like_number(first)
+    return _DIGIT.search(first) is None and plain(first) in _SUMMARIES

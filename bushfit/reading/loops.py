@@ -9,6 +9,7 @@ from bushfit.geometry import Place
 from bushfit.reading.headers import LOOP_COLUMNS, Column
 from bushfit.reading.labelled import note_not_understood
 from bushfit.reading.measurement import Floats, Loop
+from bushfit.reading.parts import OpenedFile
 from bushfit.reading.preload import parse_preload
 from bushfit.reading.source import LEAST_VALUE
 from bushfit.reading.stated import LoopFile
@@ -21,11 +22,13 @@ _LATEST_SECOND = 1e11
 _FEWEST_LOOP_ROWS = 10
 
 
-def read_loop(file: Path, direction: Place, test: LoopFile, *, name: str | None = None, shared: bool = False) -> Loop:
+def read_loop(
+    file: Path | OpenedFile, direction: Place, test: LoopFile, *, name: str | None = None, shared: bool = False
+) -> Loop:
     """Read a hysteresis loop from a test file.
 
     Args:
-        file: path of a table with columns time (optional), displacement and force.
+        file: path, or opened file, of a table with columns time (optional), displacement and force.
         direction: direction of the bushing, or the specimen; it determines which headers and units are accepted.
         test: table [[loops]] of the campaign, with the information that the file does not contain.
         name: name of the loop; default the file name without its ending.
@@ -40,7 +43,7 @@ def read_loop(file: Path, direction: Place, test: LoopFile, *, name: str | None 
     rows = test.rows_of_test(shared=shared)
     table = Table.open(file, LOOP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
     wanted = loop_columns(table, direction, test)
-    values, notes = table.read_with_notes(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
+    values, notes = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
     table = table.needing(wanted)
     displacement, force = values["displacement"], values["force"]
     for role in ("displacement", "force"):
@@ -61,7 +64,7 @@ def read_loop(file: Path, direction: Place, test: LoopFile, *, name: str | None 
     else:
         time = test.clock(displacement)
     return Loop(
-        name or file.stem,
+        name or table.file.stem,
         direction,
         time,
         displacement,
@@ -120,7 +123,7 @@ def time_column(table: Table, place: Place) -> Column:
 def _has_day_numbers(table: Table, time: Column) -> bool:
     """Return True if a time column without a unit contains day numbers of a spreadsheet."""
     try:
-        return are_day_numbers(table.read({"time": time}, fewest_rows=1)["time"])
+        return are_day_numbers(table.read({"time": time}, fewest_rows=1)[0]["time"])
     except ValueError:
         return False
 
@@ -144,21 +147,17 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
     if column.index in table.clocks:
         time = without_midnight(time)
         time = time - time[0]
+    likelier_unit = "ms" if time.size and time[0] > _LATEST_SECOND else None
     if column.scale == 1.0 and column.unit and are_day_numbers(time):
+        likelier_unit = "d"
+    if likelier_unit:
+        kind = "milliseconds since 1970" if likelier_unit == "ms" else "day numbers of a spreadsheet"
         raise table.error(
-            "these times look like day numbers of a spreadsheet, not seconds",
-            column=column,
-            found=f"{time[0]:.9g} {column.unit} to {time[-1]:.9g} {column.unit}",
-            expected="times in seconds, or days",
-            hint='units = { time = "d" } in the campaign; or subtract the first time from all',
-        )
-    if time.size and time[0] > _LATEST_SECOND:
-        raise table.error(
-            "these times look like milliseconds since 1970, not seconds",
+            f"these times look like {kind}, not seconds",
             column=column,
             found=f"{time[0] / column.scale:.15g} {column.unit or 's'} in the first row",
-            expected="times in seconds",
-            hint='units = { time = "ms" } in the campaign; or subtract the first time from all',
+            expected="times in seconds" if likelier_unit == "ms" else "times in seconds, or days",
+            hint=f'units = {{ time = "{likelier_unit}" }} in the campaign; or subtract the first time from all',
         )
     stuck = time[1:] <= time[:-1]
     if stuck.any() and (even := spread(time)) is not None:

@@ -4,6 +4,8 @@ import re
 import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
+from functools import reduce
+from operator import or_
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -125,10 +127,8 @@ def labels_in_names(*names: str) -> Labels:
 
     Numbers without a unit, such as dates and part numbers, are not read as amplitudes.
     """
-    labels = NO_LABELS
-    for name in names:
-        labels |= _labels_in_name(unicodedata.normalize("NFC", name))
-    return labels
+    normalized = (unicodedata.normalize("NFC", name) for name in names)
+    return reduce(or_, map(_labels_in_name, normalized), NO_LABELS)
 
 
 def _labels_in_name(name: str) -> Labels:
@@ -170,10 +170,7 @@ def labels_above(lines: Iterable[Line]) -> Labels:
 
     Unknown names and quantities without a unit are ignored.
     """
-    labels = NO_LABELS
-    for line in lines:
-        labels |= _label_in_line(line)
-    return labels
+    return reduce(or_, map(_label_in_line, lines), NO_LABELS)
 
 
 def _label_in_line(line: Line) -> Labels:

@@ -69,7 +69,7 @@ def read_resonance(table: Table, direction: Place, base_acceleration: float | No
         MeasurementError, UnitError: a column, a unit or a value cannot be used.
     """
     wanted = _resonance_columns(table, direction, has_stated_base=base_acceleration is not None)
-    values = table.read(wanted, fewest_rows=FEWEST_ROWS)
+    values, _ = table.read(wanted, fewest_rows=FEWEST_ROWS)
     table.check_positive(_POSITIVE, wanted, values)
     ratio, base = _transmissibility(values, base_acceleration)
     bad = ~(np.isfinite(ratio) & (base > 0.0) & (ratio != 0.0))

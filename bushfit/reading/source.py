@@ -79,6 +79,12 @@ class Text:
         marks = APOSTROPHES if sign == "'" else '"' if sign == layout.delimiter == "," else sign
         return any(self.data.find(mark.encode(), start) >= 0 for mark in marks)
 
+    def first_words(self, delimiter: str) -> set[str]:
+        """Return the distinct texts without digits that are the first cell of a row."""
+        mark = re.escape(delimiter).encode()
+        first = re.compile(rb'\n[ \t"%b]*([^\d\r\n"%b]+)(?=["\r\n%b])' % (mark, mark, mark))
+        return {word.decode("utf-8", "replace").strip() for word in set(first.findall(b"\n" + self.data))}
+
     def frame(self, layout: Layout, types: Mapping[int, Any], width: int, decimal: str) -> Any:
         """Read columns of a block with pandas.
 
@@ -204,13 +210,13 @@ Group = tuple[str, list[Channel], Sequence[tuple[Any, ...]]]
 RowSource = Text | Sheet
 
 
-def cells_of(line: Line, layout: Layout) -> Sequence[str | float]:
+def cells_of(line: Line, delimiter: str) -> Sequence[str | float]:
     """Return the cells of a line of text or row of a sheet; numbers of a sheet remain numbers.
 
     Raises:
         csv.Error: the line or a quoted cell is far too long; the message has the line number.
     """
     try:
-        return split(line.content, layout.delimiter) if isinstance(line.content, str) else line.content
+        return split(line.content, delimiter) if isinstance(line.content, str) else line.content
     except csv.Error as error:
         raise csv.Error(f"{error}, line {line.number}") from error

@@ -14,6 +14,7 @@ from bushfit.geometry import Place, strain_factor_of_files
 from bushfit.reading.headers import AGREEING_PAIRS, SWEEP_COLUMNS, ZERO_TO_PEAK, AmplitudeConvention, Column, si_unit
 from bushfit.reading.labelled import column_texts, note_not_understood
 from bushfit.reading.measurement import SAME_TEMPERATURE, Floats, Sweep
+from bushfit.reading.parts import OpenedFile
 from bushfit.reading.preload import parse_preload
 from bushfit.reading.runs import runs_of
 from bushfit.reading.stated import SweepFile
@@ -40,7 +41,7 @@ _HINTS = {
 
 
 def read_sweep(
-    file: Path,
+    file: Path | OpenedFile,
     direction: Place,
     test: SweepFile,
     *,
@@ -51,9 +52,9 @@ def read_sweep(
     """Read a stepped-sine sweep from a test file.
 
     Args:
-        file: path of a long or wide table (see `wide`) with columns frequency, amplitude and one of PAIRS. Optional
-            columns: repeat (by default, an operating point that occurs again is a repeat), amplitude reached,
-            temperature, and relative error.
+        file: path, or opened file, of a long or wide table (see `wide`) with columns frequency, amplitude and one of
+            PAIRS. Optional columns: repeat (by default, an operating point that occurs again is a repeat), amplitude
+            reached, temperature, and relative error.
         direction: direction of the bushing, or the specimen.
         test: table [[sweeps]] of the campaign, with the information that the file does not contain. Its temperature
             selects rows of a file with several temperatures.
@@ -77,7 +78,7 @@ def read_sweep(
         )
     stated = {role: value for role, value in constants.items() if value is not None}
     columns = sweep_columns(table, direction, pair, stated, test.amplitude)
-    values, notes = table.read_with_notes(columns, fewest_rows=_FEWEST_SWEEP_ROWS)
+    values, notes = table.read(columns, fewest_rows=_FEWEST_SWEEP_ROWS)
     table = table.needing(columns)
     table.check_positive(_POSITIVE, columns, values)
     for role, value in stated.items():
@@ -104,7 +105,7 @@ def read_sweep(
         reached = amplitude
     unknown = note_not_understood(table, table.row_labels, selected, frequency, runs.amplitude)
     return Sweep(
-        name or file.stem,
+        name or table.file.stem,
         direction,
         frequency,
         runs.amplitude,

@@ -3,7 +3,6 @@
 import csv
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from itertools import islice
@@ -48,13 +47,11 @@ class Table(Cells):
     """Table of a test whose columns have roles, such as "force", and can be read in SI.
 
     Args:
-        checksum: SHA-256 of the file, which may still be running in a thread.
         names: usual column names by role, before adaptation to the motion.
         motion: kind of motion: translation, rotation or strain.
         notes: sentences on columns that were recognised only by their unit.
     """
 
-    checksum: Future[str]
     names: Mapping[str, Sequence[str]]
     motion: Motion
     notes: tuple[str, ...] = field(default=(), kw_only=True)
@@ -96,13 +93,12 @@ class Table(Cells):
 
         def lay_out(source: RowSource) -> tuple[RowSource, Layout]:
             """Return source and layout of the table in a part of the file, as a long table without blocks."""
-            delimiter = DELIMITERS[file_format.delimiter] if file_format.delimiter else None
-            delimiter = "" if isinstance(source, Sheet) else delimiter
+            delimiter = "" if isinstance(source, Sheet) else DELIMITERS.get(file_format.delimiter or "")
             layout = source.layout or find_layout(
                 source.head(), vocabulary, delimiter=delimiter, header_line=file_format.header_line
             )
             may_be_wide = "amplitude" in names and file_format.header_line is None
-            if may_be_wide and (wide := unpivot(source, opened.file, vocabulary, layout, delimiter)):
+            if may_be_wide and (wide := unpivot(source, opened.file, vocabulary, layout)):
                 return wide
             return combined(source, layout, vocabulary)
 
@@ -116,7 +112,7 @@ class Table(Cells):
             found = f"header_line = {file_format.header_line}"
             problem, hint = "there is no header on this line", "lines count from 1"
             raise MeasurementError(problem, file=opened.file, found=found, hint=hint)
-        table = cls(opened.file, source, layout, file_format, opened.checksum, names, motion)
+        table = cls(opened, source, layout, names, motion)
         if len(table.headers) < 2:
             expected = f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks"
             raise table.header_error("there is only one column", expected=expected)
@@ -136,7 +132,7 @@ class Table(Cells):
     @property
     def sha256(self) -> str:
         """SHA-256 of the file in hexadecimal digits."""
-        return self.checksum.result()
+        return self.opened.checksum.result()
 
     @cached_property
     def row_labels(self) -> Mapping[str, tuple[int, Sequence[str]]]:
@@ -249,18 +245,7 @@ class Table(Cells):
             problem = f"this is a test of {found}"
             raise self.header_error(problem, found=f'"{header}" for the {label}', expected=expected, hint=hint)
 
-    def read(self, wanted: Mapping[str, Column], *, fewest_rows: int) -> dict[str, Floats]:
-        """Return the values of columns in SI by role, (n,) each.
-
-        Args:
-            wanted: columns by role, with their factors to SI.
-            fewest_rows: smallest number of rows that is accepted.
-        """
-        return self.read_with_notes(wanted, fewest_rows=fewest_rows)[0]
-
-    def read_with_notes(
-        self, wanted: Mapping[str, Column], *, fewest_rows: int
-    ) -> tuple[dict[str, Floats], tuple[str, ...]]:
+    def read(self, wanted: Mapping[str, Column], *, fewest_rows: int) -> tuple[dict[str, Floats], tuple[str, ...]]:
         """Read columns, and list the rows that are left out.
 
         Args:

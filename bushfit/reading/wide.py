@@ -19,9 +19,9 @@ from bushfit import units
 from bushfit.errors import MeasurementError
 from bushfit.reading.blocks import COUNTED
 from bushfit.reading.headers import AmplitudeConvention, Vocabulary, split_convention
-from bushfit.reading.layout import DELIMITERS, Layout, is_comment, is_row, split
+from bushfit.reading.layout import Layout, is_comment, is_row
 from bushfit.reading.numerals import is_like_number, plainest_value
-from bushfit.reading.source import RowSource, Sheet
+from bushfit.reading.source import RowSource, Sheet, cells_of
 
 #: Roles of the two stepped quantities: one varies down the rows and the other across the columns.
 _STEPPED = ("frequency", "amplitude")
@@ -80,9 +80,7 @@ class _Meaning:
 _WideColumn = tuple[_Meaning, _Meaning, list[tuple[int, str | float, str | float]]]
 
 
-def unpivot(
-    source: RowSource, file: Path, vocabulary: Vocabulary, layout: Layout, delimiter: str | None
-) -> tuple[RowSource, Layout] | None:
+def unpivot(source: RowSource, file: Path, vocabulary: Vocabulary, layout: Layout) -> tuple[RowSource, Layout] | None:
     """Turn a wide table into a long one, which has a row for each frequency and amplitude.
 
     Args:
@@ -90,7 +88,6 @@ def unpivot(
         file: path, for errors.
         vocabulary: known column names.
         layout: layout of the file if it is read as a long table.
-        delimiter: character between cells; "" for a sheet; None to try all.
 
     Returns:
         Source and layout of the long table; None if the file has no wide table.
@@ -98,35 +95,33 @@ def unpivot(
     Raises:
         MeasurementError: the blocks have different frequencies or amplitudes, or do not state their quantity.
     """
-    roles = [heading.role for cell in layout.headers if (heading := vocabulary.heading(cell))]
+    roles, mark = [heading.role for cell in layout.headers if (heading := vocabulary.heading(cell))], layout.delimiter
     is_long = len(roles) > 2 and len(set(roles)) == len(roles) and not set(roles).isdisjoint(_STEPPED)
     if is_long or len(layout.headers) > _MOST_COLUMNS:
         return None
-    for mark in DELIMITERS.values() if delimiter is None else (delimiter,):
-        rows: list[_Row] = []
-        for number, content in source.head():
-            if not is_comment(content, mark):
-                cells = split(content, mark) if isinstance(content, str) else content
-                rows.append((number, [c[:_LONGEST_HEADER] if isinstance(c, str) else c for c in cells]))
-        blocks = list(_find_blocks(rows, vocabulary))
-        if series := [column for headers, data in blocks for column in _read_block(headers, data, vocabulary)]:
-            texts = (text for headers, _ in blocks for row in headers for text in row)
-            written = tuple(text for text in texts if any(m.role or m.stepped for m in _read_corner(text, vocabulary)))
-            sheet, long_layout = _long_table(series, source, file, vocabulary)
-            return sheet, replace(long_layout, delimiter=mark, written=written)
-    return None
+    lines = [(line.number, cells_of(line, mark)) for line in source.head() if not is_comment(line.content, mark)]
+    rows = [(n, [c[:_LONGEST_HEADER] if isinstance(c, str) else c for c in cells]) for n, cells in lines]
+    blocks = list(_find_blocks(rows, vocabulary))
+    series = [column for headers, data in blocks for column in _read_block(headers, data, vocabulary)]
+    if not series:
+        return None
+    texts = (text for headers, _ in blocks for row in headers for text in row)
+    written = tuple(text for text in texts if any(m.role or m.stepped for m in _read_corner(text, vocabulary)))
+    sheet, long_layout = _long_table(series, source, file, vocabulary)
+    return sheet, replace(long_layout, delimiter=mark, written=written)
 
 
 def _find_blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple[list[list[str]], list[_Row]]]:
     """Yield header rows and rows of numbers of each possible block, without the columns to its left and right."""
 
-    starts: list[int | None] = []
-    for _, cells in rows:
-        first = next((index for index, cell in enumerate(cells) if cell != ""), 0)
-        texts = [str(cell) for cell in cells]
-        starts.append(first if is_row(texts) and is_like_number(texts[first]) else None)
+    def first_number(index: int) -> int | None:
+        """Column of the first cell of a row of numbers; None for another row."""
+        texts = [str(cell) for cell in rows[index][1]]
+        first = next((column for column, text in enumerate(texts) if text), 0)
+        return first if is_row(texts) and is_like_number(texts[first]) else None
+
     end = 0
-    for start, run in groupby(range(len(rows)), key=starts.__getitem__):
+    for start, run in groupby(range(len(rows)), key=first_number):
         numbers = list(run)
         if start is None or len(numbers) < 2:
             continue
@@ -137,9 +132,9 @@ def _find_blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple
         headers = [[str(cell) for cell in cells] for _, cells in padded[: -len(numbers)]]
         corners = [[m.stepped for m in _read_corner(cell, vocabulary) if not m.level] for cell in (headers or [[]])[-1]]
         repeated = [n for n in range(start + 1, len(corners)) if any(corners[n]) and corners[n] == corners[start]]
-        for first, last in zip([start, *repeated], [*repeated, width], strict=True):
-            data = [(line, cells[first:last]) for line, cells in padded[-len(numbers) :]]
-            yield [cells[first:last] for cells in headers], data
+        for side in map(slice, [start, *repeated], [*repeated, width]):
+            data = [(line, cells[side]) for line, cells in padded[-len(numbers) :]]
+            yield [cells[side] for cells in headers], data
 
 
 def _read_block(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: Vocabulary) -> list[_WideColumn]:
@@ -246,15 +241,15 @@ def _long_table(
             quantity has two units.
     """
     by_role: dict[str | None, list[_WideColumn]] = {meaning.role: [] for meaning, *_ in series}
-    for one in sorted(series, key=lambda one: plainest_value(one[0].level or "")):
-        by_role[one[0].role].append(one)
+    for column in sorted(series, key=lambda column: plainest_value(column[0].level or "")):
+        by_role[column[0].role].append(column)
     down = {(first.stepped, first.level_unit, first.convention) for _, first, _ in series}
     across = {(meaning.stepped, meaning.level_unit, meaning.convention) for meaning, *_ in series}
     quantities = dict.fromkeys((meaning.role, meaning.unit, None) for meaning, *_ in series)
-    levels = [
+    steps = [
         [
-            (plainest_value(meaning.level or ""), [plainest_value(str(text)) for _, text, _ in points])
-            for meaning, _, points in columns
+            (plainest_value(m.level or ""), *(plainest_value(str(text)) for _, text, _ in points))
+            for m, _, points in columns
         ]
         for columns in by_role.values()
     ]
@@ -262,21 +257,20 @@ def _long_table(
     if None in by_role:
         problem = "the quantity of a block of this wide table is not stated"
         expected = "a quantity such as K* [N/mm] or tan delta above each block, or in each header"
-    elif any(block != levels[0] for block in levels):
+    elif any(block != steps[0] for block in steps):
         problem, expected = "the blocks of this wide table differ", "the same frequencies and amplitudes in all blocks"
     elif len(down) > 1 or len(across) > 1 or len(quantities) > len(by_role):
         problem = "this wide table states one quantity in two ways"
         expected = "one unit for each quantity, and levels of one kind"
     if problem:
-        plural = {"frequency": "frequencies", "amplitude": "amplitudes", None: "amplitudes"}
         kinds = Counter((m.role, m.unit, m.stepped, len(points)) for m, _, points in series)
         raise MeasurementError(
             problem,
             file=file,
             place=f'sheet "{source.sheet}"' if source.sheet else f"line {series[0][2][0][0] - 1}",
             found="; ".join(
-                f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of "
-                f"{count} {plural[stepped]}, {rows} rows"
+                f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of {count} "
+                f"{'frequencies' if stepped == 'frequency' else 'amplitudes'}, {rows} rows"
                 for (role, unit, stepped, rows), count in kinds.items()
             ),
             expected=expected,
@@ -286,13 +280,12 @@ def _long_table(
         f"{vocabulary.name_of(role or '')}{COUNTED[convention]}{f' [{unit}]' if unit else ''}"
         for role, unit, convention in (*down, *across, *quantities)
     ]
-    numbers: list[int] = []
-    rows: list[list[str | float]] = []
+    rows: list[_Row] = []
     for columns in zip(*by_role.values(), strict=True):
         text = columns[0][0].level or ""
         level = text if _GROUPED.fullmatch(text) else plainest_value(text)
-        for points in zip(*(points for *_, points in columns), strict=True):
-            numbers.append(points[0][0])
-            rows.append([points[0][1], level, *(cell for _, _, cell in points)])
-    sheet = Sheet(source.sheet or "", rows, numbers=numbers)
+        points = zip(*(points for *_, points in columns), strict=True)
+        rows += [(row[0][0], [row[0][1], level, *(cell for _, _, cell in row)]) for row in points]
+    numbers, content = zip(*rows, strict=True)
+    sheet = Sheet(source.sheet or "", content, numbers=numbers)
     return sheet, Layout("", tuple(headers), min(numbers) - 1, ("",) * len(headers), None)

@@ -117,7 +117,7 @@ def test_what_can_be_read_in_two_ways_is_refused(case: str, tmp_path: Path) -> N
         with pytest.raises(MeasurementError, match=r"two ways[\s\S]*decimal = "):
             table.read(wanted, fewest_rows=1)
     else:
-        assert table.read(wanted, fewest_rows=1)["force"][0] == force
+        assert table.read(wanted, fewest_rows=1)[0]["force"][0] == force
 
 
 def written(dialect: Dialect, folder: Path) -> Path:
