@@ -284,7 +284,7 @@ def _add_by_unit(
         is_beside_stiffness = role in ("frequency", "amplitude", "phase")
         if is_beside_stiffness and not {"stiffness", "storage_stiffness", "force_amplitude"} & set(roles):
             continue
-        if motion is STRAINING and not (qualifier or is_beside_stiffness):
+        if motion is STRAINING and (role == "force_amplitude" or not (qualifier or is_beside_stiffness)):
             continue  # a ratio or a pressure may be any quantity
         expected = {si_unit(role, kind) for kind in motions}
         fitting = [
