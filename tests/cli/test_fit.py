@@ -56,12 +56,7 @@ def second_off(own: Path, off: float, tilted: bool = False) -> None:
 
 
 @pytest.mark.parametrize(
-    ("off", "tilted", "told"),
-    [
-        (0.0, False, []),
-        (0.05, False, [REPEATS_OFF]),
-        (0.13, True, [ROWS_APART, REPEATS_OFF]),
-    ],
+    ("off", "tilted", "told"), [(0.0, False, []), (0.05, False, [REPEATS_OFF]), (0.13, True, [ROWS_APART, REPEATS_OFF])]
 )
 def test_repeats_that_disagree_do_not_excuse_themselves(own: Path, off: float, tilted: bool, told: list[str]) -> None:
     second_off(own, off, tilted)

@@ -123,11 +123,7 @@ CASES = {
     "both senses": (Rubber(c2=1.0, c3=8.0), metres(-1e-3, 0.0, 1e-3), ()),
     "not from zero": (STIFF, newtons(300.0, 600.0, 900.0), ()),
     "five positions": (Rubber(c3=8.0), metres(0.0, 5e-4, 1e-3, 1.5e-3, 2e-3), ()),
-    "five positions, stiffening added": (
-        Rubber(c3=8.0),
-        metres(0.0, 5e-4, 1e-3, 1.5e-3, 2e-3),
-        ("strain_stiffening",),
-    ),
+    "five positions, stiffening added": (Rubber(c3=8.0), metres(0.0, 5e-4, 1e-3, 1.5e-3, 2e-3), ("strain_stiffening",)),
     "no influence": (Rubber(), newtons(0.0, 500.0, 1000.0), ()),
 }
 

@@ -126,11 +126,5 @@ def process_dependent_viscosity(random: Generator) -> StressLaw:
 #: Rubbers by name.
 HELD_BACK_RUBBERS = {
     make.__name__: make
-    for make in (
-        intrinsic_time,
-        bouc_wen,
-        uniform_sliders,
-        softening_prony_series,
-        process_dependent_viscosity,
-    )
+    for make in (intrinsic_time, bouc_wen, uniform_sliders, softening_prony_series, process_dependent_viscosity)
 }

@@ -113,12 +113,7 @@ def _at_temperatures(plan: SimulateSettings, random: Generator) -> SimulateSetti
 
 
 def _sized(
-    plain: Model,
-    effect: Effect,
-    wanted: float,
-    plan: SimulateSettings,
-    random: Generator,
-    visible: tuple[float, float],
+    plain: Model, effect: Effect, wanted: float, plan: SimulateSettings, random: Generator, visible: tuple[float, float]
 ) -> dict[str, float]:
     """Values of an effect of which about the wanted size stays visible after a plain fit."""
     values = {

@@ -16,17 +16,7 @@ from mistaken_records import MISTAKEN
 from numpy.random import Generator
 from rubber_in_time import StrainHistory, StressLaw
 from scipy.signal import lfilter
-from time_rig import (
-    DIRECTIONS,
-    SAMPLES,
-    Array,
-    Bushing,
-    Change,
-    Response,
-    Rubber,
-    Tests,
-    respond,
-)
+from time_rig import DIRECTIONS, SAMPLES, Array, Bushing, Change, Response, Rubber, Tests, respond
 from visibility import CYCLES, ROUNDS, Noise, seen
 from working_kinds import WORKING
 from working_rubbers import WORKING_RUBBERS

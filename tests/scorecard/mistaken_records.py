@@ -22,11 +22,7 @@ def _loops(bench: Bench) -> Mask:
 
 
 def _register(
-    name: str,
-    sentence: str,
-    chosen: Callable[[Bench], Mask],
-    change: Callable[[Mask], Change],
-    **more: Any,
+    name: str, sentence: str, chosen: Callable[[Bench], Mask], change: Callable[[Mask], Change], **more: Any
 ) -> None:
     def made(bench: Bench) -> Sized:
         made = change(chosen(bench))
