@@ -33,7 +33,7 @@ USAGE = [
     ("predict|model.json|--bushing|loop.csv", "loop.csv"),
     ("predict|model.json|--temperature|40 degC", "the model has no effect of temperature"),
     ("predict|model.json|--temperature|warm", "--temperature: "),
-    ("predict|model.json|--arms|1e-9 %", "no error for arms", "0.0001 % up to 100 %"),
+    ("predict|model.json|--arms|1e-7 %", "no error for arms", "0.0001 % up to 100 %"),
     ("fit|campaign.toml|--direction|torsion", "campaign.toml: no test in the directions asked for", "torsion"),
     ("fit|campaign.toml|--effect|stiffness_factor.mount", "no such direction or specimen", "one of axial, radial, torsion"),
     ("fit|campaign.toml|--effect|inertai", "unknown effect", 'did you mean "inertia"?'),

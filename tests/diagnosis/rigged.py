@@ -102,12 +102,7 @@ TWO = {"delay": {"tau": 1e-4}, "strain_stiffening": {"c3": 20.0}}
 
 
 def asked(campaign: Campaign, model: Model | None = None, **settings: object) -> Diagnosis:
-    diagnosis = diagnose(PreparedCampaign.from_campaign(campaign), model, DiagnosisSettings(**settings))  # type: ignore[arg-type]
-    [
-        f"{label} {share:.3f}"
-        for label, (_, share) in zip(diagnosis.odds.labels, diagnosis.odds.explanations, strict=True)
-    ]
-    return diagnosis
+    return diagnose(PreparedCampaign.from_campaign(campaign), model, DiagnosisSettings(**settings))  # type: ignore[arg-type]
 
 
 def said(diagnosis: Diagnosis) -> str:

@@ -65,5 +65,3 @@ def test_what_no_passive_arms_can_do_is_refused() -> None:
     with pytest.raises(ModelError, match="no set of springs and dashpots") as refused:
         fitted_arms(lambda omega: 1e4j + 0.0 * omega, (5.0, 155.0), 0.01)
     assert "an error of" in str(refused.value)
-    with pytest.raises(ModelError, match="no error for arms"):
-        springpot(0.24, (5.0, 155.0), 1e-9)

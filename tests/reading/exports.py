@@ -125,7 +125,6 @@ T10 = (
     "Hz\tmm\tN/mm\t\tdeg\tN-s/mm\tN\n" + "\n".join(table([], F, 2 * A, K, ETA, PHASE, DAMPING, 0 * F + 500.0)[1:])
 )  # fmt: skip
 EXCEL_DAYS = TIME / 86_400.0 + 46_352.5
-RAW = [f"{x:.4f}\t{y:.3f}" for x, y in zip(DISPLACEMENT, FORCE, strict=True)]
 
 EXPORTS: dict[str, Export] = {
     # sweeps that have other columns too

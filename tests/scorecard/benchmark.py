@@ -12,13 +12,12 @@ from typing import Any
 import click
 import numpy as np
 from baselines import BASELINES
-from held_back_kinds import HELD_BACK
 from kinds import SIZES
 from lab_campaign import RUBBERS, campaign
 from listed_kinds import LISTED
 from mistaken_records import MISTAKEN
+from rig_faults import RIG_FAULTS
 from scipy.stats import binomtest
-from working_kinds import WORKING
 
 from bushfit.campaign.campaign import load_campaign
 from bushfit.commands.diagnose import diagnose
@@ -43,7 +42,7 @@ ToolAnswer = dict[str, Any]
 def tasks(seed: int, count: int) -> list[tuple[str, str, float, int, str]]:
     """Group, kind, size, seed and law of so many campaigns, in random order; 300 contain all of every group."""
     random = np.random.default_rng([seed, 300])
-    faults, records = [*WORKING, *HELD_BACK], [*MISTAKEN]
+    faults, records = [*RIG_FAULTS], [*MISTAKEN]
     drawn = [("own law", name, SIZES[turn], "") for turn in range(3) for name in LISTED]
     drawn += [("rig fault", name, SIZES[1 + turn], "") for turn in range(2) for name in faults]
     drawn += [("record", name, 0.0, "") for _ in range(2) for name in records]

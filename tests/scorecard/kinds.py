@@ -1,8 +1,7 @@
 """What a kind of discrepancy is made for and of: by a bench, what changes in rig, rubber, software or record.
 
 Kinds that a library of laws lists stand in listed_kinds.py, mistakes in files in mistaken_records.py, and kinds that no
-page of bushfit lists in working_kinds.py and, held back, in held_back_kinds.py: no verdict on those is looked at while
-anything is tuned. All but mistakes are brought to one of three sizes.
+page of bushfit lists in rig_faults.py. All but mistakes are brought to one of three sizes.
 """
 
 from __future__ import annotations

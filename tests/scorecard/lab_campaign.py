@@ -8,21 +8,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from held_back_kinds import HELD_BACK
-from held_back_rubbers import HELD_BACK_RUBBERS
 from kinds import Bench, Kind, Place, sized
 from listed_kinds import LISTED
 from mistaken_records import MISTAKEN
 from numpy.random import Generator
+from other_rubbers import HELD_BACK_RUBBERS, WORKING_RUBBERS
+from rig_faults import RIG_FAULTS
 from rubber_in_time import StrainHistory, StressLaw
 from scipy.signal import lfilter
 from time_rig import DIRECTIONS, SAMPLES, Array, Bushing, Change, Response, Rubber, Tests, respond
 from visibility import CYCLES, ROUNDS, Noise, seen
-from working_kinds import WORKING
-from working_rubbers import WORKING_RUBBERS
 
 #: Every kind by name.
-KINDS = WORKING | HELD_BACK | LISTED | MISTAKEN
+KINDS = RIG_FAULTS | LISTED | MISTAKEN
 #: Rubbers of other laws, and the effects of a list that describe their difference from the paper's rubber truly.
 RUBBERS = WORKING_RUBBERS | HELD_BACK_RUBBERS
 TRUE_OF_RUBBER: dict[str, tuple[str, ...]] = {

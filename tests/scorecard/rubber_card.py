@@ -12,11 +12,10 @@ import click
 import numpy as np
 import pandas as pd
 from click.testing import CliRunner
-from held_back_rubbers import HELD_BACK_RUBBERS
 from lab_campaign import campaign, draw
+from other_rubbers import HELD_BACK_RUBBERS, WORKING_RUBBERS
 from scipy.optimize import least_squares
 from time_rig import DIRECTIONS, SAMPLES, Array, Rubber, Tests, respond
-from working_rubbers import WORKING_RUBBERS
 
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.cli import cli

@@ -1,6 +1,6 @@
-"""Kinds of discrepancy: of the size asked for, the same for the same seed, written as bushfit reads them.
+"""What the campaigns are made of: kinds of discrepancy of the size asked for, rubbers of other laws, the rig in time.
 
-And the rig in time that makes them, against tables from outside and bushfit's closed forms: three roads to one number.
+Against tables from outside, closed forms, and bushfit's: three roads to one number.
 """
 
 from pathlib import Path
@@ -9,8 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from kinds import SIZES, Bench, largest, sized
-from lab_campaign import KINDS, a_specimen, campaign
-from time_rig import DIRECTIONS, Bushing, Rubber, Tests, friction, respond
+from lab_campaign import KINDS, RUBBERS, OtherRubber, a_specimen, campaign
+from rubber_card import evaluate
+from rubber_in_time import StrainHistory, fractional_derivative, relax, sliders
+from time_rig import DIRECTIONS, Bushing, Rubber, Tests, first_harmonic, friction, respond
 
 from bushfit import geometry
 from bushfit.effects import BASE
@@ -103,3 +105,48 @@ def test_friction_with_further_turns_is_that_walked_from_rest() -> None:
         walked.append(stress)
         before = value
     assert np.allclose(friction(wave[None, :], largest, half)[0], walked[-512:], atol=1e-5 * largest)
+
+
+PHASE = 2.0 * np.pi * np.arange(512) / 512
+
+
+def steady(frequency: float, amplitude: float = 1.0) -> StrainHistory:
+    return StrainHistory(amplitude * np.sin(PHASE)[None, :], np.array([[1.0 / (512 * frequency)]]), periodic=True)
+
+
+def test_relaxation_is_that_of_a_maxwell_element() -> None:
+    history = steady(2.0)
+    stress = relax(history, history.rate, np.full_like(history.rate, 1.0 / 0.05))
+    z = 2j * np.pi * 2.0 * 0.05
+    assert first_harmonic(stress) / first_harmonic(history.strain) == pytest.approx(z / (1.0 + z), rel=1e-3)
+
+
+def test_fractional_derivative_from_rest_becomes_the_steady_one() -> None:
+    from_rest = StrainHistory(np.tile(np.sin(PHASE), 12)[None, :], np.array([[1.0 / 512]]), periodic=False)
+    last = fractional_derivative(from_rest, 0.3)[:, -512:]
+    assert first_harmonic(last) / -1j == pytest.approx((2j * np.pi) ** 0.3, rel=1e-2)
+
+
+def test_a_slider_loses_four_times_its_yield_force_times_its_slip() -> None:
+    history = steady(1.0, amplitude=0.05)
+    stress = sliders(history, np.array([1e6]), np.array([0.01]))[0]
+    loss = np.sum(0.5 * (stress + np.roll(stress, 1)) * np.diff(history.strain[0], prepend=history.strain[0, -1]))
+    assert loss == pytest.approx(4.0 * 1e4 * (0.05 - 0.01), rel=2e-3)
+
+
+@pytest.mark.parametrize("rubber", RUBBERS)
+def test_every_rubber_is_stiffer_when_fast_and_softer_when_far(rubber: str) -> None:
+    law = OtherRubber(RUBBERS[rubber](np.random.default_rng(3)), 1e6)
+    frequency, amplitude = np.array([5.0, 100.0, 5.0]), np.array([1e-4, 1e-4, 5e-4])
+    tests = points(CMP, frequency, amplitude, 0)
+    slow, fast, far = respond(tests, law).stiffness
+    assert abs(far) < abs(slow) < abs(fast)
+    for value in (slow, fast, far):
+        assert 0.02 < value.imag / value.real < 0.3
+
+
+def test_a_campaign_is_evaluated_as_by_its_user() -> None:
+    misfit, least, covered, half_width = evaluate(("two_springpots", 538641422))
+    assert misfit >= 0.999 * least > 0.005
+    assert covered > 0.9
+    assert 0.005 < half_width < 0.03
