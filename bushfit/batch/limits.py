@@ -314,11 +314,11 @@ def limit_sentence(
     displayed = quantity.displayed(estimate.value)
     ends = [number(end * displayed.factor, 4) for end in (estimate.low, estimate.high) if end is not None]
     finite = [limit for limit in allowed if math.isfinite(limit)]
-    sentence = f"{quantity.name} {number(estimate.value * displayed.factor, 4)}"
-    sentence += f" {displayed.unit}" if displayed.unit != "-" else ""
+    unit = f" {displayed.unit}" if displayed.unit != "-" else ""
+    sentence = f"{quantity.name} {number(estimate.value * displayed.factor, 4)}{unit}"
     sentence += f" ({' to '.join(ends)})" if len(ends) == 2 else ""
     if finite:
         nearest = min(finite, key=lambda limit: abs(limit - estimate.value))
-        sentence += f", limit {number(nearest * displayed.factor, 4)}"
+        sentence += f", limit {number(nearest * displayed.factor, 4)}{unit}"
     sentence += f", at the {bound} bound of the fit" if bound else ""
     return sentence + (f": {result}" if result.startswith("conditional") else "")

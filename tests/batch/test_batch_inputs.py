@@ -142,7 +142,7 @@ def test_a_part_is_as_good_as_its_worst_and_the_words_say_why(tmp_path: Path) ->
     assert judged(read, quantities=known, verdict="named") == (
         "conditional fail",
         {"alpha": "alpha 0.26 (0.25 to 0.27), limit 0.252: conditional fail"},
-        {"mu": "mu 1.19 MPa (1.17 to 1.21), limit 1.2: conditional pass"},
+        {"mu": "mu 1.19 MPa (1.17 to 1.21), limit 1.2 MPa: conditional pass"},
     )
     assert judged(read, quantities=known, verdict="partly")[:2] == (
         "fail",
@@ -177,7 +177,7 @@ def test_a_part_whose_fit_misses_the_tests_is_judged_on_measured_points(tmp_path
     )  # fmt: skip
     measured = {stiffness: Estimate(3.99e5, 3.95e5, 4.03e5)}
     assert judged(read, quantities=poor, measured=measured) == (
-        "fail", {stiffness: f"measured {stiffness} 399 N/mm (395 to 403), limit 440"}, not_judged
+        "fail", {stiffness: f"measured {stiffness} 399 N/mm (395 to 403), limit 440 N/mm"}, not_judged
     )  # fmt: skip
     noisy = poor | {"reduced chi-square": Estimate(1.1)}
     assert judged(read, quantities=noisy, measured=measured)[1].keys() == {"mu"}, "noise is in the interval"

@@ -24,7 +24,7 @@ _WIDTH, _HEIGHT, _LEAST_SCALE = 110.0, 26.0, 0.005
 _DIFFERENT, _USUAL = "#b4500c", "#1f4e9c"
 #: Order of the rows: parts that need attention first.
 _ORDER = ("error", "fail", "conditional fail", "not judged", "differs", "conditional pass", "")
-#: Text columns that the table of parts contains if they differ between parts.
+#: Text columns that the table of parts contains if they differ between parts (the first: also from the part's name).
 _LABELS = ("campaign name", "subgroup", "verdict", "named effects", "on a bound")
 _TONES = {"pass": "good", "conditional pass": "fair", "not judged": "fair", "conditional fail": "bad", "fail": "bad"}
 
@@ -55,7 +55,8 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
         reported = (folder / part.folder / "report.html").exists()
         links.append(base + quote(part.folder) + ("/report.html" if reported else "/") if part.folder else "")
         listed.setdefault(status[-1], []).append((part, links[-1]))
-    labels = [name for name in _LABELS if len({part.labels.get(name, "") for part in parts}) > 1]
+    named_twice = all(part.labels.get("campaign name") in ("", part.name) for part in parts)
+    labels = [name for name in _LABELS[named_twice:] if len({part.labels.get(name, "") for part in parts}) > 1]
     heads = ["result"] * bool(batch.limits) + labels
     row_limit = max(1, _MOST_CELLS // (len(heads) + len(batch.quantities) + (4 if has_curves else 1)))
     ordered = sorted(range(len(parts)), key=lambda index: _ORDER.index(status[index]))
