@@ -1,6 +1,7 @@
 """Priors and ties of parameters in [fit] of a campaign."""
 
 import re
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,11 +13,12 @@ from bushfit.errors import CampaignError, error_location
 from bushfit.geometry import get_places
 from bushfit.model.constraints import Constraints, Prior, Tie
 from bushfit.model.file import load_result
+from bushfit.model.result import Result
 from bushfit.validation import unknown_key
 
 #: Number of a prior, and its value and standard deviation, each with a unit; one unit may serve both.
 _NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
-_PLUS_MINUS = re.compile(rf"\s*{_NUMBER}\s*(|[^\d\s+].*?)\s*(?:\+-|±)\s*{_NUMBER}\s*(|[^\d\s].*?)\s*")
+_PLUS_MINUS = re.compile(rf"\s*{_NUMBER}\s*(|[^\d\s+].*?)\s*(?:\+/?-|±)\s*{_NUMBER}\s*(|[^\d\s].*?)\s*")
 
 
 def constraints_of(campaign: Campaign) -> Constraints:
@@ -33,17 +35,21 @@ def constraints_of(campaign: Campaign) -> Constraints:
         ModelError: an earlier model that cannot be used, or an expression without a value.
     """
     settings = campaign.fit.parameters
-    priors, stated = list[Prior](), dict[str, str]()
+    priors = list[Prior]()
     for name, setting in settings.items():
+        text = setting.prior or ""
+        earlier = load_result(campaign.path.parent / text) if text.endswith(".json") else None
         with error_location(campaign.path, place=f"fit.{name}"):
             _check(setting)
-            if setting.prior:
-                priors.append(_prior(campaign, setting.prior, name))
-                stated[name] = setting.prior
+            if earlier:
+                priors.append(_from_result(campaign, earlier, text, only=name))
+            elif text:
+                priors.append(_prior(text, name))
     if whole := campaign.fit.prior:
+        earlier = load_result(campaign.path.parent / whole)
+        without = [name for name, setting in settings.items() if setting.prior or not setting.vary or setting.tie]
         with error_location(campaign.path, place="fit.prior"):
-            fixed = [name for name, setting in settings.items() if not setting.vary or setting.tie]
-            priors.append(_from_file(campaign, whole, without=(*stated, *fixed)))
+            priors.append(_from_result(campaign, earlier, whole, without=without))
     with error_location(campaign.path):
         return Constraints(priors, _ties(campaign))
 
@@ -60,11 +66,10 @@ def _check(setting: ParameterSetting) -> None:
         raise CampaignError("these keys exclude each other", found=found, expected=expected)
 
 
-def _prior(campaign: Campaign, text: str, name: str) -> Prior:
-    """Prior of one parameter, from a value with its standard deviation or from an earlier model."""
-    if text.endswith(".json"):
-        return _from_file(campaign, text, only=name)
-    if not (match := _PLUS_MINUS.fullmatch(text)):
+def _prior(text: str, name: str) -> Prior:
+    """Prior of one parameter, from a value with its standard deviation."""
+    match = _PLUS_MINUS.fullmatch(text)
+    if not match or (match[4] == "%" and not match[2]):  # 3 % may be of the value, or added to it
         expected = '"0.24 +- 0.03" (with a unit if the parameter has one), or the model.json of an earlier fit'
         raise CampaignError("this is no prior", found=f'"{text}"', expected=expected)
     parameter = get_parameter(name)
@@ -80,16 +85,18 @@ def _prior(campaign: Campaign, text: str, name: str) -> Prior:
     return Prior((name,), np.array([mean]), np.array([[deviation**2]]), text)
 
 
-def _from_file(campaign: Campaign, file: str, only: str | None = None, without: tuple[str, ...] = ()) -> Prior:
+def _from_result(
+    campaign: Campaign, result: Result, file: str, only: str | None = None, without: Sequence[str] = ()
+) -> Prior:
     """Prior from the fitted values and the covariance of an earlier model.
 
     Args:
         campaign: campaign whose tests the earlier fit must not have used.
-        file: model.json, relative to the campaign file.
+        result: earlier fit.
+        file: its model.json, as the campaign states it.
         only: name of the parameter that is taken; None for all fitted parameters that are free in the campaign.
         without: names of parameters that are not taken.
     """
-    result = load_result(campaign.path.parent / file)
     sources = [loop.source for loop in campaign.loops] + [sweep.source for sweep in campaign.sweeps]
     hashes = {source.sha256 for source in sources if source}
     if twice := [str(source.file) for source in result.inputs if source.sha256 in hashes]:

@@ -121,15 +121,17 @@ def prior_rows(model: Model, names: Sequence[str]) -> tuple[Array, Array]:
         names: names of the parameters of the derivatives.
 
     Returns:
-        Value minus prior mean in standard errors of the prior, (p,), and derivatives, (len(names), p).
+        Value minus prior mean in standard errors of the prior, (p,), and derivatives, (len(names), p). Parameters that
+        the model lacks have rows of zeros, so that p is the same for all models of a campaign.
     """
     residuals, slopes = [np.empty(0)], [np.empty((len(names), 0))]
     for prior in model.constraints.priors:
         coordinates = Coordinates.of_parameters(model, [name for name in prior.names if name in model.values])
         mean = dict(zip(prior.names, prior.mean.tolist(), strict=True))
         whitening = np.linalg.inv(np.linalg.cholesky(prior_covariance(prior, coordinates)))
-        residuals.append(whitening @ (coordinates.point(model.values) - coordinates.point(mean)))
-        slopes.append(coordinate_changes(model, names, coordinates.names) @ whitening.T)
+        absent = (0, len(prior.names) - len(coordinates.names))
+        residuals.append(np.pad(whitening @ (coordinates.point(model.values) - coordinates.point(mean)), absent))
+        slopes.append(np.pad(coordinate_changes(model, names, coordinates.names) @ whitening.T, ((0, 0), absent)))
     return np.concatenate(residuals), np.concatenate(slopes, axis=-1)
 
 

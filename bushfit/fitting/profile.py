@@ -14,6 +14,7 @@ import numpy as np
 from bushfit.errors import FitError
 from bushfit.fitting.assess import linear_errors, reduced_chi_square
 from bushfit.fitting.coordinates import Coordinates
+from bushfit.fitting.preparation import split_by_kind
 from bushfit.fitting.problem import FitResult
 from bushfit.fitting.solve import solve
 from bushfit.model.covariance import Z95, Covariance
@@ -134,7 +135,9 @@ def profile95(best: FitResult, covariance: Covariance) -> Mapping[str, Interval]
     half = np.array(
         [covariance.half_width_of(name) if name in covariance.names else 0.0 for name in names]
     )  # 0 of one at a bound
-    missed = any(test.model_error for test in best.minimised)  # how far it bends parameters, no weight tells
+    # how far a model error, or a gain of a loop that the weights do not contain, bends parameters, no weight tells
+    loops, _ = split_by_kind(best.minimised)
+    missed = any(test.model_error for test in best.minimised) or not all(loop.gain_weighs for loop in loops)
     widest = np.inf if missed else _WIDEST * Z95 * np.sqrt(_excess(best))
     allowed = np.clip(half / best.coordinates.slopes(best.model.values) / linear, Z95, widest)
     found: dict[str, Interval] = {}

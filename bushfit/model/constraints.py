@@ -82,7 +82,9 @@ class Tie:
         names = tuple(dict.fromkeys(pattern.findall(expression)))
         for used in names:
             if not is_parameter(used):
-                raise unknown_key(used, parameter_names())
+                error = unknown_key(used, parameter_names())
+                error.hint = error.hint or "expressions have values in SI units, without the units"
+                raise error
         code = pattern.sub(lambda match: f"p{names.index(match[0])}", expression)
         tie = cls(name, expression, names, code, file)
         tie.value({used: get_parameter(used).typical + 0j for used in names})  # complex, as for derivatives
@@ -110,6 +112,7 @@ class Tie:
                 place=f"fit.{self.name}",
                 found=self.expression,
                 expected="numbers, names of parameters, + - * / ** ( ), exp, log and sqrt",
+                hint="write ** for a power" if "^" in self.expression else None,
             ) from error
         return value
 

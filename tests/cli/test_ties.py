@@ -67,7 +67,7 @@ def test_a_tie_that_is_not_used_is_reported(
     assert re.search(rf"is not used: the model lacks {lacking}\n", done.stderr)
 
 
-@pytest.mark.parametrize("prior", [".24 +- .003", "+0.24 ± 3e-3"])
+@pytest.mark.parametrize("prior", [".24 +- .003", "+0.24 ± 3e-3", "24 % +/- 0.3 %"])
 def test_numbers_of_a_prior_are_written_in_any_way(bushfit: Run, root: Path, tmp_path: Path, prior: str) -> None:
     campaign = written(root, tmp_path, "cmp_15961_prior", f'[fit.alpha]\nprior = "{prior}"')
     bushfit("fit", campaign, "-o", tmp_path / "x", "--no-plots")
@@ -89,3 +89,34 @@ def test_the_spread_of_a_new_bushing_is_that_of_the_priors(
     table = pd.read_csv(tmp_path / "x/axial.csv")
     half = table["stiffness [N/mm], high"] / table["stiffness [N/mm]"] - 1.0
     assert half.min() == pytest.approx(1.96 * spread * (1.0 + 1.0 / 3.0) ** 0.5, rel=0.15)
+
+
+def test_a_tie_and_a_prior_of_a_branch_end_where_a_search_replaces_it(bushfit: Run, root: Path, tmp_path: Path) -> None:
+    tables = '[fit.sigma_fmax]\nexpression = "0.014 * mu"\n[fit.eps_half]\nprior = "0.013 +- 0.001"'
+    campaign = written(root, tmp_path, "cmp_15961_prior", tables)
+    bushfit("diagnose", campaign, "-o", tmp_path / "x", "--no-plots")
+    assert document(tmp_path / "x/diagnosis.json")["verdict"] == "consistent"
+
+
+def test_a_profile_contains_errors_that_the_weights_do_not(bushfit: Run, root: Path, tmp_path: Path) -> None:
+    """A tie determines alpha far better than the gain of the loop, which is assumed, allows."""
+    campaign = written(root, tmp_path, "cmp_15961_prior", '[fit.m]\nexpression = "0.18 * mu"')
+    bushfit("fit", campaign, "--profile", "-o", tmp_path / "x", "--no-plots")
+    alpha = document(tmp_path / "x/model.json")["parameters"]["alpha"]
+    assert alpha["profile95"] == pytest.approx(alpha["ci95"], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("key", "problem"),
+    [
+        ('expression = "mu ^ 0.8"', "try: write ** for a power"),
+        ('expression = "0.2 MPa"', "try: expressions have values in SI units, without the units"),
+        ('prior = "0.2 +- 3 %"', "this is no prior"),
+        ('prior = "none.json"', "none.json: there is no such file"),
+    ],
+)
+def test_what_is_no_tie_or_prior_has_a_next_step(
+    bushfit: Run, root: Path, tmp_path: Path, key: str, problem: str
+) -> None:
+    campaign = written(root, tmp_path, "cmp_15961_prior", f"[fit.alpha]\n{key}")
+    assert problem in bushfit("fit", campaign, "-o", tmp_path / "x", status=2).stderr
