@@ -1,6 +1,6 @@
 """Candidate refits: effects fitted together with all parameters of the model."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -59,35 +59,29 @@ def refitted(
         start_values = {name: value for name, value in start.items() if name in proposal.model.values}
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
             fits[proposal.name] = fit_from(proposal.model.with_values(start_values), tests, fixed, limits)
-    list(track("effects refitted", _descend(fits), len(fits)))
-    best = min((fit.chi_square for fit in fits.values()), default=0.0)
+    running, best = list(fits), 0.0
+    for _ in track("evaluations of effects", range(1, EVALUATIONS)):
+        for name in running:
+            fits[name] = fits[name].finished(fits[name].evaluations + 1)
+        best = min((fit.chi_square for fit in fits.values()), default=0.0)
+        for name in list(running):
+            fit = fits[name]
+            behind = fit.evaluations >= _FIRST and fit.chi_square - _MOST_FALL * fit.expected_fall >= best + _FAR
+            if fit.converged or behind:
+                running.remove(name)
+        if not running:
+            break
     near = {
-        name: fit
+        name: fit.solution
         for name, fit in fits.items()
         if fit.converged or fit.evaluations >= EVALUATIONS or fit.chi_square <= best + _FAR
     }
     if columns is None:
-        return {name: Evidence(fit.solution, evidence.data_sets) for name, fit in near.items()}
+        return {name: Evidence(solution, evidence.data_sets) for name, solution in near.items()}
     return {
-        name: Evidence(fit.solution.moved_to(fit.model, evidence.data_sets), evidence.data_sets, fit.solution)
-        for name, fit in near.items()
+        name: Evidence(solution.moved_to(solution.model, evidence.data_sets), evidence.data_sets, solution)
+        for name, solution in near.items()
     }
-
-
-def _descend(fits: dict[str, Descent]) -> Iterator[str]:
-    """Step all fits in turn, in place, until each has ended or fallen behind; yields the name of each that stops."""
-    running = list(fits)
-    while running:
-        for name in running:
-            fits[name] = fits[name].stepped()
-        limit = min(fit.chi_square for fit in fits.values()) + _FAR
-        for name in list(running):
-            fit = fits[name]
-            ended = fit.converged or fit.evaluations >= EVALUATIONS
-            behind = fit.evaluations >= _FIRST and fit.chi_square - _MOST_FALL * fit.expected_fall >= limit
-            if ended or behind:
-                running.remove(name)
-                yield name
 
 
 def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from bushfit.diagnosis.described import GapDescription, describe
 from bushfit.diagnosis.document import Verdict
 from bushfit.diagnosis.evidence import Evidence, fit, result_of
-from bushfit.diagnosis.holdout import hold_out
+from bushfit.diagnosis.holdout import HoldOut, hold_out
 from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis
 from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.next_test import deciding_test
@@ -52,6 +52,7 @@ class DiagnosisWriter:
     finding: Finding
     hypotheses: Sequence[Hypothesis]
     unresolved: Sequence[str]
+    _refitted: dict[Evidence, Evidence] = field(default_factory=dict)
 
     @property
     def request(self) -> DiagnosisRequest:
@@ -92,11 +93,12 @@ class DiagnosisWriter:
         why = f"lowers chi-square by {base.chi_square - plain.chi_square:.0f}{company}; {self._probability(first)}"
         entries = [NamedCause(name, why) for name in names]
         if self.finding.verdict == "named":
-            if _gap_stays(base, plain, names, request.bounds):
+            holdout = hold_out(base, plain, request.bounds)
+            if _gap_stays(holdout, plain, names, request.bounds):
                 finding = decide_verdict(self.hypotheses, request.tolerance, gap_stays=True)
                 return replace(self, finding=finding).diagnosis()
             summary = f"{' and '.join(names)} {'closes' if len(names) == 1 else 'close'} the gap"
-            return self._finished("named", summary, after, entries, places=first.best)
+            return self._finished("named", summary, after, entries, places=first.best, holdout=holdout)
         excess = [
             max(fitted.chi_square / sum(test.residual_count for test in fitted.data_sets) - 1.0, 0.0)
             for fitted in (base, plain)
@@ -241,6 +243,7 @@ class DiagnosisWriter:
         places: Hypothesis | None = None,
         next_test: str = "",
         gap: GapDescription | None = None,
+        holdout: HoldOut | None = None,
     ) -> Diagnosis:
         """Assemble the diagnosis with regions, hold-out, candidates and the model to use.
 
@@ -252,6 +255,7 @@ class DiagnosisWriter:
             places: hypothesis whose faulty parts of the tests are reported; None without any.
             next_test: advice on the next test; "" for the usual confirmation of the first entry.
             gap: description of a gap without a name; None without one.
+            holdout: residuals of held-out tests, if they were computed before.
         """
         base, after, bounds = (
             self._with_free_gains(self.request.base),
@@ -281,7 +285,7 @@ class DiagnosisWriter:
             tuple(entries),
             regions,
             regions if after is base else find_regions(after),
-            gap.holdout if gap else hold_out(base, after, bounds),
+            gap.holdout if gap else holdout or hold_out(base, after, bounds),
             next_test,
             tuple(self._candidates()),
             base,
@@ -302,10 +306,6 @@ class DiagnosisWriter:
             data_sets = with_gain_weighting(evidence.data_sets, weigh=False)
             self._refitted[evidence] = fit(evidence.model, data_sets, self.request.fixed, self.request.bounds)
         return self._refitted[evidence]
-
-    @cached_property
-    def _refitted(self) -> dict[Evidence, Evidence]:
-        return {}
 
     def _candidates(self) -> list[CandidateResult]:
         """List all effects that the starting model lacks, and all mistakes that were fitted, the highest score first.
@@ -350,16 +350,15 @@ class DiagnosisWriter:
         return [*notes, *([_ONE_DIRECTION] if self.first and self.first.unnamed and len(directions) == 1 else [])]
 
 
-def _gap_stays(before: Evidence, after: Evidence, names: Sequence[str], bounds: Bounds) -> bool:
+def _gap_stays(holdout: HoldOut, after: Evidence, names: Sequence[str], bounds: Bounds) -> bool:
     """True if held-out tests show a gap beside the named effects, or if one of the effects may be absent.
 
     Args:
-        before: fit without the effects.
+        holdout: residuals of held-out tests without and with the effects.
         after: fit with the effects.
         names: names of the effects.
         bounds: limits of parameters inside their general limits.
     """
-    holdout = hold_out(before, after, bounds)
     if holdout.after is not None and holdout.after > LARGEST_CLOSED_GAP:
         return True
     result = result_of(after, bounds, after.model.effects, lacking=False)

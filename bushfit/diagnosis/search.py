@@ -67,7 +67,9 @@ class Search:
                             self._note(hypothesis)
             if depth == ROUNDS or self._is_sure():
                 break
-            fresh = [grown for state in track("with one more", beam) for grown in self._grow(state, depth)]
+            fresh = list[SearchState]()
+            for state in track("with one more", beam):
+                fresh += self._grow(state, depth)
             if depth == 0:
                 fresh += self._corrected_records()
             followed = [h for h in self._known.values() if h.unnamed in ("", COMPOUND) and not h.levels]

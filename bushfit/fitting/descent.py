@@ -122,10 +122,6 @@ class Descent:
         state = self.model, self.residual, self.jacobian, self.evaluations, at_bound, not self.converged
         return FitResult(self.problem, *state)
 
-    def stepped(self) -> "Descent":
-        """Return the fit after one more evaluation of the model."""
-        return self.finished(self.evaluations + 1)
-
     def finished(self, evaluations: int) -> "Descent":
         """Take steps until the fit has converged or has used up its evaluations of the model.
 
