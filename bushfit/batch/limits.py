@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import ConfigDict, Field, ValidationInfo
+from pydantic import ConfigDict, Field
 
 from bushfit.batch.document import Estimate, RowFile
 from bushfit.batch.manifest import Row
@@ -30,7 +30,6 @@ from bushfit.batch.quantities import (
     LOSS_FACTOR,
     STIFFNESS,
     PartQuantity,
-    Point,
     PointText,
 )
 from bushfit.campaign.quantities import convert_limits
@@ -89,20 +88,17 @@ class Bounds:
         return low, high
 
 
-def _read_stiffness(raw: object, info: ValidationInfo) -> object:
-    point = info.data.get("at")
-    return parse_quantity(raw, point.motion.stiffness_unit) if isinstance(point, Point) else 0.0
-
-
 _LIMIT = Field(ge=0, allow_inf_nan=False)
 _RATIO = converter(
     lambda raw, _: raw if isinstance(raw, int | float) and not isinstance(raw, bool) else parse_quantity(raw, "1"),
     text("a share, or a number") | {"type": ["string", "number"]},
 )
 Ratio = Annotated[float, _RATIO, _LIMIT]
-Stiffness = Annotated[
-    float, converter(_read_stiffness, text("a number with a unit of N/m, N*m/rad or Pa, by the point")), _LIMIT
-]
+_STIFFNESS = converter(
+    lambda raw, info: parse_quantity(raw, point.motion.stiffness_unit) if (point := info.data.get("at")) else 0.0,
+    text("a number with a unit of N/m, N*m/rad or Pa, by the point"),
+)
+Stiffness = Annotated[float, _STIFFNESS, _LIMIT]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -95,7 +95,12 @@ def command(
     settings["temperature"] = kelvin(temperature)
     if time_domain and "abaqus" not in formats:
         raise click.UsageError("'--time-domain' requires '--format abaqus'.")
-    settings["time_domain"], settings["cardanic"] = time_domain, _cardanic(cardanic)
+    settings["time_domain"] = time_domain
+    if cardanic is not None:
+        stiffness, separator, loss = cardanic.partition(",")
+        real = positive(stiffness, "--cardanic", "N*m/rad") or 0.0
+        loss_factor = positive(f"{loss} -", "--cardanic", "1") or 0.0 if separator else 0.0
+        settings["cardanic"] = complex(real, real * loss_factor)
     settings["static_rates"] = displacement_rates(static_rate)
     settings["accuracy"] = positive(accuracy, "--accuracy", "1")
     comma = output.formats.table_form == "decimal-comma"
@@ -107,12 +112,3 @@ def command(
     output.warn(exported.predicted.warnings)
     inputs = [file, *(input_files(loaded) if loaded else [])]
     output.write(output.folder((loaded or result).name), exported.files, exported.document, inputs)
-
-
-def _cardanic(text: str | None) -> complex | None:
-    """Parse --cardanic, a stiffness and an optional loss factor, to a complex stiffness [N m/rad]; None without it."""
-    if text is None:
-        return None
-    stiffness, comma, loss = text.partition(",")
-    real = positive(stiffness, "--cardanic", "N*m/rad")
-    return complex(real or 0.0, (positive(f"{loss} -", "--cardanic", "1") or 0.0) * (real or 0.0) if comma else 0.0)

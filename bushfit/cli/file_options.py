@@ -135,8 +135,8 @@ def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tes
             test_options = {key: arguments.pop(key) for key in (*keys, *_AS_WRITTEN)}
             test_options["columns"] = _pairs(arguments.pop("columns"), "--column", "force=Kraft", roles)
             test_options["units"] = _pairs(arguments.pop("units"), "--unit", "force=kN", roles)
-            given = {key: value for key, value in test_options.items() if value not in (None, {})}
-            return function(test_options=given, **arguments)
+            test_options = {key: value for key, value in test_options.items() if value not in (None, {})}
+            return function(test_options=test_options, **arguments)
 
         return add_parameters(wrapped, *parameters, option_group("File format, if it is not detected", *written))
 

@@ -122,8 +122,12 @@ def command(
         inner, outer, long = (1e3 * size for size in (2 * body.inner_radius, 2 * body.outer_radius, body.length))
         across = f"from {inner:.6g} to {outer:.6g} mm in diameter, {(outer - inner) / 2:.6g} mm thick"
         output.print(f"{body.name}: rubber {across}, {long:.6g} mm long")
+    wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
     for inspection in inspections:
-        print_summary(output, inspection)
+        facts = [f"{key}: {fact}" for key, fact in inspection.facts.items() if key in wanted or key.startswith("from ")]
+        test = inspection.file.parent / inspection.label
+        output.print(f"{test}: {inspection.kind}, {inspection.direction}; {'; '.join(facts)}")
+        output.warn([f"{inspection.label}: {sentence}" for sentence in inspection.odd])
     for sentence, count in Counter(inspection.assumed for inspection in inspections).items():
         if sentence:
             output.print(f"{count} test{'s' * (count > 1)}: {sentence}")
@@ -273,15 +277,6 @@ def inspect_source(
     if is_asking and "preload" not in {*inspection.entry, *test_options}:
         raise MeasurementError("the preload of this test is not stated", file=source.file, hint="--preload")
     return inspection
-
-
-def print_summary(output: Output, inspection: Inspection) -> None:
-    """Print one line on a test (kind, direction, levels), and warn of anything unusual in its file."""
-    wanted = ("programme", "cycles", "frequency", "frequencies", "amplitude", "amplitudes")
-    facts = [f"{key}: {value}" for key, value in inspection.facts.items() if key in wanted or key.startswith("from ")]
-    name = inspection.file.parent / inspection.label
-    output.print(f"{name}: {inspection.kind}, {inspection.direction}; {'; '.join(facts)}")
-    output.warn([f"{inspection.label}: {sentence}" for sentence in inspection.odd])
 
 
 @dataclass(frozen=True)

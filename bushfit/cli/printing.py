@@ -113,9 +113,9 @@ def print_origin(output: Output, result: Result) -> None:
 
 def print_parameters(output: Output, title: str, result: Result) -> None:
     """Print the parameters: value, standard error, 95 % interval (by profile likelihood, if any), and unit."""
-    from bushfit.report.parameters import interval_kind, parameter_rows
+    from bushfit.report.parameters import parameter_rows
 
-    columns = ("parameter", "value", "std error", interval_kind(result), "unit")
+    columns = ("parameter", "value", "std error", "95 % by profile" if result.profile else "95 % interval", "unit")
     rows = []
     for row in parameter_rows(result):
         label = f"{row.name} ({row.state})" if row.state else row.name

@@ -12,7 +12,7 @@ import click
 from bushfit.cli.file_options import metadata_options, options_named
 from bushfit.cli.options import FILE, command_called, direction_option, flag, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.shared_options import kelvin, positive
+from bushfit.cli.shared_options import TEMPERATURE, kelvin, positive
 
 if TYPE_CHECKING:
     from bushfit.commands.respond import ResponseOutput
@@ -33,11 +33,7 @@ if TYPE_CHECKING:
             "responds to noise [no filter]."
         ),
     ),
-    option(
-        "--temperature",
-        "TEMP",
-        'Temperature, such as "40 degC", if the model was fitted with --effect temperature [23 degC].',
-    ),
+    TEMPERATURE,
 )
 @metadata_options("displacements")
 @with_output("results/<name> response", "tables", "pictures")

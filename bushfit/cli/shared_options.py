@@ -30,6 +30,13 @@ if TYPE_CHECKING:
 #: SI units of the grid options, by key.
 _UNITS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
 
+#: Option of commands that predict from a model.
+TEMPERATURE = option(
+    "--temperature",
+    "TEMP",
+    'Temperature, such as "40 degC", if the model was fitted with --effect temperature [23 degC].',
+)
+
 
 def campaign_options(soft_l1: str = "less weight for points far from the model, none for outliers") -> Parameter:
     """Create the argument CAMPAIGN (`campaigns`) and the options of all commands that fit a campaign.
@@ -111,11 +118,7 @@ def prediction_options(campaign: str) -> Parameter:
             "radial, and all specimens]."
         ),
         grid_options("from the campaign"),
-        option(
-            "--temperature",
-            "TEMP",
-            'Temperature, such as "40 degC", if the model was fitted with --effect temperature [23 degC].',
-        ),
+        TEMPERATURE,
         file_option("--campaign", campaign),
     )
 

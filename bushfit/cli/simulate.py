@@ -14,7 +14,6 @@ from bushfit.errors import ModelError, UnitError, error_location
 from bushfit.units import is_number, parse_quantity
 
 if TYPE_CHECKING:
-    from bushfit.campaign.simulated import SimulateSettings
     from bushfit.model.model import Model
 
 
@@ -68,18 +67,6 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
     else:
         campaign = load_campaign(source)
         truth, tests = model_of(campaign), campaign.simulate or SimulateSettings()
-    tests = _with_options(tests, settings)
-    for text in effects:
-        truth = _with_effect(truth, text)
-    with error_location(source):
-        simulated = simulate_campaign(truth, tests, output.formats.table_form)
-    output.warn(simulated.warnings)
-    output.print(simulated.simulated.truth.equation())
-    folder = output.folder(simulated.simulated.result.name, "simulated {}")
-    output.write(folder, simulated.files, simulated.document, [source])
-
-
-def _with_options(tests: SimulateSettings, settings: dict[str, Any]) -> SimulateSettings:
     changes = {name: value for name, value in settings.items() if value is not None}
     for name, value in changes.items():
         if isinstance(value, str):
@@ -87,7 +74,14 @@ def _with_options(tests: SimulateSettings, settings: dict[str, Any]) -> Simulate
                 changes[name] = parse_quantity(value, "rad" if name == "phase_error" else "1")
                 if not 0.0 <= changes[name] < 1.0:
                     raise UnitError("impossible size", found=value, expected="0 up to 100 %, or below 1 rad")
-    return replace(tests, **changes)
+    for text in effects:
+        truth = _with_effect(truth, text)
+    with error_location(source):
+        simulated = simulate_campaign(truth, replace(tests, **changes), output.formats.table_form)
+    output.warn(simulated.warnings)
+    output.print(simulated.simulated.truth.equation())
+    folder = output.folder(simulated.simulated.result.name, "simulated {}")
+    output.write(folder, simulated.files, simulated.document, [source])
 
 
 def _with_effect(model: Model, text: str) -> Model:

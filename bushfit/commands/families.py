@@ -58,7 +58,11 @@ def fit_campaign_families(
 
 
 def family_to_use(families: Sequence[FittedFamily], results: Sequence[Result]) -> str:
-    """Sentence that names the most probable family, and the range over which all probable ones agree."""
+    """Name the most probable family, and the range of frequency and strain over which all probable ones agree.
+
+    Returns:
+        The sentence, without a full stop.
+    """
     rows = list(zip(ascii_uppercase, families, results, strict=False))
     label, family, result = max(rows, key=lambda row: row[1].probability)
     likely = [row for row in rows if row[1].probability >= _LIKELY and row[0] != label]

@@ -41,11 +41,6 @@ class ParameterRow(NamedTuple):
     meaning: str
 
 
-def interval_kind(result: Result) -> str:
-    """Column heading of the intervals of a result: by profile likelihood or from the standard errors."""
-    return "95 % by profile" if result.profile else "95 % interval"
-
-
 def correlation_texts(result: Result, minimum: float = _STRONG_CORRELATION) -> str:
     """Pairs of parameters whose correlation is at least `minimum` in size, the strongest first: "mu/m -0.96, ..."."""
     pairs = [pair for pair in result.covariance.correlations() if abs(pair[2]) > minimum]

@@ -64,7 +64,13 @@ class ResultFile:
 def table_with_figure(
     name: str, make: Callable[[], pd.DataFrame], draw: Callable[[pd.DataFrame], Figure]
 ) -> list[ResultFile]:
-    """Make the result files for a table and for its figure, which `draw` makes from the table."""
+    """Make the result files for a table and for its figure.
+
+    Args:
+        name: file name of both, without extension.
+        make: function that makes the table when it is first needed.
+        draw: function that makes the figure from the table.
+    """
     table = ResultFile(name, "table", make)
     return [table, ResultFile(name, "figure", lambda: draw(table.content))]
 

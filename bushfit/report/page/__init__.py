@@ -43,7 +43,11 @@ def rendered(template: str, context: dict[str, Any]) -> str:
 
 @cache
 def templates() -> jinja2.Environment:
-    """Templates of the pages, which escape texts, with filters for significant digits, formulas and pixels."""
+    """Make the environment of the templates, which escapes texts.
+
+    Returns:
+        Environment with the filters `number` (significant digits), `formula` and `px` (pixels).
+    """
     import jinja2
 
     from bushfit.report.page.formulas import formula
@@ -77,7 +81,7 @@ def folder_pages(folder: Path, base: str = "") -> list[ResultFile]:
     from bushfit.report.compared import ComparisonDocument
     from bushfit.report.page.comparison import comparison_page
     from bushfit.report.page.index import index_page
-    from bushfit.report.page.record import has_model, read_results
+    from bushfit.report.page.record import MODELS, read_results
     from bushfit.report.page.report import report_page
 
     if (file := folder / "batch.json").exists():
@@ -89,6 +93,6 @@ def folder_pages(folder: Path, base: str = "") -> list[ResultFile]:
     if (file := folder / "compare.json").exists():
         comparison = ComparisonDocument.from_document(read_document(file), file)
         pages.append(ResultFile("compare", "page", partial(comparison_page, comparison)))
-    if has_model(folder) or not pages:
+    if not pages or any((folder / f"{name}.json").exists() for name in MODELS):
         pages.append(ResultFile("report", "page", partial(report_page, read_results(folder))))
     return pages

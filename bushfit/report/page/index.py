@@ -124,6 +124,9 @@ def sparkline(curve: Array, usual: Array, scale: float, color: str) -> Markup:
         usual: the same of the m usual parts, whose range is a grey band, (m, k).
         scale: relative deviation at the upper and lower edge.
         color: colour of the curve.
+
+    Returns:
+        SVG element with its description.
     """
     x = np.linspace(1.0, _WIDTH - 1.0, curve.size)
     band = np.concatenate([x, x[::-1]]), np.concatenate([usual.min(axis=0), usual.max(axis=0)[::-1]])

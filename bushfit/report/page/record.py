@@ -153,11 +153,6 @@ def _predictions(
     return predictions
 
 
-def has_model(folder: Path) -> bool:
-    """Check if a results folder contains a model file."""
-    return any((folder / f"{name}.json").exists() for name in MODELS)
-
-
 def read_results(folder: Path) -> list[ResultFile]:
     """Read the documents and tables of a results folder.
 
@@ -170,7 +165,7 @@ def read_results(folder: Path) -> list[ResultFile]:
     if not folder.is_dir():
         kind = "a file" if folder.exists() else "nothing"
         raise ModelError("a folder of results is needed", file=folder, found=kind, expected="as bushfit run writes it")
-    if not has_model(folder):
+    if not any((folder / f"{name}.json").exists() for name in MODELS):
         present = sorted(path.name for path in folder.iterdir())[:8]
         raise ModelError(
             "there is no model in this folder",

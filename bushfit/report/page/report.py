@@ -22,7 +22,7 @@ from bushfit.report.page import rendered
 from bushfit.report.page.record import ReportRecord, report_record
 from bushfit.report.page.svg import Picture, picture
 from bushfit.report.page.values import headline, value_rows
-from bushfit.report.parameters import correlation_texts, effect_sizes, interval_kind, parameter_rows
+from bushfit.report.parameters import correlation_texts, effect_sizes, parameter_rows
 from bushfit.report.results import ResultFile
 from bushfit.report.tables import DISPLAYS, missing_column
 from bushfit.units import CELSIUS, format_range, number
@@ -116,7 +116,7 @@ def report_page(files: Sequence[ResultFile]) -> str:
         "pictures": pictures,
         "left_out": left_out,
         "rows": list(parameter_rows(result)),
-        "interval": interval_kind(result),
+        "interval": "95 % by profile" if result.profile else "95 % interval",
         "plain": {row.name: row.value for row in parameter_rows(record.joint)} if record.joint else {},
         "quality": result.quality,
         "correlations": correlation_texts(result),
