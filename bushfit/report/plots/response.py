@@ -5,6 +5,7 @@ import pandas as pd
 
 from bushfit.effects.contract import Array
 from bushfit.report.plots import style
+from bushfit.report.tables import missing_column
 
 #: Largest number of rows of a curve over time, and of a curve over displacement; a figure has fewer pixels.
 _MOST_OVER_TIME, _MOST_OVER_DISPLACEMENT = 3000, 20_000
@@ -25,15 +26,22 @@ def response_figure(title: str, table: pd.DataFrame, note: str = "") -> style.Ch
 
     Returns:
         Figure with three panels per direction.
+
+    Raises:
+        KeyError, ModelError: a column of the table is missing.
     """
-    is_measured = str(table.columns[-1]).startswith("measured ")
-    count = (table.columns.size - 1) // 4
-    time, *columns = table.to_numpy(dtype=float).T
-    figure = style.Chart(title, count * 2 * _STRIP)
-    grid = figure.add_gridspec(2 * count, 3)
-    for row in range(count):
-        displacement, force, low, high = columns[4 * row : 4 * row + 4]
-        moves, resists = (str(header) for header in table.columns[4 * row + 1 : 4 * row + 3])
+    headers = [str(header) for header in table]
+    measured = [table[header].to_numpy(dtype=float) for header in headers if header.startswith("measured ")]
+    forces = [header.removesuffix(", low") for header in headers if header.endswith(", low")] or [headers[-1]]
+    time = table["time [s]"].to_numpy(dtype=float)
+    figure = style.Chart(title, len(forces) * 2 * _STRIP)
+    grid = figure.add_gridspec(2 * len(forces), 3)
+    for row, resists in enumerate(forces):
+        force, low, high = (table[resists + end].to_numpy(dtype=float) for end in ("", ", low", ", high"))
+        moves = headers[headers.index(resists) - 1]
+        if moves == "time [s]" or moves.endswith(", high"):
+            raise missing_column(f"displacement before {resists}")
+        displacement = table[moves].to_numpy(dtype=float)
         motion = figure.add_subplot(grid[2 * row, :2])
         course = figure.add_subplot(grid[2 * row + 1, :2], sharex=motion)
         loop = figure.add_subplot(grid[2 * row : 2 * row + 2, 2])
@@ -41,7 +49,7 @@ def response_figure(title: str, table: pd.DataFrame, note: str = "") -> style.Ch
         motion.plot(time[rows], displacement[rows], color=style.GREY, lw=0.7)
         rows = turning_rows(force, _MOST_OVER_TIME)
         course.fill_between(time[rows], low[rows], high[rows], color=PREDICTED, alpha=0.3, lw=0)
-        for values, color in ((columns[-1], MEASURED), (force, PREDICTED))[not is_measured :]:
+        for values, color in (*((values, MEASURED) for values in measured), (force, PREDICTED)):
             rows = turning_rows(values, _MOST_OVER_TIME)
             course.plot(time[rows], values[rows], color=color, lw=0.7)
             rows = turning_rows(values, _MOST_OVER_DISPLACEMENT)
@@ -49,7 +57,7 @@ def response_figure(title: str, table: pd.DataFrame, note: str = "") -> style.Ch
         style.label_axes(motion, "", moves)
         style.label_axes(course, "time [s]", resists)
         style.label_axes(loop, moves, resists)
-    return figure.explain("Blue: model; shaded: its 95 % band.", "Red: measured." * is_measured, note=note)
+    return figure.explain("Blue: model; shaded: its 95 % band.", "Red: measured." * len(measured), note=note)
 
 
 def turning_rows(values: Array, most: int) -> Array:

@@ -108,6 +108,15 @@ OF_RESULTS = [
         (without_column("sweeps.csv", header), ("a column of a table is missing", header))
         for header in ("stiffness [N/mm]", "amplitude [mm]", "loss residual [noise]", "stiffness [N m/rad]")
     ),
+    *(
+        (written("validation_road.csv", f"{headers}\n"), ("a column of a table is missing", header))
+        for headers, header in (
+            ('time [s],displacement [mm],force [N],"force [N], high",measured force [N]', "force [N], low"),
+            ('time [s],displacement [mm],force [N],"force [N], low"', "force [N], high"),
+            ('displacement [mm],force [N],"force [N], low","force [N], high"', "time [s]"),
+            ('time [s],force [N],"force [N], low","force [N], high"', "displacement before force [N]"),
+        )
+    ),
     (
         written("axial.csv", "frequency [Hz],amplitude [mm]\nx,1\n"),
         ("axial.csv: this table is not as bushfit writes it", "'x'"),
