@@ -101,7 +101,7 @@ def respond(
         channels = read_displacements(
             Path(history), direction, result.specimens, columns=columns, units=units, file_format=file_format
         )
-    elif step is None or not step > 0.0:
+    elif step is None or not 0.0 < step < np.inf:
         raise MeasurementError("the time between samples is not stated", place="step", expected="seconds above zero")
     else:
         channels = tuple(

@@ -24,6 +24,8 @@ from bushfit.units import number
 _NOISE, _MOST_NOISE = 2e-3, 0.2
 #: Largest share of the travel in strokes shorter than any in the tests without a warning; chosen.
 _MOST_SHORT = 0.2
+#: Smallest ratio of the first displacement to the largest later step that is a jump; chosen.
+_JUMP = 2.0
 #: Smallest number of samples per mean cycle without a warning: with 20 the springpot errs by 0.7 % of its force.
 _FEWEST_PER_CYCLE = 20.0
 
@@ -202,6 +204,12 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
         sine = f"{number(history.frequency, 3)} Hz and {number(factor * history.amplitude.item(), 3)} {unit}"
         warnings.append(f"{place}: {' and '.join(constant)} constant, as in a sine of {sine}")
     strokes, (unit, factor) = np.abs(history.turning.strides), place.display.displacement
+    start = abs(float(history.value[0]))
+    if not history.periodic and start > _JUMP * np.abs(np.diff(history.value)).max():
+        warnings.append(
+            f"{place}: the history begins at {number(factor * start, 3)} {unit}, to which the model jumps from rest at "
+            "0: begin the history at rest, or subtract its start"
+        )
     shortest = 2.0 * (1.0 - MARGIN) * result.measured.strain[0] / response.unit_strain if result.measured else 0.0
     short = strokes[strokes < shortest].sum() / max(strokes.sum(), np.finfo(float).tiny)
     if np.mean(strokes < _NOISE * np.ptp(history.value)) > _MOST_NOISE:

@@ -34,7 +34,7 @@ DISPLACEMENT_COLUMNS: Mapping[str, tuple[str, ...]] = {
     "displacement": tuple(LOOP_COLUMNS["displacement"]),
 }
 #: Smallest number of rows of a history, and largest number of evenly sampled rows; chosen: their results take 2 GB.
-_FEWEST_ROWS, _MOST_ROWS = 10, 10_000_000
+FEWEST_ROWS, _MOST_ROWS = 10, 10_000_000
 #: Largest deviation of a time from even sampling, relative to the step, that is taken as rounding.
 _ROUNDING = 0.1
 #: Largest ratio of evenly sampled to recorded rows; chosen: more would be guessed than was recorded.
@@ -113,7 +113,7 @@ def read_displacements(
         roles = dict.fromkeys(stated, "displacement")
     wanted = {role: table.column(role, place) for place, role in roles.items()}
     wanted["time"] = time_column(table, next(iter(roles)))
-    values, notes = table.read(wanted, fewest_rows=_FEWEST_ROWS)
+    values, notes = table.read(wanted, fewest_rows=FEWEST_ROWS)
     time, more = increasing_time(table.needing(wanted), wanted["time"], values["time"])
     with error_location(table.file, "time"):
         even, correction = even_time(time)

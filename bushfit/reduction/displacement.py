@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.errors import MeasurementError, error_location
-from bushfit.reading.displacements import DisplacementHistory, even_time
+from bushfit.reading.displacements import FEWEST_ROWS, DisplacementHistory, even_time
 from bushfit.reading.measurement import Loop
 from bushfit.units import number
 
 #: Ratio of mean to range of a displacement above which the mean is the zero of a transducer; chosen: no rubber follows.
 _OFFSET = 10.0
+#: Largest displacement [m or rad]: forces of larger ones are no numbers.
+_LARGEST = 1e30
 #: Largest distance between the ends of a cycle, relative to its range.
 _CLOSED = 0.01
 #: Largest number of samples of a segment of the spectrum, share of the record, and ratio of the density to that of the
@@ -81,21 +83,21 @@ def prepare_displacements(
         lowpass: cut-off frequency of a low-pass filter [Hz]; None for no filter.
 
     Returns:
-        Channels without an offset far larger than the motion (the mean of a steady state, or the first value of a
-        motion), and in a steady state without a last sample that repeats the first.
+        Channels that move, without an offset far larger than the motion (the mean of a steady state, or the first value
+        of a motion), and in a steady state without a last sample that repeats the first.
 
     Raises:
         MeasurementError: no motion, a steady state that does not end where it begins, or a low-pass that does not suit
             the history.
     """
-    channels = [_without_offset(channel, steady=steady) for channel in channels]
+    channels = [_without_offset(channel, steady=steady) for channel in _moving_channels(channels)]
     if steady:
         ends = np.array([channel.displacement[[-1, 0, 1]] / np.ptp(channel.displacement) for channel in channels])
         for channel in channels:
             _require_cycle(channel)
         if np.abs(ends[:, 0] - ends[:, 1]).sum() < 0.5 * np.abs(ends[:, 2] - ends[:, 1]).sum():
             channels = [replace(channel, displacement=channel.displacement[:-1]) for channel in channels]
-    return [_smoothed(channel, lowpass, steady=steady) for channel in channels] if lowpass else channels
+    return [_smoothed(channel, lowpass, steady=steady) for channel in channels] if lowpass is not None else channels
 
 
 def prepare_record(record: Loop, lowpass: float | None = None) -> Loop:
@@ -118,13 +120,28 @@ def prepare_record(record: Loop, lowpass: float | None = None) -> Loop:
     return replace(record, time=time, displacement=channel.displacement, force=force, source=source)
 
 
+def _moving_channels(channels: Sequence[DisplacementHistory]) -> list[DisplacementHistory]:
+    """Check that channels have equal lengths and finite values, and leave out those that never move, with a note."""
+    shapes = {channel.displacement.shape for channel in channels}
+    if len(shapes) != 1 or len(shape := shapes.pop()) != 1 or shape[0] < FEWEST_ROWS:
+        found = ", ".join(f"{channel.direction}: {channel.displacement.shape}" for channel in channels)
+        expected = f"at least {FEWEST_ROWS} displacements, as many in each direction"
+        raise MeasurementError("this is no history", found=found or "no direction", expected=expected)
+    for channel in channels:
+        if not np.all(np.abs(channel.displacement) < _LARGEST):
+            expected = "finite displacements"
+            raise MeasurementError("this is no motion", place=str(channel.direction), expected=expected)
+    still = [channel.direction for channel in channels if not np.ptp(channel.displacement)]
+    if len(still) == len(channels):
+        expected = "displacements that change"
+        raise MeasurementError("this is no motion", place=", ".join(map(str, still)), expected=expected)
+    notes = tuple(f"{place}: left out, its displacement never changes" for place in still)
+    return [replace(channel, notes=(*channel.notes, *notes)) for channel in channels if channel.direction not in still]
+
+
 def _without_offset(channel: DisplacementHistory, *, steady: bool) -> DisplacementHistory:
     """Remove an offset far larger than the motion: the mean of a steady state, or the first value of a motion."""
     motion, span = channel.displacement, np.ptp(channel.displacement)
-    if not np.all(np.isfinite(motion)) or not span:
-        raise MeasurementError(
-            "this is no motion", place=str(channel.direction), expected="finite displacements that change"
-        )
     if abs(motion.mean()) <= _OFFSET * span:
         return channel
     offset = float(motion.mean() if steady else motion[0])

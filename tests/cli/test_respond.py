@@ -60,6 +60,7 @@ def test_one_column_takes_its_direction_from_an_option(bushfit: Run, tmp_path: P
         (TIME + 0.002 * np.sin(20.0 * TIME), MOTION, (), "resampled evenly at"),
         (TIME, MOTION + 1000.0, (), "1000 mm, the first value, is subtracted"),
         (TIME, MOTION + 1000.0, ("--steady",), "1000 mm, the mean, is subtracted"),
+        (TIME, MOTION + 2.0, (), "the history begins at 2 mm, to which the model jumps"),
         (TIME, 10.0 * MOTION, (), "but fitted at"),
         (TIME, MOTION, ("--lowpass", "60 Hz"), "low-passed at 60 Hz without delay, which removes"),
     ],
@@ -104,6 +105,23 @@ def test_what_cannot_be_used_is_one_error(
     done = bushfit("respond", "model", road, *options, "-o", tmp_path / "out", status=2)
     assert problem in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_channel_that_never_moves_is_left_out(bushfit: Run, tmp_path: Path) -> None:
+    still = {"radial_displacement__mm": 0.0 * TIME + 3.0}
+    road = write(tmp_path, time__s=TIME, axial_displacement__mm=MOTION, **still)
+    done = bushfit("respond", "model", road, "-o", tmp_path / "out", "--no-plots", "-v")
+    assert "radial: left out, its displacement never changes" in done.stderr
+    assert list(pd.read_csv(tmp_path / "out/response.csv"))[1] == "displacement [mm]"
+
+
+def test_channels_of_a_steady_state_keep_one_length(bushfit: Run, tmp_path: Path) -> None:
+    """The last row repeats the first, which one channel alone, flat at its start, does not show."""
+    flat = np.maximum(np.sin(2.0 * np.pi * TIME / TIME[-1]) - 0.5, 0.0)
+    sine = np.sin(2.0 * np.pi * 4.0 * TIME / TIME[-1])
+    road = write(tmp_path, time__s=TIME, axial_displacement__mm=0.2 * sine, radial_displacement__mm=0.1 * flat)
+    bushfit("respond", "model", road, "--steady", "-o", tmp_path / "out", "--no-plots")
+    assert len(pd.read_csv(tmp_path / "out/response.csv")) == N - 1
 
 
 def test_a_batch_responds_for_each_part(bushfit: Run, work: Path, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from bushfit.commands.respond import respond
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
 from bushfit.effects.rig_compliance import force as sleeve_force
+from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.covariance import Covariance
@@ -121,6 +122,25 @@ def test_ranges_beyond_the_tests_are_stated(paper_model: Model) -> None:
     assert large.warnings[1].startswith("axial: strain rates of up to 9.24 1/s")
     coarse = time_response(result, Direction.AXIAL, History.sampled(4e-4 * np.sin(30.0 * TIME[::20]), 20 * STEP))
     assert coarse.warnings[0].startswith("axial: the history has 11 samples in a mean cycle")
+
+
+@pytest.mark.parametrize(
+    ("history", "step", "problem"),
+    [
+        ({}, STEP, "no direction"),
+        ({"axial": [0.0, 1e-4, 0.0]}, STEP, r"axial: \(3,\)"),
+        ({"axial": np.ones((2, 50))}, STEP, r"axial: \(2, 50\)"),
+        ({"axial": random(TIME), "radial": random(TIME)[1:]}, STEP, r"radial: \(2999,\)"),
+        ({"axial": 1e200 * random(TIME)}, STEP, "axial: this is no motion"),
+        ({"axial": np.where(TIME[-1] == TIME, np.nan, TIME)}, STEP, "axial: this is no motion"),
+        ({"axial": random(TIME)}, np.inf, "seconds above zero"),
+    ],
+)
+def test_arrays_that_are_no_history_are_one_error(
+    paper_model: Model, history: dict[str, Array], step: float, problem: str
+) -> None:
+    with pytest.raises(MeasurementError, match=problem):
+        respond(Result(paper_model), history, step=step)
 
 
 @pytest.mark.parametrize("noise", [0.002, 0.01])
