@@ -298,7 +298,7 @@ class MeasuredSweep(MeasuredBase):
         loss = relative.imag * (np.abs(stiffness) / stiffness.real) ** 2
         return gain + 1j * loss * self._phase_per_loss
 
-    @property
+    @cached_property
     def _phase_per_loss(self) -> Array:
         """Derivative of phase by loss factor eta at each point, 1/(1 + eta^2), (n,)."""
         return (self.measured.real / np.abs(self.measured)) ** 2
