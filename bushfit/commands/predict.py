@@ -174,7 +174,9 @@ def predict(
     result = as_result(model)
     if isinstance(bushing, str):
         of_bushing = [place for place in result.specimens if place.bushing and place.body == bushing]
-        directions = [str(place) for name in directions or _DIRECTIONS for place in get_places(name, of_bushing)]
+        preloaded = [stated.place for stated in result.measured.preloads] if preloads and result.measured else []
+        default = [str(place) for place in of_bushing if str(place) in preloaded] or _DIRECTIONS
+        directions = [str(place) for name in directions or default for place in get_places(name, of_bushing)]
     elif bushing:
         result, note = transfer_compound(result, bushing)
         notes, directions = (*notes, note), directions or [str(direction) for direction in _DIRECTIONS]
