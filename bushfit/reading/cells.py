@@ -336,30 +336,24 @@ class Cells:
         evidence = consistent_notations(self.number_texts(), notations)
         if evidence.contrary is None and any(way.thousands for way in evidence.ways):
             evidence = consistent_notations(self.number_texts(), notations, all_cells=True)
-        columns = {column.index: column for column in self.roles.values()}
+        question = evidence.contrary or evidence.unclear
+        if question is None:
+            return evidence.ways[0]
+        (line, index), text = question
         if evidence.contrary:
-            (line, index), text = evidence.contrary
-            raise self.error(
-                "this number has another format than the others",
-                line=line,
-                column=columns[index],
-                found=f'"{text}"',
-                expected=f"numbers with a decimal {'comma' if evidence.ways[0].decimal == ',' else 'point'}",
-                hint="correct this cell; or, if all numbers of the file are written so, state "
-                'decimal = "..." and thousands = "..." in the campaign',
-            )
-        if evidence.unclear:
-            (line, index), text = evidence.unclear
-            readings = dict.fromkeys(way.value(text) or 0.0 for way in evidence.ways)
-            raise self.error(
+            problem, found = "this number has another format than the others", f'"{text}"'
+            expected = f"numbers with a decimal {'comma' if evidence.ways[0].decimal == ',' else 'point'}"
+            hint = "correct this cell; or, if all numbers of the file are written so, state "
+            hint += 'decimal = "..." and thousands = "..." in the campaign'
+        else:
+            problem, found = (
                 "this number can be read in two ways",
-                line=line,
-                column=columns[index],
-                found=f'"{text}", and no number in the file that settles it',
-                expected=" or ".join(f"{reading:.15g}" for reading in readings),
-                hint='state decimal = "." or decimal = "," in the campaign',
+                f'"{text}", and no number in the file that settles it',
             )
-        return evidence.ways[0]
+            expected = " or ".join(dict.fromkeys(f"{way.value(text) or 0.0:.15g}" for way in evidence.ways))
+            hint = 'state decimal = "." or decimal = "," in the campaign'
+        column = next(column for column in self.roles.values() if column.index == index)
+        raise self.error(problem, line=line, column=column, found=found, expected=expected, hint=hint)
 
     def possible_numerals(self) -> tuple[Numerals, ...]:
         """Return the notations of numbers that agree with the decimal mark and thousands separator the user states."""

@@ -90,27 +90,27 @@ def read_displacements(
     Raises:
         MeasurementError, UnitError: a column, its unit, the direction or the time cannot be used.
     """
-    stated = get_places(direction, specimens) if direction else []
-    motion = stated[0].motion if len({place.axis for place in stated}) == 1 else None
+    named_places = get_places(direction, specimens) if direction else []
+    motion = named_places[0].motion if len({place.axis for place in named_places}) == 1 else None
     table = Table.open(file, DISPLACEMENT_COLUMNS, columns, units, file_format, motion or TRANSLATION)
     headed = [axis for axis in Direction if str(axis) in table.roles]
-    places = stated or [place for axis in headed for place in get_places(axis, specimens)]
+    places = named_places or [place for axis in headed for place in get_places(axis, specimens)]
     roles = {place: str(place.axis) for place in places if place.axis in headed}
     if not roles:
         turns = table.agrees("displacement", "rad")
-        tested = stated[0] if motion else Direction.TORSION if turns else Direction.AXIAL
+        tested = named_places[0] if motion else Direction.TORSION if turns else Direction.AXIAL
         column = table.column("displacement", tested)
         axis = direction_of_file(table.file, [column.header], turns=turns, sheet=table.source.sheet)
         if axis and not motion:
-            stated = [place for place in stated or get_places(axis, specimens) if place.axis == axis]
-        if len({place.axis for place in stated}) != 1:
+            named_places = [place for place in named_places or get_places(axis, specimens) if place.axis == axis]
+        if len({place.axis for place in named_places}) != 1:
             raise table.header_error(
                 "the direction of this displacement is not stated",
                 found=f'"{column.header}"',
                 expected="axial, radial or torsion in the header or in the name of the file",
-                hint=f"state it: --direction {next(map(repr, map(str, stated)), 'axial (or radial, torsion)')}",
+                hint=f"state it: --direction {next(map(repr, map(str, named_places)), 'axial (or radial, torsion)')}",
             )
-        roles = dict.fromkeys(stated, "displacement")
+        roles = dict.fromkeys(named_places, "displacement")
     wanted = {role: table.column(role, place) for place, role in roles.items()}
     wanted["time"] = time_column(table, next(iter(roles)))
     values, notes = table.read(wanted, fewest_rows=FEWEST_ROWS)
