@@ -113,7 +113,7 @@ SPOILED: list[tuple[str, Callable[[Path], object], tuple[str, ...]]] = [
     ("rates.mf4", of_two_rates, ("no group holds such a table", '"at 100 Hz", "at 20 Hz"', "resample")),
     ("unit.tdms", without_unit, ('group "Run 1", column "force": the force has no unit', 'units = { force = "N" }')),
     ("wrong.parquet", with_wrong_unit, ('column "force": the unit does not fit', '"mm"')),
-    ("gap.feather", with_a_gap, ('row 17, column "displacement"', "no finite number")),
+    ("gap.feather", with_a_gap, ('row 17, column "displacement"', "not a finite number")),
     ("text.mat", lambda file: LOOP.to_csv(file), ("this is no MATLAB file", "a MATLAB file, according to")),
     ("text.uff", lambda file: LOOP.to_csv(file), ("this is no UFF file",)),
     ("empty.mf4", lambda file: file.write_bytes(b""), ("the file is empty",)),
