@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import Campaign, load_campaign
-from bushfit.campaign.session import SessionTest, session
+from bushfit.campaign.session import SessionTest, planned_session, session
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Bushing, Direction, Specimen, unit_strain
 
@@ -175,3 +176,11 @@ def test_a_campaign_gives_temperatures_and_order(tmp_path: Path, order: tuple[st
     assert conditions[first].session_time[0] == 0.0
     part = data.sweeps[1].select(data.sweeps[1].amplitude == 1e-4).conditions
     np.testing.assert_array_equal(part.session_time, conditions["warm"].session_time)
+
+
+def test_a_planned_sweep_has_its_own_repeats_else_those_of_the_session() -> None:
+    bushing = Bushing("b", 0.01, 0.018, 0.034)
+    sweep = SimulatedSweep(Direction.AXIAL, (1e-4, 2e-4), (5.0, 15.0, 25.0), repeats=3)
+    tests = [sweep, SimulatedLoop(Direction.AXIAL, 1e-3, 1.0), SimulatedSweep(Direction.AXIAL, (3e-3,), (5.0,))]
+    conditions = planned_session(bushing, tests, repeats=2)
+    assert [np.size(test.largest_strain) for test in conditions] == [18, 1, 2]

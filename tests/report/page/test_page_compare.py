@@ -5,11 +5,13 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pytest
 from production import COUNT, LOSSY, SOFT
 from reading_html import HARMFUL, LARGEST, assert_harmless, loads, parsed, spoiled
 
+from bushfit import units
 from bushfit.report.compared import ComparisonDocument
 from bushfit.report.page import folder_pages
 from bushfit.report.page.comparison import comparison_page
@@ -117,6 +119,11 @@ def test_the_page_shows_each_curve_against_the_batch_and_who_differs(made: Path)
     assert max(numbers[rows.index(f"part_{SOFT}")]) < -5.0 < 5.0 < max(numbers[rows.index(f"part_0{LOSSY}")])
     assert {f"part_{SOFT}", f"part_0{LOSSY}"} < set(rows[:8]), "what differs is among those that come first"
     assert any(alt.endswith("Single curves: part_07, part_20") for alt in alts)
+    parts = json.loads((made / "out/batch.json").read_text(encoding="utf-8"))["parts"]
+    measured = np.array([part["curve"] for part in parts])
+    usual = [not (part["deviations"] or part["poor_fit"]) for part in parts]
+    scale = 150.0 * np.abs(measured / np.median(measured, axis=0) - 1.0)[usual].max()
+    assert f"scale {units.number(-scale, 2)} to {units.number(scale, 2, '+')} %" in found.text
     assert loads(page) == []
     for words in ("2 differ from the others", "SN 907", "part_20 fails: mu 0.", "Differs from the others: mu -3"):
         assert words in found.text
