@@ -9,6 +9,7 @@ from baselines import single, sparse
 from benchmark import ToolAnswer, benchmark, judge, location_score, make, read_answers, score, sha256, tasks
 from click.testing import CliRunner
 from lab_campaign import campaign
+from sessions import evaluate
 
 COUNT = 5
 MUTE: ToolAnswer = {"sees": False, "claims": [], "where": []}
@@ -141,3 +142,8 @@ def test_baselines_name_what_is_plain(tmp_path: Path) -> None:
     for answer in (sparse(tmp_path), single(tmp_path)):
         assert answer["claims"][0] in plain
         assert {region["frequency_Hz"][0] for region in answer["where"]}
+
+
+@pytest.mark.slow
+def test_a_planned_session_settles_what_was_left_open() -> None:
+    assert evaluate((1545993629, ("coupled_breakdown",)), 8.0) == "rightly"
