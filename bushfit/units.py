@@ -139,7 +139,7 @@ def parse_quantity(value: object, *expected: str) -> float:
     number = _NUMBER.match(text)
     if not isinstance(value, str | int | float) or isinstance(value, bool) or number is None:
         written = f'"{text}"' if isinstance(value, str) else text.lower() if isinstance(value, bool) else text
-        raise refuse("this is no quantity", found=written)
+        raise refuse("this is not a quantity", found=written)
     suffix = text[number.end() :].strip()
     if not suffix:
         hint = None if expected[0] == "1" else f'write "{text} {unit}"'
@@ -147,7 +147,7 @@ def parse_quantity(value: object, *expected: str) -> float:
     if suffix[0] in ",.":
         parts = re.fullmatch(r"([+-]?\d+),(\d\d?|\d{4,})(\D*)", text)  # three digits may be thousands
         advice = f'write "{parts[1]}.{parts[2]}{parts[3]}", with' if parts else "write numbers with"
-        raise refuse("this is no quantity", found=f'"{text}"', hint=f"{advice} a decimal point")
+        raise refuse("this is not a quantity", found=f'"{text}"', hint=f"{advice} a decimal point")
     if not math.isfinite(float(number[0])):
         raise refuse("the number is too large", found=f'"{text}"')
     fitting = next((choice for choice in expected if is_compatible(suffix, choice)), expected[0])
@@ -347,5 +347,5 @@ def parse_temperature(raw: object) -> float:
     scale = kelvin_scale(match[2]) if match else None
     value = scale[0] * float(match[1].replace(",", ".")) + scale[1] if match and scale else -1.0
     if value < 0.0:
-        raise UnitError("this is no temperature", found=repr(raw), expected='such as "22 degC" or "295 K"')
+        raise UnitError("this is not a temperature", found=repr(raw), expected='such as "22 degC" or "295 K"')
     return value

@@ -168,7 +168,7 @@ def read_manifest(source: str, settings: RowSettings, *more: str) -> Manifest:
     title, base, entries = path.stem, path.parent, list[Entry]()
     if strange := [name for name in (source, *more) if more and Path(name).suffix.lower() != ".toml"]:
         expected = "one manifest, or campaign files alone"
-        raise CampaignError("this is no campaign", file=strange[0], expected=expected, hint=_INIT_HINT)
+        raise CampaignError("this is not a campaign", file=strange[0], expected=expected, hint=_INIT_HINT)
     if more or (_PATTERN.search(source) and not os.path.exists(path)):  # noqa: PTH110
         title, base, entries = "batch", Path(), [Entry(campaign=name) for name in (source, *more)]
     elif path.suffix.lower() == ".toml":
@@ -186,7 +186,7 @@ def read_manifest(source: str, settings: RowSettings, *more: str) -> Manifest:
     else:
         expected = 'a .toml or .csv file, or a pattern in quotes such as "bushings/*/campaign.toml"'
         hint = f'"{path}/*/campaign.toml" in quotes' if os.path.isdir(path) else _INIT_HINT  # noqa: PTH112
-        raise CampaignError("this is no manifest", file=path, expected=expected, hint=hint)
+        raise CampaignError("this is not a manifest", file=path, expected=expected, hint=hint)
     listed = entries if more else [entry for one in entries for entry in expand_pattern(one, base, source)]
     if not listed:
         raise CampaignError("the manifest has no rows", file=source, expected="a campaign on each line")

@@ -68,7 +68,7 @@ def parse_point(text: str) -> Point:
     axis = match[1].split()[-1] if match else ""
     if not match or (axis not in set(Direction) and did_you_mean(match[1].lower(), list(Direction))):
         hint = "write numbers with a decimal point" if re.search(r"\d,\d", text) else None
-        raise UnitError("this is no operating point", found=repr(text), expected=expected, hint=hint)
+        raise UnitError("this is not an operating point", found=repr(text), expected=expected, hint=hint)
     strain = is_compatible(match[3].lstrip("+-.0123456789eE "), STRAINING.displacement_unit)
     of_specimen = STRAINING if strain else TRANSLATION
     motion = Direction(axis).motion if axis in set(Direction) else of_specimen

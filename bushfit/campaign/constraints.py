@@ -71,7 +71,7 @@ def _prior(text: str, name: str) -> Prior:
     match = _PLUS_MINUS.fullmatch(text)
     if not match or (match[4] == "%" and not match[2]):  # 3 % may be of the value, or added to it
         expected = '"0.24 +- 0.03" (with a unit if the parameter has one), or the model.json of an earlier fit'
-        raise CampaignError("this is no prior", found=f'"{text}"', expected=expected)
+        raise CampaignError("this is not a prior", found=f'"{text}"', expected=expected)
     parameter = get_parameter(name)
     parts = (match[1], match[2] or match[4]), (match[3], match[4])
     mean, deviation = (
@@ -81,7 +81,7 @@ def _prior(text: str, name: str) -> Prior:
     if not (low <= mean <= high and deviation > 0.0 and (mean > 0.0 or not parameter.log)):
         limits = f"{low:g} to {high:g} {parameter.unit}".removesuffix(" 1")
         expected = f"a value within {limits}, and a positive standard deviation"
-        raise CampaignError("this is no prior", found=f'"{text}"', expected=expected)
+        raise CampaignError("this is not a prior", found=f'"{text}"', expected=expected)
     return Prior((name,), np.array([mean]), np.array([[deviation**2]]), text)
 
 

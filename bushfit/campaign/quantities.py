@@ -208,5 +208,5 @@ def embedded(file: Path) -> str:
     elif _SVG in data[:_HEAD]:
         kind = "svg+xml"
     else:
-        raise CampaignError("this is no picture that a page can show", file=file, expected="PNG or SVG")
+        raise CampaignError("this is not a picture that a page can show", file=file, expected="PNG or SVG")
     return f"data:image/{kind};base64,{base64.b64encode(data).decode()}"

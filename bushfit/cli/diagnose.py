@@ -83,7 +83,7 @@ def command(
     with error_location(place="--tolerance"):
         share = parse_quantity(tolerance, "1")
         if not 0.0 <= share <= 1.0:
-            raise BushfitError("this is no share of |K|", found=f'"{tolerance}"', expected="0 % to 100 %")
+            raise BushfitError("this is not a share of |K|", found=f'"{tolerance}"', expected="0 % to 100 %")
     campaign = open_campaign(campaigns)
     folder = output.checked_folder(campaign.name, "diagnosis.json", "model.json")
     data = prepare_tests(campaign, loss)

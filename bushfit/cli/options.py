@@ -86,9 +86,7 @@ class Folder(click.Path):
     """Option type for a results folder; an empty text is an error."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        return (
-            super().convert(value, param, ctx) if value else self.fail("this is no folder: an empty text", param, ctx)
-        )
+        return super().convert(value, param, ctx) if value else self.fail("an empty text is not a folder", param, ctx)
 
 
 class Size(NumberType):
@@ -102,7 +100,7 @@ class Size(NumberType):
         with suppress(ValueError):
             if 0.0 < (size := float(text.removesuffix("%")) * (0.01 if "%" in text else 1.0)) <= self._maximum:
                 return size
-        return self.fail(f"{text} is no {self.name}", param, ctx)
+        return self.fail(f"{text} is not a {self.name}", param, ctx)
 
 
 def command_called(name: str, *examples: str) -> Callable[[Function], click.Command]:
@@ -148,7 +146,7 @@ def direction_option(words: str) -> Parameter:
 
     def check(ctx: click.Context, parameter: click.Parameter, places: tuple[str, ...]) -> tuple[str, ...]:
         if not all(place.strip() for place in places):
-            raise click.BadParameter("this is no direction: an empty text", ctx, parameter)
+            raise click.BadParameter("an empty text is not a direction", ctx, parameter)
         return places
 
     return option("--direction directions", "PLACE", words, type=str, multiple=True, callback=check)

@@ -143,7 +143,7 @@ def _target(text: str) -> tuple[str, float]:
     """Parse a target such as "stiffness.axial=1 %" into its name and its relative size (0.01)."""
     name, equals, size = text.rpartition("=")
     if not equals:
-        raise click.BadParameter(f"'{text}' is no name, '=' and size, such as \"mu=2 %\".", param_hint="'--target'")
+        raise click.BadParameter(f"'{text}' is not NAME=SIZE, such as \"mu=2 %\".", param_hint="'--target'")
     return name.strip(), positive(size.strip(), "--target", "1") or 0.0
 
 

@@ -202,7 +202,7 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
         parts = re.fullmatch(r"\s*([-+0-9.eE,:\s]*[0-9.])\s*([^-+\d\s:,.][^,]*)", text)
         if not parts or parts[1].count(":") not in (0, 2):
             hint = "write the step, too: start:stop:step" if text.count(":") == 1 else None
-            raise UnitError("these are no values with a unit", found=repr(text), expected=expected, hint=hint)
+            raise UnitError("these are not values with a unit", found=repr(text), expected=expected, hint=hint)
         is_range = ":" in parts[1]
         values = tuple(
             parse_quantity(f"{number} {parts[2]}", unit) for number in parts[1].split(":" if is_range else ",")

@@ -287,7 +287,7 @@ def requested_preloads(result: Result, place: Place, preloads: Sequence[str]) ->
     parsed = [parse_preload(text, place) for text in preloads]
     if None in parsed:
         found, expected = f'"{preloads[parsed.index(None)]}"', 'such as "500 N", "1.5 mm" or "none"'
-        raise UnitError(f"this is no preload of the {place} direction", place="preload", found=found, expected=expected)
+        raise UnitError(f"not a preload of the {place} direction", place="preload", found=found, expected=expected)
     return [tested_preload(result, place, preload) for preload in parsed]
 
 

@@ -139,7 +139,7 @@ class FitTable(Quality):
             low, high = getattr(self, key) or (1.0, 1.0)
             if not SIZES[0] <= low <= high <= SIZES[1]:
                 found, expected = f"{low:g}, {high:g}", "least and largest, above zero"
-                raise ValueError(ModelError("this is no range", place=key, found=found, expected=expected))
+                raise ValueError(ModelError("this is not a range", place=key, found=found, expected=expected))
         for key in ("nrmse", "reduced_chi_square", "points", "noise"):
             if getattr(self, key) < 0.0:
                 found = f"{getattr(self, key):g}"

@@ -253,7 +253,7 @@ def _read_json(file: Path) -> Any:
 
 
 def _refuse_constant(constant: str) -> NoReturn:
-    raise ValueError(f"{constant}, which is no number")
+    raise ValueError(f"{constant}, which is not a number")
 
 
 def _refuse_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -262,7 +262,7 @@ class CampaignTable:
     def __post_init__(self) -> None:
         if self.logo is not None and not _PICTURE.fullmatch(self.logo):
             expected = "data:image/png;base64, or data:image/svg+xml;base64, and the picture"
-            raise ValueError(ModelError("this is no picture", place="logo", found=self.logo, expected=expected))
+            raise ValueError(ModelError("this is not a picture", place="logo", found=self.logo, expected=expected))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -127,7 +127,7 @@ def _check_rivals(names: Iterable[str], possible: Container[str]) -> None:
     """Raise a ModelError if a name is not among the possible effects."""
     if unknown := [name for name in names if name not in possible]:
         raise ModelError(
-            "this is no rival in these tests",
+            "this is not a rival in these tests",
             place="--rivals",
             found=", ".join(unknown),
             expected="effects of the library that the model lacks, and the tests could show",

@@ -73,7 +73,7 @@ class LargeMotion:
         require_time_law(model)
         if place.motion.displacement_unit != self.unit:
             expected = f"a motion in {place.display.displacement.name}"
-            raise ModelError("this is no motion of the direction", place=str(place), found=self.unit, expected=expected)
+            raise ModelError("not a motion of this direction", place=str(place), found=self.unit, expected=expected)
         low, high = _SLOW * self.frequency, _SLOWEST * self.frequency
         if self.frequency and not (low <= frequency.min() and frequency.max() <= high):
             raise ModelError(

@@ -83,7 +83,7 @@ def format_of(data: bytes, file: Path) -> Format | None:
         by_ending and not by_content and by_ending.read is not labview
     ):  # LabVIEW also writes plain tables under this ending
         raise MeasurementError(
-            f"this is no {by_ending.name} file",
+            f"this is not a {by_ending.name} file",
             file=file,
             found="the first bytes of another file",
             expected=f"a {by_ending.name} file, according to its ending {file.suffix}",

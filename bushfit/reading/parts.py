@@ -85,7 +85,7 @@ def open_file(file: Path, file_format: FileFormat) -> OpenedFile:
     name = file_format.sheet
     if not parts and name:
         expected = "a workbook, or a file with groups of channels"
-        raise MeasurementError("this is no workbook", file=file, found=f'sheet = "{name}"', expected=expected)
+        raise MeasurementError("this is not a workbook", file=file, found=f'sheet = "{name}"', expected=expected)
     if not parts:
         text, encoding = to_utf8(data, file, file_format.encoding)
         return OpenedFile(file, checksum, file_format, [Text(join_quoted(text), encoding)])

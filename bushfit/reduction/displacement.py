@@ -130,11 +130,11 @@ def _moving_channels(channels: Sequence[DisplacementHistory]) -> list[Displaceme
     for channel in channels:
         if not np.all(np.abs(channel.displacement) < _LARGEST):
             expected = "finite displacements"
-            raise MeasurementError("this is no motion", place=str(channel.direction), expected=expected)
+            raise MeasurementError("this is not a motion", place=str(channel.direction), expected=expected)
     still = [channel.direction for channel in channels if not np.ptp(channel.displacement)]
     if len(still) == len(channels):
         expected = "displacements that change"
-        raise MeasurementError("this is no motion", place=", ".join(map(str, still)), expected=expected)
+        raise MeasurementError("this is not a motion", place=", ".join(map(str, still)), expected=expected)
     notes = tuple(f"{place}: left out, its displacement never changes" for place in still)
     return [replace(channel, notes=(*channel.notes, *notes)) for channel in channels if channel.direction not in still]
 

@@ -52,7 +52,7 @@ IN_SWEEP = [
     ("stiffness in newtons", every("stiffness [N/mm]", "stiffness [N]"), 'sweep.csv, line 1, column "stiffness [N]": the unit does not fit', "a stiffness, such as N/mm"),
     ("semicolons in the header alone", row(1, ",", ";"), "sweep.csv, line 1: there is no column for the frequency", 'name the column in the campaign: columns = { frequency = "..." }'),
     ("a torsion sweep as axial", lambda lines: text(lines).replace("amplitude [mm]", "amplitude [deg]").replace("[N/mm]", "[N m/rad]"), 'sweep.csv, line 1, column "amplitude [deg]": the unit does not fit', "a length, such as mm"),
-    ("repeat is a half", lambda lines: text([lines[0] + ",repeat", *(line + ",0.5" for line in lines[1:])]), 'sweep.csv, line 2, column "repeat": this is no repeat number', "a whole number"),
+    ("repeat is a half", lambda lines: text([lines[0] + ",repeat", *(line + ",0.5" for line in lines[1:])]), 'sweep.csv, line 2, column "repeat": this is not a repeat number', "a whole number"),
     ("loss factor of a hundred", column(3, "100"), 'sweep.csv, line 2, column "loss factor [-]": no bushing has this loss', "check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]"),
     ("strain of a bushing", every("amplitude [mm]", "strain [%]"), "sweep.csv, line 1: this is a test of strain and modulus", 'and specimen = "its name" here'),
     ("no amplitude", lambda lines: text([line.replace(line.split(",")[1] + ",", "", 1) for line in lines]), "sweep.csv, line 1: there is no column for the amplitude", 'or state at_amplitude = "0.1 mm" if all rows have it'),

@@ -174,7 +174,7 @@ def test_predict_on_a_large_motion_and_on_an_offset(bushfit: Run, tmp_path: Path
     [
         (("--over", "0.5 Hz"), "--over"),
         (("--over", "0.5 Hz -1 mm"), "a value above zero"),
-        (("--over", "2 deg"), "this is no motion of the direction"),
+        (("--over", "2 deg"), "not a motion of this direction"),
         (("--over", "50 Hz 1 mm"), "do not suit the slow motion"),
         (("--frequencies", "0 Hz"), "predict --static writes the static curve"),
         (("--frequencies", "0:10:5 Hz"), "predict --static writes the static curve"),

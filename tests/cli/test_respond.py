@@ -92,7 +92,7 @@ def test_corrections_are_stated(
         ),
         ({"time__s": TIME, "axial_displacement__mm": MOTION}, ("--lowpass", "100 Hz"), "does not suit the history"),
         ({"time__s": TIME, "axial_displacement__mm": MOTION}, ("--lowpass", "1e-6 Hz"), "one cycle in the history"),
-        ({"time__s": TIME, "axial_displacement__mm": 0.0 * MOTION}, (), "this is no motion"),
+        ({"time__s": TIME, "axial_displacement__mm": 0.0 * MOTION}, (), "this is not a motion"),
         ({"axial_displacement__mm": MOTION, "radial_displacement__mm": MOTION}, (), "no column for the time"),
         ({"time__s": TIME, "axial_displacement__mm": TIME}, ("--steady",), "a steady state needs whole cycles"),
         ({"time__s": np.append(TIME[:-1], 100.0), "axial_displacement__mm": MOTION}, (), "too uneven"),

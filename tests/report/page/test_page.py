@@ -130,7 +130,7 @@ def test_conditions_of_the_tests_are_told(root: Path, tmp_path: Path) -> None:
     model.write_text(model.read_text(encoding="utf-8").replace("data:image/png;base64,", "https://a.b/"))
     refused = call(tmp_path, "report", "x", "--force")
     assert refused.returncode == 2, "nothing is loaded from elsewhere, whatever a file says"
-    assert "campaign.logo: this is no picture" in refused.stderr
+    assert "campaign.logo: this is not a picture" in refused.stderr
 
 
 @pytest.mark.parametrize(
