@@ -45,7 +45,7 @@ def test_quantity_in_si(text: str, expected: str, value: float) -> None:
     ("value", "expected", "words"),
     [
         (10, "m", ["without a unit", "10 mm"]), ("10", "m", ["without a unit", 'write "10 mm"']),
-        (0.5, "1", ["without a unit", "%"]), (True, "m", ["not a quantity", "true"]), ("mm", "m", ["not a quantity", "mm"]),
+        (0.5, "1", ["without a unit", "%"]), (True, "m", ["a quantity", "true"]), ("mm", "m", ["not a quantity", "mm"]),
         ("10,5 mm", "m", ["not a quantity", "decimal point"]), ("10 kg", "m", ["does not fit", "kg", "a length"]),
         ("10 deg", "1", ["does not fit", "a ratio"]),
         ("10 N m", "N*m/rad", ["does not fit", "a torsional stiffness"]), ("10 dB", "1", ["unknown unit", "dB"]),
