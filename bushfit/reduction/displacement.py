@@ -126,7 +126,7 @@ def _moving_channels(channels: Sequence[DisplacementHistory]) -> list[Displaceme
     if len(shapes) != 1 or len(shape := shapes.pop()) != 1 or shape[0] < FEWEST_ROWS:
         found = ", ".join(f"{channel.direction}: {channel.displacement.shape}" for channel in channels)
         expected = f"at least {FEWEST_ROWS} displacements, as many in each direction"
-        raise MeasurementError("this is no history", found=found or "no direction", expected=expected)
+        raise MeasurementError("this is not a history", found=found or "no direction", expected=expected)
     for channel in channels:
         if not np.all(np.abs(channel.displacement) < _LARGEST):
             expected = "finite displacements"

@@ -111,7 +111,7 @@ def test_a_profile_contains_errors_that_the_weights_do_not(bushfit: Run, root: P
     [
         ('expression = "mu ^ 0.8"', "try: write ** for a power"),
         ('expression = "0.2 MPa"', "try: expressions have values in SI units, without the units"),
-        ('prior = "0.2 +- 3 %"', "this is no prior"),
+        ('prior = "0.2 +- 3 %"', "this is not a prior"),
         ('prior = "none.json"', "none.json: there is no such file"),
     ],
 )

@@ -131,8 +131,8 @@ def test_ranges_beyond_the_tests_are_stated(paper_model: Model) -> None:
         ({"axial": [0.0, 1e-4, 0.0]}, STEP, r"axial: \(3,\)"),
         ({"axial": np.ones((2, 50))}, STEP, r"axial: \(2, 50\)"),
         ({"axial": random(TIME), "radial": random(TIME)[1:]}, STEP, r"radial: \(2999,\)"),
-        ({"axial": 1e200 * random(TIME)}, STEP, "axial: this is no motion"),
-        ({"axial": np.where(TIME[-1] == TIME, np.nan, TIME)}, STEP, "axial: this is no motion"),
+        ({"axial": 1e200 * random(TIME)}, STEP, "axial: this is not a motion"),
+        ({"axial": np.where(TIME[-1] == TIME, np.nan, TIME)}, STEP, "axial: this is not a motion"),
         ({"axial": random(TIME)}, np.inf, "seconds above zero"),
     ],
 )
