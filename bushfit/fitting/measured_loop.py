@@ -125,12 +125,7 @@ class MeasuredLoop(MeasuredBase):
         return replace(self, drive=replace(self.drive, noise=relative * self.drive.half_range))
 
     def with_model_error(self, size: float) -> Self:
-        """Return the test with an error of the model added to its noise.
-
-        Args:
-            size: standard deviation of the model's error, relative to half the force range (of a sweep: relative to
-                |K|).
-        """
+        """Return the test with a model error of this standard deviation, relative to half the force range, or to |K|."""
         test = replace(self, model_error=size)
         test.__dict__["_unit_error"] = self._unit_error
         return test
@@ -146,9 +141,6 @@ class MeasuredLoop(MeasuredBase):
         Args:
             model: model to evaluate.
             values: parameter values in place of the model's own; leading axes are added to the result.
-
-        Returns:
-            Force, (..., n).
         """
         if values is None and (force := self._recall("force", model)) is not None:
             return force
