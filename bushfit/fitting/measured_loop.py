@@ -125,7 +125,7 @@ class MeasuredLoop(MeasuredBase):
         return replace(self, drive=replace(self.drive, noise=relative * self.drive.half_range))
 
     def with_model_error(self, size: float) -> Self:
-        """Return the test with a model error of this standard deviation, relative to half the force range, or to |K|."""
+        """Return the test with a model error of this standard deviation, relative to half the force range or |K|."""
         test = replace(self, model_error=size)
         test.__dict__["_unit_error"] = self._unit_error
         return test

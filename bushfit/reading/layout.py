@@ -317,7 +317,8 @@ def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence
     if len(widths) == 1 and len(headers) < (width := widths.pop()) < 2 * len(headers) and not may_be_decimal:
         # R writes no header for the names of rows, which come first
         counts = [cells[0] for line, cells in below if line != units_line and is_row(cells)]
-        first = any(not is_like_number(cell) for cell in counts) or _are_counts(counts)
+        are_numbered = len(counts) > 2 and counts in [[str(n + start) for n in range(len(counts))] for start in (0, 1)]
+        first = are_numbered or any(not is_like_number(cell) for cell in counts)
         unnamed = [""] * (width - len(headers))
         headers, row = ([*unnamed, *headers], [*unnamed, *row]) if first else ([*headers, *unnamed], [*row, *unnamed])
     contents = [line.content for line in lines[index + 1 :] if line.number != units_line]
@@ -325,11 +326,6 @@ def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence
         _NUMBERED.match(next(filter(None, split(content, delimiter)), "")) for content in contents
     )
     return Layout(delimiter, tuple(headers), number, tuple(row), units_line, numbered=numbered)
-
-
-def _are_counts(cells: Sequence[str]) -> bool:
-    """Return True if cells are row numbers, 0, 1, 2, ... or 1, 2, 3, ..."""
-    return len(cells) > 2 and any(list(cells) == [str(start + n) for n in range(len(cells))] for start in (0, 1))
 
 
 def is_units_row(cells: Sequence[str]) -> bool:
