@@ -200,7 +200,7 @@ def _print_static(output: Output, curve: StaticCurve) -> None:
     middle = curve.displacement.size // 2
     secant, slope = (number(factor * value, 4) for value in (curve.secant.value[0], curve.slope.value[middle]))
     output.print(
-        f"{curve.direction}: static {curve.direction.motion.words[2]} {secant} {name} from -{reach} to {reach} at "
+        f"{curve.label}: static {curve.direction.motion.words[2]} {secant} {name} from -{reach} to {reach} at "
         f"{curve.rate_text}, {slope} {name} about zero"
     )
 

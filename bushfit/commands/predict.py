@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -86,8 +87,8 @@ class PredictionOutput:
         }
         for resonance in self.resonances:
             document[f"{resonance.place}_resonance"] = table_columns(tables.predicted_resonance_table(resonance))
-        for curve in self.static:
-            document[f"{curve.direction}_static"] = table_columns(tables.static_table(curve))
+        for curves in by_direction(self.static):
+            document[f"{curves[0].direction}_static"] = table_columns(static_tables(curves))
         if self.arms:
             document["arms"] = [
                 {
@@ -190,8 +191,8 @@ def predict(
             expected="a model with the effect of temperature",
             hint="fit tests at several temperatures with --effect temperature",
         )
-    if len(preloads) > 1 and (wide or mass or static or static_rates):
-        problem = "wide tables, resonances and static curves require a single preload"
+    if len(preloads) > 1 and (wide or mass):
+        problem = "wide tables and resonances require a single preload"
         raise ModelError(problem, found=", ".join(preloads), expected="one, or none")
     if preloads and directions is None and result.measured:
         directions = [stated.place for stated in result.measured.preloads] or None
@@ -365,7 +366,7 @@ def _files(
         files.append(ResultFile("arms", "table", partial(tables.arms_table, result.model, output.arms, places)))
     suffixes: Sequence[tuple[str, Callable[[Any], pd.DataFrame], Sequence[Any]]] = [
         ("wide", tables.wide_table, output.predictions if wide else ()),
-        ("static", tables.static_table, output.static),
+        ("static", static_tables, by_direction(output.static)),
         ("resonance", tables.predicted_resonance_table, output.resonances),
     ]
     for suffix, make, parts in suffixes:
@@ -374,12 +375,22 @@ def _files(
             while stem in names:  # of a specimen
                 stem += "_"
             files.append(ResultFile(stem, "table", partial(make, part)))
-            if isinstance(part, StaticCurve):
-                title = f"{result.name}: {part.label}, static curve"
+            if suffix == "static":
+                title = f"{result.name}: {part[0].label if len(part) == 1 else part[0].direction}, static curve"
                 files.append(ResultFile(stem, "figure", partial(plots.prediction.static_figure, part, title)))
     if output.measured:
         files.append(ResultFile("measured", "table", partial(measured_table, result, output.measured)))
     return files
+
+
+def by_direction(curves: Sequence[StaticCurve]) -> list[list[StaticCurve]]:
+    """Group static curves by their direction or specimen, in order; a group has a curve per preload."""
+    return [[*group] for _, group in groupby(curves, key=lambda curve: curve.direction)]
+
+
+def static_tables(curves: Sequence[StaticCurve]) -> pd.DataFrame:
+    """Table of the static curves of one direction at several preloads, one below the other."""
+    return pd.concat([tables.static_table(curve) for curve in curves], ignore_index=True)
 
 
 def measured_table(result: Result, sweeps: Sequence[MeasuredSweep]) -> pd.DataFrame:

@@ -281,11 +281,14 @@ class Modifier(Effect):
     Args:
         adjust: (values, condition) -> the changed values only, by parameter name.
         shift_factor: (values, test conditions) -> time-temperature shift factor a_T; None without a shift.
+        stress: (values, strain history, setting) -> stress [Pa] to add in the time domain; None without one. Its first
+            harmonic is zero, since `adjust` gives the stiffness.
     """
 
     level: Level = Level.MATERIAL
     adjust: Callable[[Values, Condition], dict[str, Value]]
     shift_factor: Callable[[Values, RubberConditions], Value] | None = None
+    stress: Callable[[Values, History, Setting], Array] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

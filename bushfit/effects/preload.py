@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bushfit.effects.contract import Array, Condition, Setting, Value, Values, scaled_values
+from bushfit.effects.contract import Array, Condition, History, Setting, Value, Values, scaled_values
 from bushfit.geometry import stiffness_per_modulus, unit_strain
 
 #: Names of the stresses and moduli of friction, by whatever law.
@@ -42,6 +42,28 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
         **scaled_values(p, friction, np.exp(p["friction"] * strain + p["friction_square"] * np.square(strain))),
         **scaled_values(p, rate, np.exp(p["rate"] * strain + p["rate_square"] * np.square(strain))),
     }
+
+
+def stress(p: Values, history: History, setting: Setting) -> Array:
+    """Curvature of the elastic law about the preload, which a straight line of the slope of `adjust` leaves out.
+
+    Args:
+        p: parameter values by name, with mu [Pa], c2, c3 [1].
+        history: tensor shear strain e about the preload over time [1], (..., n).
+        setting: the test, with its preload.
+
+    Returns:
+        Stress to add at each sample [Pa], (..., n); zero if the preload is unknown.
+
+    Notes:
+        2 mu ((c2 + 3 c3 es) e^2 + c3 (e^3 - 3/4 e0^2 e)) about the static strain es, with the amplitude e0.
+    """
+    strain = history.value
+    if setting.conditions.preload is None:
+        return np.zeros_like(strain)
+    square = np.square(strain)
+    cubic = p["c3"] * (square - 0.75 * np.square(history.amplitude)) * strain
+    return np.asarray(2.0 * p["mu"] * ((p["c2"] + 3.0 * p["c3"] * static_strain(p, setting)) * square + cubic))
 
 
 def tangent(p: Values, strain: Value) -> Array:

@@ -120,6 +120,9 @@ def stack_force(model: Model, setting: Setting, values: Values, layers: Sequence
         together, stress = displacement.periodic and structure.viscoelastic, np.zeros(1)
         for branch in structure.others if together else structure.branches:
             stress = stress + branch.stress(values_for_effect(branch, base), strain)
+        for modifier in structure.modifiers:
+            if modifier.stress:
+                stress = stress + modifier.stress(values_for_effect(modifier, values), strain, setting)
         if together:  # the linear branches add up harmonic by harmonic; motions of one time step share their moduli
             count = strain.value.shape[-1]
             step, moduli = last_moduli.get(count, (None, np.zeros(1)))

@@ -12,6 +12,7 @@ from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Alternative, CampaignTable, Result, TestTable
 from bushfit.prediction.static_curve import static_curve, static_rate
+from bushfit.reading.preload import Preload
 
 #: 10 mm/min.
 RATE = 10e-3 / 60.0
@@ -65,6 +66,30 @@ def test_the_band_is_what_the_covariance_makes_of_the_force(paper_model: Model) 
         half = 1.959964 * np.sqrt(np.einsum("in,ij,jn->n", slopes, covariance.matrix, slopes))
         np.testing.assert_allclose(band.high - band.value, half, rtol=1e-4, atol=1e-6 * half.max())
         np.testing.assert_allclose(band.value - band.low, half, rtol=1e-4, atol=1e-6 * half.max())
+
+
+@pytest.mark.parametrize(("c2", "c3"), [(0.0, 20.0), (2.0, 30.0), (3.0, 0.0)])
+@pytest.mark.parametrize(("offset", "reach"), [(1e-3, 5e-4), (-8e-4, 6e-4)])
+def test_about_a_preload_it_is_that_of_the_rig_with_the_whole_elastic_law(
+    paper_model: Model, c2: float, c3: float, offset: float, reach: float
+) -> None:
+    samples, frequency = 1000, RATE / (4.0 * reach)
+    phase = np.arange(8 * samples + 1) / samples
+    motion = offset * np.minimum(2.0 * phase, 1.0) + reach * rig.wave("triangle", phase - 0.5) * (phase >= 0.5)
+    whole = paper_model.with_effect("asymmetry", {"asymmetry.c2": c2})
+    whole = whole.with_effect("strain_stiffening", {"strain_stiffening.c3": c3})
+    force = rig.imposed(whole, Direction.AXIAL, motion, 1.0 / (frequency * samples), frequency).force
+    rising = np.diff(motion[-samples - 1 :]) > 0.0
+    ways = []
+    for way in (rising, ~rising):
+        rows = np.nonzero(way)[0] - samples
+        rows = rows[np.argsort(motion[rows])]
+        ways.append(np.interp(np.linspace(-0.9, 0.9, 91) * reach, motion[rows] - offset, force[rows]))
+    values = {f"preload.{name}": 0.0 for name in ("friction", "friction_square", "rate", "rate_square")}
+    loaded = paper_model.with_effect("preload", {"preload.c2": c2, "preload.c3": c3, **values})
+    curve = static_curve(Result(loaded), Direction.AXIAL, reach, RATE, preload=Preload(offset, "m"))
+    expected, mean = np.mean(ways, axis=0), curve.mean.value[5:-5]
+    np.testing.assert_allclose(mean - mean[45], expected - expected[45], atol=0.005 * np.ptp(expected) / 2.0)
 
 
 def test_the_rate_is_stated_or_that_of_the_slowest_loop(paper_model: Model) -> None:

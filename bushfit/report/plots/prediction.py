@@ -92,28 +92,32 @@ def prediction_figure(
 
 
 @style.fixed_settings()
-def static_figure(curve: StaticCurve, title: str) -> style.Chart:
-    """Figure of a static curve: force over displacement, and its slope, with 95 % bands.
+def static_figure(curves: Sequence[StaticCurve], title: str) -> style.Chart:
+    """Figure of static curves: force over displacement, and its slope, with 95 % bands.
 
     Args:
-        curve: predicted static curve of one direction or specimen.
+        curves: predicted static curves of one direction or specimen, one per preload.
         title: title of the figure.
 
     Returns:
         Figure with two panels.
     """
-    place = curve.direction
+    curve, place = curves[0], curves[0].direction
     (_, length), (name, force), (stiffness_name, stiffness) = place.display
-    unit, factor = display_unit(name, force, float(np.abs(curve.mean.value).max()))
+    unit, factor = display_unit(name, force, max(float(np.abs(one.mean.value).max()) for one in curves))
     slope_unit, slope_factor = display_unit(stiffness_name, stiffness, float(curve.secant.value[0]))
     figure = style.Chart(title, style.ROW)
     panels = figure.subplots(1, 2)
-    x, (look, *_) = curve.displacement * length, style.styles(1, "loop")
-    for line in (curve.loading, curve.unloading):
-        panels[0].plot(x, factor * line.value, color=look.color, lw=_THIN)
-    for axes, band, scale in zip(panels, (curve.mean, curve.slope), (factor, slope_factor), strict=True):
-        axes.plot(x, scale * band.value, color=look.color, lw=_LINE)
-        axes.fill_between(x, scale * band.low, scale * band.high, color=look.color, alpha=0.22, lw=0)
+    for one, look in zip(curves, style.styles(len(curves), "loop"), strict=True):
+        x = one.displacement * length
+        for line in (one.loading, one.unloading):
+            panels[0].plot(x, factor * line.value, color=look.color, lw=_THIN)
+        for axes, band, scale in zip(panels, (one.mean, one.slope), (factor, slope_factor), strict=True):
+            axes.plot(x, scale * band.value, color=look.color, ls=look.dashes, lw=_LINE)
+            axes.fill_between(x, scale * band.low, scale * band.high, color=look.color, alpha=0.22, lw=0)
+    if len(curves) > 1:
+        handles = [look.handle(False) for look in style.styles(len(curves), "loop")]
+        style.legend(panels[1], handles, [one.preload.text(place) for one in curves if one.preload], "preload")
     style.label_axes(panels[0], displacement_header(place), f"{words(place)[1]} [{unit}]")
     style.label_axes(panels[1], displacement_header(place), f"static {words(place)[2]} [{slope_unit}]")
     panels[1].set_ylim(bottom=0.0)
