@@ -253,7 +253,8 @@ def unnamed_curves(evidence: Evidence) -> list[Explanation]:
             curves: dict[Hashable, list[MeasuredSweep]] = defaultdict(list)
             for sweep in sweeps:
                 if str(sweep.direction) == direction:
-                    curves[_temperature_step(sweep)].append(sweep)
+                    kelvin = sweep.sweep.temperature
+                    curves[None if kelvin is None else round(float(np.mean(kelvin)) / SAME_TEMPERATURE)].append(sweep)
             parts = zip(*(_restricted(evidence, sweeps, c, columns, share) for c in curves.values()), strict=True)
             residuals, changes = map(np.concatenate, parts)
             groups[f"{roughness} {direction}"] = Group(residuals, changes, act_together=True)
@@ -322,9 +323,3 @@ def _shared_by(evidence: Evidence, loops: Sequence[MeasuredLoop], changes: Calla
     for loop, of_loop in zip(loops, by_loop, strict=True):
         columns[:, evidence.residual_rows[loop]] = of_loop
     return columns
-
-
-def _temperature_step(sweep: MeasuredSweep) -> int | None:
-    """Mean temperature of a sweep in whole steps of 2 K, to group sweeps of equal temperature; None if unknown."""
-    kelvin = sweep.sweep.temperature
-    return None if kelvin is None else round(float(np.mean(kelvin)) / SAME_TEMPERATURE)

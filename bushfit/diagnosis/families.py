@@ -1,6 +1,6 @@
 """Model families on one campaign: the paper's model, and others that replace its branches, fitted and held out."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from itertools import product
@@ -211,7 +211,12 @@ def _gain(
         by the noise of each row, times the smaller mean square, at least 1. A row that is not held out acts through the
         parameters. Nonlinearity and estimated noise add to that, see `_BEYOND_LINEAR`.
     """
-    disjoint = [predictions[name] for name in _disjoint_parts(data_sets, predictions)]
+    disjoint, used_rows = list[Predicted](), np.zeros(sum(data_set.size for data_set in data_sets), dtype=bool)
+    for part in parts(data_sets):
+        rows = part.rows(data_sets)
+        if part.name in predictions and not (rows & used_rows).any():  # no point counts twice
+            disjoint.append(predictions[part.name])
+            used_rows |= rows
     if not disjoint:
         return None, None
     plain = np.concatenate([prediction.residuals[:, 0] for prediction in disjoint], axis=1)
@@ -221,13 +226,3 @@ def _gain(
     gain = float(before - after)
     p = float(2.0 * ndtr(-abs(gain) / error)) if error else 1.0
     return (gain, float(gain - Z95 * error), float(gain + Z95 * error)), p
-
-
-def _disjoint_parts(data_sets: Sequence[MeasuredTest], among: Collection[str]) -> Iterator[str]:
-    """Names of the held-out parts in `among` that share no point with an earlier part."""
-    used_rows = np.zeros(sum(data_set.size for data_set in data_sets), dtype=bool)
-    for part in parts(data_sets):
-        rows = part.rows(data_sets)
-        if part.name in among and not (rows & used_rows).any():
-            yield part.name
-            used_rows |= rows

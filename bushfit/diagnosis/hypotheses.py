@@ -151,17 +151,9 @@ class Tests:
         return compound(self.base)
 
     @cached_property
-    def _faulty_parts_in_fits(self) -> dict[str, FaultyPart]:
+    def faulty_parts_in_fits(self) -> dict[str, FaultyPart]:
+        """Faulty parts by name, with the residuals that a fit minimises in place of those in units of the scatter."""
         return {part.name: part for part in find_faulty_parts(self.base)}
-
-    def in_fits(self, part: FaultyPart) -> FaultyPart:
-        """Convert a faulty test part from residuals in units of the scatter to the residuals that a fit minimises.
-
-        Args:
-            part: frequency, level, repeat or loop whose points deviate together.
-        """
-        fitted = self._faulty_parts_in_fits[part.name]
-        return fitted if len(fitted.columns) == len(part.columns) else fitted.point_by_point()
 
     @cached_property
     def explanations(self) -> list[Explanation]:
@@ -252,9 +244,11 @@ class SearchState:
         Returns:
             Change of the whitened residuals per standard deviation, (c, n); None without faulty parts and deviation.
         """
-        columns = [
-            x * self.tests.in_fits(part).columns for part, x in zip(self.faulty_parts, self.amounts, strict=True)
-        ]
+        columns = []
+        for part, amount in zip(self.faulty_parts, self.amounts, strict=True):
+            fitted = self.tests.faulty_parts_in_fits[part.name]
+            fitted = fitted if len(fitted.columns) == len(part.columns) else fitted.point_by_point()
+            columns.append(amount * fitted.columns)
         compound = self.tests.compound_in_fits if deviation else None
         columns += [deviation * compound.whole] if compound else []
         return np.concatenate(columns) if columns else None
