@@ -112,7 +112,7 @@ class LinearModel:
         by_noise = np.diag(products[0] + products[1])[1 : 1 + len(self.jacobian)]
         index = rig.combinations[1][self.nodes]
         used = np.unique(index)
-        results = list[tuple[Array, _AtNodes]]()
+        results = list[tuple[Array, list[Array]]]()
         for part in np.array_split(used, max(1, min(used.size, used.size * projections.size // _AT_ONCE))):
             scatter, roots = rig.combinations[0][part, 0], rig.roots[0][part]
             share = 1.0 / np.square(scatter)[:, None, None]
@@ -124,25 +124,16 @@ class LinearModel:
                 grams.append(share[..., None] * both[0] + both[1] - errors @ errors.swapaxes(-1, -2))
             log_det = rig.roots[1][part] + 2.0 * np.count_nonzero(scatters) * np.log(scatter)
             chosen = np.flatnonzero(np.isin(index, part))
-            at_nodes = self._projected(chosen, np.searchsorted(part, index[chosen]), gram, grams, log_det, by_noise)
-            results.append((chosen, at_nodes))
+            arrays = self._projected(chosen, np.searchsorted(part, index[chosen]), gram, grams, log_det, by_noise)
+            results.append((chosen, arrays))
         order = np.argsort(np.concatenate([chosen for chosen, _ in results]))
-        base, misfit, changes = (
-            np.concatenate([getattr(result, name) for _, result in results])[order]
-            for name in ("base", "misfit", "changes")
-        )
-        along_groups, grams = (
-            [
-                np.concatenate(kind)[order]
-                for kind in zip(*(getattr(result, name) for _, result in results), strict=True)
-            ]
-            for name in ("projections", "grams")
-        )
-        return _AtNodes(base, misfit, changes, along_groups, grams)
+        joined = [np.concatenate(kind)[order] for kind in zip(*(arrays for _, arrays in results), strict=True)]
+        base, misfit, changes, *others = joined
+        return _AtNodes(base, misfit, changes, others[: len(self._blocks)], others[len(self._blocks) :])
 
     def _projected(
         self, chosen: Array, index: Array, gram: Array, grams: Sequence[Array], log_det: Array, by_noise: Array
-    ) -> "_AtNodes":
+    ) -> list[Array]:
         """Project parameters and the compound's deviation out of the inner products, at some of the nodes.
 
         Args:
@@ -152,6 +143,9 @@ class LinearModel:
             grams: inner products within the blocks of groups, for each combination, one array per block width.
             log_det: natural log of the determinant of the covariance of noise and rig errors, for each combination.
             by_noise: squared norms of the rows of the Jacobian, whitened by noise alone, (k,).
+
+        Returns:
+            Arrays of `_AtNodes` in order, those of projections and grams one by one.
         """
         flat, has_prior = slice(1, 1 + len(self.jacobian)), self.precision > 0.0
         scale = np.sqrt(np.maximum(by_noise + self.precision, np.finfo(float).tiny))
@@ -181,7 +175,7 @@ class LinearModel:
             projected.append(products[index] - (smooth_rows * shrinkage[:, None, None]) @ smooth_rows.swapaxes(-1, -2))
             projections.append(residual[:, rows])
         weight = np.array([self.rig.nodes[n].log_weight for n in self.nodes[chosen]])
-        return _AtNodes(weight - 0.5 * (residual[:, 0] + log_det), residual[:, 0], changes, projections, projected)
+        return [weight - 0.5 * (residual[:, 0] + log_det), residual[:, 0], changes, *projections, *projected]
 
     @cached_property
     def _gains(self) -> list[tuple[Array, Array]]:

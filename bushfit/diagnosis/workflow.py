@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 from bushfit.diagnosis.claims import Screen, adopted, claims
 from bushfit.diagnosis.condense import condensed
@@ -52,9 +53,10 @@ def diagnose(
         get_candidate(name)
     data, messages = adopted(data, [name for name in settings.adopt if get_mistake(name)])
     excluded: tuple[Outlier, ...] = ()
+    fixed = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
     for _ in range(_MAXIMUM_ROUNDS):  # single outliers of sweeps, which repeats and neighbours contradict
         try:
-            initial = _initial_fit(data, model, settings)
+            base, start, outliers = _initial_fit(data, model, settings, fixed)
         except FitError as error:
             thousands = [claim for claim in claims(data, settings.without) if claim.mistake.scales]
             for claim in Screen(data).best(thousands, 1):
@@ -62,26 +64,25 @@ def diagnose(
                 error.hint = f"these tests agree if {claim.words(data)}: {options} corrects it"
             raise
         known_rows = {(outlier.test, outlier.row) for outlier in excluded}  # a robust fit finds them anew
-        sweeps = split_by_kind(initial.evidence.data_sets)[1]
-        candidates = (*initial.outliers, *outliers_at(initial.evidence.model, sweeps))
+        candidates = (*outliers, *outliers_at(base.model, split_by_kind(base.data_sets)[1]))
         wild = tuple(outlier for outlier in candidates if (outlier.test, outlier.row) not in known_rows)
         if not wild:
             break
         data, excluded = data.without(wild), (*excluded, *wild)
     whole, (data, reductions) = data, condensed(data)
     if reductions:
-        initial = _initial_fit(data, model, settings)
+        base, start, outliers = _initial_fit(data, model, settings, fixed)
     search = Search(
         DiagnosisRequest(
             data,
-            initial.evidence,
-            lambda mended: _initial_fit(mended, model, settings).evidence,
+            base,
+            lambda mended: _initial_fit(mended, model, settings, fixed)[0],
             settings.without,
             settings.max_effects,
             settings.tolerance,
-            initial.start,
-            outlier_clusters(excluded, whole.sweeps, initial.evidence.model),
-            initial.fixed,
+            start,
+            outlier_clusters(excluded, whole.sweeps, base.model),
+            fixed,
             data.bounds,
         )
     )
@@ -90,51 +91,39 @@ def diagnose(
     diagnosis = DiagnosisWriter(search, finding, hypotheses, settings.unresolved).diagnosis()
     pairs = zip(whole.sweeps, data.sweeps, strict=True)
     reduced = {after.name for before, after in pairs if after.size < before.size}
-    counts = Counter(outlier.test for outlier in initial.outliers if outlier.test in reduced)
+    counts = Counter(outlier.test for outlier in outliers if outlier.test in reduced)
     left_out = (
         f"{name}: {count} of these points are left out, because they deviate by more than noise"
         for name, count in counts.items()
     )
     of_loops = outliers_at(diagnosis.result.model, data.loops)
-    outliers = (*outlier_warnings(of_loops, robust=data.robust), *outlier_warnings(excluded, robust=True))
-    notes = (*messages, *reductions, *left_out, *diagnosis.notes, *data.assumed, *outliers)
+    warnings = (*outlier_warnings(of_loops, robust=data.robust), *outlier_warnings(excluded, robust=True))
+    notes = (*messages, *reductions, *left_out, *diagnosis.notes, *data.assumed, *warnings)
     result = replace(
         diagnosis.result,
         outliers=(*of_loops, *excluded),
-        warnings=(*messages, *diagnosis.result.warnings, *outliers),
+        warnings=(*messages, *diagnosis.result.warnings, *warnings),
         specimens=data.campaign.specimens,
     )
     return replace(diagnosis, notes=notes, result=result)
 
 
-@dataclass(frozen=True, eq=False)
-class InitialFit:
-    """Starting model fitted to all tests of a campaign.
-
-    Args:
-        evidence: the fit.
-        start: starting values read from the data, by parameter.
-        fixed: names of parameters that are not fitted.
-        outliers: points that a robust fit left out.
-    """
-
-    evidence: Evidence
-    start: dict[str, float]
-    fixed: list[str]
-    outliers: tuple[Outlier, ...]
-
-
-def _initial_fit(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> InitialFit:
+def _initial_fit(
+    data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings, fixed: Sequence[str]
+) -> tuple[Evidence, dict[str, float], tuple[Outlier, ...]]:
     """Fit the starting model with the adopted effects; gain errors of loops have the stated or an assumed class.
 
     Args:
         data: campaign with prepared tests.
         model: starting model; None for the paper's three branches and the effects of [fit].
         settings: settings of the diagnosis, with the effects to adopt.
+        fixed: names of parameters that are not fitted.
+
+    Returns:
+        The fit, starting values read from the data by parameter, and the points that a robust fit left out.
     """
     hint = "add measured tests to the campaign"
     data_sets = data.require_tests(data.data_sets, "there is nothing to diagnose", hint)
-    fixed = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
     start = data.start_values(data_sets, {})
     model = replace(model or data.starting_model(data.effects, data_sets, {}), constraints=data.constraints)
     start = {name: value for name, value in start.items() if name in model.values and name not in fixed}
@@ -150,4 +139,4 @@ def _initial_fit(data: PreparedCampaign, model: Model | None, settings: Diagnosi
         outliers, data_sets = robust.outliers, robust.data_sets
     data_sets = [data_set.with_weight() for data_set in with_gain_weighting(data_sets, weigh=True)]
     descent = fit_from(model, data_sets, fixed, data.bounds).finished(EVALUATIONS)
-    return InitialFit(Evidence(descent.solution, tuple(data_sets)), start, fixed, outliers)
+    return Evidence(descent.solution, tuple(data_sets)), start, outliers
