@@ -44,7 +44,7 @@ def table() -> Iterator[Rows]:
     """Rows of what, figure and target; printed once all are there."""
     rows: Rows = []
     yield rows
-    widths = [max(len(row[i]) for row in rows) for i in range(3)]
+    widths = [max((len(row[i]) for row in rows), default=0) for i in range(3)]
     print()
     for row in rows:
         print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
