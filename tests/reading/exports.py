@@ -23,13 +23,8 @@ FORCE = 1000.0 * np.sin(2.0 * np.pi * 0.1 * TIME + 0.1)
 class Export:
     """A file and what `inspect` makes of it.
 
-    Args:
-        content: of the file.
-        kind: of the test; None if the file raises a question.
-        words: of the question, or of the notes.
-        stated: options that the file needs, as keys of a campaign.
-        name: of the file.
-        reference: columns of the test in SI; default those of this module.
+    The kind is None if the file raises a question, and the words are those of the question or of the notes. The file
+    needs the stated keys of a campaign. The reference has the columns of the test in SI; default those of this module.
     """
 
     content: str | bytes
@@ -63,10 +58,9 @@ def loop(headers: str = "time [s]|displacement [mm]|force [N]", *columns: Any, *
 
 def blocks(title: Callable[[float], str], headers: str, mark: str = "\t", end: Sequence[str] = ()) -> str:
     """A block of a sweep for each amplitude, below its title."""
-    lines: list[str] = []
-    for amplitude in (0.1, 0.5):
-        rows = amplitude == AMPLITUDE
-        lines += [title(amplitude), *table(headers.split("|"), F[rows], K[rows], ETA[rows], mark=mark), *end]
+    lines = list[str]()
+    for level in (0.1, 0.5):
+        lines += [title(level), *table(headers.split("|"), *(x[level == A] for x in (F, K, ETA)), mark=mark), *end]
     return "\n".join(lines) + "\n"
 
 
