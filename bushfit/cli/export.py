@@ -41,7 +41,7 @@ from bushfit.cli.shared_options import (
     option(
         "--dialect",
         "DIALECT",
-        "Write the nastran file for another solver: optistruct, with stiffness magnitude and loss angle.",
+        "Solver of the nastran file: optistruct, which reads the stiffness magnitude and the loss angle [Nastran].",
         type=click.Choice(["optistruct"]),
     ),
     flag("--time-domain", "For abaqus: write the materials as Prony series, for analyses in time."),
