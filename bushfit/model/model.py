@@ -64,7 +64,24 @@ class Model:
                 raise ModelError("a parameter has no value", place=name, expected=f"a number [{parameters[name].unit}]")
             if name not in parameters:
                 raise ModelError("unknown parameter", place=name, expected="one of " + ", ".join(parameters))
-            _check(name, self.values[name], parameters[name])
+            self._check(name, parameters[name])
+
+    def _check(self, name: str, parameter: Parameter) -> None:
+        """Raise a ModelError if a value is outside the bounds of its parameter; the neutral value is always valid."""
+        value, (low, high) = self.values[name], parameter.bounds
+        if parameter.neutral is not None:
+            low, high = min(low, parameter.neutral), max(high, parameter.neutral)
+        if not low <= value <= high:
+            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+            tie = next((tie for tie in self.constraints.active_ties(self.values) if tie.name == name), None)
+            raise ModelError(
+                "impossible value",
+                file=tie.file if tie else None,
+                place=f"fit.{name}" if tie else name,
+                found=f"{tie.expression} = {value:g}{unit}" if tie else f"{value:g}{unit}",
+                expected=f"{low:g} to {high:g}{unit} ({parameter.meaning})",
+                hint="correct the expression, or limit its parameters by min and max in [fit]" if tie else None,
+            )
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Model, (self.bushing, self.effects, dict(self.values), self.unnamed, self.constraints)
@@ -381,18 +398,3 @@ class Model:
         values = self.values if values is None else values
         shifts = ((modifier, modifier.shift_factor) for modifier in self.structure.modifiers)
         return prod(shift(values_for_effect(modifier, values), conditions) for modifier, shift in shifts if shift)
-
-
-def _check(name: str, value: float, parameter: Parameter) -> None:
-    """Raise a ModelError if a value is outside the bounds of its parameter; the neutral value is always valid."""
-    low, high = parameter.bounds
-    if parameter.neutral is not None:
-        low, high = min(low, parameter.neutral), max(high, parameter.neutral)
-    if not low <= value <= high:
-        unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-        raise ModelError(
-            "impossible value",
-            place=name,
-            found=f"{value:g}{unit}",
-            expected=f"{low:g} to {high:g}{unit} ({parameter.meaning})",
-        )

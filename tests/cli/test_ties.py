@@ -26,7 +26,7 @@ def written(root: Path, folder: Path, name: str, tables: str) -> Path:
     [
         ("cmp_15961_prior", '[fit.m]\nequal = "0.18 * mu"', 'try: expression = "..." takes the value of an expression'),
         ("cmp_15961_prior", '[fit.m]\nequal = "mu"', "parameters of different units are not equal"),
-        ("cmp_15961_prior", '[fit.alpha]\nexpression = "mu"', "found: alpha = mu = 1."),
+        ("cmp_15961_prior", '[fit.alpha]\nexpression = "mu"', "impossible value\n  found: mu = 1."),
         ("cmp_15961_prior", '[fit.m]\nexpression = "log(alpha - 1)"', "this expression has no value"),
         ("three_shapes", f'[{LONG}]\nequal = "stiffness_factor.y z"', "no such direction or specimen"),
         ("three_shapes", f'[{LONG}]\nexpression = "stiffness_factor.y"', "no such direction or specimen"),
