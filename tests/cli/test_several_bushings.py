@@ -10,6 +10,9 @@ import pandas as pd
 import pytest
 from shell import Run, typing
 
+from bushfit.geometry import Specimen
+from bushfit.report.results import place_names
+
 N = 200
 TIME = np.arange(N) / 200.0
 MOTION = 0.2 * np.sin(2.0 * np.pi * 5.0 * TIME)
@@ -179,3 +182,17 @@ def test_a_test_of_another_name_is_refused(root: Path, tmp_path: Path, old: str,
     text = (root / "configs/three_shapes.toml").read_text(encoding="utf-8").replace("../data", f"{root}/data")
     (tmp_path / "c.toml").write_text(text.partition("[simulate]")[0].replace(old, new), encoding="utf-8")
     assert problem in typing(tmp_path)("fit", "c.toml", "-o", "x", status=2).stderr
+
+
+def test_the_axial_formula_of_an_untested_bushing_is_that_of_a_tested_one(
+    shapes: Path, root: Path, tmp_path: Path
+) -> None:
+    run = typing(tmp_path)
+    run("fit", root / "configs/three_shapes.toml", "--direction", "short", "-o", "m", "--no-plots")
+    done = run("predict", "m", "--bushing", "long", "--direction", "axial", "-o", "x", "--no-plots", "-v")
+    assert "formula" not in done.stderr
+
+
+def test_files_of_bushings_differ_where_a_system_ignores_case() -> None:
+    names = place_names([Specimen("Long", "modulus"), Specimen("long", "modulus")])
+    assert names[0].casefold() != names[1].casefold()

@@ -16,7 +16,7 @@ def written(root: Path, folder: Path, name: str, tables: str) -> Path:
     """A campaign of the package without its ties, priors and simulation, with further tables; bodies have odd names."""
     text = (root / f"configs/{name}.toml").read_text(encoding="utf-8").replace("../data", f"{root}/data")
     text = re.split(r"^\[(?:fit|simulate)", text, flags=re.MULTILINE)[0]
-    text = text.replace('"long"', '"front left"').replace('"thick"', '"x-1"')
+    text = text.replace('"long"', '"front left"').replace('"thick"', '"x-1"').replace('"short"', '"x"')
     (folder / "campaign.toml").write_text(f"{text}\n{tables}", encoding="utf-8")
     return folder / "campaign.toml"
 
@@ -81,7 +81,7 @@ def test_the_spread_of_a_new_bushing_is_that_of_the_priors(
     bushfit: Run, root: Path, tmp_path: Path, keys: str, spread: float
 ) -> None:
     """A limit alone leaves the prior of a free factor as it is."""
-    tables = "\n".join(f'[fit."stiffness_factor.{name}"]\n{keys}' for name in ("short", "front left", "x-1"))
+    tables = "\n".join(f'[fit."stiffness_factor.{name}"]\n{keys}' for name in ("x", "front left", "x-1"))
     bushfit("fit", written(root, tmp_path, "three_shapes", tables), "-o", tmp_path / "m", "--no-plots")
     new = ("--bushing", root / "configs/new_bushing.toml", "--direction", "axial")
     done = bushfit("predict", tmp_path / "m", *new, "-o", tmp_path / "x", "--no-plots", "-v")
