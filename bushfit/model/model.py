@@ -115,6 +115,17 @@ class Model:
         """Names of the effects of which only the steady first harmonic is known, and no law in time."""
         return [effect.name for effect in self.records if effect.harmonic_only]
 
+    def require_time_law(self) -> None:
+        """Raise a ModelError if an effect has no law in time."""
+        if names := self.without_time_law:
+            raise ModelError(
+                "this needs a law in time, which an effect of the model does not have",
+                place=" and ".join(names),
+                found="a law of the steady first harmonic alone",
+                expected="effects with a law in time",
+                hint="use a model without it, or predict the steady state",
+            )
+
     @property
     def constant_modifiers(self) -> list[str]:
         """Names of the modifiers, other than temperature shifts, which a motion through time uses at one amplitude."""

@@ -12,7 +12,6 @@ import numpy as np
 
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
 from bushfit.effects.history import History
-from bushfit.errors import ModelError
 from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model
 from bushfit.reduction.harmonics import cycle_harmonics
@@ -118,14 +117,7 @@ def imposed(
     Raises:
         ModelError: an effect of the model has no equation in time.
     """
-    if model.without_time_law:
-        raise ModelError(
-            "the rig follows a motion through time, for which this effect has no law",
-            place=model.without_time_law[0],
-            found="a law of the steady first harmonic alone",
-            expected="effects with a law in time",
-            hint="ask predict for the stiffness of the steady state",
-        )
+    model.require_time_law()
     history = History(motion, step, periodic=False, frequency=frequency)
     force = model.force(direction, history, kind=kind, conditions=conditions)
     return Record(np.arange(motion.size) * step, motion, force)

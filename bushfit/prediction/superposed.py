@@ -70,7 +70,7 @@ class LargeMotion:
             ModelError: an effect has no law in time, the motion is of another kind than the direction, or it is not
                 slow compared with the small harmonic.
         """
-        require_time_law(model)
+        model.without(Level.INSTRUMENT, UNNAMED).require_time_law()
         if place.motion.displacement_unit != self.unit:
             expected = f"a motion in {place.display.displacement.name}"
             raise ModelError("not a motion of this direction", place=str(place), found=self.unit, expected=expected)
@@ -127,7 +127,7 @@ def superposed_stiffness_and_slopes(
 
 def untimed_effects(model: Model) -> list[str]:
     """Names of the effects of the bushing without a law in time, except the unnamed correction."""
-    return [name for name in model.without(Level.INSTRUMENT).without_time_law if name != UNNAMED]
+    return model.without(Level.INSTRUMENT, UNNAMED).without_time_law
 
 
 def timed_candidates(
@@ -146,20 +146,8 @@ def timed_candidates(
     Raises:
         ModelError: an effect of the fitted model has no law in time.
     """
-    require_time_law(result.model)
+    result.model.without(Level.INSTRUMENT, UNNAMED).require_time_law()
     models = candidates(result, rig=rig)
     untimed = sorted({name for _, model in models for name in untimed_effects(model)})
     sentence = f"{subject}: the band excludes the alternative with {' or '.join(untimed)}, which has no law in time"
     return [pair for pair in models if not untimed_effects(pair[1])], [sentence] if untimed else []
-
-
-def require_time_law(model: Model) -> None:
-    """Raise a ModelError if an effect of the bushing has no law in time."""
-    if names := untimed_effects(model):
-        raise ModelError(
-            "this needs a law in time, which an effect of the model does not have",
-            place=" and ".join(names),
-            found="a law of the steady first harmonic alone",
-            expected="effects with a law in time",
-            hint="fit a model without it",
-        )
