@@ -157,7 +157,8 @@ def even_time(time: Floats) -> tuple[Floats, tuple[str, ...]]:
         reason = f"the time steps are {steps.min():.3g} to {steps.max():.3g} s"
         if gaps.any():
             longest = f"the longest gap is {steps.max():.3g} s from {time[steps.argmax()]:.6g} s"
-            reason = f"{rows[gaps].sum() - gaps.sum()} rows are missing, {longest}"
+            missing = rows[gaps].sum() - gaps.sum()
+            reason = f"{missing} rows are missing, {longest}" if missing > 1 else f"1 row is missing, {longest}"
         correction = (f"{reason}: resampled evenly at {1.0 / step:.6g} Hz, by straight lines",)
     if even.size > _MOST_ROWS:
         raise MeasurementError("the history is too long", found=f"{even.size} rows", expected=f"up to {_MOST_ROWS}")

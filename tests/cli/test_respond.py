@@ -57,6 +57,7 @@ def test_one_column_takes_its_direction_from_an_option(bushfit: Run, tmp_path: P
     ("time", "motion", "options", "warning"),
     [
         (np.delete(TIME, slice(100, 110)), np.delete(MOTION, slice(100, 110)), (), "10 rows are missing"),
+        (np.delete(TIME, 100), np.delete(MOTION, 100), (), "1 row is missing"),
         (TIME + 0.002 * np.sin(20.0 * TIME), MOTION, (), "resampled evenly at"),
         (TIME, MOTION + 1000.0, (), "1000 mm, the first value, is subtracted"),
         (TIME, MOTION + 1000.0, ("--steady",), "1000 mm, the mean, is subtracted"),
