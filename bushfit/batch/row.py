@@ -110,7 +110,7 @@ def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFi
         BushfitError: inputs that cannot be used.
     """
     campaign = load_campaign(Path(row.campaign))
-    result, diagnosis, files = run_commands(campaign, row.settings, formats)
+    result, diagnosis, files, response_warnings = run_commands(campaign, row.settings, formats)
     tests: tuple[Loop | Sweep, ...] = (*campaign.loops, *campaign.sweeps)
     sources = [test.source for test in tests if test.source]
     inputs = {Path(row.campaign).name: campaign.sha256} | {str(source.file): source.sha256 for source in sources}
@@ -134,7 +134,7 @@ def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFi
         verdict=diagnosis.verdict if diagnosis else None,
         effects=[effect.label for effect in found],
         alternatives=[*(name for effect in found for name in effect.alternatives), *twins],
-        warnings=warnings_of(result, warnings, diagnosis.notes if diagnosis else ()),
+        warnings=warnings_of(result, [*warnings, response_warnings], diagnosis.notes if diagnosis else ()),
         quantities=quantities,
         measured=measured,
         at_bound=at_bound,
@@ -145,7 +145,7 @@ def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFi
 
 def run_commands(
     campaign: Campaign, settings: RowSettings, formats: Formats
-) -> tuple[Result, Diagnosis | None, dict[str, bytes]]:
+) -> tuple[Result, Diagnosis | None, dict[str, bytes], list[str]]:
     """Run the commands of a row: run alone, or any of fit, diagnose, predict and respond, each from the last result.
 
     Args:
@@ -154,7 +154,8 @@ def run_commands(
         formats: formats of the result files; the tables of a prediction are always written.
 
     Returns:
-        The last result, the diagnosis (None without diagnose), and the contents of the result files by name.
+        The last result, the diagnosis (None without diagnose), the contents of the result files by name, and the
+        warnings of the response to a history.
     """
     from bushfit.commands.diagnose import diagnose  # only workers need the commands, which are slow to import
     from bushfit.commands.fit import fit
@@ -167,7 +168,7 @@ def run_commands(
         ran = run(campaign)
         prediction = [file for file in ran.predicted.files if file.name != "measured"]
         files = encode_all(ran.files, formats) | encode_all(prediction, with_tables)
-        return ran.result, ran.diagnosed.diagnosis if ran.diagnosed else None, files
+        return ran.result, ran.diagnosed.diagnosis if ran.diagnosed else None, files, []
     start = result = load_result(Path(settings.model)) if settings.model else None
     diagnosis, joint, files = None, None, {}
     data = PreparedCampaign.from_campaign(campaign) if set(commands) - {"predict", "respond"} else None
@@ -186,9 +187,11 @@ def run_commands(
     assert result is not None  # the manifest refuses rows without fit, diagnose or model
     if "predict" in commands:
         files |= encode_all(predict(result, campaign).files, with_tables)
+    warnings = list[str]()
     if "respond" in commands and settings.history:
-        files |= encode_all(respond(result, settings.history, lowpass=settings.lowpass).files, with_tables)
-    return result, diagnosis, files
+        response = respond(result, settings.history, lowpass=settings.lowpass)
+        files, warnings = files | encode_all(response.files, with_tables), list(response.warnings)
+    return result, diagnosis, files, warnings
 
 
 def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[str, Estimate], list[Sequence[str]]]:

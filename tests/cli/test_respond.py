@@ -135,6 +135,8 @@ def test_a_batch_responds_for_each_part(bushfit: Run, work: Path, tmp_path: Path
     bushfit("respond", model, tmp_path / "road.csv", "--lowpass", "40 Hz", "-o", tmp_path / "single", "--no-plots")
     written = (tmp_path / "batch/bushings/cmp_15961/response.csv").read_text()
     assert written == (tmp_path / "single/response.csv").read_text()
+    row = json.loads((tmp_path / "batch/bushings/cmp_15961/row.json").read_text())
+    assert any("low-passed at 40 Hz" in warning for warning in row["warnings"])
     manifest.write_text(f"{settings}[[bushings]]\ncampaign = '{campaign}'\n")
     done = bushfit("batch", manifest, "-o", tmp_path / "none", status=2)
     assert "respond has no displacement history" in done.stderr
