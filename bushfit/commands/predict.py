@@ -256,12 +256,15 @@ def predict(
 def _of_bushings(campaign: Campaign, result: Result) -> Campaign:
     """Assign the tests of a campaign with a [bushing] to the one of several fitted bushings that has its geometry."""
     stated, fitted = campaign.bushing, result.bushings
-    if not stated or not fitted:
-        return campaign
-    bodies = [body for body in fitted if replace(stated, name=body.name) == body]
-    if not bodies:
-        found, expected = stated.name, f"a campaign of {' or '.join(body.name for body in fitted)}"
+    bodies = [body for body in fitted if stated and replace(stated, name=body.name) == body]
+    listed = {place.bushing for place in campaign.specimens if place.bushing}
+    others = [body.name for body in listed - {*fitted} if body.name in [one.name for one in fitted]]
+    others += [stated.name] if stated and fitted and not bodies else []
+    if others:
+        found, expected = ", ".join(others), f"the geometry of {' or '.join(body.name for body in fitted)} in the model"
         raise ModelError("the campaign tests another bushing", file=campaign.path, found=found, expected=expected)
+    if not bodies:
+        return campaign
     places = {place.axis: place for place in result.specimens if place.bushing == bodies[0]}
     return replace(
         campaign,

@@ -15,7 +15,7 @@ from bushfit.diagnosis.record import Diagnosis, DiagnosisSettings
 from bushfit.diagnosis.report_text import DiagnosisWriter
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import decide_verdict
-from bushfit.effects import get_effect, qualified_name
+from bushfit.effects import get_effect, place_suffix, qualified_name
 from bushfit.effects.mistakes import get_candidate, get_mistake
 from bushfit.errors import FitError
 from bushfit.fitting.design import fit_from
@@ -23,6 +23,7 @@ from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.robust import estimate, outlier_warnings, outliers_at
+from bushfit.geometry import get_places
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 
@@ -51,6 +52,8 @@ def diagnose(
     settings = settings or DiagnosisSettings()
     for name in (*settings.adopt, *settings.without):
         get_candidate(name)
+        if place := place_suffix(name):
+            get_places(place, data.campaign.specimens)
     data, messages = adopted(data, [name for name in settings.adopt if get_mistake(name)])
     excluded: tuple[Outlier, ...] = ()
     fixed = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]

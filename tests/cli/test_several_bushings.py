@@ -34,6 +34,8 @@ def shapes(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         pd.DataFrame({"time [s]": TIME, **columns}).to_csv(folder / f"{name}.csv", index=False)
     test = f'[[sweeps]]\nfile = "{root}/data/three_shapes/long.csv"\ndirection = "axial"\n'
     (folder / "mine.toml").write_text(f'[bushing]\nname = "mine"\n{SIZES}{test}', encoding="utf-8")
+    text = (root / "configs/three_shapes.toml").read_text(encoding="utf-8").replace("../data", f"{root}/data")
+    (folder / "longer.toml").write_text(text.replace('"50 mm"', '"60 mm"'), encoding="utf-8")
     return folder
 
 
@@ -112,6 +114,7 @@ def test_predictions_are_of_the_bushing_asked_for(
     [
         (("--bushing", "long", "--direction", "short"), "expected: one of axial, radial, torsion, long axial, long,"),
         (("--bushing", "long", "--campaign", "CMP"), "cmp_15961.toml: the campaign tests another bushing"),
+        (("--campaign", "longer.toml"), "longer.toml: the campaign tests another bushing\n  found: long\n"),
     ],
 )
 def test_bushings_that_do_not_fit_the_model_are_refused(
@@ -196,3 +199,10 @@ def test_the_axial_formula_of_an_untested_bushing_is_that_of_a_tested_one(
 def test_files_of_bushings_differ_where_a_system_ignores_case() -> None:
     names = place_names([Specimen("Long", "modulus"), Specimen("long", "modulus")])
     assert names[0].casefold() != names[1].casefold()
+
+
+@pytest.mark.parametrize("option", ["--adopt", "--without"])
+def test_a_diagnosis_knows_the_places_of_its_effects(root: Path, tmp_path: Path, option: str) -> None:
+    campaign = root / "configs/three_shapes.toml"
+    done = typing(tmp_path)("diagnose", campaign, option, "stiffness_factor.lung", "-o", "x", status=2)
+    assert "no such direction or specimen" in done.stderr
