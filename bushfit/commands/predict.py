@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -50,6 +51,10 @@ PredictionDocument = dict[str, dict[str, list[float | None]] | list[str]]
 _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
 
 
+#: A prediction or a static curve.
+Part = TypeVar("Part", Prediction, StaticCurve)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class PredictionOutput:
     """Predicted stiffness and loss factor of a fitted model, with tables and figures.
@@ -82,13 +87,13 @@ class PredictionOutput:
     def document(self) -> Mapping[str, Any]:
         """Content of `predict --json`: tables of the predictions by direction, Maxwell arms, tests and warnings."""
         document: dict[str, Any] = {
-            str(place): table_columns(joined_table(p for p in self.predictions if p.direction == place))
-            for place in dict.fromkeys(prediction.direction for prediction in self.predictions)
+            str(predictions[0].direction): table_columns(joined_table(prediction_table, predictions))
+            for predictions in by_direction(self.predictions)
         }
         for resonance in self.resonances:
             document[f"{resonance.place}_resonance"] = table_columns(tables.predicted_resonance_table(resonance))
         for curves in by_direction(self.static):
-            document[f"{curves[0].direction}_static"] = table_columns(static_tables(curves))
+            document[f"{curves[0].direction}_static"] = table_columns(joined_table(tables.static_table, curves))
         if self.arms:
             document["arms"] = [
                 {
@@ -338,10 +343,8 @@ def _files(
         temperature: temperature of the prediction [K]; None for the reference temperature.
         wide: True to add tables with one column per amplitude.
     """
-    result, by_place = output.result, dict[Place, list[Prediction]]()
-    for prediction in output.predictions:
-        by_place.setdefault(prediction.direction, []).append(prediction)
-    places = list(by_place)
+    result, by_place = output.result, by_direction(output.predictions)
+    places = [predictions[0].direction for predictions in by_place]
     names = place_names(places)
 
     def draw(prediction: Prediction) -> Figure:
@@ -359,8 +362,8 @@ def _files(
         return plots.prediction.prediction_figure(result, prediction, table, title, note, temperature)
 
     files = list[ResultFile]()
-    for name, predictions in zip(names, by_place.values(), strict=True):
-        files.append(ResultFile(name, "table", partial(joined_table, predictions)))
+    for name, predictions in zip(names, by_place, strict=True):
+        files.append(ResultFile(name, "table", partial(joined_table, prediction_table, predictions)))
         files.append(ResultFile(name, "figure", partial(draw, predictions[0])))
         if len(predictions) > 1:
             over_preload = partial(plots.preload.preload_figure, result, predictions, result.name, temperature)
@@ -369,7 +372,7 @@ def _files(
         files.append(ResultFile("arms", "table", partial(tables.arms_table, result.model, output.arms, places)))
     suffixes: Sequence[tuple[str, Callable[[Any], pd.DataFrame], Sequence[Any]]] = [
         ("wide", tables.wide_table, output.predictions if wide else ()),
-        ("static", static_tables, by_direction(output.static)),
+        ("static", partial(joined_table, tables.static_table), by_direction(output.static)),
         ("resonance", tables.predicted_resonance_table, output.resonances),
     ]
     for suffix, make, parts in suffixes:
@@ -386,14 +389,9 @@ def _files(
     return files
 
 
-def by_direction(curves: Sequence[StaticCurve]) -> list[list[StaticCurve]]:
-    """Group static curves by their direction or specimen, in order; a group has a curve per preload."""
-    return [[*group] for _, group in groupby(curves, key=lambda curve: curve.direction)]
-
-
-def static_tables(curves: Sequence[StaticCurve]) -> pd.DataFrame:
-    """Table of the static curves of one direction at several preloads, one below the other."""
-    return pd.concat([tables.static_table(curve) for curve in curves], ignore_index=True)
+def by_direction(parts: Sequence[Part]) -> list[list[Part]]:
+    """Group successive predictions or static curves of a direction or specimen; a group has one per preload."""
+    return [list(group) for _, group in groupby(parts, key=attrgetter("direction"))]
 
 
 def measured_table(result: Result, sweeps: Sequence[MeasuredSweep]) -> pd.DataFrame:
@@ -404,9 +402,9 @@ def measured_table(result: Result, sweeps: Sequence[MeasuredSweep]) -> pd.DataFr
     return table.assign(fitted=np.repeat(["yes", "no"], counts))
 
 
-def joined_table(predictions: Iterable[Prediction]) -> pd.DataFrame:
-    """Table of the predictions of one direction at several preloads, one below the other."""
-    return pd.concat([prediction_table(prediction) for prediction in predictions], ignore_index=True)
+def joined_table(make: Callable[[Part], pd.DataFrame], parts: Sequence[Part]) -> pd.DataFrame:
+    """Table of the predictions or static curves of one direction at several preloads, one below the other."""
+    return pd.concat([make(part) for part in parts], ignore_index=True)
 
 
 def table_columns(table: pd.DataFrame) -> dict[str, list[Any]]:
