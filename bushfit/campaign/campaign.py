@@ -128,8 +128,8 @@ def load_campaign(path: str | Path) -> Campaign:
     factors = tuple(f"stiffness_factor.{table.name}" for table in content.bushings if table.factor == "free")
     parameters = {**{name: ParameterSetting() for name in factors}, **content.fit.parameters}
     for name in factors:
-        if (stated := parameters[name]).vary and not (stated.prior or stated.tie):
-            parameters[name] = replace(stated, prior=f"1 +- {FACTOR_SPREAD}")
+        if (setting := parameters[name]).vary and not (setting.prior or setting.tie):
+            parameters[name] = replace(setting, prior=f"1 +- {FACTOR_SPREAD}")
     effects = (*content.fit.effects, *(name for name in factors if name not in content.fit.effects))
     found["fit"] = replace(content.fit, effects=effects, parameters=parameters)
     settings = {key: value for key, value in vars(content).items() if key != "bushings"}

@@ -180,7 +180,7 @@ def predict(
     result = as_result(model)
     if isinstance(bushing, str):
         of_bushing = [place for place in result.specimens if place.bushing and place.body == bushing]
-        preloaded = [stated.place for stated in result.measured.preloads] if preloads and result.measured else []
+        preloaded = [tested.place for tested in result.measured.preloads] if preloads and result.measured else []
         default = [str(place) for place in of_bushing if str(place) in preloaded] or _DIRECTIONS
         directions = [str(place) for name in directions or default for place in get_places(name, of_bushing)]
     elif bushing:
@@ -200,7 +200,7 @@ def predict(
         problem = "wide tables and resonances require a single preload"
         raise ModelError(problem, found=", ".join(preloads), expected="one, or none")
     if preloads and directions is None and result.measured:
-        directions = [stated.place for stated in result.measured.preloads] or None
+        directions = [tested.place for tested in result.measured.preloads] or None
     requested = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
     settings = grid_settings(requested, campaign)
     specimens = {specimen.name: specimen for specimen in (*result.specimens, *(campaign.specimens if campaign else ()))}
@@ -260,13 +260,16 @@ def predict(
 
 def _of_bushings(campaign: Campaign, result: Result) -> Campaign:
     """Assign the tests of a campaign with a [bushing] to the one of several fitted bushings that has its geometry."""
-    stated, fitted = campaign.bushing, result.bushings
-    bodies = [body for body in fitted if stated and replace(stated, name=body.name) == body]
+    bushing, fitted = campaign.bushing, result.bushings
+    bodies = [body for body in fitted if bushing and replace(bushing, name=body.name) == body]
     listed = {place.bushing for place in campaign.specimens if place.bushing}
-    others = [body.name for body in listed - {*fitted} if body.name in [one.name for one in fitted]]
-    others += [stated.name] if stated and fitted and not bodies else []
-    if others:
-        found, expected = ", ".join(others), f"the geometry of {' or '.join(body.name for body in fitted)} in the model"
+    different = sorted({body.name for body in listed - {*fitted}} & {body.name for body in fitted})
+    different += [bushing.name] if bushing and fitted and not bodies else []
+    if different:
+        found, expected = (
+            ", ".join(different),
+            f"the geometry of {' or '.join(body.name for body in fitted)} in the model",
+        )
         raise ModelError("the campaign tests another bushing", file=campaign.path, found=found, expected=expected)
     if not bodies:
         return campaign

@@ -21,10 +21,10 @@ def factor_spread(result: Result) -> float | None:
     """Standard deviation of the factors of bushings about 1, by their priors; None if no bushing has a free factor."""
     names = [f"stiffness_factor.{bushing.name}" for bushing in result.bushings]
     priors = [result.priors[name] for name in names if name in result.priors]
-    stated = [(prior.mean - 1.0, prior.deviation) for prior in priors if not prior.source.endswith(".json")]
-    if not stated:  # a prior from a file is of one bushing, and not of their spread
+    distances = [(prior.mean - 1.0, prior.deviation) for prior in priors if not prior.source.endswith(".json")]
+    if not distances:  # a prior from a file is of one bushing, and not of their spread
         return FACTOR_SPREAD if priors else None
-    return float(np.sqrt(np.mean(np.square(stated).sum(axis=1))))
+    return float(np.sqrt(np.mean(np.square(distances).sum(axis=1))))
 
 
 def with_factor(result: Result, places: Sequence[str], spread: float) -> Result:
