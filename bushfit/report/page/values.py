@@ -69,7 +69,8 @@ def headline(record: ReportRecord, prediction: Prediction) -> dict[str, str]:
         relative = [band.root[:, 0] / band.value[0] for band in (point.stiffness, curve.secant)]
         half = Z95 * ratio * float(np.linalg.norm(relative[0] - relative[1]))
         row["static"], row["static_point"] = f"{number(static, 4)} {unit}", f"at {curve.rate_text}"
-        row["stiffening"] = f"{ratio:.2f} ± {half:.2f}" if half else f"{ratio:.2f}"
+        decimals = max(2, math.ceil(-math.log10(2.0 * half))) if half else 2  # the interval is not rounded to 0
+        row["stiffening"] = f"{ratio:.{decimals}f}" + (f" ± {half:.{decimals}f}" if half else "")
     for usable in result.usable:
         if usable.place == str(place):
             errors = number(100 * usable.stiffness, 2), number(usable.loss_factor, 2)
