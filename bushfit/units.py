@@ -49,10 +49,10 @@ _FACTOR = r"(?:[^\W\d_]+|[%‰°1])(?:(?:\^|\*\*)-?[1-9]|⁻?[¹²³])?"
 _UNIT = re.compile(rf"{_FACTOR}(?:(?:\s*[*/·⋅]\s*|\s+){_FACTOR})*")
 #: Maximum length of a unit [characters]; pint is slow with longer texts.
 _LONGEST_UNIT = 40
-#: Unit by spelling: in lower case, with capitals, and spellings of an acceleration.
-_SPELLINGS, _EXACT, _OF_ACCELERATION = (
+#: Unit by spelling: in lower case, with capitals, and spellings of an acceleration and of a length.
+_SPELLINGS, _EXACT, _OF_ACCELERATION, _OF_LENGTH = (
     {word: unit for unit, words in _WORDS[table].items() for word in words.split()}
-    for table in ("spellings", "exact", "of_acceleration")
+    for table in ("spellings", "exact", "of_acceleration", "of_length")
 )
 #: Common units: factor to SI and SI base unit. With these alone pint is not imported, which takes longer than a fit.
 _EVERYDAY: dict[str, tuple[float, str]] = {
@@ -97,8 +97,7 @@ def si_factor(text: str, expected: str) -> float:
     """
     if expected == "K" and (degree := kelvin_scale(text)):
         return degree[0]
-    if expected == "m/s^2":
-        text = _OF_ACCELERATION.get(text.strip(), text)
+    text = {"m/s^2": _OF_ACCELERATION, "m": _OF_LENGTH}.get(expected, {}).get(text.strip(), text)
     scale, base = _resolve(text)
     if base != _resolve(expected)[1]:
         hint = 'a pound of force is "lbf"' if {"lb", "lbs"} & set(_WORD.findall(text)) else None

@@ -33,6 +33,7 @@ def test_units_that_people_read(value: float, unit: str, shown: str) -> None:
         ("60 1/min", "Hz", 1.0), ("10 mm/min", "m/s", 1e-2 / 60), ("3 kNmm", "N*m", 3.0), ("1 kN·mm⁻¹", "N/m", 1e6),
         ("1 N mm^-1", "N/m", 1e3), ("1 Nm/deg", "N*m/rad", math.degrees(1)), ("1 N/mm2", "Pa", 1e6),
         ("1 kp/mm", "N/m", 9806.65), ("1 kgf/cm2", "Pa", 98066.5), ("1 Ncm", "N*m", 1e-2), ("2 Inch", "m", 0.0508),
+        ("2 mils", "m", 5.08e-5), ("3 N/M", "N/m", 3.0),
         ("30 RPM", "rad/s", 3.141592653589793),
     ],
 )  # fmt: skip
@@ -85,8 +86,8 @@ def test_units_of_the_field_are_as_large_as_in_the_whole_list_of_pint() -> None:
 @pytest.mark.parametrize(
     ("unit", "expected", "said"),
     [
-        ("mil", "m", r"two ways(.|\n)*thou"),
-        ("mils", "m", r"two ways(.|\n)*mrad"),
+        ("mil", "rad", r"two ways(.|\n)*thou"),
+        ("mils", "rad", r"two ways(.|\n)*mrad"),
         ("grad", "m", r"two ways(.|\n)*gon"),
         *((unit, "N", 'a pound of force is "lbf"') for unit in ("lb", "lbs/in", "in-lb")),
     ],

@@ -17,11 +17,13 @@ from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
 #: Largest text that is searched for blocks without their own headers [bytes]; chosen: some 100,000 rows.
 _MOST_BYTES = 1 << 22
 #: Letter that does not begin an exponent.
-_LETTER = re.compile(r"[^\W\d_eE]|[eE](?![+-]?\d)")
+_LETTER = re.compile(r"[^\W\d_eEdD]|[eEdD](?![+-]?\d)")
 #: Bytes that occur in rows of numbers, which cannot begin a block.
-_NUMERIC = b"0123456789.,+-eE \t\r\n"
+_NUMERIC = b"0123456789.,+-eEdD \t\r\n"
 #: Complex number: "1500+150i", "(1500 + 150j)".
-_COMPLEX = re.compile(r"\(?\s*([+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*([+-]\s*[\d.,]+(?:[eE][+-]?\d+)?)\s*\*?\s*[ij]\s*\)?")
+_COMPLEX = re.compile(
+    r"\(?\s*([+-]?[\d.,]+(?:[eEdD][+-]?\d+)?)\s*([+-]\s*[\d.,]+(?:[eEdD][+-]?\d+)?)\s*\*?\s*[ij]\s*\)?"
+)
 #: First rows that are searched for complex numbers; chosen: room for remarks.
 _FIRST = 8
 #: Text of each amplitude convention in the header of an added column.

@@ -22,7 +22,7 @@ _SEPARATORS = {",": ",", ".": r"\.", " ": f"[{BLANKS}]", "'": f"[{APOSTROPHES}]"
 #: Largest number of characters of a number; chosen: the largest float written out has 309 digits.
 _LONGEST_NUMBER = 400
 #: Text with the characters of a number, in an order that numbers may have.
-_LIKE_NUMBER = re.compile(rf"{_SIGN}?[.,]?\d[\d.,{BLANKS}{APOSTROPHES}]*(?:[eE]{_SIGN}?\d+)?", re.ASCII)
+_LIKE_NUMBER = re.compile(rf"{_SIGN}?[.,]?\d[\d.,{BLANKS}{APOSTROPHES}]*(?:[eEdD]{_SIGN}?\d+)?", re.ASCII)
 #: Number whose point or comma may be the thousands separator or the decimal mark: 1.234.
 _ONE_GROUP = re.compile(rf"{_SIGN}?[1-9]\d{{0,2}}([.,])\d{{3}}", re.ASCII)
 #: Number without thousands separators: 1234.5.
@@ -39,7 +39,7 @@ class Numerals:
     @cached_property
     def _pattern(self) -> re.Pattern[str]:
         mark = re.escape(self.decimal)
-        forms = [rf"(?:\d+(?:{mark}\d*)?|{mark}\d+)(?:[eE]{_SIGN}?\d+)?"]
+        forms = [rf"(?:\d+(?:{mark}\d*)?|{mark}\d+)(?:[eEdD]{_SIGN}?\d+)?"]  # Fortran writes 1.0D-03
         if self.thousands:
             forms.append(rf"[1-9]\d{{0,2}}(?:{_SEPARATORS[self.thousands]}\d{{3}})+(?:{mark}\d*)?")
         return re.compile(rf"{_SIGN}?(?:{'|'.join(forms)})", re.ASCII)
@@ -54,7 +54,7 @@ class Numerals:
             return None
         if self.thousands:
             text = re.sub(_SEPARATORS[self.thousands], "", text)
-        return float(text.replace(self.decimal, ".").replace("\u2212", "-"))
+        return float(text.replace(self.decimal, ".").replace("\u2212", "-").lower().replace("d", "e"))
 
 
 #: All notations, the plainest first.

@@ -100,6 +100,7 @@ UNCLEAR: dict[str, tuple[str, dict[str, str], float | None]] = {
     "settled by four digits": ("1.234;1234.567;2.345", {}, 2.345),
     "settled by both marks": ("1.234,5;1.234;2.345", {}, 2345.0),
     "settled by an exponent": ("1.234;1.234e3;2.345", {}, 2.345),
+    "settled by an exponent of Fortran": ("1.234;1.234D+03;2.345", {}, 2.345),
     "settled by a group too many": ("1.234.567;1.234;2.345", {}, 2345.0),
 }
 
