@@ -126,7 +126,7 @@ class BatchResult:
 
     @cached_property
     def curve_deviation(self) -> Array:
-        """|K| of each part over the median of all parts, less 1: geometric mean along the measured curve, (n,)."""
+        """Relative deviation of |K| of each part from the median of the parts, averaged over the curve, (parts,)."""
         if not self.curves:
             return np.full(len(self.records), np.nan)
         logarithms = np.log([*self.curves.values()])

@@ -113,7 +113,7 @@ def _from_result(
 
 
 def _tie(campaign: Campaign, name: str, setting: ParameterSetting) -> Tie:
-    """Parse the tie of a parameter; one that is equal to another has its unit."""
+    """Parse the expression, or the name of an equal parameter of the same unit, that a parameter is tied to."""
     labels = [label for specimen in campaign.specimens for label in specimen.labels]
     if other := (setting.equal or "").strip():
         tie = Tie(name, other, (other,), "p0", campaign.path)

@@ -131,7 +131,10 @@ def _noise(before: SweepNoise, condensations: Sequence[_Means], rig: RigSettings
 
 
 def _condensed_sweep(data_set: MeasuredSweep) -> _Means | None:
-    """Reduce a sweep with long runs or very many lines; None if the whole sweep is diagnosed."""
+    """Average neighbouring points of a sweep with long runs, and select some of very many held values.
+
+    None if the whole sweep is diagnosed.
+    """
     sweep, rows, words = data_set.sweep, data_set.order[data_set.weights > 0.0], ""
     lines = np.unique(sweep.held_value[rows])
     if lines.size > _MOST_LINES:

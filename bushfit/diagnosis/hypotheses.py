@@ -292,7 +292,8 @@ class SearchState:
             log_odds: natural log of the explanation's prior odds.
 
         Returns:
-            The extended hypothesis and, if considered, the same with a deviation of the compound.
+            The extended hypothesis and, if the search considers a smooth deviation of the compound from the model, a
+            second one with this deviation.
         """
         plain = self.hypotheses[0]
         if explanation.kind == "effect":

@@ -209,10 +209,10 @@ def _subsets(names: frozenset[str]) -> list[frozenset[str]]:
 
 
 def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
-    """Merge hypotheses with the same parts, with or without a deviation of the compound, to compositions.
+    """Merge hypotheses that consist of the same explanations, with or without a deviation of the compound.
 
-    A set of parts that is less probable than a simpler set is merged with the simpler set; so is an effect with the
-    effect that is its limit. Faulty parts of the same kinds are merged.
+    A set of explanations that is less probable than a subset of it is merged with the subset; an effect that is a
+    limiting case of another is merged with that effect. Faulty parts of the same kinds are merged.
 
     Args:
         pairs: hypotheses and their posterior weights, the most probable first.

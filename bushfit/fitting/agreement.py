@@ -133,7 +133,7 @@ class LeaveOut:
         return pull
 
     def _rest(self, rows: Array) -> Array:
-        """Fisher information of the fit without the given rows (indices or mask), in the basis, (m, m)."""
+        """Fisher information of a fit without the given rows (indices or mask), along the m basis vectors, (m, m)."""
         return np.eye(self.components.size) - self.basis[rows].T @ self.basis[rows]
 
     def _basis_step(self, rows: Array) -> Array:

@@ -142,7 +142,11 @@ class FittedTests:
 
     @cached_property
     def remainder(self) -> tuple[Array, Array]:
-        """Orthonormal directions absorbed by parameters and rig errors, (k, d), and residual without these, (d,)."""
+        """Project out what k parameters and rig errors explain of the d components of the residuals.
+
+        Returns:
+            Orthonormal basis of the explained changes, (k, d), and residual without its components in them, (d,).
+        """
         rows, residual = self.solution.jacobian, self.solution.residual
         pairs = list(zip(self._blocks, self.rig_errors, strict=True))
         across = np.concatenate([rows[:, block] @ errors.T for (_, block, *_), errors in pairs], axis=1)
@@ -273,10 +277,10 @@ def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
 
 
 def discrepancies(tests: FittedTests) -> list[Discrepancy]:
-    """List the Gaussian processes of the misfit that are compared by their likelihood.
+    """List the Gaussian processes that may describe the misfit of a model, to be compared by their likelihood.
 
-    For each pair of correlation lengths, in ln frequency and in ln strain, there is one process that all directions
-    share and one of which each direction has its own.
+    For each pair of correlation lengths, in ln frequency and in ln strain, the list has two processes: one error for
+    all directions, and independent errors of the directions.
     """
     names = tuple(dict.fromkeys(tests.directions.tolist()))
     shared = dict.fromkeys([(names,), tuple((name,) for name in names)])

@@ -38,7 +38,7 @@ class LevelErrors(NamedTuple):
 def level_errors(
     data_sets: Sequence[MeasuredTest], residual: Array, absorbed: Array, maximum: tuple[float, float]
 ) -> LevelErrors:
-    """Estimate gain and phase errors that all repeats of a level share, by restricted maximum likelihood.
+    """Estimate gain and phase errors that all runs at one amplitude or frequency share (a level).
 
     Args:
         data_sets: fitted tests.
@@ -47,12 +47,12 @@ def level_errors(
         maximum: largest standard deviation of gain and of phase [rad] that the rig may have.
 
     Returns:
-        Errors, with the gain of the likelihood that they bring.
+        Errors, with the fall of -2 ln(likelihood) that they bring.
 
     Notes:
         An error of a level adds v u u^T to the covariance of the whitened residuals, where u is the whitened unit error
         of the level and v its variance. The directions in `absorbed` are projected out (Patterson and Thompson, 1971).
-        The likelihood is maximised by Fisher scoring, in the space of the levels.
+        The restricted likelihood is maximised by Fisher scoring, in the space of the levels.
     """
     rows, kinds, before, size = list[Array](), np.empty(0), (0.0, 0.0), residual.size
     for sweep, block in zip(data_sets, rows_of(data_sets), strict=True):

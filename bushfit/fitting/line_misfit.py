@@ -54,7 +54,7 @@ class LineMisfit:
 
     @cached_property
     def smooth(self) -> Array:
-        """Smooth part of `misfit` (K_measured/K_model - 1): a polynomial in the log of the step, complex (n,)."""
+        """Smooth part of `misfit` (K_measured/K_model - 1): a polynomial in the log of `step`, complex (n,)."""
         x = np.log(self.step)
         basis = np.polynomial.legendre.legvander(unit(x), min(_SMOOTH_DEGREE, np.unique(x).size - 1))
         return basis @ np.linalg.lstsq(basis.astype(complex), self.misfit, rcond=None)[0]

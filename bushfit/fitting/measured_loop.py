@@ -316,7 +316,10 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def _shared(self) -> CommonError | None:
-        """Error that all rows share: of the model, or else of the gain if the weights of residuals include it."""
+        """Error that all rows of the loop share: the model error, or without one the gain error; None without both.
+
+        A gain error that the weights of the residuals exclude is left out.
+        """
         if self.model_error:
             return self._unit_error.scaled(self.model_error)
         return CommonError(self.gain_error * self.unit_gain[None]) if self.gain_weighs and self.gain_error else None

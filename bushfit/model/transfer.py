@@ -18,7 +18,10 @@ FACTOR_SPREAD = 0.03
 
 
 def factor_spread(result: Result) -> float | None:
-    """Standard deviation of the factors of bushings about 1, by their priors; None if no bushing has a free factor."""
+    """Standard deviation from 1 of the factor on a bushing's stiffness, by the priors of the fitted bushings.
+
+    None if no bushing has a free factor.
+    """
     names = [f"stiffness_factor.{bushing.name}" for bushing in result.bushings]
     priors = [result.priors[name] for name in names if name in result.priors]
     distances = [(prior.mean - 1.0, prior.deviation) for prior in priors if not prior.source.endswith(".json")]

@@ -92,9 +92,9 @@ class PlanSearch:
 
     @cached_property
     def required_runs(self) -> Array:
-        """Smallest number of runs of each test, (tests,): one run in each untested direction that has a target.
+        """Smallest number of runs of each candidate test, (tests,): 1 for one test in each untested target direction.
 
-        Tests in other directions do not determine the error of the stiffness formula. All zero if the runs do not fit
+        Only a test in this direction determines the error of its stiffness formula. All zero if the runs do not fit
         into the hours.
         """
         problem = self.problem

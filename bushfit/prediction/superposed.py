@@ -126,7 +126,7 @@ def superposed_stiffness_and_slopes(
 
 
 def untimed_effects(model: Model) -> list[str]:
-    """Names of the effects of the bushing without a law in time, except the unnamed correction."""
+    """Names of a bushing's effects whose force over time cannot be computed; a smooth correction is not listed."""
     return model.without(Level.INSTRUMENT, UNNAMED).without_time_law
 
 

@@ -113,7 +113,15 @@ def _resonance_columns(table: Table, place: Place, *, has_stated_base: bool) -> 
 
 
 def _transmissibility(values: Mapping[str, Floats], stated_base: float | None) -> tuple[Complex, Floats]:
-    """Transmissibility [-] and zero-to-peak acceleration of the base [m/s^2], (n,) each."""
+    """Compute the transmissibility and the acceleration of the base.
+
+    Args:
+        values: columns of the file by role, such as "transmissibility", or accelerations and phases, (n,) each.
+        stated_base: zero-to-peak acceleration of the base [m/s^2], for a file without a column for it.
+
+    Returns:
+        Complex transmissibility [-], and zero-to-peak acceleration of the base [m/s^2], (n,) each.
+    """
     base = values.get("base_acceleration", np.full(values["frequency"].shape, stated_base or 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
         if "transmissibility" in values:

@@ -115,7 +115,7 @@ def _find_blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple
     """Yield header rows and rows of numbers of each possible block, without the columns to its left and right."""
 
     def first_number(index: int) -> int | None:
-        """Column of the first cell of a row of numbers; None for another row."""
+        """Index of the first filled column if the row with this index has only numbers; else None."""
         texts = [str(cell) for cell in rows[index][1]]
         first = next((column for column, text in enumerate(texts) if text), 0)
         return first if is_row(texts) and is_like_number(texts[first]) else None
