@@ -15,6 +15,7 @@ from bushfit.reading.headers import LOOP_COLUMNS, PAIRS, RESONANCE_COLUMNS, SWEE
 from bushfit.reading.labelled import Rows
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.names import direction_of_file
+from bushfit.reading.numerals import is_like_number
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.resonance import is_resonance
 from bushfit.reading.stiffness import hint_for_convertible_columns, refuse_ambiguous_damping
@@ -76,13 +77,16 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
     understood = ", ".join(role.replace("_", " ") for role in best.roles)
     lacking = missing_role(best, is_sweep=is_sweep) or "force"
     units = {"displacement": "m", "force": "N", "stiffness": "N/m", "storage_stiffness": "N/m", "phase": "rad"}
+    advice = hint_for_convertible_columns(best)
+    if len(best.headers) > 2 and all(is_like_number(header) for header in best.headers[1:]):
+        advice = "the table has a row for each quantity: exchange its rows and columns"
     column = best.columns_key(lacking, units.get(lacking, "1"))
     raise best.header_error(
         "the columns are not those of a test",
         kind=NoTestError,
         found=", ".join(best.headers) + f" (understood: {understood})" if understood else None,
         expected="time, displacement and force; or frequency, amplitude, and stiffness with loss factor or phase",
-        hint=hint_for_convertible_columns(best) or f"correct the header, or name the column: {column}",
+        hint=advice or f"correct the header, or name the column: {column}",
     )
 
 

@@ -301,6 +301,7 @@ EXPORTS: dict[str, Export] = {
         sweep("Frequenz [Hz]|Wegamplitude SS [mm]|Kraftamplitude SS [N]|Phasenwinkel [°]", F, 2 * A, 2 * K * A, PHASE, mark=";").replace(".", ",")
     ),
     "tan(delta)/%": Export(sweep("f/Hz|A/mm|K*/(N/mm)|tan(delta)/%", F, A, K, 100 * ETA)),
+    "rows and columns exchanged": Export("Frequency [Hz],5,10,20,40\nStiffness [N/mm],594,608,627,640\nLoss factor,0.1,0.11,0.12,0.13\n", None, ["exchange its rows and columns"]),
     "a quality factor": Export(sweep(USUAL + "Q [-]", F, A, K, 1 / ETA), None, ["the columns are not those of a test"]),
     "logarithms of a DMA": Export(
         sweep("log10(f/Hz)|Strain [%]|log10 G' [Pa]|log10 G'' [Pa]", np.log10(F), 10 * A, np.log10(1e6 * G.real), np.log10(1e6 * G.imag)), reference=MODULUS
