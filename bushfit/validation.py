@@ -62,9 +62,9 @@ Text = Annotated[str, Field(min_length=1)]
 Name = Annotated[str, Field(strict=True, min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$")]
 
 
-def unknown_key(key: str, known_names: Collection[str]) -> CampaignError:
-    """Error for an unknown key, with the known keys and the most similar one."""
-    hint = did_you_mean(key, known_names, similarity=0.5)
+def unknown_key(key: str, known_names: Collection[str], otherwise: str | None = None) -> CampaignError:
+    """Error for an unknown key, with the known keys and the most similar one, or another hint if none is similar."""
+    hint = did_you_mean(key, known_names, similarity=0.5) or otherwise
     hint = f"{hint} It is half of a diameter" if hint and "diameter" in key and "radius" in hint else hint
     listed = [*known_names][:_MAXIMUM_LISTED]
     expected = "one of " + ", ".join(listed) + (", ..." if len(known_names) > _MAXIMUM_LISTED else "")

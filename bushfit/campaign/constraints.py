@@ -118,9 +118,8 @@ def _tie(campaign: Campaign, name: str, setting: ParameterSetting) -> Tie:
     if other := (setting.equal or "").strip():
         tie = Tie(name, other, (other,), "p0", campaign.path)
         if not is_parameter(other):
-            error = unknown_key(other, parameter_names())
-            error.hint = error.hint or 'expression = "..." takes the value of an expression'
-            raise error
+            hint = 'expression = "..." takes the value of an expression'
+            raise unknown_key(other, parameter_names(), hint)
     else:
         tie = Tie.from_expression(name, setting.expression or "", labels, campaign.path)
     for used in tie.names:

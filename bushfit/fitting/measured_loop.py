@@ -204,8 +204,11 @@ class MeasuredLoop(MeasuredBase):
     def relative_difference(self, model: Model) -> Array:
         return ((self.force(model) - self.drive.force) / self.drive.half_range)[None]
 
-    def misfit(self, model: Model, values: Values | None = None) -> Array:
+    def difference(self, model: Model, values: Values | None = None) -> Array:
         return (self.force(model, values) - self.drive.force) * self._per_noise
+
+    def misfit(self, model: Model) -> Array:
+        return self.difference(model)
 
     def distance(self, model: Model) -> Array:
         """Absolute difference between model and measured force at each row, in units of noise, (n,)."""
@@ -282,8 +285,8 @@ class MeasuredLoop(MeasuredBase):
         """Changes of the whitened residuals, (c, size), by changes of the force relative to half its range, (c, n)."""
         return self.whiten(waves * (self._per_noise * self.drive.half_range))
 
-    def whiten(self, misfit: Array) -> Array:
-        return self._less_shared(self._in_noise(misfit))
+    def whiten(self, difference: Array) -> Array:
+        return self._less_shared(self._in_noise(difference))
 
     @property
     def log_det_covariance(self) -> float:

@@ -224,7 +224,7 @@ class MeasuredSweep(MeasuredBase):
         ]
         return stiffness if values is not None else self._keep("stiffness", model, (), stiffness)
 
-    def misfit(self, model: Model, values: Values | None = None) -> Array:
+    def difference(self, model: Model, values: Values | None = None) -> Array:
         with np.errstate(divide="ignore", invalid="ignore"):  # not finite where there is no stiffness: within free play
             return self.deviation(self.stiffness(model, values))
 
@@ -313,17 +313,17 @@ class MeasuredSweep(MeasuredBase):
         points = np.unique(self.frequency + 1j * self.amplitude, return_inverse=True)[1]
         return Whitening(self.block_starts, line_starts, random, self.noise, self.weights, points, self.model_error)
 
-    def whiten(self, misfit: Array) -> Array:
+    def whiten(self, difference: Array) -> Array:
         """Whiten deviations by the scatter and the errors that points share.
 
         Args:
-            misfit: relative differences in magnitude + i differences in phase [rad], complex (..., n).
+            difference: relative differences in magnitude + i differences in phase [rad], complex (..., n).
 
         Returns:
             Whitened residuals in units of noise, (..., 2 n): n gains, then n phases.
         """
         with np.errstate(invalid="ignore"):
-            return self.covariance.whiten(misfit)
+            return self.covariance.whiten(difference)
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
         return self.covariance.noise_sensitivity(influence)

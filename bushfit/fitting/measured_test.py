@@ -48,20 +48,20 @@ class MeasuredBase(ABC):
         """
 
     @abstractmethod
-    def misfit(self, model: Model, values: Values | None = None) -> Array:
-        """Model minus measured at each row or point in units of noise, before shared errors are removed.
+    def difference(self, model: Model, values: Values | None = None) -> Array:
+        """Model minus measured at each row or point, before noise and shared errors are whitened.
 
         Args:
             model: model to evaluate.
             values: parameter values in place of the model's own; leading axes are added to the result.
 
         Returns:
-            Differences in force, (..., n); of a sweep in gain + i phase, complex (..., n), not yet in units of noise.
+            Differences in force in units of noise, (..., n); of a sweep in gain + i phase [rad], complex (..., n).
         """
 
     @abstractmethod
-    def whiten(self, misfit: Array) -> Array:
-        """Whiten a misfit, (..., n): remove the correlation of its noise, and the errors that rows or points share.
+    def whiten(self, difference: Array) -> Array:
+        """Whiten a `difference`: remove the correlation of its noise, and the errors that rows or points share.
 
         Returns:
             Whitened residuals, (..., size), whose noise is independent with unit variance.
@@ -81,7 +81,11 @@ class MeasuredBase(ABC):
         Returns:
             Residuals in the force of each row, (..., size); of a sweep of n points, n gains, then n phases.
         """
-        return self.whiten(self.misfit(model, values))
+        return self.whiten(self.difference(model, values))
+
+    def misfit(self, model: Model) -> Array:
+        """Residuals for tables, (size,): as `residual`, but rows of a loop keep their correlation and shared errors."""
+        return self.residual(model)
 
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
         """Derivatives of the whitened residuals by parameter value, (len(names), size)."""

@@ -82,9 +82,8 @@ class Tie:
         names = tuple(dict.fromkeys(pattern.findall(expression)))
         for used in names:
             if not is_parameter(used):
-                error = unknown_key(used, parameter_names())
-                error.hint = error.hint or "expressions have values in SI units, without the units"
-                raise error
+                hint = "expressions have values in SI units, without the units"
+                raise unknown_key(used, parameter_names(), hint)
         code = pattern.sub(lambda match: f"p{names.index(match[0])}", expression)
         tie = cls(name, expression, names, code, file)
         tie.value({used: get_parameter(used).typical + 0j for used in names})  # complex, as for derivatives

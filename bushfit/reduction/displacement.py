@@ -146,8 +146,8 @@ def _without_offset(channel: DisplacementHistory, *, steady: bool) -> Displaceme
         return channel
     offset = float(motion.mean() if steady else motion[0])
     unit, factor = channel.direction.display.displacement
-    which = "mean" if steady else "first value"
-    note = f"{channel.direction}: {number(factor * offset, 4)} {unit}, the {which}, is subtracted as an offset"
+    datum = "mean" if steady else "first value"
+    note = f"{channel.direction}: {number(factor * offset, 4)} {unit}, the {datum}, is subtracted as an offset"
     return replace(channel, displacement=motion - offset, notes=(*channel.notes, note))
 
 

@@ -36,8 +36,8 @@ def gap_table(diagnosis: Diagnosis) -> pd.DataFrame:
         columns |= condition_columns(data_set) if isinstance(data_set, MeasuredSweep) else {}
         columns |= data_set.columns()
         for name, model, test in (("before", before.model, data_set), ("after", after.model, corrected)):
-            gap = test.residual(model) if isinstance(test, MeasuredSweep) else test.misfit(model)
-            in_noise, percent = np.split(-gap, test.residuals_per_point), -100.0 * test.relative_difference(model)
+            in_noise = np.split(-test.misfit(model), test.residuals_per_point)
+            percent = -100.0 * test.relative_difference(model)
             columns |= {
                 f"{part} {name} [noise]": column for part, column in zip(test.components, in_noise, strict=True)
             }
