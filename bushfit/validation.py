@@ -63,7 +63,13 @@ Name = Annotated[str, Field(strict=True, min_length=1, max_length=200, pattern=r
 
 
 def unknown_key(key: str, known_names: Collection[str], otherwise: str | None = None) -> CampaignError:
-    """Error for an unknown key, with the known keys and the most similar one, or another hint if none is similar."""
+    """Make the error for an unknown key, with the known keys and the most similar one.
+
+    Args:
+        key: unknown key.
+        known_names: known keys.
+        otherwise: hint if no known key is similar.
+    """
     hint = did_you_mean(key, known_names, similarity=0.5) or otherwise
     hint = f"{hint} It is half of a diameter" if hint and "diameter" in key and "radius" in hint else hint
     listed = [*known_names][:_MAXIMUM_LISTED]
