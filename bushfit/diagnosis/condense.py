@@ -89,7 +89,7 @@ def _some(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
     sizes = np.array([loop.size for loop in loops])
     if sizes.sum() <= _MOST_ROWS:
         return loops
-    keys = [(str(loop.direction), loop.drive.amplitude, loop.drive.frequency) for loop in loops]
+    keys = [(str(loop.direction), loop.prepared.amplitude, loop.prepared.frequency) for loop in loops]
     times_before = np.tril(repeats_of(loops), -1).sum(axis=1)
     once = sorted(np.flatnonzero(times_before == 0).tolist(), key=keys.__getitem__)
     again = [n for n in np.argsort(times_before, kind="stable").tolist() if times_before[n]]

@@ -222,10 +222,10 @@ def compound_shapes(loop: MeasuredLoop) -> Array:
     """
     if loop.fundamental_only:
         return np.empty((0, loop.size))
-    phase, order = loop.drive.phase, np.arange(3, _LAST_OVERTONE + 1, 2)[:, None]
+    phase, order = loop.prepared.phase, np.arange(3, _LAST_OVERTONE + 1, 2)[:, None]
     angle = 2.0 * np.pi * order * phase
     waves = np.concatenate([np.cos(angle) / order**2, np.sin(angle) / order**2])
-    if loop.drive.from_rest:
+    if loop.prepared.from_rest:
         order = np.arange(_TRANSIENT_WAVES)[:, None]
         first = np.cos(np.pi * order * phase) * (phase < 1.0)
         waves = np.concatenate([waves, first / (3.0 * (1.0 + order))])

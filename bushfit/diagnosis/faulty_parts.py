@@ -41,7 +41,7 @@ def find_faulty_parts(evidence: Evidence) -> list[FaultyPart]:
             act_together=True,
             covered_rows=(evidence.residual_rows[loop], evidence.residual.size),
         )
-        ends = (loop.drive.frequency,) * 2, (loop.drive.amplitude,) * 2
+        ends = (loop.prepared.frequency,) * 2, (loop.prepared.amplitude,) * 2
         faulty_parts.append(FaultyPart("part", "loop", f"the loop {loop.name}", group, loop.direction, *ends))
     return faulty_parts
 

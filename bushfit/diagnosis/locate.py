@@ -146,7 +146,7 @@ def _loop_regions(evidence: Evidence) -> Iterator[MisfitRegion]:
     """Yield a region for each loop, with the harmonic in which its force deviates most from the model."""
     loops, _ = split_by_kind(evidence.data_sets)
     for data_set in loops:
-        columns, amplitude = data_set.smooth_changes(), data_set.drive.amplitude
+        columns, amplitude = data_set.smooth_changes(), data_set.prepared.amplitude
         norms = np.maximum(np.linalg.norm(columns, axis=1), np.finfo(float).tiny)
         amounts = columns @ evidence.residual[evidence.residual_rows[data_set]] / norms
         by_order = [np.hypot(values[::2], [0.0, *values[1::2]]) for values in (amounts, amounts / norms)]
@@ -158,7 +158,7 @@ def _loop_regions(evidence: Evidence) -> Iterator[MisfitRegion]:
         yield MisfitRegion(
             data_set.direction,
             "loop",
-            (data_set.drive.frequency,) * 2,
+            (data_set.prepared.frequency,) * 2,
             (amplitude,) * 2,
             "force",
             float(np.sqrt(np.mean(np.square(amounts)))),

@@ -128,15 +128,17 @@ def _candidates(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[tup
     loops, sweeps = split_by_kind(data_sets)
     yield "a repeat of every test", list(data_sets)
     if loops:
-        largest = max(loops, key=lambda loop: loop.drive.amplitude * model.unit_strain(loop.direction))
+        largest = max(loops, key=lambda loop: loop.prepared.amplitude * model.unit_strain(loop.direction))
         for words, amplitude, rate in (
             ("of 3 times the largest amplitude", 3.0, 1.0),
             ("of 10 times the largest amplitude", 10.0, 1.0),
             ("at a tenth of the rate", 1.0, 0.1),
             ("at ten times the rate", 1.0, 10.0),
         ):
-            coefficients, frequency = largest.drive.coefficients * amplitude, largest.drive.frequency * rate
-            changed = replace(largest, drive=replace(largest.drive, coefficients=coefficients, frequency=frequency))
+            coefficients, frequency = largest.prepared.coefficients * amplitude, largest.prepared.frequency * rate
+            changed = replace(
+                largest, prepared=replace(largest.prepared, coefficients=coefficients, frequency=frequency)
+            )
             yield f"a loop {words}", [changed.noise_free(model).with_noise(largest.relative_noise)]
     else:
         direction = data_sets[0].direction

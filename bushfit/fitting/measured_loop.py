@@ -9,9 +9,9 @@ import numpy as np
 
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Values
 from bushfit.fitting.common_error import CommonError, ErrorProducts
-from bushfit.fitting.drive import Drive
 from bushfit.fitting.loop_harmonics import SMOOTH_HARMONICS, smooth_waves
 from bushfit.fitting.measured_test import MeasuredBase
+from bushfit.fitting.prepared_loop import PreparedLoop
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 from bushfit.model.sensitivity import force_and_slopes, force_slopes_of_branches, stiffness_and_slopes
@@ -28,10 +28,10 @@ _ERROR_SIZES /= np.linalg.norm(_ERROR_SIZES)
 class MeasuredLoop(MeasuredBase):
     """Measured loop: force at n rows, or bins of phase, driven by the measured displacement.
 
-    Rows that are left out have no weight, see `prepare_drive`, but are kept, because the response is computed in time.
+    Rows that are left out have no weight, see `prepare_loop`, but are kept, because the response is computed in time.
 
     Args:
-        drive: loop prepared as an input of the model.
+        prepared: loop prepared as an input of the model.
         test_conditions: temperature of the rubber in the loop, and its strains before.
         fundamental_only: True to use only the first harmonic of the residuals, so that the loop is one operating point
             with two residuals: for an added stiffness that is known at the loop's frequency only.
@@ -44,7 +44,7 @@ class MeasuredLoop(MeasuredBase):
         contradiction: sentence on a disagreement with an earlier test of the same points; None without one.
     """
 
-    drive: Drive
+    prepared: PreparedLoop
     test_conditions: RubberConditions = UNKNOWN
     fundamental_only: bool = False
     gain_error: float = 0.0
@@ -57,12 +57,12 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def test(self) -> Loop:
-        return self.drive.loop
+        return self.prepared.loop
 
     @property
     def notes(self) -> Sequence[str]:
         """Sentences for the user on left-out parts or a preload of the record, and on contradictory tests."""
-        return [*self.drive.notes, *([self.contradiction] if self.contradiction else [])]
+        return [*self.prepared.notes, *([self.contradiction] if self.contradiction else [])]
 
     @property
     def temperature(self) -> float:
@@ -72,12 +72,12 @@ class MeasuredLoop(MeasuredBase):
     @property
     def frequency(self) -> Array:
         """Frequency [Hz] of the only operating point of a loop, (1,), or of each point of a sweep, (n,)."""
-        return np.array([self.drive.frequency])
+        return np.array([self.prepared.frequency])
 
     @property
     def amplitude(self) -> Array:
         """Zero-to-peak amplitude [m or rad] of the only point of a loop, (1,), or of all sweep points, (n,)."""
-        return np.array([self.drive.amplitude])
+        return np.array([self.prepared.amplitude])
 
     @property
     def conditions(self) -> RubberConditions:
@@ -87,42 +87,42 @@ class MeasuredLoop(MeasuredBase):
     @cached_property
     def measured(self) -> Array:
         """Complex stiffness of the loop's first harmonic [N/m or N m/rad], (1,); of a sweep, of each point, (n,)."""
-        return np.array([self.drive.first_harmonic])
+        return np.array([self.prepared.first_harmonic])
 
     @property
     def size(self) -> int:
         """Number of residuals of the test: rows or bins of a loop, two for each point of a sweep."""
-        return 2 if self.fundamental_only else int(self.drive.force.size)
+        return 2 if self.fundamental_only else int(self.prepared.force.size)
 
     @cached_property
     def residual_count(self) -> int:
         """Number of residuals with weight; if the noise of rows is correlated, the effective number."""
-        return 2 if self.fundamental_only else round(self.drive.row_noise.share * np.count_nonzero(self._counting))
+        return 2 if self.fundamental_only else round(self.prepared.row_noise.share * np.count_nonzero(self._counting))
 
     @property
     def independent_count(self) -> float:
         """Number of independent residuals, by which a mean over the loop is uncertain; smaller for correlated noise."""
-        return self.residual_count / (1.0 if self.fundamental_only else self.drive.row_noise.rows_as_one)
+        return self.residual_count / (1.0 if self.fundamental_only else self.prepared.row_noise.rows_as_one)
 
     @property
     def weights(self) -> Array:
-        return self.drive.weight
+        return self.prepared.weight
 
     @property
     def relative_noise(self) -> float:
         """Standard deviation of one row's noise, relative to half the force range (of a sweep: relative to |K|)."""
-        return self.drive.noise / self.drive.half_range
+        return self.prepared.noise / self.prepared.half_range
 
     def weighted(self, weight: Array) -> Self:
         """Return the test with the weight of each row (of a sweep: point) multiplied by a factor, (n,)."""
-        return replace(self, drive=replace(self.drive, weight=self.drive.weight * weight))
+        return replace(self, prepared=replace(self.prepared, weight=self.prepared.weight * weight))
 
     def fundamental(self) -> Self:
         return replace(self, fundamental_only=True)
 
     def with_noise(self, relative: float) -> Self:
         """Return the loop with another standard deviation of the noise of a row, relative to half the force range."""
-        return replace(self, drive=replace(self.drive, noise=relative * self.drive.half_range))
+        return replace(self, prepared=replace(self.prepared, noise=relative * self.prepared.half_range))
 
     def with_model_error(self, size: float) -> Self:
         """Return the test with a model error of this standard deviation, relative to half the force range or |K|."""
@@ -133,7 +133,7 @@ class MeasuredLoop(MeasuredBase):
     def noise_free(self, model: Model) -> Self:
         """Return the test with the response of a model in place of the measured response."""
         force = self.force(model)
-        return replace(self, drive=replace(self.drive, force=force, half_range=float(np.ptp(force)) / 2.0))
+        return replace(self, prepared=replace(self.prepared, force=force, half_range=float(np.ptp(force)) / 2.0))
 
     def force(self, model: Model, values: Values | None = None) -> Array:
         """Model force at the rows [N or N m], (..., n).
@@ -144,9 +144,9 @@ class MeasuredLoop(MeasuredBase):
         """
         if values is None and (force := self._recall("force", model)) is not None:
             return force
-        history = self.drive.history(model.is_transient)
+        history = self.prepared.history(model.is_transient)
         force = model.force(self.direction, history, kind="loop", values=values, conditions=self.test_conditions)
-        force = self.drive.interpolate_at_rows(force) + (self.drive.datum or 0.0)
+        force = self.prepared.interpolate_at_rows(force) + (self.prepared.datum or 0.0)
         return force if values is not None else self._keep("force", model, (), force)
 
     def residual_with(self, added: Array, model: Model) -> Array:
@@ -166,12 +166,12 @@ class MeasuredLoop(MeasuredBase):
 
     def _slopes(self, model: Model, names: Sequence[str]) -> Array:
         """Derivatives of the force at the n rows by parameter value, (len(names), n); may cache the force, too."""
-        history = self.drive.history(model.is_transient)
+        history = self.prepared.history(model.is_transient)
         if model.only_branches:
-            return self.drive.interpolate_at_rows(force_slopes_of_branches(model, self.direction, history, names))
+            return self.prepared.interpolate_at_rows(force_slopes_of_branches(model, self.direction, history, names))
         force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
-        self._keep("force", model, (), self.drive.interpolate_at_rows(force) + (self.drive.datum or 0.0))
-        return self.drive.interpolate_at_rows(slopes)
+        self._keep("force", model, (), self.prepared.interpolate_at_rows(force) + (self.prepared.datum or 0.0))
+        return self.prepared.interpolate_at_rows(slopes)
 
     def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
         """Derivatives by k parameters of the whitened residuals with an added stiffness (`residual_with`), (k, size).
@@ -202,10 +202,10 @@ class MeasuredLoop(MeasuredBase):
         return np.concatenate((change.real, change.imag), axis=-1) @ self._unit_changes
 
     def relative_difference(self, model: Model) -> Array:
-        return ((self.force(model) - self.drive.force) / self.drive.half_range)[None]
+        return ((self.force(model) - self.prepared.force) / self.prepared.half_range)[None]
 
     def difference(self, model: Model, values: Values | None = None) -> Array:
-        return (self.force(model, values) - self.drive.force) * self._per_noise
+        return (self.force(model, values) - self.prepared.force) * self._per_noise
 
     def misfit(self, model: Model) -> Array:
         return self.difference(model)
@@ -216,18 +216,18 @@ class MeasuredLoop(MeasuredBase):
 
     def displayed_residual(self, model: Model) -> Array:
         """Residuals for charts, model minus measured in units of noise, (size,): also of points without weight."""
-        distance = (self.force(model) - self.drive.force) / self.drive.noise
+        distance = (self.force(model) - self.prepared.force) / self.prepared.noise
         return np.where(self.weights > 0.0, self.misfit(model), distance)
 
     def outlier_indices(self, model: Model) -> Array:
         """Indices of the rows whose force is far from the harmonics fitted to the loop, (k,); the model is not used."""
-        return self.drive.outliers["force"].rows
+        return self.prepared.outliers["force"].rows
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
         """Yield the outliers with file and row, from the indices of the points (of a loop: all outliers)."""
         file = str(self.source.file) if self.source else None
-        before = self.drive.first_row + (self.test.part.first_row if self.test.part else 0)
-        for column, (rows, distance) in self.drive.outliers.items():
+        before = self.prepared.first_row + (self.test.part.first_row if self.test.part else 0)
+        for column, (rows, distance) in self.prepared.outliers.items():
             for row, noise_units in zip(rows.tolist(), distance.tolist(), strict=True):
                 yield Outlier(self.name, file, row + before + 1, column, noise_units)
 
@@ -244,36 +244,36 @@ class MeasuredLoop(MeasuredBase):
 
     def gain_and_offset(self) -> Array:
         """Change of the whitened residuals by a gain error of 100 %, and by an offset of half the range, (2, size)."""
-        offset = np.full(self.drive.force.size, self.drive.half_range)
+        offset = np.full(self.prepared.force.size, self.prepared.half_range)
         return np.array([self._less_shared(self.unit_gain), self.whiten(offset * self._per_noise)])
 
     def columns(self) -> dict[str, Any]:
         """Table columns by header that identify the point of each residual, such as time [s] and amplitude."""
         unit, factor = self.direction.display.displacement
         return {
-            "time [s]": self.drive.phase / self.drive.frequency,
-            "frequency [Hz]": self.drive.frequency,
-            f"amplitude [{unit}]": self.drive.amplitude * factor,
+            "time [s]": self.prepared.phase / self.prepared.frequency,
+            "frequency [Hz]": self.prepared.frequency,
+            f"amplitude [{unit}]": self.prepared.amplitude * factor,
         }
 
     @cached_property
     def _counting(self) -> Array:
-        return self.drive.row_noise.counting(self.drive.weight)
+        return self.prepared.row_noise.counting(self.prepared.weight)
 
     @cached_property
     def _per_noise(self) -> Array:
-        return np.sqrt(self.drive.weight) / (self.drive.noise * self.drive.row_noise.size)
+        return np.sqrt(self.prepared.weight) / (self.prepared.noise * self.prepared.row_noise.size)
 
     @cached_property
     def _waves(self) -> Array:
-        return smooth_waves(self.drive.phase)
+        return smooth_waves(self.prepared.phase)
 
     def _in_noise(self, rows: Array) -> Array:
         """Remove the correlation of the noise from rows of force in units of noise, (..., n); rows left out become 0.
 
         If only the first harmonic is used, the result has the two components along it, (..., 2).
         """
-        white = self.drive.row_noise.whiten(rows)
+        white = self.prepared.row_noise.whiten(rows)
         white *= self._counting
         return white @ self._fundamental if self.fundamental_only else white
 
@@ -283,7 +283,7 @@ class MeasuredLoop(MeasuredBase):
 
     def force_changes(self, waves: Array) -> Array:
         """Changes of the whitened residuals, (c, size), by changes of the force relative to half its range, (c, n)."""
-        return self.whiten(waves * (self._per_noise * self.drive.half_range))
+        return self.whiten(waves * (self._per_noise * self.prepared.half_range))
 
     def whiten(self, difference: Array) -> Array:
         return self._less_shared(self._in_noise(difference))
@@ -296,13 +296,13 @@ class MeasuredLoop(MeasuredBase):
     @cached_property
     def _fundamental(self) -> Array:
         """Orthonormal basis of the whitened rows of a first harmonic, (n, 2)."""
-        waves = self.drive.row_noise.whiten(self._waves[1:3] * self._per_noise) * self._counting
+        waves = self.prepared.row_noise.whiten(self._waves[1:3] * self._per_noise) * self._counting
         return np.linalg.qr(waves.T)[0]
 
     @cached_property
     def _unit_changes(self) -> Array:
         """Change of the whitened residuals by a change of the stiffness by 1 and by i [N/m or N m/rad], (2, size)."""
-        wave = self.drive.coefficients[1] * np.exp(2j * np.pi * self.drive.phase)
+        wave = self.prepared.coefficients[1] * np.exp(2j * np.pi * self.prepared.phase)
         return self.whiten(np.array([wave.real, -wave.imag]) * self._per_noise)
 
     @cached_property
@@ -314,7 +314,7 @@ class MeasuredLoop(MeasuredBase):
         27 (2012) 00008).
         """
         waves, weighed = self._waves.T, self.weights > 0.0
-        smooth = waves @ np.linalg.lstsq(waves[weighed], self.drive.force[weighed], rcond=None)[0]
+        smooth = waves @ np.linalg.lstsq(waves[weighed], self.prepared.force[weighed], rcond=None)[0]
         return self._in_noise(smooth * self._per_noise)
 
     @cached_property
@@ -335,14 +335,14 @@ class MeasuredLoop(MeasuredBase):
         a drift.
         """
         count = 1 if self.fundamental_only else _ERROR_HARMONICS
-        angle = 2.0 * np.pi * self.drive.phase * np.arange(1, count + 1)[:, None]
+        angle = 2.0 * np.pi * self.prepared.phase * np.arange(1, count + 1)[:, None]
         waves = np.stack((np.cos(angle), np.sin(angle)), axis=1) * _ERROR_SIZES[:count, None, None]
         waves = waves.reshape(-1, angle.shape[1])
-        if self.drive.from_rest and not self.fundamental_only:  # the first cycle has an error of its own, and a drift
-            order = np.arange(2.0 * np.ceil(self.drive.cycles))[:, None]
-            drift = np.cos(np.pi * order * self.drive.phase / self.drive.cycles) / (1.0 + order)
-            waves = np.concatenate((waves, waves * (self.drive.phase < 1.0), drift))
-        return self._in_noise(waves * (self._per_noise * self.drive.half_range))
+        if self.prepared.from_rest and not self.fundamental_only:  # the first cycle has its error and a drift
+            order = np.arange(2.0 * np.ceil(self.prepared.cycles))[:, None]
+            drift = np.cos(np.pi * order * self.prepared.phase / self.prepared.cycles) / (1.0 + order)
+            waves = np.concatenate((waves, waves * (self.prepared.phase < 1.0), drift))
+        return self._in_noise(waves * (self._per_noise * self.prepared.half_range))
 
     @cached_property
     def _unit_error(self) -> CommonError:
@@ -357,7 +357,7 @@ class MeasuredLoop(MeasuredBase):
             names: names of the parameters.
         """
         slopes = self._slopes(model, names)
-        misfit = (self.force(model) - self.drive.force)[None]
+        misfit = (self.force(model) - self.prepared.force)[None]
         white = self._in_noise(np.concatenate((misfit, slopes)) * self._per_noise)
         directions, size = self._unit_error.principal_errors
         return ErrorProducts(white @ white.T, white @ directions * size, np.square(size))
@@ -374,11 +374,11 @@ class MeasuredLoop(MeasuredBase):
         """
         reaction = self._less_shared(influence)
         whole = reaction @ self._fundamental.T if self.fundamental_only else reaction
-        parts = list(self.drive.row_noise.noise_sensitivity(whole))
+        parts = list(self.prepared.row_noise.noise_sensitivity(whole))
         if self.fundamental_only:
             parts = [part @ self._fundamental for part in parts]
         if not parts and self.test.noise is None:
-            rows = round(self.drive.row_noise.share * np.count_nonzero(self._counting))
+            rows = round(self.prepared.row_noise.share * np.count_nonzero(self._counting))
             parts = [np.sqrt(2.0 / rows) * reaction]
         return {(self.name, index): self._less_shared(part) for index, part in enumerate(parts)}
 

@@ -9,11 +9,11 @@ import numpy as np
 
 from bushfit.campaign.schema import UNSTATED, Residuals, RigSettings
 from bushfit.effects.contract import Array
-from bushfit.fitting.drive import Drive, prepare_drive
 from bushfit.fitting.measured_loop import MeasuredLoop
 from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.fitting.outliers import contradictions
+from bushfit.fitting.prepared_loop import PreparedLoop, prepare_loop
 from bushfit.fitting.rig_class import class_errors
 from bushfit.geometry import Bushing, Place, unit_strain
 from bushfit.model.model import Model
@@ -53,8 +53,8 @@ def prepare_loops(
         rig: class of the rig.
         without_outliers: True to give rows whose force is an outlier no weight.
     """
-    drives = [prepare_drive(loop, without_outliers=without_outliers) for loop in loops]
-    found = [MeasuredLoop(drive).weighted(np.array(drive.loop.weight)) for drive in drives]
+    prepared_loops = [prepare_loop(loop, without_outliers=without_outliers) for loop in loops]
+    found = [MeasuredLoop(prepared).weighted(np.array(prepared.loop.weight)) for prepared in prepared_loops]
     first = np.argmax(repeats_of(found), axis=1) if found else np.empty(0)
     return with_gain_errors(_with_contradictions(found, [first]), rig)
 
@@ -80,7 +80,7 @@ def with_gain_weighting(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> li
 
 def repeats_of(loops: Sequence[MeasuredLoop]) -> Array:
     """Mask of the pairs of loops that are repeats (same direction, preload, amplitude and frequency), (n, n)."""
-    conditions = np.log([(loop.drive.amplitude, loop.drive.frequency) for loop in loops]).reshape(-1, 2)
+    conditions = np.log([(loop.prepared.amplitude, loop.prepared.frequency) for loop in loops]).reshape(-1, 2)
     place = np.array([f"{loop.direction} {loop.test.preload}" for loop in loops])
     return np.all(np.abs(conditions[:, None] - conditions) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
 
@@ -225,7 +225,7 @@ def new_loop(
     """
     phase, nil = cycles * np.arange(rows) / rows, np.zeros(rows)
     motion = amplitude * np.sin(2.0 * np.pi * phase)
-    silent = Drive(
+    silent = PreparedLoop(
         loop=Loop("new", place, phase / frequency, motion, nil),
         frequency=frequency,
         cycles=cycles,

@@ -54,7 +54,7 @@ def estimate(
 
     soft_l1 minimises the sum of 2 C^2 (sqrt(1 + (z/C)^2) - 1) over the distances z of the points in units of noise.
     The covariance is that of least squares with all weights equal to (E psi')^2/E psi^2 for normal noise, where psi is
-    the derivative of the loss. Outliers of loops already have weight 0, see `drive`.
+    the derivative of the loss. Outliers of loops already have weight 0, see `prepared_loop`.
 
     Args:
         problem: parameters to fit, tests and bounds.
@@ -110,7 +110,7 @@ def _efficiency(parts: int) -> float:
 def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
     """Warnings about the outliers that the fit includes and those that it leaves out, with the first rows of each test.
 
-    Outliers of the displacement are always left out, see `drive`.
+    Outliers of the displacement are always left out, see `prepared_loop`.
 
     Args:
         outliers: outliers of all tests.

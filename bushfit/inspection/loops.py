@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.effects.mistakes import MISTAKES
-from bushfit.fitting.drive import TOLD_MEAN, Drive, prepare_drive, recorded_means
 from bushfit.fitting.loop_cycles import waveform
+from bushfit.fitting.prepared_loop import TOLD_MEAN, PreparedLoop, prepare_loop, recorded_means
 from bushfit.inspection.labels import wrong_labels
 from bushfit.inspection.plausible import implausible_sizes
 from bushfit.inspection.record import Findings, format_frequencies
@@ -182,38 +182,38 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     Raises:
         FitError: no whole cycle, or a loop that runs the wrong way round.
     """
-    drive, units, names = prepare_drive(loop), loop.direction.display, loop.direction.motion.words
+    prepared, units, names = prepare_loop(loop), loop.direction.display, loop.direction.motion.words
     (length, to_length), half_force = units.displacement, float(np.ptp(loop.force)) / 2.0
     force, to_force = display_unit(*units.force, half_force)
     half_motion = np.ptp(loop.displacement) / 2.0
-    amplitude, mean_motion, mean_force = drive.amplitude, drive.coefficients[0].real, float(drive.force.mean())
-    noise = number(100 * drive.noise / half_force, 2)
+    amplitude, mean_motion, mean_force = prepared.amplitude, prepared.coefficients[0].real, float(prepared.force.mean())
+    noise = number(100 * prepared.noise / half_force, 2)
     facts = {
-        "cycles": f"{drive.cycles:.3g}, {'the first from rest' if drive.from_rest else 'treated as steady'}",
-        "frequency": f"{drive.frequency:.4g} Hz, {waveform(drive.coefficients)}",
-        "sampling": f"{describe_sampling(loop)}, {loop.time.size / drive.cycles:.4g} rows per cycle",
+        "cycles": f"{prepared.cycles:.3g}, {'the first from rest' if prepared.from_rest else 'treated as steady'}",
+        "frequency": f"{prepared.frequency:.4g} Hz, {waveform(prepared.coefficients)}",
+        "sampling": f"{describe_sampling(loop)}, {loop.time.size / prepared.cycles:.4g} rows per cycle",
         "amplitude": f"{number(to_length * amplitude, 4)} {length} zero-to-peak",
         # down to the last digit of the amplitude: what lies below is noise
         f"mean {names[0]}": f"{format_aligned([to_length * amplitude, to_length * mean_motion], 4)[1]} {length}",
         f"mean {names[1]}": f"{format_aligned([to_force * half_force, to_force * mean_force], 4)[1]} {force}",
-        "noise": f"{noise} % of half the {names[1]} range, per row{drive.correlated}",
+        "noise": f"{noise} % of half the {names[1]} range, per row{prepared.correlation_text}",
     }
-    sizes = (np.array([size]) for size in (drive.frequency, amplitude, half_force / amplitude))
-    if means := recorded_means(drive):
+    sizes = (np.array([size]) for size in (prepared.frequency, amplitude, half_force / amplitude))
+    if means := recorded_means(prepared):
         facts["preload"] = means[0].text(loop.direction)
     odd = [
-        *wrong_labels(labels, loop.direction, [amplitude, half_motion], [drive.frequency]),
+        *wrong_labels(labels, loop.direction, [amplitude, half_motion], [prepared.frequency]),
         *implausible_sizes(loop.direction, *sizes),
         *odd_channels(loop),
-        *drive.notes,
-        *changing_cycles(drive),
-        *ripple(drive),
+        *prepared.notes,
+        *changing_cycles(prepared),
+        *ripple(prepared),
     ]
-    if drive.frequency * _LONGEST_CYCLE < 1.0:  # longer than any laboratory waits: what may the file say instead?
-        mistakes = [mistake.in_words(drive.loop) for mistake in MISTAKES.values() if mistake.time < 1.0]
-        minutes = number(1.0 / drive.frequency / 60.0, 2)
+    if prepared.frequency * _LONGEST_CYCLE < 1.0:  # longer than any laboratory waits: what may the file say instead?
+        mistakes = [mistake.in_words(prepared.loop) for mistake in MISTAKES.values() if mistake.time < 1.0]
+        minutes = number(1.0 / prepared.frequency / 60.0, 2)
         odd.append(f"one cycle takes {minutes} min, which is unusual; possible causes: {', or '.join(mistakes)}")
-    if _SMALLEST_OFFSET * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and drive.datum is not None:
+    if _SMALLEST_OFFSET * half_motion < abs(mean_motion) <= TOLD_MEAN * amplitude and prepared.datum is not None:
         odd.append(
             f"the mean displacement is {number(to_length * mean_motion, 3)} {length}, "
             f"{number(100 * mean_motion / half_motion, 2)} % of its amplitude: the fit uses the loop about its mean"
@@ -265,11 +265,14 @@ def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> F
     Raises:
         FitError: a part without a whole cycle, or one that runs the wrong way round.
     """
-    drives = [prepare_drive(loop) for loop in loops]
+    prepared_loops = [prepare_loop(loop) for loop in loops]
     unit, factor = record.direction.display.displacement
-    amplitudes, frequencies = [drive.amplitude for drive in drives], [drive.frequency for drive in drives]
-    cycles = sorted(drive.cycles for drive in drives)
-    left_out = 1 - sum(drive.loop.displacement.size for drive in drives) / record.displacement.size
+    amplitudes, frequencies = (
+        [prepared.amplitude for prepared in prepared_loops],
+        [prepared.frequency for prepared in prepared_loops],
+    )
+    cycles = sorted(prepared.cycles for prepared in prepared_loops)
+    left_out = 1 - sum(prepared.loop.displacement.size for prepared in prepared_loops) / record.displacement.size
     sizes, rates, ends = (
         list(dict.fromkeys(f"{value:.3g}" for value in values))
         for values in ([factor * size for size in amplitudes], frequencies, (cycles[0], cycles[-1]))
@@ -279,21 +282,20 @@ def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> F
         f"{' to '.join(ends)} cycles used of each; {100 * left_out:.2g} % of the rows left out"
     }
     odd = [*wrong_labels(labels, record.direction, amplitudes, frequencies), *odd_channels(record)]
-    for place, (loop, drive) in enumerate(zip(loops, drives, strict=True), start=1):
+    for place, (loop, prepared) in enumerate(zip(loops, prepared_loops, strict=True), start=1):
         rest = loop.part.left_out if loop.part else None
-        size, course = number(factor * drive.amplitude, 4), waveform(drive.coefficients)
-        noise = (
-            f"noise {number(100 * drive.noise / drive.half_range, 2)} % of half the range, per row{drive.correlated}"
-        )
-        words = f"{size} {unit} at {drive.frequency:.4g} Hz, {course}", noise, rest
+        size, course = number(factor * prepared.amplitude, 4), waveform(prepared.coefficients)
+        percent = number(100 * prepared.noise / prepared.half_range, 2)
+        noise = f"noise {percent} % of half the range, per row{prepared.correlation_text}"
+        words = f"{size} {unit} at {prepared.frequency:.4g} Hz, {course}", noise, rest
         facts[f"loop {place}"] = "; ".join(filter(None, words))
-        notes = (*drive.notes, *changing_cycles(drive), *ripple(drive))
+        notes = (*prepared.notes, *changing_cycles(prepared), *ripple(prepared))
         odd += [f"loop {place}: {note}" for note in notes if note != rest]
     facts["sampling"] = describe_sampling(record)
     return facts, odd
 
 
-def changing_cycles(drive: Drive) -> list[str]:
+def changing_cycles(prepared: PreparedLoop) -> list[str]:
     """Find a force amplitude, mean force or mean motion that changes from the first to the last cycles of a loop.
 
     Loops of one cycle, or with too few rows in a cycle, are not checked.
@@ -301,10 +303,10 @@ def changing_cycles(drive: Drive) -> list[str]:
     Returns:
         One sentence for each change beyond chance.
     """
-    loop, count, odd = drive.loop, int(drive.cycles + 0.01), list[str]()
-    phase = (loop.time - loop.time[0]) * drive.frequency
+    loop, count, odd = prepared.loop, int(prepared.cycles + 0.01), list[str]()
+    phase = (loop.time - loop.time[0]) * prepared.frequency
     numbers = sorted({*range(min(count, _MOST_END_CYCLES)), *range(max(count - _MOST_END_CYCLES, 0), count)})
-    outliers = drive.outliers["force"].rows
+    outliers = prepared.outliers["force"].rows
     parts = [np.setdiff1d(np.flatnonzero((phase >= n) & (phase < n + 1)), outliers) for n in numbers]
     rows = min((part.size for part in parts), default=0)
     order = resolved_order(rows, 7)  # a loop of rubber has next to nothing beyond
@@ -313,9 +315,11 @@ def changing_cycles(drive: Drive) -> list[str]:
     both = np.stack((loop.force, loop.displacement), axis=1)
     fitted = [cycle_harmonics(phase[part], both[part], order) for part in parts]
     # the first cycle from rest has another mean, by the memory of the rubber
-    means = np.array([mean for mean, *_ in fitted])[int(drive.from_rest) :]
+    means = np.array([mean for mean, *_ in fitted])[int(prepared.from_rest) :]
     amplitude = np.array([abs(first[0]) for _, first, _ in fitted])
-    error = max(drive.noise, *(scatter[0] for *_, scatter in fitted)) * np.sqrt(1.0 / rows)  # of the force [N or N m]
+    error = max(prepared.noise, *(scatter[0] for *_, scatter in fitted)) * np.sqrt(
+        1.0 / rows
+    )  # of the force [N or N m]
     (motion, force, _), units = loop.direction.motion.words, loop.direction.display
     smallest = _SMALLEST_CHANGE * np.ptp(loop.force) / 2.0
     # the standard error of an amplitude is sqrt(2) `error`, that of a difference of two is 2 `error`
@@ -331,7 +335,7 @@ def changing_cycles(drive: Drive) -> list[str]:
         )
     # a time that was made from the motion turns its noise into drift
     smallest_drift = (
-        2.0 * _SMALLEST_CHANGE * drive.amplitude if loop.has_recorded_time else noise_threshold(loop.displacement)
+        2.0 * _SMALLEST_CHANGE * prepared.amplitude if loop.has_recorded_time else noise_threshold(loop.displacement)
     )
     limits = max(_REAL_CHANGE * 1.5 * error, smallest), smallest_drift
     for name, unit, mean, limit in zip(
@@ -343,7 +347,7 @@ def changing_cycles(drive: Drive) -> list[str]:
     return odd
 
 
-def ripple(drive: Drive) -> list[str]:
+def ripple(prepared: PreparedLoop) -> list[str]:
     """Find a fast sine superposed on the motion of a loop: mains hum, servo oscillation or sensor noise.
 
     Returns:
@@ -353,28 +357,28 @@ def ripple(drive: Drive) -> list[str]:
         The slow harmonics are subtracted from the motion; the ripple is the largest line in the spectrum of the
         remainder, with a Hann window. White noise makes lines up to about five times the median.
     """
-    loop, steps = drive.loop, np.diff(drive.loop.time)
+    loop, steps = prepared.loop, np.diff(prepared.loop.time)
     if (
         not loop.has_recorded_time
         or steps.size < _FEWEST_RIPPLE_ROWS
         or np.ptp(steps) > 2.0 * _EVEN_CLOCK * np.median(steps)
     ):
         return []
-    phase = (loop.time - loop.time[0]) * drive.frequency
-    is_triangle = waveform(drive.coefficients) == "a triangle"
-    slow = drive.coefficients if is_triangle else drive.coefficients[: _RIPPLE_ORDER + 1]
+    phase = (loop.time - loop.time[0]) * prepared.frequency
+    is_triangle = waveform(prepared.coefficients) == "a triangle"
+    slow = prepared.coefficients if is_triangle else prepared.coefficients[: _RIPPLE_ORDER + 1]
     rest = loop.displacement - series(slow, phase)
-    rest[drive.outliers["displacement"].rows] = 0.0
+    rest[prepared.outliers["displacement"].rows] = 0.0
     window = np.hanning(rest.size)
     lines = np.abs(np.fft.rfft((rest - rest.mean()) * window)) * (2.0 / window.sum())
     frequency = np.fft.rfftfreq(rest.size, float(np.mean(steps)))
-    lines[frequency < _RIPPLE_ORDER * drive.frequency] = 0.0
+    lines[frequency < _RIPPLE_ORDER * prepared.frequency] = 0.0
     line = int(np.argmax(lines))
-    if lines[line] <= max(_SMALLEST_RIPPLE * drive.amplitude, _RIPPLE_LINE * float(np.median(lines))):
+    if lines[line] <= max(_SMALLEST_RIPPLE * prepared.amplitude, _RIPPLE_LINE * float(np.median(lines))):
         return []
     unit, factor = loop.direction.display.displacement
     return [
         f"a ripple of about {number(factor * lines[line], 2)} {unit} at {frequency[line]:.3g} Hz "
-        f"({number(100 * lines[line] / drive.amplitude, 2)} % of the amplitude) is superposed on the motion: "
+        f"({number(100 * lines[line] / prepared.amplitude, 2)} % of the amplitude) is superposed on the motion: "
         "mains hum, or an oscillating controller? The slow motion is read as the loop"
     ]

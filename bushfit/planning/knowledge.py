@@ -217,11 +217,11 @@ def noise_of(data: PreparedCampaign) -> Noise:
         gain, phase = np.sqrt(np.mean(np.square(list(noise.random.values())), axis=0)).tolist()
         estimate = replace(estimate, scatter=(gain, phase), shared=noise.shared)
     if loops:
-        rows = [loop.test.time.size / loop.drive.cycles for loop in loops]
+        rows = [loop.test.time.size / loop.prepared.cycles for loop in loops]
         forces = [
             loop.relative_noise * np.sqrt(ROWS_PER_CYCLE / count) for loop, count in zip(loops, rows, strict=True)
         ]
-        as_one = float(np.mean([loop.drive.row_noise.rows_as_one for loop in loops]))
+        as_one = float(np.mean([loop.prepared.row_noise.rows_as_one for loop in loops]))
         force = float(np.sqrt(np.mean(np.square(forces))))
         estimate = replace(estimate, force=force, rows_as_one=as_one)
     return estimate
@@ -236,7 +236,7 @@ def _tests(data: PreparedCampaign) -> Iterator[Test]:
     """Convert the loops and sweeps of a campaign to runs of a plan; free oscillations are omitted."""
     for loop in data.loops:
         yield SimulatedLoop(
-            loop.direction, loop.drive.amplitude, loop.drive.frequency, max(round(loop.drive.cycles), 1)
+            loop.direction, loop.prepared.amplitude, loop.prepared.frequency, max(round(loop.prepared.cycles), 1)
         )
     for sweep in data.sweeps:
         stepped = sweep.sweep.stepped

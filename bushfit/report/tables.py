@@ -221,23 +221,23 @@ def loops_table(model: Model, data_sets: Sequence[MeasuredLoop]) -> pd.DataFrame
     """
     tables = []
     for data_set in data_sets:
-        place, drive = data_set.direction, data_set.drive
+        place, prepared = data_set.direction, data_set.prepared
         (_, length), (_, factor), _ = place.display
         force = response_headers(place)[2]
-        binned = drive.phase.size < data_set.test.force.size
-        outliers = np.empty(0) if binned else drive.outliers["force"].rows
+        binned = prepared.phase.size < data_set.test.force.size
+        outliers = np.empty(0) if binned else prepared.outliers["force"].rows
         tables.append(
             pd.DataFrame(
                 {
                     "loop": data_set.name,
                     "direction": str(place),
-                    "time [s]": drive.phase / drive.frequency,
-                    "frequency [Hz]": drive.frequency,
-                    displacement_header(place): drive.displacement(drive.phase) * length,
-                    force: drive.force * factor,
+                    "time [s]": prepared.phase / prepared.frequency,
+                    "frequency [Hz]": prepared.frequency,
+                    displacement_header(place): prepared.displacement(prepared.phase) * length,
+                    force: prepared.force * factor,
                     f"model {force}": data_set.force(model) * factor,
                     "residual [noise]": -data_set.displayed_residual(model),
-                    "outlier": np.where(np.isin(np.arange(drive.phase.size), outliers), "yes", "no"),
+                    "outlier": np.where(np.isin(np.arange(prepared.phase.size), outliers), "yes", "no"),
                 }
             )
         )

@@ -90,14 +90,14 @@ def test_the_compound_bends_a_loop_in_odd_overtones_and_in_the_first_cycle(bare:
     """In steady cycles the h-th overtone has 1/h^2 of the deviation of the stiffness, and no even one occurs."""
     loop = split_by_kind(bare.data_sets)[0][0]
     unit = np.abs(loop.smooth_changes()[1]).max()
-    rows, phase = compound_shapes(loop) / unit, loop.drive.phase
+    rows, phase = compound_shapes(loop) / unit, loop.prepared.phase
     waves = np.exp(2j * np.pi * np.arange(15)[:, None] * phase)
     by_order = np.abs(rows @ waves.T) * 2.0 / phase.size
     odd = np.arange(3, 14, 2)
     expected = np.zeros((2, len(odd), 15))
     expected[:, np.arange(len(odd)), odd] = 1.0 / odd**2
     np.testing.assert_allclose(by_order.reshape(expected.shape), expected, atol=3e-3)
-    rested = compound_shapes(replace(loop, drive=replace(loop.drive, from_rest=True)))[len(rows) :] / unit
+    rested = compound_shapes(replace(loop, prepared=replace(loop.prepared, from_rest=True)))[len(rows) :] / unit
     assert len(rested) == 6
     assert not rested[:, phase >= 1.0].any()
     np.testing.assert_allclose(np.abs(rested).max(axis=1), 1.0 / (3.0 * np.arange(1, 7)), rtol=0.01)

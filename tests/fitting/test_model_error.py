@@ -57,8 +57,8 @@ def spoiled(campaign: Campaign, off: Off) -> Campaign:
     """The axial tests of a campaign, their stiffness off; of a loop its first harmonic."""
     loops = list[Loop]()
     for data in PreparedCampaign.from_campaign(campaign).loops:
-        loop, drive = data.test, data.drive
-        both = basis(drive.phase, 1).T[1:]
+        loop, prepared = data.test, data.prepared
+        both = basis(prepared.phase, 1).T[1:]
         first = both @ loop.force / np.sum(np.square(both), axis=1)
         share = complex(off(data.frequency, data.amplitude)[0])
         moved = np.array([[share.real, -share.imag], [share.imag, share.real]]) @ first

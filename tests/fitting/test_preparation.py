@@ -111,13 +111,13 @@ def test_magnitude_and_loss_factor_are_what_they_say(sweep: MeasuredSweep, paper
 
 
 def test_the_right_model_of_a_loop_leaves_noise_alone(loop: MeasuredLoop, paper_model: Model) -> None:
-    residual, counted = loop.residual(paper_model), loop.drive.weight > 0.0
+    residual, counted = loop.residual(paper_model), loop.prepared.weight > 0.0
     assert residual.size == loop.size == loop.test.time.size
     assert loop.residual_count == np.count_nonzero(counted) > 0.99 * loop.size
     assert np.std(residual[counted]) == pytest.approx(1.0, abs=0.05)
     assert abs(np.corrcoef(residual[1:], residual[:-1])[0, 1]) < 0.06
     assert loop.relative_noise == pytest.approx(3e-3, rel=0.1)
-    weighed = loop.relative(paper_model) / loop.relative_noise * np.sqrt(loop.drive.weight[counted])
+    weighed = loop.relative(paper_model) / loop.relative_noise * np.sqrt(loop.prepared.weight[counted])
     np.testing.assert_allclose(np.abs(residual[counted]), weighed, rtol=1e-9)
     assert np.array_equal(loop.distance(paper_model), np.abs(residual))
     assert np.max(np.abs(loop.noise_free(paper_model).residual(paper_model))) < 1e-9

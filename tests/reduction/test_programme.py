@@ -8,7 +8,7 @@ import pytest
 
 from bushfit.campaign.simulated import SimulateSettings
 from bushfit.effects.contract import Array
-from bushfit.fitting.drive import prepare_drive
+from bushfit.fitting.prepared_loop import prepare_loop
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.model import Model
@@ -83,13 +83,15 @@ def test_each_steady_part_is_a_loop_in_its_order(paper_model: Model, case: str) 
     motions, expected = PROGRAMMES[case]
     record = recorded(paper_model, *motions)
     loops = programme(record)
-    drives = [prepare_drive(loop) for loop in loops]
+    prepared_loops = [prepare_loop(loop) for loop in loops]
     assert [loop.name for loop in loops] == [f"loop_part_{number}" for number in range(1, len(expected) + 1)]
-    assert [1e3 * drive.amplitude for drive in drives] == pytest.approx([x for x, _ in expected], rel=5e-3)
-    assert [drive.frequency for drive in drives] == pytest.approx([f for _, f in expected], rel=2e-3)
+    assert [1e3 * prepared.amplitude for prepared in prepared_loops] == pytest.approx(
+        [x for x, _ in expected], rel=5e-3
+    )
+    assert [prepared.frequency for prepared in prepared_loops] == pytest.approx([f for _, f in expected], rel=2e-3)
     # the first cycle of later parts remembers what came before, and goes where two more remain
     used = {"up and down": [3, 2, 2, 2, 2], "two cycles": [2, 2, 2], "pauses": [4, 4, 4]}.get(case)
-    assert used is None or [drive.cycles for drive in drives] == pytest.approx(used, abs=0.2)
+    assert used is None or [prepared.cycles for prepared in prepared_loops] == pytest.approx(used, abs=0.2)
     if case == "pauses":
         sentences = [loop.part.left_out for loop in loops if loop.part and loop.part.left_out]
         assert [sentence.count("before its steady cycles") for sentence in sentences] == [1, 1, 1]
@@ -104,10 +106,10 @@ def test_each_steady_part_is_a_loop_in_its_order(paper_model: Model, case: str) 
 def test_without_time_parts_are_the_same(paper_model: Model, case: str) -> None:
     motions, expected = PROGRAMMES[case]
     loops = programme(replace(recorded(paper_model, *motions), has_recorded_time=False), LoopFile(file="", rate=1e-4))
-    sizes = [prepare_drive(loop).amplitude for loop in loops]
+    sizes = [prepare_loop(loop).amplitude for loop in loops]
     assert [1e3 * size for size in sizes] == pytest.approx([x for x, _ in expected], rel=1e-2)
     for loop, size in zip(loops, sizes, strict=True):
-        assert prepare_drive(loop).frequency == pytest.approx(1e-4 / (4.0 * size), rel=2e-2)
+        assert prepare_loop(loop).frequency == pytest.approx(1e-4 / (4.0 * size), rel=2e-2)
 
 
 def virgin(loop: Loop, share: float) -> Loop:
@@ -120,6 +122,6 @@ def test_a_softening_is_told_of_each_part(paper_model: Model) -> None:
     loops = programme(virgin(recorded(paper_model, *[cycles(5, x) for x in (0.2, 0.5, 1)]), 0.12))
     found = [100.0 * (loop.softening or 0.0) for loop in loops]
     assert found == pytest.approx([12.0] * 3, abs=4.0)  # with what a springpot and friction make from rest
-    assert any("stiffer than the last (Mullins)" in note for note in prepare_drive(loops[1]).notes)
+    assert any("stiffer than the last (Mullins)" in note for note in prepare_loop(loops[1]).notes)
     (one,) = programme(virgin(recorded(paper_model, cycles(5, 1)), 0.12))
     assert one.softening == pytest.approx(0.12, abs=0.03)

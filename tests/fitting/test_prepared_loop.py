@@ -8,10 +8,10 @@ import pytest
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.drive import prepare_drive
 from bushfit.fitting.loop_cycles import steady_cycles
 from bushfit.fitting.loop_harmonics import MOST_ROWS
 from bushfit.fitting.preparation import MeasuredLoop
+from bushfit.fitting.prepared_loop import prepare_loop
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.model import Model
@@ -69,13 +69,13 @@ CASES: dict[str, dict[str, Any]] = {
 def test_the_motion_is_cleared_and_the_true_model_leaves_only_noise(paper_model: Model, case: str) -> None:
     """One peak and one trough a cycle, where the motion has them, although the sensor turns at every other row."""
     loop = measured(paper_model, **CASES[case])
-    data_set = MeasuredLoop(prepare_drive(loop))
-    cycle = data_set.drive.history(is_transient=False).value
+    data_set = MeasuredLoop(prepare_loop(loop))
+    cycle = data_set.prepared.history(is_transient=False).value
     turns = np.flatnonzero(np.diff(np.sign(np.diff(np.append(cycle, cycle[0])))) != 0)
     residual = data_set.residual(paper_model)
     reduced = float(residual @ residual) / residual.size
-    print(f"{case}: f {data_set.drive.frequency:.6f} Hz, turns {turns.size}, reduced chi-square {reduced:.3f}")
-    assert data_set.drive.frequency == pytest.approx(FREQUENCY, rel=2e-3)
+    print(f"{case}: f {data_set.prepared.frequency:.6f} Hz, turns {turns.size}, reduced chi-square {reduced:.3f}")
+    assert data_set.prepared.frequency == pytest.approx(FREQUENCY, rel=2e-3)
     assert turns.size
     assert np.all(np.abs(cycle[turns]) > 0.95 * AMPLITUDE)
     assert (cycle.max(), -cycle.min()) == pytest.approx((AMPLITUDE, AMPLITUDE), rel=1.5e-2)
@@ -86,13 +86,13 @@ def test_the_motion_is_cleared_and_the_true_model_leaves_only_noise(paper_model:
 def test_from_rest_the_virgin_curve_is_followed(paper_model: Model) -> None:
     whole = rig.record(paper_model, Direction.AXIAL, FREQUENCY, AMPLITUDE, cycles=3, steps_per_cycle=1000)
     loop = Loop("loop", Direction.AXIAL, whole.time, whole.displacement, whole.force)
-    drive = prepare_drive(loop)
-    assert drive.from_rest
-    assert not drive.history(is_transient=False).periodic
-    gap = np.max(np.abs(MeasuredLoop(drive).force(paper_model) - loop.force)) / drive.half_range
+    prepared = prepare_loop(loop)
+    assert prepared.from_rest
+    assert not prepared.history(is_transient=False).periodic
+    gap = np.max(np.abs(MeasuredLoop(prepared).force(paper_model) - loop.force)) / prepared.half_range
     print(f"from rest: model within {gap:.1e} of the record")
     assert gap < 2e-3
-    settled = prepare_drive(measured(paper_model))
+    settled = prepare_loop(measured(paper_model))
     assert not settled.from_rest
 
 
@@ -103,29 +103,29 @@ def test_rest_may_be_a_preload(paper_model: Model, cycles: float, amplitude: flo
     noise = 3e-3 * np.ptp(whole.force) * np.random.default_rng(0).standard_normal(whole.force.size)
     force, settled = whole.force + 640.0 + noise, slice(2000, None)
     loop = Loop("loop", Direction.AXIAL, whole.time[rows], whole.displacement[rows] + 1.2e-3, force[rows])
-    data_set = MeasuredLoop(prepare_drive(loop))
+    data_set = MeasuredLoop(prepare_loop(loop))
     residual = data_set.residual(paper_model)
     reduced = float(residual @ residual) / data_set.residual_count
     print(f"{cycles} cycles of {1e3 * amplitude:g} mm from rest about a preload: reduced chi-square {reduced:.3f}")
-    assert data_set.drive.from_rest
+    assert data_set.prepared.from_rest
     assert reduced < 1.2
     assert "recorded about a mean displacement of 1.2 mm" in " ".join(data_set.notes)
     later = Loop("loop", Direction.AXIAL, whole.time[settled], whole.displacement[settled] + 1.2e-3, force[settled])
-    assert not prepare_drive(later).from_rest
+    assert not prepare_loop(later).from_rest
 
 
 def test_many_rows_are_binned_without_loss(paper_model: Model) -> None:
     loop = measured(paper_model, cycles=5.0, rows=40_000)
-    drive = prepare_drive(loop)
-    assert drive.force.size <= 5 * 1024 + 1
-    assert 0.99 * loop.force.size < drive.weight.sum() < loop.force.size  # the turning points carry none
+    prepared = prepare_loop(loop)
+    assert prepared.force.size <= 5 * 1024 + 1
+    assert 0.99 * loop.force.size < prepared.weight.sum() < loop.force.size  # the turning points carry none
     assert loop.force.size > MOST_ROWS
-    residual = MeasuredLoop(drive).residual(paper_model)
+    residual = MeasuredLoop(prepared).residual(paper_model)
     reduced = float(residual @ residual) / residual.size
-    print(f"{loop.force.size} rows in {drive.force.size} bins: reduced chi-square {reduced:.3f}")
+    print(f"{loop.force.size} rows in {prepared.force.size} bins: reduced chi-square {reduced:.3f}")
     assert 0.9 < reduced < 1.15
-    few = prepare_drive(measured(paper_model, cycles=5.0, rows=500))
-    assert drive.first_harmonic == pytest.approx(few.first_harmonic, rel=2e-3)
+    few = prepare_loop(measured(paper_model, cycles=5.0, rows=500))
+    assert prepared.first_harmonic == pytest.approx(few.first_harmonic, rel=2e-3)
 
 
 def with_hole(loop: Loop, begin: float, end: float) -> Loop:
@@ -139,11 +139,11 @@ def with_hole(loop: Loop, begin: float, end: float) -> Loop:
 def test_rows_that_are_missing_do_not_change_the_frequency(
     paper_model: Model, waveform: str, hole: tuple[float, float]
 ) -> None:
-    drive = prepare_drive(with_hole(measured(paper_model, waveform=waveform, cycles=3.0), *hole))
-    assert drive.frequency == pytest.approx(FREQUENCY, rel=1e-3)
-    assert drive.amplitude == pytest.approx(AMPLITUDE, rel=5e-3)
+    prepared = prepare_loop(with_hole(measured(paper_model, waveform=waveform, cycles=3.0), *hole))
+    assert prepared.frequency == pytest.approx(FREQUENCY, rel=1e-3)
+    assert prepared.amplitude == pytest.approx(AMPLITUDE, rel=5e-3)
     if hole[1] - hole[0] > 0.4:
-        (note,) = drive.notes
+        (note,) = prepared.notes
         assert "rows are missing" in note
 
 
@@ -200,12 +200,12 @@ def recorded(model: Model, *motions: Array, noise: float = 3e-3) -> Loop:
 
 @pytest.mark.parametrize("case", RUN_INS)
 def test_the_true_model_leaves_only_noise_of_the_steady_cycles(paper_model: Model, case: str) -> None:
-    drive = prepare_drive(recorded(paper_model, *RUN_INS[case]))
-    gap = float(np.sqrt(np.mean(np.square(MeasuredLoop(drive).relative(paper_model)))))
-    print(f"{case}: {drive.notes}; true model within {100 * gap:.2f} % of half the force range, noise 0.3 %")
-    (note,) = drive.notes
+    prepared = prepare_loop(recorded(paper_model, *RUN_INS[case]))
+    gap = float(np.sqrt(np.mean(np.square(MeasuredLoop(prepared).relative(paper_model)))))
+    print(f"{case}: {prepared.notes}; true model within {100 * gap:.2f} % of half the force range, noise 0.3 %")
+    (note,) = prepared.notes
     assert "left out" in note
-    assert drive.frequency == pytest.approx(1.0 / PERIOD, rel=2e-3)
-    assert drive.amplitude == pytest.approx(AMPLITUDE, rel=1e-2)
-    assert drive.cycles == pytest.approx(round(drive.cycles * 4) / 4, abs=0.05)
+    assert prepared.frequency == pytest.approx(1.0 / PERIOD, rel=2e-3)
+    assert prepared.amplitude == pytest.approx(AMPLITUDE, rel=1e-2)
+    assert prepared.cycles == pytest.approx(round(prepared.cycles * 4) / 4, abs=0.05)
     assert gap < 6e-3  # a long hold is remembered for longer than a cycle

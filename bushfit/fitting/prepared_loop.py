@@ -1,4 +1,4 @@
-"""Motion that drives the model in a loop: the measured displacement without its noise.
+"""Loop prepared as an input of the model: the measured displacement without its noise, and the force with weights.
 
 A loop's displacement is periodic. It is written as the harmonics that rise above its noise, found by least
 squares at the samples as they are (any number of cycles, sine or triangle, evenly sampled or not), so the
@@ -49,7 +49,7 @@ _ACCURACY = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class PreparedLoop:
     """A measured loop, prepared as an input of the model: its motion without noise, and its force with weights.
 
     Args:
@@ -96,7 +96,7 @@ class Drive:
         return float(self.history(is_transient=False).amplitude[0])
 
     @property
-    def correlated(self) -> str:
+    def correlation_text(self) -> str:
         """Text on the number of rows over which the noise of the force is correlated; "" without correlation."""
         if not self.row_noise.order:
             return ""
@@ -121,11 +121,11 @@ class Drive:
         The whole record is used if it begins at rest, or if the response of the model changes over the first cycles
         (`is_transient`). A loop that other cycles precede is settled in any case.
         """
-        return self._settling if is_transient and not (self.from_rest or self.follows) else self._motion
+        return self._settling if is_transient and not (self.from_rest or self.has_predecessor) else self._motion
 
     @property
-    def follows(self) -> bool:
-        """True if earlier rows of the same record, which the rubber remembers, precede the loop."""
+    def has_predecessor(self) -> bool:
+        """True if the record has rows before the loop, whose deformation the rubber remembers."""
         return self.loop.part is not None and self.loop.part.first_row > 0
 
     @property
@@ -172,7 +172,7 @@ class Drive:
         return rows
 
 
-def prepare_drive(loop: Loop, *, without_outliers: bool = False) -> Drive:
+def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> PreparedLoop:
     """Prepare a loop for the model: find its cycles, remove the noise of its displacement, and weight its force.
 
     Outliers of displacement or force do not affect cycles, motion and noise. With `without_outliers`, rows whose force
@@ -206,7 +206,7 @@ def prepare_drive(loop: Loop, *, without_outliers: bool = False) -> Drive:
         notes.append(loop.part.left_out)
     if loop.softening is not None:
         notes.append(f"the first cycle is {number(100 * loop.softening, 2)} % stiffer than the last (Mullins)")
-    drive = Drive(
+    prepared = PreparedLoop(
         loop,
         frequency,
         cycles,
@@ -219,30 +219,30 @@ def prepare_drive(loop: Loop, *, without_outliers: bool = False) -> Drive:
         outliers=found.outliers,
         first_row=first_row,
     )
-    drive = _with_row_noise(drive, found)
-    drive = replace(drive, weight=np.where(_at_reversal(drive), 0.0, drive.weight))
-    _check_loses_energy(drive)
+    prepared = _with_row_noise(prepared, found)
+    prepared = replace(prepared, weight=np.where(_at_reversal(prepared), 0.0, prepared.weight))
+    _check_loses_energy(prepared)
     if from_rest and not rests[0]:
-        drive = replace(drive, datum=float(np.average(drive.force, weights=drive.weight)))
+        prepared = replace(prepared, datum=float(np.average(prepared.force, weights=prepared.weight)))
     elif not from_rest:
         # a stiffness that is not the same to either side makes a mean force too, and a second harmonic of its size
-        mean, _, cosine, _, sine = least_squares(basis(drive.phase, 2), drive.force, drive.weight)
+        mean, _, cosine, _, sine = least_squares(basis(prepared.phase, 2), prepared.force, prepared.weight)
         preload = float(mean) if abs(mean) - np.hypot(cosine, sine) > _PRELOADED * half_force else None
-        unknown = drive.follows or abs(found.motion[0]) > 0.01 * half_motion
-        drive = replace(drive, datum=found.force_mean if unknown else preload)
-    return replace(drive, notes=(*drive.notes, *_preload(drive)))
+        unknown = prepared.has_predecessor or abs(found.motion[0]) > 0.01 * half_motion
+        prepared = replace(prepared, datum=found.force_mean if unknown else preload)
+    return replace(prepared, notes=(*prepared.notes, *_preload(prepared)))
 
 
-def _check_loses_energy(drive: Drive) -> None:
+def _check_loses_energy(prepared: PreparedLoop) -> None:
     """Raise a FitError if the force lags behind the displacement by more than noise and the rig's delay explain."""
-    stiffness = drive.first_harmonic
-    rows = drive.weight.sum() / drive.row_noise.rows_as_one
-    chance = drive.noise * np.sqrt(2.0 / rows) / abs(drive.coefficients[1])
+    stiffness = prepared.first_harmonic
+    rows = prepared.weight.sum() / prepared.row_noise.rows_as_one
+    chance = prepared.noise * np.sqrt(2.0 / rows) / abs(prepared.coefficients[1])
     if stiffness.imag < -max(_CERTAIN * chance, _NO_LOSS * abs(stiffness)):
-        late = number(-1e3 * np.angle(stiffness) / (2.0 * np.pi * drive.frequency), 2)
+        late = number(-1e3 * np.angle(stiffness) / (2.0 * np.pi * prepared.frequency), 2)
         raise FitError(
             "the loop releases energy, which no bushing does",
-            file=drive.loop.source.file if drive.loop.source else None,
+            file=prepared.loop.source.file if prepared.loop.source else None,
             found=f"a loss factor of {stiffness.imag / stiffness.real:.3g}: the force lags behind the displacement",
             expected="a force that runs ahead of the displacement",
             hint="are the columns of displacement and force swapped, or do the rows run backwards in time? Name the "
@@ -251,50 +251,52 @@ def _check_loses_energy(drive: Drive) -> None:
         )
 
 
-def _with_row_noise(drive: Drive, loop_harmonics: LoopHarmonics) -> Drive:
+def _with_row_noise(prepared: PreparedLoop, loop_harmonics: LoopHarmonics) -> PreparedLoop:
     """Estimate size and correlation of the noise of a loop's rows, or bins, from its whole cycles.
 
     If there is no whole cycle, or the noise is below that of any rig, the rows are taken to be independent.
     """
-    binned = drive.force.size < drive.loop.force.size
-    turn = drive.phase.astype(np.intp)
-    rows = (turn >= int(drive.from_rest)) & (turn < int(drive.cycles + drive._rounding))
+    binned = prepared.force.size < prepared.loop.force.size
+    turn = prepared.phase.astype(np.intp)
+    rows = (turn >= int(prepared.from_rest)) & (turn < int(prepared.cycles + prepared._rounding))
     cycles = np.unique(turn[rows]).size
     if not cycles or np.count_nonzero(rows) < 32 * cycles:  # fewer resolve no correlation
-        return drive
-    phase, force, weight, harmonics = drive.phase[rows], drive.force[rows], drive.weight[rows], loop_harmonics.force
-    if drive.from_rest:
+        return prepared
+    phase, force, weight = prepared.phase[rows], prepared.force[rows], prepared.weight[rows]
+    harmonics = loop_harmonics.force
+    if prepared.from_rest:
         harmonics = as_complex(least_squares(basis(phase, harmonics.size - 1), force, weight))
     if cycles == 1:
         harmonics = np.where(noise_harmonics_of_single_cycle(np.arange(harmonics.size)), 0.0, harmonics)
     misfit = force - series(harmonics, phase)
-    if np.std(misfit) < FLOOR * drive.half_range:
-        return drive
+    if np.std(misfit) < FLOOR * prepared.half_range:
+        return prepared
     if not weight.all():
         misfit = np.interp(phase, phase[weight > 0.0], misfit[weight > 0.0])
     scale = np.sqrt(weight) if binned else 1.0
     model, size = row_noise(misfit * scale, remove_slow_changes(phase, misfit)[0] * scale, cycles)
     if binned and model.order:
         # a row more or less in a bin of rows that depend on one another tells nothing: one weight for each turn
-        weighted = drive.weight > 0.0
+        weighted = prepared.weight > 0.0
         count = np.bincount(turn[weighted], minlength=turn.max() + 1)
-        mean = np.bincount(turn[weighted], drive.weight[weighted], minlength=count.size) / np.maximum(count, 1)
-        drive = replace(drive, weight=np.where(weighted, mean[turn], 0.0))
-        scale = np.sqrt(drive.weight[rows])
+        mean = np.bincount(turn[weighted], prepared.weight[weighted], minlength=count.size) / np.maximum(count, 1)
+        prepared = replace(prepared, weight=np.where(weighted, mean[turn], 0.0))
+        scale = np.sqrt(prepared.weight[rows])
         model, size = row_noise(misfit * scale, remove_slow_changes(phase, misfit)[0] * scale, cycles)
     if binned:
-        breaks = () if drive.from_rest else tuple((np.flatnonzero(np.diff(turn)) + 1).tolist())
-        return replace(drive, row_noise=replace(model, size=max(size / loop_harmonics.force_noise, 1.0), breaks=breaks))
+        breaks = () if prepared.from_rest else tuple((np.flatnonzero(np.diff(turn)) + 1).tolist())
+        model = replace(model, size=max(size / loop_harmonics.force_noise, 1.0), breaks=breaks)
+        return replace(prepared, row_noise=model)
     if not model.order:
-        return drive
-    noise = drive.noise if drive.loop.noise is not None else max(size, FLOOR * drive.half_range)
-    return replace(drive, noise=noise, row_noise=model)
+        return prepared
+    noise = prepared.noise if prepared.loop.noise is not None else max(size, FLOOR * prepared.half_range)
+    return replace(prepared, noise=noise, row_noise=model)
 
 
-def _at_reversal(drive: Drive) -> Array:
+def _at_reversal(prepared: PreparedLoop) -> Array:
     """Mask of the rows near a turning point of the motion, where the force of dry friction jumps, (rows,)."""
-    motion, position = drive.history(is_transient=False).value, drive.phase * GRID
-    if drive.from_rest:
+    motion, position = prepared.history(is_transient=False).value, prepared.phase * GRID
+    if prepared.from_rest:
         turns = np.flatnonzero(reversals(motion))
     else:
         turns, position = np.flatnonzero(reversals(np.tile(motion, 3))) - GRID, position % GRID
@@ -338,26 +340,26 @@ def _rests(
     return bool(unmoved and unloaded), bool(in_middle and is_first)
 
 
-def recorded_means(drive: Drive) -> list[Preload]:
+def recorded_means(prepared: PreparedLoop) -> list[Preload]:
     """Mean displacement and mean force of a loop that are too large for a zero error of a sensor.
 
     Returns:
         Means [m, rad or 1, and N or N m]; none, one or both.
     """
-    if drive.datum is None:
+    if prepared.datum is None:
         return []
-    motion, means = drive.loop.direction.motion, list[Preload]()
-    if abs(mean_motion := float(drive.coefficients[0].real)) > TOLD_MEAN * drive.amplitude:
+    motion, means = prepared.loop.direction.motion, list[Preload]()
+    if abs(mean_motion := float(prepared.coefficients[0].real)) > TOLD_MEAN * prepared.amplitude:
         means.append(Preload(mean_motion, motion.displacement_unit))
-    if abs(drive.datum) > (TOLD_MEAN if means else _PRELOADED) * drive.half_range:
-        means.append(Preload(drive.datum, motion.force_unit))
+    if abs(prepared.datum) > (TOLD_MEAN if means else _PRELOADED) * prepared.half_range:
+        means.append(Preload(prepared.datum, motion.force_unit))
     return means
 
 
-def _preload(drive: Drive) -> Iterator[str]:
+def _preload(prepared: PreparedLoop) -> Iterator[str]:
     """Yield a note on the mean displacement and force of a loop without a stated preload."""
-    loop = drive.loop
-    if means := recorded_means(drive) if loop.preload is None or not loop.preload.value else []:
+    loop = prepared.loop
+    if means := recorded_means(prepared) if loop.preload is None or not loop.preload.value else []:
         motion = loop.direction.motion
         words = {motion.displacement_unit: motion.words[0], motion.force_unit: motion.words[1]}
         listed = " and ".join(f"a mean {words[mean.unit]} of {mean.text(loop.direction, 3)}" for mean in means)
