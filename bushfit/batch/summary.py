@@ -82,9 +82,9 @@ class BatchResult:
 
     @cached_property
     def figures(self) -> dict[str, Array]:
-        """Value, ends of the 95 % interval and standard error of each quantity [SI], (4, n); NaN if unknown.
+        """Value, low and high end of the 95 % interval, and standard error of each quantity of n parts [SI], (4, n).
 
-        The keys are the names of the quantities.
+        The keys are the names of the quantities; numbers that are not known are NaN.
         """
         figures = dict[str, Array]()
         for index, record in enumerate(self.records):

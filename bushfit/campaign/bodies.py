@@ -94,6 +94,6 @@ class SpecimenSettings:
 
 
 def specimens_of(bushings: Iterable[SeveralBushings], coupons: Iterable[SpecimenSettings]) -> list[Specimen]:
-    """Make the specimens of a campaign: the three directions of each of several bushings, then the coupons."""
+    """Make the specimens of a campaign: three directions for each of several bushings, then those of [[specimens]]."""
     directions = [place for table in bushings for place in Specimen.of_bushing(table.to_bushing())]
     return [*directions, *(Specimen(**vars(table)) for table in coupons)]

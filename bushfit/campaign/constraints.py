@@ -40,7 +40,7 @@ def constraints_of(campaign: Campaign) -> Constraints:
         text = setting.prior or ""
         earlier = load_result(campaign.path.parent / text) if text.endswith(".json") else None
         with error_location(campaign.path, place=f"fit.{name}"):
-            _check(setting)
+            _require_compatible_keys(setting)
             if earlier:
                 priors.append(_from_result(campaign, earlier, text, only=name))
             elif text:
@@ -54,7 +54,7 @@ def constraints_of(campaign: Campaign) -> Constraints:
         return Constraints(priors, _ties(campaign))
 
 
-def _check(setting: ParameterSetting) -> None:
+def _require_compatible_keys(setting: ParameterSetting) -> None:
     """Raise a CampaignError for settings of a parameter that exclude each other."""
     limits = [key for key in ("value", "min", "max") if getattr(setting, key) is not None]
     stated = [key for key in ("equal", "expression") if getattr(setting, key)]
@@ -67,7 +67,7 @@ def _check(setting: ParameterSetting) -> None:
 
 
 def _prior(text: str, name: str) -> Prior:
-    """Prior of one parameter, from a value with its standard deviation."""
+    """Parse a prior of one parameter, such as "0.24 +- 0.03" (value and standard deviation)."""
     match = _PLUS_MINUS.fullmatch(text)
     if not match or (match[4] == "%" and not match[2]):  # 3 % may be of the value, or added to it
         expected = '"0.24 +- 0.03" (with a unit if the parameter has one), or the model.json of an earlier fit'

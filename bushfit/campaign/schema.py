@@ -81,7 +81,7 @@ class ParameterSetting:
 
     @property
     def tie(self) -> str | None:
-        """Expression that gives the value; None for a parameter that is not tied."""
+        """Expression of other parameters that gives the value of this one; None if it is not tied."""
         return self.equal or self.expression
 
 

@@ -18,7 +18,7 @@ _LEVEL_STEP = 0.15
 
 
 class SessionTest(NamedTuple):
-    """One test of a session: a sequence of tests on one body.
+    """One test of a session; a session is the sequence of all tests on one body.
 
     Args:
         place: direction of the bushing, or specimen.

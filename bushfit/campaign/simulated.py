@@ -55,7 +55,7 @@ class SimulatedTest:
 
     @property
     def static(self) -> Preload | None:
-        """Preload of the test; None if not stated."""
+        """Static displacement or force about which the test is made, parsed from `preload`; None if not stated."""
         return parse_preload(self.preload, self.direction)
 
 

@@ -109,7 +109,7 @@ def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tes
         further = _OF_TESTS if kind == "tests" else {}
         keys = ("direction", "force_sign", *further)
         parameters = [
-            click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_tests_alone),
+            click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_refuse_models),
             option_group(
                 "Information that is missing in the files",
                 _metadata_option("direction", "DIRECTION", "Direction: axial, radial or torsion [from file names]."),
@@ -148,7 +148,7 @@ def _metadata_option(key: str, metavar: str, words: str | None = None) -> Parame
     return option(option_of(key), metavar, words, type=TYPES.get(key))
 
 
-def _tests_alone(context: click.Context, _: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
+def _refuse_models(context: click.Context, _: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
     """Callback of the argument `files`: raise a MeasurementError if a file is a campaign or a model."""
     for file in () if context.resilient_parsing else files:  # no error during shell completion
         if (found := _NO_TESTS.get(file.suffix.lower())) and file.is_file():

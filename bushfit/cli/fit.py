@@ -37,7 +37,7 @@ def static(
 
     campaign, start = open_campaign(campaigns), load_model(dynamic) if dynamic else None
     folder = output.checked_folder(campaign.name, "static.json")
-    _finish(output, folder, fit_static(campaign, dynamic=start, loss=loss), dynamic, max_nrmse)
+    _show_fit(output, folder, fit_static(campaign, dynamic=start, loss=loss), dynamic, max_nrmse)
 
 
 @command_called("fit-dynamic", "configs/cmp_15961.toml")
@@ -65,7 +65,7 @@ def dynamic(
 
     campaign, start = open_campaign(campaigns), load_model(static) if static else None
     folder = output.checked_folder(campaign.name, "dynamic.json")
-    _finish(output, folder, fit_dynamic(campaign, static=start, loss=loss), static, max_nrmse)
+    _show_fit(output, folder, fit_dynamic(campaign, static=start, loss=loss), static, max_nrmse)
 
 
 @command_called("fit", "configs/arm_bushing.toml --direction axial --direction radial --profile")
@@ -109,10 +109,10 @@ def fit(
     campaign = open_campaign(campaigns)
     folder = output.checked_folder(campaign.name, "model.json")
     result = fit_campaign(campaign, directions=directions, effects=effects, profile=profile, loss=loss)
-    _finish(output, folder, result, None, max_nrmse)
+    _show_fit(output, folder, result, None, max_nrmse)
 
 
-def _finish(output: Output, folder: Path, fitted: FitOutput, model: Path | None, max_nrmse: float | None) -> None:
+def _show_fit(output: Output, folder: Path, fitted: FitOutput, model: Path | None, max_nrmse: float | None) -> None:
     """Print and write the result of a fit, and exit with status 1 if its NRMSE exceeds the limit of --max-nrmse.
 
     Args:

@@ -151,7 +151,7 @@ def make_bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, d
         sizes: texts of the options for radii, diameters and the length, by key.
 
     Returns:
-        The bushing, and the keys of its [bushing] table.
+        The bushing, and the entries of its [bushing] table as texts by key.
 
     Raises:
         UsageError: both radius and diameter of one side are given.
@@ -336,11 +336,11 @@ class Questions:
         """Ask for the value of an option that an error names.
 
         Args:
-            key: key of the option, and its role.
+            key: campaign key, and the column role for a header or unit, such as ("column", "force"), or "".
             error: error to print above the question.
 
         Returns:
-            The answer by its key; a rate in Hz has the key of a frequency.
+            The answer by `key`; a speed that is answered in Hz has the key of a frequency.
         """
         name, role = key
         answer = self._answers.get(key)

@@ -273,7 +273,7 @@ def with_output(folder: str, *written: Written) -> Parameter:
 
 
 def _trust(_: click.Context, __: click.Parameter, is_given: bool) -> None:
-    """Permit to run the Python file of an effect, in this process and in those that it starts."""
+    """Callback of --trust: permit the Python file of an effect to run in this process and its child processes."""
     if is_given:
         from bushfit.model.laws import TRUST
 

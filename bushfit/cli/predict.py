@@ -176,7 +176,7 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
 
 
 def _large_motion(text: str | None) -> LargeMotion | None:
-    """Parse --over: a frequency and an amplitude, or an offset; None if the option was not given."""
+    """Parse --over: a slow sine ("2 Hz 3 mm") or offset ("3 mm") below the predicted vibration; None if not given."""
     from bushfit.prediction.superposed import LargeMotion
     from bushfit.units import parse_quantity
 
@@ -192,7 +192,7 @@ def _large_motion(text: str | None) -> LargeMotion | None:
 
 
 def _print_static(output: Output, curve: StaticCurve) -> None:
-    """Print reach, rate and stiffness of a static curve, from end to end and about zero."""
+    """Print the displacement range and loading rate of a static curve, and its stiffness over the range and at zero."""
     from bushfit.units import format_range, number
 
     (unit, length), _, (name, factor) = curve.direction.display

@@ -17,7 +17,7 @@ _MOST_TESTS = 8
 
 
 def print_validations(output: Output, validations: Sequence[Validation], before: Sequence[Validation] = ()) -> None:
-    """Print NRMSE, peak and energy error, and share of points in the band of validation records, if there are any.
+    """Print NRMSE, peak and energy error, and share of points in the 95 % band for each validation record.
 
     Args:
         output: output of the command.

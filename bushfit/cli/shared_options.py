@@ -110,7 +110,7 @@ def grid_options(default: str) -> Parameter:
 
 
 def prediction_options(campaign: str) -> Parameter:
-    """Create the options for directions, grid and temperature of a prediction, and --campaign with a help text."""
+    """Create --direction, the options of the grid, --temperature, and --campaign with the help text `campaign`."""
     return option_group(
         "Range and conditions",
         direction_option(
@@ -124,7 +124,7 @@ def prediction_options(campaign: str) -> Parameter:
 
 
 def static_rate_option(subject: str) -> Parameter:
-    """Create the option --static-rate, the rate of `subject`."""
+    """Create the option --static-rate, the loading rate of static curves; its help text begins with `subject`."""
     return option(
         "--static-rate", "RATE", f'{subject}, such as "10 mm/min" [rate of the slowest loop, else 10 mm/min].'
     )

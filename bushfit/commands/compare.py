@@ -279,7 +279,11 @@ def _warnings(
 
 
 def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> list[list[Place]]:
-    """Directions or specimens to compare, each as a list with one entry per result; the compound if none is common."""
+    """Find the directions or specimens to compare: those with the given names, or all that the results have in common.
+
+    Returns:
+        The direction or specimen in each result, one list for each; the rubber compound if nothing is in common.
+    """
     if names:
         columns = list[list[Place]]()
         for name in names:

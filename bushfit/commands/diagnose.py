@@ -130,7 +130,7 @@ def diagnose(
 
 
 def diagnosis_files(diagnosis: Diagnosis, document: DiagnosisFile, title: str) -> list[ResultFile]:
-    """Tables of the gap and of the candidates, and the figure of the gap.
+    """Tables of the gap (measured minus model) and of the candidate effects, and the figure of the gap.
 
     Args:
         diagnosis: the diagnosis.

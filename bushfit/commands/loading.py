@@ -20,7 +20,7 @@ class HasResult(Protocol):
 
 
 def as_result(model: Result | HasResult) -> Result:
-    """Return the result itself, or the result of a command's output."""
+    """Return the fitted model in the output of a command; a fitted model is returned unchanged."""
     return model if isinstance(model, Result) else model.result
 
 

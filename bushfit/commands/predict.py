@@ -186,7 +186,7 @@ def predict(
     elif bushing:
         result, note = transfer_compound(result, bushing)
         notes, directions = (*notes, note), directions or [str(direction) for direction in _DIRECTIONS]
-    campaign = campaign and _of_bushings(campaign, result)
+    campaign = campaign and _assign_bushing(campaign, result)
     sweeps = campaign.sweeps if campaign else ()
     depends_on_temperature = result.model.depends_on_temperature
     if temperature is not None and not depends_on_temperature:
@@ -258,8 +258,8 @@ def predict(
     return replace(output, files=_files(output, drawn_sweeps, temperature, wide=wide))
 
 
-def _of_bushings(campaign: Campaign, result: Result) -> Campaign:
-    """Assign the tests of a campaign with a [bushing] to the one of several fitted bushings that has its geometry."""
+def _assign_bushing(campaign: Campaign, result: Result) -> Campaign:
+    """Assign a campaign's tests to that of several fitted bushings whose geometry is equal; refuse another geometry."""
     bushing, fitted = campaign.bushing, result.bushings
     bodies = [body for body in fitted if bushing and replace(bushing, name=body.name) == body]
     listed = {place.bushing for place in campaign.specimens if place.bushing}

@@ -16,7 +16,7 @@ from bushfit.errors import ModelError
 from bushfit.model.file import require_schema
 from bushfit.prediction.comparison import Comparison, Contrast, ParameterContrast, relative_difference
 from bushfit.report.compare_document import SCHEMA, ComparisonFile
-from bushfit.report.tables import require_columns, response_headers, words
+from bushfit.report.tables import quantity_words, require_columns, response_headers
 from bushfit.units import display_unit, number, split_header
 from bushfit.validation import validate_tables
 
@@ -53,7 +53,7 @@ def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
             columns |= {header: band.value * scale, f"{header}, low": band.low * scale}
             columns[f"{header}, high"] = band.high * scale
     differences = (
-        (f"relative difference of {words(contrast.place)[2]} [-]", contrast.stiffness, relative_difference),
+        (f"relative difference of {quantity_words(contrast.place)[2]} [-]", contrast.stiffness, relative_difference),
         ("difference of loss factor [-]", contrast.loss_factor, np.asarray),
     )
     for header, band, convert in differences:

@@ -52,7 +52,8 @@ def candidates_table(diagnosis: Diagnosis) -> pd.DataFrame:
     """Table of the results of a diagnosis for every effect that could explain the gap.
 
     Returns:
-        A row per effect: level, score, gain in chi-square, probability, fitted parameters, and reason for the result.
+        A row per effect: level (material, component, instrument, record), score, gain in chi-square, probability,
+        fitted parameters, and reason for accepting or rejecting the effect.
     """
     rows = [
         {

@@ -30,8 +30,8 @@ DISPLAYS = {motion.displacement_unit: motion.display.displacement for motion in 
 IF_RIGS = "if it is the rig's"
 
 
-def words(place: Place) -> tuple[str, str, str]:
-    """Words for amplitude, force and stiffness in table headers, or for strain amplitude, stress and modulus."""
+def quantity_words(place: Place) -> tuple[str, str, str]:
+    """Words for amplitude, force and stiffness in headers: for a modulus "strain amplitude", "stress", "modulus"."""
     if place.motion is not STRAINING:
         return "amplitude", "force", "stiffness"
     strain, stress, modulus = STRAINING.words
@@ -41,7 +41,7 @@ def words(place: Place) -> tuple[str, str, str]:
 def response_headers(place: Place) -> tuple[str, str, str]:
     """Column headers, with units, of amplitude, stiffness magnitude and force for a direction or specimen."""
     (length, _), (force, _), (stiffness, _) = place.display
-    motion_name, resisting, resisted = words(place)
+    motion_name, resisting, resisted = quantity_words(place)
     return f"{motion_name} [{length}]", f"{resisted} [{stiffness}]", f"{resisting} [{force}]"
 
 
@@ -82,7 +82,7 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
         motion, if there is one.
     """
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
-    motion_name, _, resisted = words(prediction.direction)
+    motion_name, _, resisted = quantity_words(prediction.direction)
     force = f"{resisted} [{stiffness}]"
     quantities = {
         force: ("stiffness", factor),
@@ -124,7 +124,7 @@ def wide_table(prediction: Prediction, display: Display | None = None) -> pd.Dat
         the prediction has no operating point.
     """
     (length, length_factor), _, (stiffness, factor) = display or prediction.direction.display
-    resisted = words(prediction.direction)[2]
+    resisted = quantity_words(prediction.direction)[2]
     points = pd.DataFrame({"frequency [Hz]": prediction.frequency, "amplitude": prediction.amplitude})
     points[resisted], points["loss factor"] = prediction.stiffness.value * factor, prediction.loss_factor.value
     units = {resisted: stiffness, "loss factor": "-"}
@@ -203,7 +203,7 @@ def arms_table(model: Model, arms: Sequence[Arms], places: Sequence[Place]) -> p
     columns = {"in place of": names, "relaxation time [s]": times, "shear modulus [MPa]": 1e-6 * modulus}
     for place in places:
         *_, (unit, factor) = place.display
-        columns[f"{place} {words(place)[2]} [{unit}]"] = factor * model.stiffness_per_modulus(place) * modulus
+        columns[f"{place} {quantity_words(place)[2]} [{unit}]"] = factor * model.stiffness_per_modulus(place) * modulus
     return pd.DataFrame(columns)
 
 
@@ -320,7 +320,7 @@ def master_curve_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:
 
 
 def bushings_table(bushings: Sequence[OtherBushings]) -> pd.DataFrame:
-    """Table of the agreement of each of several bushings with a fit to the others, one row per bushing."""
+    """Table of the errors with which a fit to the other bushings predicts each bushing; a row per bushing."""
     columns = ["bushing", "points", "NRMSE [%]", "chi2 [-]", "mean error [%]", "in band [%]"]
     table = pd.DataFrame([astuple(row) for row in bushings], columns=columns)
     percent = [name for name in columns if "%" in name]

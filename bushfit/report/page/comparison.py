@@ -18,7 +18,7 @@ from bushfit.report.compared import (
     parameter_cells,
 )
 from bushfit.report.page import rendered
-from bushfit.report.page.report import MOST, conditions, tube_description
+from bushfit.report.page.report import MOST, summarize_conditions, tube_description
 from bushfit.report.page.svg import picture
 from bushfit.report.page.values import grid_corners
 from bushfit.report.results import ResultFile
@@ -62,7 +62,7 @@ def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = N
             strain = format_range("%", *(100.0 * end for end in measured.strain))
             tests = f"{format_range('Hz', *measured.frequency)}, strain {strain}, {', '.join(measured.directions)}"
         body = tube_description(Bushing(*astuple(entry["bushing"]))) if entry["bushing"] else "rubber compound"
-        test_conditions = dict(conditions(source.conditions for source in entry["inputs"]))
+        test_conditions = dict(summarize_conditions(source.conditions for source in entry["inputs"]))
         entries.append({"of": entry, "body": body, "tests": tests, "conditions": test_conditions})
     labels: dict[tuple[str, str], list[str]] = {}
     for entry in compared:

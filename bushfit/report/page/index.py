@@ -121,8 +121,8 @@ def sparkline(curve: Array, usual: Array, scale: float, color: str) -> Markup:
 
     Args:
         curve: relative deviation of |K| at each operating point, (k,).
-        usual: the same of the m usual parts, whose range is a grey band, (m, k).
-        scale: relative deviation at the upper and lower edge.
+        usual: relative deviations of the m usual parts, whose range is a grey band, (m, k).
+        scale: relative deviation at the upper and lower edge of the drawing.
         color: colour of the curve.
 
     Returns:

@@ -106,7 +106,7 @@ def report_page(files: Sequence[ResultFile]) -> str:
             key.replace("_", " ").capitalize(): text for key, text in (campaign.report if campaign else {}).items()
         },
         "logo": campaign.logo if campaign else None,
-        "facts": [*bodies, *conditions(test.conditions for test in tests)],
+        "facts": [*bodies, *summarize_conditions(test.conditions for test in tests)],
         "headlines": [headline(record, prediction) for prediction in predictions],
         "diagnosis": diagnosis,
         "tone": _TONES.get(diagnosis["verdict"], "fair") if diagnosis else "fair",
@@ -144,14 +144,14 @@ def draw_figures(record: ReportRecord) -> tuple[list[Picture], bool]:
     residuals), loops, and validation records.
 
     Args:
-        record: records of the result.
+        record: input of the report.
 
     Returns:
         Figures of the report, and True if further figures are left out.
     """
     result, diagnosis = record.result, record.diagnosis
     sweeps, loops, gap = (record.tables.get(name) for name in ("sweeps", "loops", "gap"))
-    drawn_sweeps, figures = sweeps_beside(sweeps, result), _Figures()
+    drawn_sweeps, figures = comparable_sweeps(sweeps, result), _Figures()
     for name, prediction in [*record.predictions.items()][:_MOST_PLACES]:
         title = f"{prediction.direction}: prediction and measurement"
         draw = plots.prediction.prediction_figure
@@ -183,8 +183,8 @@ def draw_figures(record: ReportRecord) -> tuple[list[Picture], bool]:
     return pictures, len(pictures) < len(figures) or len(record.predictions) > _MOST_PLACES
 
 
-def sweeps_beside(sweeps: pd.DataFrame | None, result: Result) -> pd.DataFrame | None:
-    """Measured sweeps to draw with a prediction: all, or only those at 23 °C if the model depends on temperature.
+def comparable_sweeps(sweeps: pd.DataFrame | None, result: Result) -> pd.DataFrame | None:
+    """Select the measured sweeps to draw with a prediction: if the model depends on temperature, those at 23 °C.
 
     Args:
         sweeps: table of sweeps; None without sweeps.
@@ -217,7 +217,7 @@ def specimen_description(specimen: Specimen) -> str:
     )
 
 
-def conditions(test_conditions: Iterable[Mapping[str, str | float]]) -> Iterator[tuple[str, str]]:
+def summarize_conditions(test_conditions: Iterable[Mapping[str, str | float]]) -> Iterator[tuple[str, str]]:
     """Summarise the conditions of all tests: temperature, preload, date, operator and specimen number.
 
     Args:

@@ -61,7 +61,7 @@ def headline(record: ReportRecord, prediction: Prediction) -> dict[str, str]:
         "static_point": f"lowest frequency {number(lowest, 3)} Hz",
         "stiffening": "",
         "accuracy": "",
-        "basis": basis(record, str(place)),
+        "basis": describe_basis(record, str(place)),
     }
     if lowest < frequency and lowest <= _STATIC and not untimed_effects(result.model):
         curve = static_curve(result, place, amplitude, static_rate(result, place))
@@ -96,8 +96,8 @@ def interval(values: Sequence[float], digits: int = 4) -> str:
     return f"{low} to {high}" if values[2] > values[1] else ""
 
 
-def basis(record: ReportRecord, place: str) -> str:
-    """Describe the tests that the prediction for a direction or specimen is based on, and its agreement with others.
+def describe_basis(record: ReportRecord, place: str) -> str:
+    """Describe the tests behind the prediction of a direction or specimen, and its deviation from tests not fitted.
 
     Returns:
         The sentence, without a full stop.

@@ -8,7 +8,7 @@ from bushfit.fitting.master_curve import ShiftedSweep
 from bushfit.model.model import Model
 from bushfit.reading.measurement import loss_factor
 from bushfit.report.plots import style
-from bushfit.report.tables import words
+from bushfit.report.tables import quantity_words
 from bushfit.units import CELSIUS, display_unit, number
 
 #: Number of points of a line.
@@ -55,7 +55,7 @@ def master_curve_figure(model: Model, shifted_sweeps: Sequence[ShiftedSweep], ti
                 axes.plot(*points, "o", color=looks[rounded[shifted.sweep.name]].color, **style.DOT)
             axes.plot(frequency, part(line), color=style.INK, lw=1.1, zorder=3)
             style.logarithmic(axes, reach)
-        style.label_axes(stiffness, "reduced frequency f a_T [Hz]", f"{place}\n|{words(place)[2]}| [{unit}]")
+        style.label_axes(stiffness, "reduced frequency f a_T [Hz]", f"{place}\n|{quantity_words(place)[2]}| [{unit}]")
         style.label_axes(loss, "reduced frequency f a_T [Hz]", "loss factor [-]")
         style.name_levels(loss, [f"{degree:g}" for degree in degrees], "temperature")
     return figure.explain(

@@ -16,7 +16,7 @@ from bushfit.reading.runs import nominal
 from bushfit.report.plots import style
 from bushfit.report.plots.fits import draw_curves, draw_points, points_note, points_to_draw, stiffness_scale
 from bushfit.report.plots.measured import Axis, header_of, rows_at_preload, sweep_groups
-from bushfit.report.tables import IF_RIGS, displacement_header, response_headers, spread, words
+from bushfit.report.tables import IF_RIGS, displacement_header, quantity_words, response_headers, spread
 from bushfit.units import display_unit, format_range
 
 #: Number of points of a line of the model.
@@ -118,8 +118,8 @@ def static_figure(curves: Sequence[StaticCurve], title: str) -> style.Chart:
     if len(curves) > 1:
         handles = [look.handle(False) for look in style.styles(len(curves), "loop")]
         style.legend(panels[1], handles, [one.preload.text(place) for one in curves if one.preload], "preload")
-    style.label_axes(panels[0], displacement_header(place), f"{words(place)[1]} [{unit}]")
-    style.label_axes(panels[1], displacement_header(place), f"static {words(place)[2]} [{slope_unit}]")
+    style.label_axes(panels[0], displacement_header(place), f"{quantity_words(place)[1]} [{unit}]")
+    style.label_axes(panels[1], displacement_header(place), f"static {quantity_words(place)[2]} [{slope_unit}]")
     panels[1].set_ylim(bottom=0.0)
     return figure.explain(
         f"Thin lines: loading and unloading at {curve.rate_text}; thick: their mean, and its slope; shaded: 95 % band."

@@ -22,7 +22,7 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.rig import wave
 from bushfit.report.page.record import read_results
-from bushfit.report.page.report import report_page, sweeps_beside
+from bushfit.report.page.report import comparable_sweeps, report_page
 from bushfit.report.results import ResultFile, contents
 
 Results = Callable[[str], Path]
@@ -210,5 +210,5 @@ def test_names_do_no_harm(root: Path) -> None:
 def test_beside_a_prediction_at_23_degrees_only_sweeps_of_that_temperature_are_drawn(paper_model: Model) -> None:
     table = pd.DataFrame({"sweep": ["cold", "room", "none"], "temperature [degC]": [-10.0, 24.0, np.nan]})
     warm = Result(paper_model.with_effect("temperature"))
-    shown = [sweeps_beside(table, result) for result in (warm, Result(paper_model))]
+    shown = [comparable_sweeps(table, result) for result in (warm, Result(paper_model))]
     assert [list(rows["sweep"]) for rows in shown if rows is not None] == [["room", "none"], ["cold", "room", "none"]]
