@@ -47,7 +47,7 @@ def bushing() -> Bushing:
 
 
 @pytest.fixture(scope="session")
-def made(paper_model: Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(paper_model, tmp_path_factory) -> Path:
     """A simulated production run, and in `out` the batch of it; what the terminal said is in `said`."""
     folder = tmp_path_factory.mktemp("production")
     production.make(folder, paper_model)
@@ -76,7 +76,7 @@ def campaign() -> Campaign:
 
 
 @pytest.fixture(scope="session")
-def result(campaign: Campaign) -> Result:
+def result(campaign) -> Result:
     """The joint fit to its axial tests."""
     return fit_joint(PreparedCampaign.from_campaign(campaign))
 
@@ -96,13 +96,13 @@ def other_models() -> dict[str, Model]:
 
 
 @pytest.fixture
-def typed(tmp_path: Path) -> Callable[..., Done]:
+def typed(tmp_path) -> Callable[..., Done]:
     """Run a command line in `tmp_path`."""
     return partial(call, tmp_path)
 
 
 @pytest.fixture(scope="session")
-def shared(tmp_path_factory: pytest.TempPathFactory) -> Shared:
+def shared(tmp_path_factory) -> Shared:
     """Commands that run once a session, for all its workers."""
     base = tmp_path_factory.getbasetemp()
     store = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "shared"

@@ -38,7 +38,7 @@ def blocks(page: Path, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
 
 
-def test_effects_and_commands_are_in_the_tables_of_their_pages(root: Path) -> None:
+def test_effects_and_commands_are_in_the_tables_of_their_pages(root):
     page = PAGE.read_text(encoding="utf-8")
     assert renewed(page) == page, "run: python tests/effect_tables.py"
     commands = (root / "bushfit/manual/commands.md").read_text(encoding="utf-8")
@@ -69,7 +69,7 @@ def keys_written(table: Any) -> set[str]:
     return set().union(*(keys_written(entry) for entry in table)) if isinstance(table, list) else set()
 
 
-def test_the_campaign_reference_is_valid_and_has_every_key(root: Path) -> None:
+def test_the_campaign_reference_is_valid_and_has_every_key(root):
     """The page itself, and its comment with the tables in place of [bushing]."""
     text = (root / "configs/reference.toml").read_text(encoding="utf-8")
     (instead,) = re.findall(r"^# \[\[bushings\]\].*?(?=\n\n)", text, re.MULTILINE | re.DOTALL)
@@ -82,7 +82,7 @@ def test_the_campaign_reference_is_valid_and_has_every_key(root: Path) -> None:
     assert keys(CampaignFile) - written <= {"parameters", "inner_diameter", "outer_diameter"}
 
 
-def test_manifest_and_limits_are_valid_and_have_every_key(root: Path) -> None:
+def test_manifest_and_limits_are_valid_and_have_every_key(root):
     page = root / "bushfit/manual/batch.md"
     manifest, limits = (tomllib.loads(block) for block in blocks(page, "toml"))
     for schema, block in ((ManifestFile, manifest), (Limits, limits)):
@@ -91,7 +91,7 @@ def test_manifest_and_limits_are_valid_and_have_every_key(root: Path) -> None:
         assert [key for key in keys(schema) if not re.search(rf"\b{key}\b", text)] == []
 
 
-def test_recipes_for_ci_are_valid_and_run_what_there_is(root: Path) -> None:
+def test_recipes_for_ci_are_valid_and_run_what_there_is(root):
     github, gitlab = (yaml.safe_load(block) for block in blocks(root / "bushfit/manual/batch.md", "yaml"))
     steps = [step["run"] for step in github["jobs"]["fit"]["steps"] if "run" in step]
     above = click.Context(cli, **cli.context_settings)
@@ -104,7 +104,7 @@ def test_recipes_for_ci_are_valid_and_run_what_there_is(root: Path) -> None:
         batch.make_context("batch", arguments, parent=above)
 
 
-def test_the_page_on_diagnose_has_every_constant_that_moves_a_verdict(root: Path) -> None:
+def test_the_page_on_diagnose_has_every_constant_that_moves_a_verdict(root):
     """With its value; those that follow from others aside."""
     source = ast.parse((root / "bushfit/diagnosis/priors.py").read_text(encoding="utf-8"))
     stated: dict[str, list[float]] = {}
@@ -123,7 +123,7 @@ def test_the_page_on_diagnose_has_every_constant_that_moves_a_verdict(root: Path
     assert len(stated) <= 20
 
 
-def test_the_map_of_the_code_is_the_code(root: Path) -> None:
+def test_the_map_of_the_code_is_the_code(root):
     """Every module and folder of the package, in the order in which they may import."""
     (tree,) = (block for block in blocks(root / "bushfit/README.md", "text") if block.startswith("bushfit/\n"))
     shown = re.findall(r"^  (\w+(?:/|\.py)) +\S", tree, re.MULTILINE)
@@ -133,7 +133,7 @@ def test_the_map_of_the_code_is_the_code(root: Path) -> None:
     assert [entry for entry in shown if not (root / "bushfit" / entry).exists()] == []
 
 
-def test_the_page_of_each_folder_has_its_files_in_their_own_words(root: Path) -> None:
+def test_the_page_of_each_folder_has_its_files_in_their_own_words(root):
     """Each file once, with the first sentence of its docstring; the effects are a file each, named after them."""
     folders = [folder for folder in (root / "bushfit").iterdir() if (folder / "__init__.py").exists()]
     assert len(folders) > 10
@@ -148,7 +148,7 @@ def test_the_page_of_each_folder_has_its_files_in_their_own_words(root: Path) ->
         assert dict(rows) == {name: " ".join((words or "").split("\n\n")[0].split()) for name, words in said.items()}
 
 
-def test_what_the_page_on_the_code_names_is_there(root: Path) -> None:
+def test_what_the_page_on_the_code_names_is_there(root):
     text = (root / "bushfit/manual/code.md").read_text(encoding="utf-8")
     (tree,) = blocks(root / "bushfit/manual/code.md", "text")
     paths = re.findall(r"`([\w/]+(?:\.py|/))`", text) + re.findall(r"[\w/]+\.py", tree)
@@ -173,7 +173,7 @@ def is_there(name: str) -> bool:
     return False
 
 
-def test_the_steps_before_a_merge_are_the_same_wherever_they_stand(root: Path) -> None:
+def test_the_steps_before_a_merge_are_the_same_wherever_they_stand(root):
     """.ci/run, the page on the code, and the hooks, which leave out what is slow."""
     merged = re.findall(r"^step (?!python )(.+)$", (root / ".ci/run").read_text(encoding="utf-8"), re.MULTILINE)
     shown = blocks(root / "bushfit/manual/code.md", "sh")[0].splitlines()
@@ -199,7 +199,7 @@ COPIES: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("copy", COPIES)
-def test_files_of_other_formats_hold_their_csv(root: Path, copy: str) -> None:
+def test_files_of_other_formats_hold_their_csv(root, copy):
     """Of a loop every fifth row; of a UFF file the first rows, which are those of an amplitude."""
     kind, direction = Path(copy).stem.split("_")
     read: Any = read_loop if kind == "loop" else read_sweep
@@ -215,15 +215,13 @@ def test_files_of_other_formats_hold_their_csv(root: Path, copy: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def wheel(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def wheel(root, tmp_path_factory) -> Path:
     """The wheel, built where the builder is installed."""
     builder = pytest.importorskip("hatchling.builders.wheel").WheelBuilder(str(root))
     return Path(next(builder.build(directory=str(tmp_path_factory.mktemp("wheel")), versions=["standard"])))
 
 
-def test_measured_rubber_has_a_licence_of_its_own_and_nothing_built_holds_it(
-    root: Path, wheel: Path, tmp_path: Path
-) -> None:
+def test_measured_rubber_has_a_licence_of_its_own_and_nothing_built_holds_it(root, wheel, tmp_path):
     folders = [folder for folder in (root / "data/measured").iterdir() if folder.is_dir()]
     assert folders
     for folder in folders:
@@ -241,7 +239,7 @@ def test_measured_rubber_has_a_licence_of_its_own_and_nothing_built_holds_it(
     assert [name for name in names if "measured" in Path(name).parts] == []
 
 
-def test_the_wheel_is_for_every_machine_and_holds_every_file_of_the_package(root: Path, wheel: Path) -> None:
+def test_the_wheel_is_for_every_machine_and_holds_every_file_of_the_package(root, wheel):
     """Words and units, the marker that it carries types, pages, sources in other languages."""
     assert wheel.name.endswith("-py3-none-any.whl")
     package = root / "bushfit"
@@ -254,7 +252,7 @@ def test_the_wheel_is_for_every_machine_and_holds_every_file_of_the_package(root
 
 
 @pytest.mark.slow
-def test_the_wheel_works_elsewhere(wheel: Path, tmp_path: Path) -> None:
+def test_the_wheel_works_elsewhere(wheel, tmp_path):
     """Unpacked into another folder, with nothing of the repository."""
     zipfile.ZipFile(wheel).extractall(tmp_path / "site")
     code = "import bushfit, sys\nfrom bushfit.cli import main\nprint(bushfit.__file__, file=sys.stderr)\nmain()"
@@ -274,14 +272,14 @@ def test_the_wheel_works_elsewhere(wheel: Path, tmp_path: Path) -> None:
     assert (tmp_path / "results/axial.png").exists()
 
 
-def test_the_citation_names_the_paper_and_the_version(root: Path) -> None:
+def test_the_citation_names_the_paper_and_the_version(root):
     citation = yaml.safe_load((root / "CITATION.cff").read_text(encoding="utf-8"))
     project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     assert (citation["version"], citation["license"]) == (project["version"], project["license"])
     assert citation["references"][0]["doi"] in (root / "README.md").read_text(encoding="utf-8")
 
 
-def test_the_workflow_covers_every_python_of_the_project_and_three_systems(root: Path) -> None:
+def test_the_workflow_covers_every_python_of_the_project_and_three_systems(root):
     workflow = yaml.safe_load((root / ".github/workflows/ci.yml").read_text(encoding="utf-8"))
     matrix = workflow["jobs"]["quick"]["strategy"]["matrix"]
     project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -30,7 +29,7 @@ SEEDS = 20
 
 
 @pytest.fixture(scope="module")
-def off(root: Path) -> Callable[[Campaign], tuple[float, float]]:
+def off(root) -> Callable[[Campaign], tuple[float, float]]:
     """How far a campaign's two steps put the radial stiffness, relative, and loss factor off the kept computation."""
     known = pd.read_csv(root / "data/reference/stiffness_table1.csv")
     known = known[(known.direction == "radial") & known["amplitude [m or rad]"].isin([1e-4, 2e-4, 5e-4])]
@@ -47,7 +46,7 @@ def off(root: Path) -> Callable[[Campaign], tuple[float, float]]:
 
 
 @pytest.fixture(scope="module")
-def claimed(root: Path) -> re.Match[str]:
+def claimed(root) -> re.Match[str]:
     """What the page says: of the campaign, and median and worst of the draws [%]."""
     page = (root / "bushfit/manual/model.md").read_text(encoding="utf-8")
     found = re.search(
@@ -59,18 +58,14 @@ def claimed(root: Path) -> re.Match[str]:
     return found
 
 
-def test_the_smallest_axial_sweep_and_a_loop_tell_the_radial_stiffness(
-    root: Path, off: Callable[[Campaign], tuple[float, float]], claimed: re.Match[str]
-) -> None:
+def test_the_smallest_axial_sweep_and_a_loop_tell_the_radial_stiffness(root, off, claimed):
     stiffness, loss = off(load_campaign(root / "configs/cmp_15961.toml"))
     print(f"configs/cmp_15961.toml: radial stiffness {100 * stiffness:.2f} %, loss factor {loss:.4f}")
     assert 100 * stiffness <= float(claimed[1]) <= 0.7
 
 
 @pytest.mark.slow
-def test_so_they_do_whatever_the_noise(
-    root: Path, off: Callable[[Campaign], tuple[float, float]], claimed: re.Match[str]
-) -> None:
+def test_so_they_do_whatever_the_noise(root, off, claimed):
     plan = SimulateSettings(noise=5e-3, force_noise=3e-3, repeats=3)
     clean = undisturbed(model_of(load_campaign(root / "configs/table_1.toml")), plan)
     drawn = [100.0 * off(measure(clean, replace(plan, seed=seed)).campaign())[0] for seed in range(SEEDS)]
@@ -85,12 +80,12 @@ LEVELS = {"01g": 0.1, "1g": 1.0}
 
 
 @pytest.fixture(scope="module")
-def campaign(root: Path) -> Campaign:
+def campaign(root) -> Campaign:
     return load_campaign(root / "configs/epdm_70.toml")
 
 
 @pytest.fixture(scope="module")
-def compound(campaign: Campaign) -> Result:
+def compound(campaign) -> Result:
     return fit_joint(
         PreparedCampaign.from_campaign(campaign),
         effects=PreparedCampaign.from_campaign(campaign).effects,
@@ -99,7 +94,7 @@ def compound(campaign: Campaign) -> Result:
 
 
 @pytest.fixture(scope="module")
-def row(root: Path) -> Callable[[str], list[str]]:
+def row(root) -> Callable[[str], list[str]]:
     """The cells of a row of its tables, by its first."""
     text = (root / "data/measured/epdm_70/README.md").read_text(encoding="utf-8")
 
@@ -111,9 +106,7 @@ def row(root: Path) -> Callable[[str], list[str]]:
     return cells
 
 
-def test_the_mount_against_its_prediction(
-    campaign: Campaign, compound: Result, row: Callable[[str], list[str]]
-) -> None:
+def test_the_mount_against_its_prediction(campaign, compound, row):
     parts = []
     for sweep in campaign.sweeps:
         if str(sweep.direction) == "mount":
@@ -132,7 +125,7 @@ def test_the_mount_against_its_prediction(
     assert row("loss factor, measured minus predicted") == losses
 
 
-def test_its_band_after_one_factor_and_the_second_coupon(campaign: Campaign, compound: Result, root: Path) -> None:
+def test_its_band_after_one_factor_and_the_second_coupon(campaign, compound, root):
     text = (root / "data/measured/epdm_70/README.md").read_text(encoding="utf-8")
     ratio, half = [], []
     for sweep in campaign.sweeps:
@@ -155,9 +148,7 @@ def test_its_band_after_one_factor_and_the_second_coupon(campaign: Campaign, com
     assert 1.02 < value < 1.06, "1.04 to 1.05 read off where both were tested"
 
 
-def test_its_resonances_and_the_reduced_files(
-    campaign: Campaign, compound: Result, row: Callable[[str], list[str]], root: Path
-) -> None:
+def test_its_resonances_and_the_reduced_files(campaign, compound, row, root):
     mount = next(specimen for specimen in campaign.specimens if specimen.name == "mount")
     folder, peaks = root / "data/measured/epdm_70", {}
     for level, acceleration in LEVELS.items():
@@ -177,9 +168,7 @@ def test_its_resonances_and_the_reduced_files(
 
 
 @pytest.mark.slow
-def test_effects_fitted_to_half_of_the_masses_shrink_the_gap_on_the_other_half(
-    root: Path, campaign: Campaign, compound: Result
-) -> None:
+def test_effects_fitted_to_half_of_the_masses_shrink_the_gap_on_the_other_half(root, campaign, compound):
     """No name closes the gap of this rubber; effects that are chosen by hand help where they were not fitted."""
     half = PreparedCampaign.from_campaign(load_campaign(root / "configs/epdm_70_half.toml"))
     found = diagnose(half)

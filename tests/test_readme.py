@@ -59,7 +59,7 @@ def _decimals(number: str) -> int:
     return len(number.partition("e")[0].partition(".")[2]) - int(number.partition("e")[2] or 0)
 
 
-def test_blocks_are_understood() -> None:
+def test_blocks_are_understood():
     text = "a\n```console\n$ bushfit run \\\n    x.toml\n...\nwrote 1.5 it\n$ cd y\n```\n```python\n$ bushfit no\n```\n"
     (one, shown), (other, nothing) = examples(text)
     assert [shlex.split(one), shlex.split(other)] == [["bushfit", "run", "x.toml"], ["cd", "y"]]
@@ -102,7 +102,7 @@ def without_pictures(shared: Shared, folder: Path, command: str) -> Done:
 
 
 @pytest.mark.parametrize("page", some([page for page in PAGES if shown_commands(page)], ["README.md"]))
-def test_every_command_of_a_page_runs_and_says_what_is_shown(page: str, shared: Shared, tmp_path: Path) -> None:
+def test_every_command_of_a_page_runs_and_says_what_is_shown(page, shared, tmp_path):
     """In order, in a folder that holds the data and campaigns and nothing that another page has made."""
     for name in ("data", "configs"):
         shutil.copytree(ROOT / name, tmp_path / name)
@@ -125,9 +125,7 @@ class Checker(doctest.OutputChecker):
         return len(lines[0]) == len(lines[1]) and all(map(says, *lines))
 
 
-def test_every_example_of_the_page_on_python_runs_and_says_what_is_shown(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_example_of_the_page_on_python_runs_and_says_what_is_shown(root, tmp_path, monkeypatch):
     for name in ("configs", "data"):
         shutil.copytree(root / name, tmp_path / name)
     monkeypatch.chdir(tmp_path)
@@ -149,7 +147,7 @@ def anchors(page: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_links_and_names_of_files_lead_somewhere(page: str) -> None:
+def test_links_and_names_of_files_lead_somewhere(page):
     """Files as seen from the top folder, where a page says where they are; patterns aside."""
     text = (ROOT / page).read_text(encoding="utf-8")
     lost = []
@@ -161,7 +159,7 @@ def test_links_and_names_of_files_lead_somewhere(page: str) -> None:
     assert lost + [name for name in named if not (ROOT / name).exists()] == []
 
 
-def test_the_readme_is_short(root: Path) -> None:
+def test_the_readme_is_short(root):
     """At most 200 lines, and none that holds several; tables, pictures and output shown are as wide as they are."""
     text = (root / "README.md").read_text(encoding="utf-8")
     prose = re.sub(r"^```.*?^```|^(?:\||!\[).*?$", "", text, flags=re.MULTILINE | re.DOTALL)

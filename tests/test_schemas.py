@@ -94,7 +94,7 @@ def keys_without_a_word(node: Any, place: str) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("name", DESCRIBED)
-def test_a_schema_is_valid_and_says_what_every_key_holds(name: str) -> None:
+def test_a_schema_is_valid_and_says_what_every_key_holds(name):
     made = schema(name)
     Draft202012Validator.check_schema(made)
     assert made["$id"] == f"urn:bushfit:schema:{name}"
@@ -103,7 +103,7 @@ def test_a_schema_is_valid_and_says_what_every_key_holds(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_what_is_written_has_the_keys_that_are_described_and_no_others(root: Path, tmp_path: Path) -> None:
+def test_what_is_written_has_the_keys_that_are_described_and_no_others(root, tmp_path):
     """Of every kind, so that keys which are there now and then have been seen."""
     found = written(root, tmp_path)
     wrong = [(name, said) for name in OUTPUTS for each in found[name] for said in complaints(name, each, whole=True)]
@@ -122,7 +122,7 @@ def described_by(file: Path) -> str:
     return file.stem if file.stem == "limits" else "manifest" if file.stem == "batch" else "campaign"
 
 
-def test_every_model_and_campaign_of_the_repository_validates(root: Path) -> None:
+def test_every_model_and_campaign_of_the_repository_validates(root):
     truths = sorted((root / "data").glob("**/truth.json"))
     tables = [file for top in ("configs", "data") for file in sorted((root / top).glob("**/*.toml"))]
     tables.remove(root / "data/example_effect/pyproject.toml")
@@ -143,13 +143,13 @@ def test_every_model_and_campaign_of_the_repository_validates(root: Path) -> Non
         ("seed = 1 ", "seed = 1.5 "), ('specimen = "DMA"', "specimen = 1"),
     ],
 )  # fmt: skip
-def test_what_is_mistyped_in_a_campaign_is_refused(root: Path, right: str, wrong: str) -> None:
+def test_what_is_mistyped_in_a_campaign_is_refused(root, right, wrong):
     text = (root / "configs/reference.toml").read_text(encoding="utf-8")
     assert right in text
     assert complaints("campaign", tomllib.loads(text.replace(right, wrong, 1)))
 
 
-def test_printed_and_written_are_the_same(root: Path, tmp_path: Path) -> None:
+def test_printed_and_written_are_the_same(root, tmp_path):
     printed = call(tmp_path, "schema", "diagnosis", "-q")
     assert (printed.returncode, printed.stderr) == (0, "")
     assert json.loads(printed.stdout) == schema("diagnosis")

@@ -19,7 +19,7 @@ from bushfit.errors import UnitError
         (1.2e-4, "s", "0.12 ms"), (3.1e7, "N/m", "31 kN/mm"), (0.0, "Pa", "0 Pa"), (0.24, "1", "0.24 -"),
     ],
 )  # fmt: skip
-def test_units_that_people_read(value: float, unit: str, shown: str) -> None:
+def test_units_that_people_read(value, unit, shown):
     name, factor = units.display_unit(unit, 1.0, value)
     assert f"{value * factor:.6g} {name}" == shown
     plain = name.removesuffix("^alpha")
@@ -37,7 +37,7 @@ def test_units_that_people_read(value: float, unit: str, shown: str) -> None:
         ("30 RPM", "rad/s", 3.141592653589793),
     ],
 )  # fmt: skip
-def test_quantity_in_si(text: str, expected: str, value: float) -> None:
+def test_quantity_in_si(text, expected, value):
     """In the spellings of rigs and data sheets, too."""
     assert units.parse_quantity(text, expected) == pytest.approx(value, rel=1e-14)
 
@@ -54,14 +54,14 @@ def test_quantity_in_si(text: str, expected: str, value: float) -> None:
         ("1e999 m", "m", ["too large"]),
     ],
 )  # fmt: skip
-def test_what_is_no_quantity_is_refused(value: object, expected: str, words: list[str]) -> None:
+def test_what_is_no_quantity_is_refused(value, expected, words):
     with pytest.raises(UnitError) as caught:
         units.parse_quantity(value, expected)
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
 @given(st.text(max_size=60))
-def test_any_text_is_a_unit_or_a_unit_error(text: str) -> None:
+def test_any_text_is_a_unit_or_a_unit_error(text):
     try:
         scale = units.si_factor(text, "N/m")
     except UnitError:
@@ -75,7 +75,7 @@ kip/in kgf/mm N*m/rad N*m/deg lbf*in/deg Pa kPa MPa GPa bar mbar psi ksi atm N/m
 km/h knot rad/s deg/s g kg t lb oz slug % ppm V mV A mA W kW hp J Wh ohm K m/s^2 l"""
 
 
-def test_units_of_the_field_are_as_large_as_in_the_whole_list_of_pint() -> None:
+def test_units_of_the_field_are_as_large_as_in_the_whole_list_of_pint():
     whole = pint.UnitRegistry(cache_folder=None)
     for text in FIELD.split():
         one = whole.Quantity(1.0, text).to_base_units()
@@ -92,7 +92,7 @@ def test_units_of_the_field_are_as_large_as_in_the_whole_list_of_pint() -> None:
         *((unit, "N", 'a pound of force is "lbf"') for unit in ("lb", "lbs/in", "in-lb")),
     ],
 )
-def test_units_of_two_readings_are_refused(unit: str, expected: str, said: str) -> None:
+def test_units_of_two_readings_are_refused(unit, expected, said):
     """As pounds of mass where a force has to stand."""
     with pytest.raises(UnitError, match=said):
         units.si_factor(unit, expected)
@@ -105,7 +105,7 @@ def test_units_of_two_readings_are_refused(unit: str, expected: str, said: str) 
         (-0.0, 3, "0"), (math.nan, 3, "nan"),
     ],
 )  # fmt: skip
-def test_numbers_that_people_read(value: float, digits: int, shown: str) -> None:
+def test_numbers_that_people_read(value, digits, shown):
     assert units.number(value, digits) == shown
 
 
@@ -119,7 +119,5 @@ def test_numbers_that_people_read(value: float, digits: int, shown: str) -> None
         ((0.0, 12.34), 3, 0, ["0", "12.3"]),
     ],
 )
-def test_numbers_that_stand_together_end_alike(
-    values: tuple[float, ...], digits: int, least: int, shown: list[str]
-) -> None:
+def test_numbers_that_stand_together_end_alike(values, digits, least, shown):
     assert units.format_aligned(values, digits, least) == shown

@@ -15,7 +15,6 @@ from bushfit.batch.quantities import list_quantities, measured_at, parse_point
 from bushfit.batch.row import estimate_quantities
 from bushfit.errors import BatchError, CampaignError, ModelError
 from bushfit.geometry import Direction, Specimen
-from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.reading.measurement import Sweep
 from bushfit.reduction.arrays import scatter
@@ -30,7 +29,7 @@ def read(folder: Path, text: str, name: str = "m.toml", given_: RowSettings | No
     return read_manifest(written(folder, text, name), given_ or RowSettings())
 
 
-def test_toml_rows_take_what_they_do_not_say_from_the_top(tmp_path: Path) -> None:
+def test_toml_rows_take_what_they_do_not_say_from_the_top(tmp_path):
     manifest = read(
         tmp_path,
         'commands = ["fit", "predict"]\neffects = ["inertia"]\nat = ["axial 25 Hz 0.1 mm"]\n'
@@ -52,12 +51,12 @@ def test_toml_rows_take_what_they_do_not_say_from_the_top(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     "body", ['[bushing]\nname = "a"', '[[specimens]]\nname = "a"', '[[bushings]]\nlength = "3 mm"']
 )
-def test_a_campaign_is_a_batch_of_one_whatever_its_bodies(body: str, tmp_path: Path) -> None:
+def test_a_campaign_is_a_batch_of_one_whatever_its_bodies(body, tmp_path):
     (row,) = read(tmp_path, f'[[loops]]\nfile = "a.csv"\n{body}\n').rows
     assert (row.name, row.campaign) == ("m", str(tmp_path / "m.toml"))
 
 
-def test_a_pattern_takes_every_match_and_names_by_folder_where_files_share_a_name(shop: Path) -> None:
+def test_a_pattern_takes_every_match_and_names_by_folder_where_files_share_a_name(shop):
     manifest = read_manifest(str(shop / "bushings/*/bushing.toml"), RowSettings())
     assert [row.name for row in manifest.rows] == ["b0", "b1", "b2", "b3", "b4"]
     inside = read(shop, '[[bushings]]\ncampaign = "bushings/b[01]/*.toml"\n[[bushings]]\ncampaign = "x.toml"\n')
@@ -72,7 +71,7 @@ finite = st.floats(-1e3, 1e3)
 
 
 @given(finite, st.floats(0, 1e3), finite, st.floats(0, 1e3))
-def test_results_follow_value_and_interval(value: float, half: float, low: float, width: float) -> None:
+def test_results_follow_value_and_interval(value, half, low, width):
     high = low + width
     result = judge_value(Estimate(value, value - half, value + half), low, high)
     assert (result in ("pass", "conditional pass")) == (low <= value <= high)
@@ -102,7 +101,7 @@ sigma_fmax = { sigma = 3, at_least = 5 }
 """
 
 
-def test_limits_of_every_kind_and_of_the_scatter_of_the_batch(tmp_path: Path) -> None:
+def test_limits_of_every_kind_and_of_the_scatter_of_the_batch(tmp_path):
     values = np.array([1.0, 1.01, 0.99, 1.02, 0.98, 7.0]) * 1e4
     allowed, notes = resolve_limits(limits(tmp_path, ALL), {"sigma_fmax": values})
     assert allowed["mu"] == (1e6, 1.2e6)
@@ -136,7 +135,7 @@ def judged(read: Limits, **record: object) -> tuple[str, dict[str, str], dict[st
     return judge_part(RowFile(status="done", **record), read, allowed, quantities)  # type: ignore[arg-type]
 
 
-def test_a_part_is_as_good_as_its_worst_and_the_words_say_why(tmp_path: Path) -> None:
+def test_a_part_is_as_good_as_its_worst_and_the_words_say_why(tmp_path):
     known = {"mu": Estimate(1.19e6, 1.17e6, 1.21e6), "alpha": Estimate(0.26, 0.25, 0.27)}
     read = limits(tmp_path, FEW)
     assert judged(read, quantities=known, verdict="named") == (
@@ -160,7 +159,7 @@ def test_a_part_is_as_good_as_its_worst_and_the_words_say_why(tmp_path: Path) ->
     assert RESULTS.index("not judged") > RESULTS.index("conditional pass"), "what is not judged is no pass"
 
 
-def test_a_part_whose_fit_misses_the_tests_is_judged_on_measured_points(tmp_path: Path) -> None:
+def test_a_part_whose_fit_misses_the_tests_is_judged_on_measured_points(tmp_path):
     stiffness = "stiffness axial 25 Hz 0.1 mm"
     poor = {
         "NRMSE": Estimate(0.12),
@@ -184,7 +183,7 @@ def test_a_part_whose_fit_misses_the_tests_is_judged_on_measured_points(tmp_path
     assert "mu" in judged(limits(tmp_path, 'nrmse = "15 %"\n[parameters.mu]\nmax = "1 MPa"\n'), quantities=poor)[1]
 
 
-def test_the_measured_point_is_the_mean_of_its_repeats_with_the_noise_of_one() -> None:
+def test_the_measured_point_is_the_mean_of_its_repeats_with_the_noise_of_one():
     stiffness = np.array([3e5 + 3e4j, 5e5, 3.2e5 + 3.2e4j])
     sweep = Sweep("s", Direction.AXIAL, np.array([25.2, 50.0, 24.9]), np.array([1e-4, 1e-4, 1.04e-4]), stiffness)
     point = parse_point("axial 25 Hz 0.1 mm")
@@ -197,7 +196,7 @@ def test_the_measured_point_is_the_mean_of_its_repeats_with_the_noise_of_one() -
     assert measured_at([sweep], parse_point("radial 25 Hz 0.1 mm"), 0.01) == {}
 
 
-def test_a_point_at_a_specimen_is_that_of_the_model(paper_model: Model) -> None:
+def test_a_point_at_a_specimen_is_that_of_the_model(paper_model):
     result = Result(paper_model, specimens=(coupon := Specimen("DMA", "modulus"),))
     estimates, _ = estimate_quantities(result, [parse_point("DMA 10 Hz 1 %")])
     modulus = abs(paper_model.stiffness(coupon, 10.0, 0.01))
@@ -218,9 +217,7 @@ def test_a_point_at_a_specimen_is_that_of_the_model(paper_model: Model) -> None:
         (("a.toml,A", 'b.toml,"B" two'), "a quote is not closed", "line 3"),
     ],
 )
-def test_a_quote_that_swallows_rows_is_an_error(
-    tmp_path: Path, lines: tuple[str, ...], problem: str, place: str
-) -> None:
+def test_a_quote_that_swallows_rows_is_an_error(tmp_path, lines, problem, place):
     with pytest.raises(CampaignError, match=problem) as error:
         read(tmp_path, "\n".join(["campaign,name", *lines]), "m.csv")
     assert error.value.place == place

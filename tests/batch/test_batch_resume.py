@@ -5,13 +5,11 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
 
 import pytest
 from trees import PATTERN, command, kept, list_many, stamps, tree, wait_for
@@ -28,7 +26,7 @@ from bushfit.report.results import Formats
 ALL = ("batch", PATTERN, "-o", "all", "--no-plots")
 
 
-def test_results_that_stand_are_refused_resumed_or_replaced(typed: Callable[..., Any], shop: Path) -> None:
+def test_results_that_stand_are_refused_resumed_or_replaced(typed, shop):
     assert typed(*ALL, "-q").returncode == 0
     before, files = stamps(shop / "all/bushings"), tree(shop / "all")
     refused = typed(*ALL)
@@ -56,7 +54,7 @@ def test_results_that_stand_are_refused_resumed_or_replaced(typed: Callable[...,
     }
 
 
-def test_only_what_changed_or_is_torn_is_done_again(typed: Callable[..., Any], shop: Path) -> None:
+def test_only_what_changed_or_is_torn_is_done_again(typed, shop):
     typed(*ALL, "-q")
     files, before = tree(shop / "all"), stamps(shop / "all/bushings")
     place = shop / "all/bushings"
@@ -84,7 +82,7 @@ def test_only_what_changed_or_is_torn_is_done_again(typed: Callable[..., Any], s
     assert (place / "b2/model.json").read_bytes() == files["bushings/b2/model.json"]
 
 
-def test_killed_in_mid_run_and_resumed_it_is_as_if_it_had_run_through(typed: Callable[..., Any], shop: Path) -> None:
+def test_killed_in_mid_run_and_resumed_it_is_as_if_it_had_run_through(typed, shop):
     list_many(shop, 8)
     assert typed("batch", "many.csv", "-o", "whole", "--no-plots", "-q").returncode == 0
     running = subprocess.Popen(command("killed", "--resume", "-q"), cwd=shop, stderr=subprocess.DEVNULL)
@@ -105,9 +103,7 @@ def test_killed_in_mid_run_and_resumed_it_is_as_if_it_had_run_through(typed: Cal
 
 
 @pytest.mark.parametrize("option", ["--force", "--resume"])
-def test_one_batch_holds_a_folder_and_clears_what_a_killed_one_left(
-    typed: Callable[..., Any], shop: Path, option: str
-) -> None:
+def test_one_batch_holds_a_folder_and_clears_what_a_killed_one_left(typed, shop, option):
     left = shop / "all" / store.STAGE / "half"
     left.mkdir(parents=True)
     with store.batch_folder(shop / "all"):
@@ -130,9 +126,7 @@ def double(row: int, folder: Path, deadly: tuple[int, ...] = (), once: tuple[int
 @pytest.mark.parametrize(
     ("count", "once", "deadly"), [(300, (), ()), (40, (100, 117), ()), (30, (), (103, 120))], ids=str
 )
-def test_a_worker_that_dies_costs_a_second_try_and_only_what_always_kills_is_given_up(
-    tmp_path: Path, count: int, once: tuple[int, ...], deadly: tuple[int, ...]
-) -> None:
+def test_a_worker_that_dies_costs_a_second_try_and_only_what_always_kills_is_given_up(tmp_path, count, once, deadly):
     task = partial(double, folder=tmp_path, once=once, deadly=deadly)
     found = list(run_rows(range(100, 100 + count), task, lambda why: why, local_workers(2)))
     assert sorted(number for number, _ in found) == list(range(count)), "each row once"
@@ -144,7 +138,7 @@ def test_a_worker_that_dies_costs_a_second_try_and_only_what_always_kills_is_giv
     assert len(list(tmp_path.iterdir())) == len(once + deadly)
 
 
-def test_a_worker_of_another_version_or_none_that_lives_ends_the_batch(tmp_path: Path) -> None:
+def test_a_worker_of_another_version_or_none_that_lives_ends_the_batch(tmp_path):
     row = Row("a", "a", "a.toml", "a.toml", RowSettings())
     task = RowTask(tmp_path, (), Formats(False, False), resume=False, version="0.0.0")
     with pytest.raises(BatchError, match=r"another bushfit[\s\S]*0\.0\.0"):
@@ -158,7 +152,7 @@ def die() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_the_key_changes_with_all_that_the_answer_depends_on(shop: Path) -> None:
+def test_the_key_changes_with_all_that_the_answer_depends_on(shop):
     row = read_manifest(str(shop / PATTERN), RowSettings()).rows[0]
     other, plain = replace(row, settings=replace(row.settings, effects=("inertia",))), Formats(pictures=False)
     points = (parse_point("axial 25 Hz 0.1 mm"),)

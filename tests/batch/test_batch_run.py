@@ -5,10 +5,8 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
 from junitparser import JUnitXml
@@ -20,7 +18,7 @@ from bushfit.batch.manifest import Row
 from bushfit.batch.row import RowTask
 
 
-def test_a_row_is_the_single_command_to_the_last_digit(typed: Callable[..., Any], shop: Path) -> None:
+def test_a_row_is_the_single_command_to_the_last_digit(typed, shop):
     (shop / "m.toml").write_text(
         '[[bushings]]\ncampaign = "bushings/b0/bushing.toml"\n'
         '[[bushings]]\ncampaign = "bushings/b1/bushing.toml"\neffects = ["inertia"]\ndirections = ["axial", "radial"]\n'
@@ -45,7 +43,7 @@ def test_a_row_is_the_single_command_to_the_last_digit(typed: Callable[..., Any]
 
 
 @pytest.mark.slow
-def test_a_row_may_be_the_whole_chain(typed: Callable[..., Any], shop: Path) -> None:
+def test_a_row_may_be_the_whole_chain(typed, shop):
     """Of a campaign that hides an inertia; what its limits do not allow is a status of 1."""
     (shop / "limits.toml").write_text('verdicts = ["consistent"]\n')
     asked = ("--command", "run", "--tables", "-o", "all", "-q", "--limits", "limits.toml")
@@ -60,9 +58,7 @@ def test_a_row_may_be_the_whole_chain(typed: Callable[..., Any], shop: Path) -> 
 
 
 @pytest.mark.slow
-def test_a_row_is_the_single_command_in_whatever_surroundings(
-    typed: Callable[..., Any], root: Path, tmp_path: Path
-) -> None:
+def test_a_row_is_the_single_command_in_whatever_surroundings(typed, root, tmp_path):
     """A user's terminal gives the linear algebra every core, and a sum split over threads ends in other digits."""
     campaign, program = root / "configs/cmp_15961.toml", str(Path(sys.executable).with_name("bushfit"))
     single = [program, "fit", str(campaign), "-o", str(tmp_path / "one"), "--no-plots", "-q"]
@@ -72,7 +68,7 @@ def test_a_row_is_the_single_command_in_whatever_surroundings(
     assert tree(tmp_path / "all/bushings/cmp_15961").items() <= tree(tmp_path / "one").items()
 
 
-def test_the_table_is_in_order_with_units_and_the_numbers_of_the_models(typed: Callable[..., Any], shop: Path) -> None:
+def test_the_table_is_in_order_with_units_and_the_numbers_of_the_models(typed, shop):
     done = typed("batch", PATTERN, "-o", "all", "--at", "axial 25 Hz 0.1 mm", "--at", "torsion 10 Hz 1 deg", "--json")
     assert done.returncode == 0, done.stderr
     table = rows(shop / "all")
@@ -103,7 +99,7 @@ def test_the_table_is_in_order_with_units_and_the_numbers_of_the_models(typed: C
     assert (shop / "all/batch.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_bad_row_costs_that_row(typed: Callable[..., Any], shop: Path) -> None:
+def test_a_bad_row_costs_that_row(typed, shop):
     (shop / "bushings/b1/sweep_axial.csv").write_text("nonsense\n1\n")
     (shop / "m.csv").write_text(
         "campaign,name\nbushings/b0/bushing.toml,=cmd|' /C calc'!A0\nbushings/b1/bushing.toml,\nabsent.toml,x\n"
@@ -124,7 +120,7 @@ def test_a_bad_row_costs_that_row(typed: Callable[..., Any], shop: Path) -> None
     assert "sweep_axial.csv" in cases[1].result[0].text
 
 
-def test_limits_decide_the_exit_status_and_are_named(typed: Callable[..., Any], shop: Path) -> None:
+def test_limits_decide_the_exit_status_and_are_named(typed, shop):
     typed("batch", PATTERN, "-o", "all", "--no-plots", "-q")
     middle = sorted(float(row["mu [MPa]"]) for row in rows(shop / "all"))[2]
     (shop / "limits.toml").write_text(f'[parameters.mu]\nmax = "{1.1 * middle} MPa"\n')
@@ -139,9 +135,7 @@ def test_limits_decide_the_exit_status_and_are_named(typed: Callable[..., Any], 
     assert [bool(case.result) for case in suite] == over
 
 
-def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(
-    typed: Callable[..., Any], shop: Path
-) -> None:
+def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(typed, shop):
     campaign = shop / "bushings/b1/bushing.toml"
     campaign.write_text(campaign.read_text() + '\n[fit.mu]\nmax = "0.2 MPa"\n')
     (shop / "limits.toml").write_text('[parameters.mu]\nmax = "1 GPa"\n')
@@ -165,7 +159,7 @@ def test_a_parameter_on_a_bound_of_its_fit_passes_on_condition_and_is_named(
     assert none.returncode == 0
 
 
-def test_limits_on_what_a_row_does_not_have(typed: Callable[..., Any], shop: Path) -> None:
+def test_limits_on_what_a_row_does_not_have(typed, shop):
     (shop / "limits.toml").write_text('verdicts = ["consistent"]\n')
     refused = typed("batch", PATTERN, "-o", "all", "--limits", "limits.toml")
     assert refused.returncode == 2
@@ -192,9 +186,7 @@ def deadly(task: RowTask, part: Row) -> tuple[RowFile, bool]:
     return RowTask.__call__(task, part)
 
 
-def test_a_campaign_that_kills_its_worker_is_told_once_and_the_others_go_on(
-    typed: Callable[..., Any], shop: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_campaign_that_kills_its_worker_is_told_once_and_the_others_go_on(typed, shop, monkeypatch):
     done_by = run.run_rows
     monkeypatch.setattr(run, "run_rows", lambda rows, task, *others: done_by(rows, partial(deadly, task), *others))
     done = typed("batch", PATTERN, "-o", "all", "--no-plots", "--no-report", "--jobs", "2")
@@ -217,9 +209,7 @@ def test_a_campaign_that_kills_its_worker_is_told_once_and_the_others_go_on(
         ("all/bushings/../batch.csv", "replace the table"), ("all/batch.png", "replace the table"),
     ],
 )  # fmt: skip
-def test_a_report_that_cannot_be_written_is_refused_before_the_work(
-    typed: Callable[..., Any], shop: Path, report: str, words: str
-) -> None:
+def test_a_report_that_cannot_be_written_is_refused_before_the_work(typed, shop, report, words):
     (shop / "old.xml").write_text("old")
     done = typed("batch", PATTERN, "-o", "all", "--junit", report)
     assert done.returncode == 2
@@ -229,7 +219,7 @@ def test_a_report_that_cannot_be_written_is_refused_before_the_work(
     assert (shop / "old.xml").read_text() == "old"
 
 
-def test_inputs_are_read_guarded(typed: Callable[..., Any], shop: Path) -> None:
+def test_inputs_are_read_guarded(typed, shop):
     """A model that is a pipe, a device or missing, and a campaign of gigabytes: one clear error a row, at once."""
     os.mkfifo(shop / "pipe.json")
     with (shop / "huge.toml").open("wb") as stream:

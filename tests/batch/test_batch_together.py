@@ -2,7 +2,6 @@
 
 import json
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,18 +14,16 @@ from bushfit.batch.comparison import capability, find_outliers, smallest_deviati
 
 
 @pytest.fixture(scope="module")
-def table(made: Path) -> pd.DataFrame:
+def table(made) -> pd.DataFrame:
     return pd.read_csv(made / "out/batch.csv", keep_default_na=False, na_values={"mu [MPa], std error": ""})
 
 
 @pytest.fixture(scope="module")
-def document(made: Path) -> Any:
+def document(made) -> Any:
     return json.loads((made / "out/batch.json").read_text(encoding="utf-8"))
 
 
-def test_a_part_that_differs_is_named_with_the_parameter_that_was_changed(
-    made: Path, table: pd.DataFrame, document: Any
-) -> None:
+def test_a_part_that_differs_is_named_with_the_parameter_that_was_changed(made, table, document):
     lossy, soft = (document["parts"][number] for number in (LOSSY, SOFT))
     assert document["differ"] == [f"part_0{LOSSY}", f"part_{SOFT}"]
     assert (next(iter(lossy["deviations"])), next(iter(soft["deviations"]))) == ("alpha", "mu")
@@ -42,7 +39,7 @@ def test_a_part_that_differs_is_named_with_the_parameter_that_was_changed(
     assert said.startswith(f"batch: {document['headline']}\n")
 
 
-def test_the_measured_curve_ends_the_table(made: Path, table: pd.DataFrame) -> None:
+def test_the_measured_curve_ends_the_table(made, table):
     columns = list(table)
     last = columns.index("warnings")
     assert columns[last + 1 :][:4] == ["campaign name", "subgroup", "differs in", "poor fit"]
@@ -58,7 +55,7 @@ def test_the_measured_curve_ends_the_table(made: Path, table: pd.DataFrame) -> N
     assert np.allclose(table["measured stiffness off the median [%]"], 100.0 * deviation, atol=1e-3)
 
 
-def test_capability_is_that_of_fixed_limits(table: pd.DataFrame, document: Any) -> None:
+def test_capability_is_that_of_fixed_limits(table, document):
     quantities, mu = document["quantities"], table["mu [MPa]"]
     sigma, found = mu.std(), quantities["mu [MPa]"]
     assert found["cp"][0] == pytest.approx(0.35 / (6 * sigma), rel=1e-5)
@@ -72,7 +69,7 @@ def test_capability_is_that_of_fixed_limits(table: pd.DataFrame, document: Any) 
     assert (one_sided["cp"], one_sided["cpk"] is None) == (None, False)
 
 
-def test_a_soft_part_of_ten_is_named() -> None:
+def test_a_soft_part_of_ten_is_named():
     """Of ten parts that scatter by 2 %, one that is 15.7 % soft."""
     random = np.random.default_rng(0)
     values = 100.0 * (1.0 + 0.02 * random.normal(size=(8, 10)))
@@ -92,7 +89,7 @@ def test_a_soft_part_of_ten_is_named() -> None:
 
 @pytest.mark.parametrize("count", [5, 30])
 @pytest.mark.parametrize("error", [0.0, 3.0])
-def test_a_part_is_named_by_chance_in_one_batch_of_twenty_at_most(count: int, error: float) -> None:
+def test_a_part_is_named_by_chance_in_one_batch_of_twenty_at_most(count, error):
     random, named, batches = np.random.default_rng(count), 0, 200
     for _ in range(batches):
         own = error * np.exp(0.3 * random.normal(size=(6, count)))
@@ -102,7 +99,7 @@ def test_a_part_is_named_by_chance_in_one_batch_of_twenty_at_most(count: int, er
     assert named <= stats.binom.ppf(0.999, batches, 0.05)
 
 
-def test_the_interval_of_cpk_covers() -> None:
+def test_the_interval_of_cpk_covers():
     random, covered = np.random.default_rng(2), 0
     for values in random.normal(size=(500, 20)):
         _, cpk = capability(values, -4.0, 5.0)

@@ -7,7 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +34,7 @@ def free_address() -> str:
 
 
 @pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[tuple[str, Processes]]:
+def cluster(tmp_path) -> Iterator[tuple[str, Processes]]:
     """A scheduler and two workers on 127.0.0.1: its address, and all three processes."""
     address = free_address()
     here = ("--host", "127.0.0.1", "--no-dashboard")
@@ -61,7 +61,7 @@ def interrupted(shop: Path, address: str, victim: subprocess.Popen[bytes]) -> tu
     return running.returncode, out, err
 
 
-def test_a_lost_worker_loses_nothing(typed: Callable[..., Any], shop: Path, cluster: tuple[str, Processes]) -> None:
+def test_a_lost_worker_loses_nothing(typed, shop, cluster):
     """What comes out is what the local pool makes, byte for byte."""
     address, (_, victim, other) = cluster
     list_many(shop, 20)
@@ -73,7 +73,7 @@ def test_a_lost_worker_loses_nothing(typed: Callable[..., Any], shop: Path, clus
     assert tree(shop / "cluster") == tree(shop / "local")
 
 
-def test_a_scheduler_that_is_lost_is_one_error_and_the_work_is_kept(shop: Path, cluster: tuple[str, Processes]) -> None:
+def test_a_scheduler_that_is_lost_is_one_error_and_the_work_is_kept(shop, cluster):
     address, (scheduler, *_) = cluster
     list_many(shop, 20)
     status, _, err = interrupted(shop, address, scheduler)
@@ -83,7 +83,7 @@ def test_a_scheduler_that_is_lost_is_one_error_and_the_work_is_kept(shop: Path, 
     assert kept(shop / "cluster") >= 5
 
 
-def test_the_last_worker_lost_is_a_warning_and_then_an_error(shop: Path, cluster: tuple[str, Processes]) -> None:
+def test_the_last_worker_lost_is_a_warning_and_then_an_error(shop, cluster):
     address, (_, victim, other) = cluster
     list_many(shop, 20)
     code = "from bushfit.batch import executor; from bushfit.cli import main; executor.NO_WORKER_SECONDS = 3.0; main()"
@@ -97,7 +97,7 @@ def test_the_last_worker_lost_is_a_warning_and_then_an_error(shop: Path, cluster
     assert err.index(b"waiting 3 s for one") < err.index(b"no Dask worker is left")
 
 
-def test_no_scheduler_at_the_address(typed: Callable[..., Any], shop: Path) -> None:
+def test_no_scheduler_at_the_address(typed, shop):
     """Nobody, a service that says nothing, an unknown scheme, and no address."""
     with socket.create_server(("127.0.0.1", 0)) as silent:
         for address in (free_address(), f"tcp://127.0.0.1:{silent.getsockname()[1]}", "foo://x", ""):

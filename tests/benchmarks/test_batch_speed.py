@@ -15,7 +15,6 @@ from itertools import product
 from pathlib import Path
 
 import pytest
-from pytest_benchmark.fixture import BenchmarkFixture
 
 from bushfit.batch.executor import local_workers
 from bushfit.batch.manifest import RowSettings, read_manifest
@@ -23,7 +22,6 @@ from bushfit.batch.row import RowTask
 from bushfit.batch.run import run_batch
 from bushfit.batch.summary import BatchPlan
 from bushfit.campaign.simulated import SimulateSettings
-from bushfit.model.model import Model
 from bushfit.report.results import Formats
 from bushfit.simulation.files import to_files
 from bushfit.simulation.measured import simulate
@@ -35,7 +33,7 @@ _KINDS = 8
 
 
 @pytest.fixture(scope="module")
-def bushings(paper_model: Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def bushings(paper_model, tmp_path_factory) -> Path:
     """Eight unlike bushings, two sweeps in three repeats and a loop each."""
     folder = tmp_path_factory.mktemp("bushings")
     plan = SimulateSettings(repeats=3, noise=0.005, force_noise=0.003, displacement_noise=0.0002, gain_error=0.003)
@@ -72,7 +70,7 @@ def seconds(bushings: Path, count: int, jobs: int, folder: Path) -> float:
     return time.perf_counter() - begin
 
 
-def test_campaigns_a_second(benchmark: BenchmarkFixture, bushings: Path, tmp_path: Path) -> None:
+def test_campaigns_a_second(benchmark, bushings, tmp_path):
     """Wall time of batches on one core and on two, and of a shell loop over `bushfit fit`, with plots and without."""
     count = 300 if benchmark.enabled else 8
     seconds(bushings, 8, 2, tmp_path / "warm")
@@ -118,7 +116,7 @@ def batch_of(bushings: Path, count: int, output: Path) -> tuple[int, int]:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="ps")
-def test_memory_does_not_grow_with_the_batch(benchmark: BenchmarkFixture, bushings: Path, tmp_path: Path) -> None:
+def test_memory_does_not_grow_with_the_batch(benchmark, bushings, tmp_path):
     few, many = (100, int(os.environ.get("BUSHFIT_MANY", "2000"))) if benchmark.enabled else (4, 8)
     one, other = batch_of(bushings, few, tmp_path), benchmark.pedantic(batch_of, (bushings, many, tmp_path), rounds=1)
     print(f"\nfrom {few} to {many} campaigns: parent {one[0]} to {other[0]} MB, worker {one[1]} to {other[1]} MB")

@@ -15,10 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pytest_benchmark.fixture import BenchmarkFixture
 
 from bushfit.campaign.simulated import SimulateSettings
-from bushfit.model.model import Model
 from bushfit.simulation.files import to_files
 from bushfit.simulation.measured import simulate
 
@@ -32,7 +30,7 @@ Curve = Mapping[int, tuple[float, float]]
 
 
 @pytest.fixture(scope="module")
-def tests(paper_model: Model, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+def tests(paper_model, tmp_path_factory) -> tuple[Path, str]:
     """A hundred simulated loops and sweeps of one bushing, and the head of a campaign of them."""
     folder, head = tmp_path_factory.mktemp("growth"), ""
     for seed in range(100):
@@ -59,7 +57,7 @@ def used(campaign: Path, output: Path) -> tuple[float, float]:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="os.wait4")
-def test_growth_of_a_run(benchmark: BenchmarkFixture, tests: tuple[Path, str], tmp_path: Path) -> None:
+def test_growth_of_a_run(benchmark, tests, tmp_path):
     folder, head = tests
     whole, curves = benchmark.enabled, dict[str, Curve]()
     for name, of in (

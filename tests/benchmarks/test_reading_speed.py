@@ -14,11 +14,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pytest_benchmark.fixture import BenchmarkFixture
 
 from bushfit.geometry import Direction
 from bushfit.model import rig
-from bushfit.model.model import Model
 
 pytestmark = pytest.mark.slow
 
@@ -65,7 +63,7 @@ def run(program: tuple[str, str], file: Path) -> dict[str, float]:
 
 
 @pytest.fixture
-def long_loop(paper_model: Model, tmp_path: Path, benchmark: BenchmarkFixture) -> tuple[Path, int]:
+def long_loop(paper_model, tmp_path, benchmark) -> tuple[Path, int]:
     """100 cycles of the paper's loop, with noise on displacement and force."""
     polars = pytest.importorskip("polars", reason="the group bench is not installed")
     pytest.importorskip("duckdb", reason="the group bench is not installed")
@@ -83,7 +81,7 @@ def long_loop(paper_model: Model, tmp_path: Path, benchmark: BenchmarkFixture) -
     return file, rows
 
 
-def test_a_loop_of_ten_million_rows(benchmark: BenchmarkFixture, long_loop: tuple[Path, int]) -> None:
+def test_a_loop_of_ten_million_rows(benchmark, long_loop):
     file, rows = long_loop
     programs = {**LIBRARIES, "bushfit: read, check, fit": BUSHFIT}
     count = 1 if benchmark.disabled else 5  # in turn, so that what else the machine does meets all alike

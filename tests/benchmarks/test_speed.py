@@ -20,7 +20,6 @@ import numpy as np
 import pytest
 from fmus import Running, request_of, wandering, written
 from hidden import hidden_campaign
-from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.optimize import leastsq
 
 from bushfit.campaign.campaign import load_campaign
@@ -51,7 +50,7 @@ def table() -> Iterator[Rows]:
 
 
 @pytest.fixture(scope="module")
-def data(root: Path) -> PreparedCampaign:
+def data(root) -> PreparedCampaign:
     return PreparedCampaign.from_campaign(load_campaign(root / "configs/cmp_15961.toml"))
 
 
@@ -81,9 +80,7 @@ def bare_stiffness(model: Model, frequency: np.ndarray, amplitude: np.ndarray) -
 
 
 @pytest.mark.parametrize("points", [16, 48, 1000, 100_000])
-def test_stiffness_against_bare_numpy(
-    benchmark: BenchmarkFixture, paper_model: Model, table: Rows, points: int
-) -> None:
+def test_stiffness_against_bare_numpy(benchmark, paper_model, table, points):
     frequency, amplitude = np.linspace(5.0, 155.0, points), np.linspace(1e-5, 1e-3, points)
     found = benchmark(paper_model.stiffness, Direction.AXIAL, frequency, amplitude)
     np.testing.assert_allclose(found, bare_stiffness(paper_model, frequency, amplitude), rtol=1e-8)
@@ -98,7 +95,7 @@ def test_stiffness_against_bare_numpy(
     table.append((f"stiffness of {points} operating points over bare NumPy", f"{fast / bare:.2f}", "<= 1.3"))
 
 
-def test_joint_fit_against_bare_minpack(benchmark: BenchmarkFixture, data: PreparedCampaign, table: Rows) -> None:
+def test_joint_fit_against_bare_minpack(benchmark, data, table):
     """The fit with covariance and advice over MINPACK with the same residual, Jacobian, start and tolerance."""
     found = benchmark(fit_joint, data)
     data_sets = data.select_tests(None)
@@ -136,7 +133,7 @@ def command_seconds(*command: str) -> float:
     return used.ru_utime + used.ru_stime
 
 
-def test_whole_commands(benchmark: BenchmarkFixture, root: Path, tmp_path: Path, table: Rows) -> None:
+def test_whole_commands(benchmark, root, tmp_path, table):
     program = str(Path(sys.executable).with_name("bushfit"))
     campaign = str(root / "configs/cmp_15961.toml")
     pairs = {
@@ -166,9 +163,7 @@ def test_whole_commands(benchmark: BenchmarkFixture, root: Path, tmp_path: Path,
         ("an effect that the library lacks", ("maxwell",), ("maxwell",)),
     ],
 )
-def test_diagnose(
-    benchmark: BenchmarkFixture, table: Rows, kind: str, hidden: tuple[str, ...], without: tuple[str, ...]
-) -> None:
+def test_diagnose(benchmark, table, kind, hidden, without):
     simulated = hidden_campaign(5, hidden)
     campaign = simulated.campaign()
 
@@ -187,7 +182,7 @@ STEP = 1e-3
 LONG, SHORT = 100.0, 0.2
 
 
-def test_faster_than_real_time(paper_model: Model, tmp_path: Path, benchmark: BenchmarkFixture) -> None:
+def test_faster_than_real_time(paper_model, tmp_path, benchmark):
     duration = SHORT if benchmark.disabled else LONG
     running = Running(written(request_of(paper_model), tmp_path), tmp_path / "open")
     shape = wandering(int(duration / STEP) + 1, STEP, seed=1)

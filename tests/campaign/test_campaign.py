@@ -39,7 +39,7 @@ SWEEP = "frequency [Hz],amplitude [mm],stiffness [N/mm],loss factor [-]\n" + "".
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path) -> Path:
     """A folder with the tables that the campaigns name."""
     (tmp_path / "loop.csv").write_text(LOOP)
     (tmp_path / "sweep.csv").write_text(SWEEP)
@@ -51,7 +51,7 @@ def campaign_from(text: str, folder: Path) -> Campaign:
     return load_campaign(folder / "campaign.toml")
 
 
-def test_what_a_campaign_says_of_its_files_their_names_and_limits(folder: Path) -> None:
+def test_what_a_campaign_says_of_its_files_their_names_and_limits(folder):
     (folder / "loop.csv").write_text(LOOP.replace("force [N]", "Kraft").replace("time [s]", "x [s]"))
     said = """
 name = "of files"
@@ -81,13 +81,13 @@ waveform = "sine"
     assert (limits.min, limits.max) == (1e3, 1e9)
 
 
-def test_without_a_bushing_a_campaign_has_the_name_of_its_first_specimen(folder: Path) -> None:
+def test_without_a_bushing_a_campaign_has_the_name_of_its_first_specimen(folder):
     specimens = 'specimens = [{ name = "DMA", kind = "modulus" }, { name = "sheet", kind = "modulus" }]'
     specimens += '\n[compound]\nhardness = "61 Shore A"\nfiller = "27 phr"\n'
     assert campaign_from(specimens, folder).name == "DMA"
 
 
-def test_settings_arrive_in_si(folder: Path) -> None:
+def test_settings_arrive_in_si(folder):
     settings = """
 [fit]
 dynamic_amplitudes = ["0.1 mm", "0.5 deg"]
@@ -127,7 +127,7 @@ RUBBER = Bushing("CMP 15 961", 0.010, 0.018, 0.034)
 COUPON = Specimen("DMA", "modulus")
 
 
-def test_turns_strains_and_rests_of_a_session() -> None:
+def test_turns_strains_and_rests_of_a_session():
     loop = SessionTest(Direction.AXIAL, np.array([1e-3]), 300.0)
     sweep = SessionTest(Direction.AXIAL, np.array([1e-4, 5e-4, 2e-4]))
     first, second = session(RUBBER, [loop, sweep])
@@ -168,7 +168,7 @@ def write(folder: Path, order: tuple[str, str]) -> Path:
 
 
 @pytest.mark.parametrize(("order", "first"), [(("", ""), "cold"), (("order = 2", "order = 1"), "warm")])
-def test_a_campaign_gives_temperatures_and_order(tmp_path: Path, order: tuple[str, str], first: str) -> None:
+def test_a_campaign_gives_temperatures_and_order(tmp_path, order, first):
     data = PreparedCampaign.from_campaign(load_campaign(write(tmp_path, order)))
     conditions = {sweep.name: sweep.conditions for sweep in data.sweeps}
     assert conditions["cold"].temperature == pytest.approx(293.15)
@@ -178,7 +178,7 @@ def test_a_campaign_gives_temperatures_and_order(tmp_path: Path, order: tuple[st
     np.testing.assert_array_equal(part.session_time, conditions["warm"].session_time)
 
 
-def test_a_planned_sweep_has_its_own_repeats_else_those_of_the_session() -> None:
+def test_a_planned_sweep_has_its_own_repeats_else_those_of_the_session():
     bushing = Bushing("b", 0.01, 0.018, 0.034)
     sweep = SimulatedSweep(Direction.AXIAL, (1e-4, 2e-4), (5.0, 15.0, 25.0), repeats=3)
     tests = [sweep, SimulatedLoop(Direction.AXIAL, 1e-3, 1.0), SimulatedSweep(Direction.AXIAL, (3e-3,), (5.0,))]

@@ -8,7 +8,7 @@ from shell import CAMPAIGN, Run, typing
 
 
 @pytest.fixture(scope="session")
-def work(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def work(root, tmp_path_factory) -> Path:
     """A folder with a copy of the campaign and, under `model`, its joint fit."""
     folder = tmp_path_factory.mktemp("work")
     shutil.copytree(root / "data/cmp_15961", folder / "data/cmp_15961")
@@ -19,7 +19,7 @@ def work(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def own(work: Path, tmp_path: Path) -> Path:
+def own(work, tmp_path) -> Path:
     """A folder with a copy of the campaign, to be changed."""
     for name in ("data", "configs"):
         shutil.copytree(work / name, tmp_path / name)
@@ -27,12 +27,12 @@ def own(work: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def bushfit(work: Path) -> Run:
+def bushfit(work) -> Run:
     """Commands in the folder of the paper's campaign."""
     return typing(work)
 
 
 @pytest.fixture
-def typed(tmp_path: Path) -> Run:
+def typed(tmp_path) -> Run:
     """Commands in an empty folder."""
     return typing(tmp_path)

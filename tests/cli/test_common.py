@@ -16,7 +16,7 @@ from pathlib import Path
 import click
 import pytest
 from click.testing import CliRunner
-from shell import CAMPAIGN, GEOMETRY, Run, names
+from shell import CAMPAIGN, GEOMETRY, names
 from spoiled import FILES, MODEL
 
 from bushfit.cli import cli, main
@@ -37,9 +37,7 @@ EXAMPLES = re.compile(r"^  Examples?:\n((?:    .*\n)+)\Z", re.MULTILINE)
     ],
     ids=lambda arguments: arguments[0],
 )  # fmt: skip
-def test_json_alone_on_standard_output_and_quiet_is_quiet(
-    bushfit: Run, tmp_path: Path, arguments: tuple[str, ...]
-) -> None:
+def test_json_alone_on_standard_output_and_quiet_is_quiet(bushfit, tmp_path, arguments):
     done = bushfit(*arguments, "-o", tmp_path / "x", "--json", "-q", "--no-plots")
     assert isinstance(json.loads(done.stdout), dict)
     assert done.stderr == ""
@@ -60,7 +58,7 @@ def test_json_alone_on_standard_output_and_quiet_is_quiet(
     ],
     ids=lambda value: value[0] if isinstance(value, tuple) else "",
 )
-def test_results_are_not_replaced_unasked(bushfit: Run, tmp_path: Path, arguments: tuple[str, ...], file: str) -> None:
+def test_results_are_not_replaced_unasked(bushfit, tmp_path, arguments, file):
     """Nor ever a file that bushfit did not write, which --force does not change."""
     (tmp_path / file).write_text("mine")
     for more in ((), ("--force",)):
@@ -76,7 +74,7 @@ def test_results_are_not_replaced_unasked(bushfit: Run, tmp_path: Path, argument
     bushfit(*arguments, "-o", tmp_path, "--force")
 
 
-def test_an_input_of_the_run_is_not_replaced(own: Path, typed: Run) -> None:
+def test_an_input_of_the_run_is_not_replaced(own, typed):
     """Measurements named as results are; a model that is where the new one goes; a campaign that is simulated."""
     for test in ("loop_axial_1", "sweep_axial"):
         (own / f"data/cmp_15961/{test}.csv").rename(own / f"{test.partition('_')[0]}s.csv")
@@ -96,9 +94,7 @@ def test_an_input_of_the_run_is_not_replaced(own: Path, typed: Run) -> None:
     assert {file.name: file.read_bytes() for file in own.glob("*.*")} == before
 
 
-def test_a_missed_limit_is_status_1_and_results_go_to_a_folder_of_the_campaign(
-    bushfit: Run, tmp_path: Path, work: Path, typed: Run
-) -> None:
+def test_a_missed_limit_is_status_1_and_results_go_to_a_folder_of_the_campaign(bushfit, tmp_path, work, typed):
     missed = bushfit("fit", CAMPAIGN, "-o", tmp_path / "x", "--no-plots", "--max-nrmse", "1e-4", status=1)
     assert "is above --max-nrmse 0.0001" in missed.stderr
     assert "model.json" in names(tmp_path / "x")
@@ -115,7 +111,7 @@ def test_a_missed_limit_is_status_1_and_results_go_to_a_folder_of_the_campaign(
     ],
     ids=["help", "fit"],
 )
-def test_slow_packages_are_imported_where_they_are_needed(work: Path, arguments: list[str], slow: set[str]) -> None:
+def test_slow_packages_are_imported_where_they_are_needed(work, arguments, slow):
     code = (
         f"import sys\nfrom bushfit.cli import main\nsys.argv = {['bushfit', *arguments]!r}\n"
         f"try:\n    main()\nfinally:\n    assert not {slow!r} & set(sys.modules)\n"
@@ -125,7 +121,7 @@ def test_slow_packages_are_imported_where_they_are_needed(work: Path, arguments:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_help_is_short_and_says_what_is_written(typed: Run, command: str) -> None:
+def test_a_help_is_short_and_says_what_is_written(typed, command):
     told = typed(command, "-h").stdout
     assert len(told.splitlines()) <= LONGEST
     assert re.search("[Ww]rites", told)
@@ -142,7 +138,7 @@ def test_a_help_is_short_and_says_what_is_written(typed: Run, command: str) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
-def test_examples_of_the_help_work(typed: Run, root: Path, tmp_path: Path, command: str) -> None:
+def test_examples_of_the_help_work(typed, root, tmp_path, command):
     for name in ("configs", "data"):
         shutil.copytree(root / name, tmp_path / name)
     told = typed(command, "-h").stdout
@@ -169,20 +165,20 @@ def asking(*words: str) -> dict[str, str]:
 
 
 @pytest.mark.parametrize(("words", "offered"), ASKED, ids=[words for words, _ in ASKED])
-def test_tab_offers(root: Path, monkeypatch: pytest.MonkeyPatch, words: str, offered: set[str]) -> None:
+def test_tab_offers(root, monkeypatch, words, offered):
     monkeypatch.chdir(root)
     done = CliRunner().invoke(cli, prog_name="bushfit", env=asking(*words.split("|")))
     assert (done.exit_code, set(done.stdout.split("\n")) - {""}, done.stderr) == (0, offered, "")
 
 
-def test_the_installed_command_answers_a_shell() -> None:
+def test_the_installed_command_answers_a_shell():
     program = str(Path(sys.executable).with_name("bushfit"))
     env = {**os.environ, **asking("simu")}
     assert subprocess.run([program], env=env, capture_output=True, check=True).stdout == b"plain,simulate\n"
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])
-def test_the_line_on_the_page_is_what_each_shell_takes(root: Path, shell: str) -> None:
+def test_the_line_on_the_page_is_what_each_shell_takes(root, shell):
     assert f"{shell}_source" in (root / "configs/README.md").read_text(encoding="utf-8")
     done = CliRunner().invoke(cli, prog_name="bushfit", env={"_BUSHFIT_COMPLETE": f"{shell}_source"})
     assert f"{shell}_complete" in done.stdout
@@ -194,7 +190,7 @@ BUSHFIT = (sys.executable, "-m", "bushfit")
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch) -> Path:
     monkeypatch.chdir(tmp_path)
     for name, content in FILES.items():
         Path(name).write_text(content)
@@ -215,14 +211,14 @@ def assert_one_line(status: int, err: bytes) -> None:
     ],
     ids=lambda it: it[0],
 )  # fmt: skip
-def test_a_full_device(arguments: tuple[str, ...], folder: Path) -> None:
+def test_a_full_device(arguments, folder):
     with Path("/dev/full").open("wb") as full:
         done = subprocess.run([*BUSHFIT, *arguments], stdout=full, stderr=subprocess.PIPE, check=False)
     assert_one_line(done.returncode, done.stderr)
     assert b"standard output cannot be written: No space left on device" in done.stderr
 
 
-def test_a_pipe_that_nobody_reads(folder: Path) -> None:
+def test_a_pipe_that_nobody_reads(folder):
     """The result is written before it is printed; what people are told besides is not needed."""
     read, write = os.pipe()
     os.close(read)
@@ -237,7 +233,7 @@ def test_a_pipe_that_nobody_reads(folder: Path) -> None:
     assert missed.returncode == 2
 
 
-def test_json_is_utf8_in_any_code_page_and_no_text_steers_the_terminal(folder: Path) -> None:
+def test_json_is_utf8_in_any_code_page_and_no_text_steers_the_terminal(folder):
     """The name of the bushing is in no code page; a warning would clear the screen, and turn the line around."""
     said = "\x1b[2J\x9b2J\u202ecleared"
     model = MODEL | {"warnings": [said], "bushing": MODEL["bushing"] | {"name": "衬套"}}
@@ -253,7 +249,7 @@ def test_json_is_utf8_in_any_code_page_and_no_text_steers_the_terminal(folder: P
     assert not any(sign in done.stderr.decode() for sign in "\x1b\x9b\u202e")
 
 
-def test_ctrl_c_in_a_callback_of_an_import_is_not_lost() -> None:
+def test_ctrl_c_in_a_callback_of_an_import_is_not_lost():
     """Python ignores what a callback of a weak reference raises, and imports have such callbacks."""
     code = (
         "import signal, sys, time, weakref; from bushfit.__main__ import repeat_interrupt\n"
@@ -270,7 +266,7 @@ def test_ctrl_c_in_a_callback_of_an_import_is_not_lost() -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signal")
 @pytest.mark.parametrize(("after", "sent"), [(0.1, signal.SIGINT), (0.5, signal.SIGINT), (1.5, signal.SIGTERM)])
-def test_an_early_ctrl_c_and_a_request_to_end(after: float, sent: signal.Signals, folder: Path) -> None:
+def test_an_early_ctrl_c_and_a_request_to_end(after, sent, folder):
     """From the first line of bushfit on, which here says that it has begun."""
     code = (
         "import signal, sys; sys.argv = ['bushfit', 'run', 'campaign.toml']\n"
@@ -312,7 +308,7 @@ def said(work: Path, monkeypatch: pytest.MonkeyPatch, heard: io.StringIO, *words
     return heard.getvalue()
 
 
-def test_a_terminal_is_shown_how_far_it_is(work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_terminal_is_shown_how_far_it_is(work, tmp_path, monkeypatch):
     monkeypatch.setattr(common, "_PATIENCE", 0.0)
     told = said(work, monkeypatch, Terminal(), *SIMULATE, "-o", tmp_path / "x")
     assert "sweeps simulated" in told
@@ -327,9 +323,7 @@ def test_a_terminal_is_shown_how_far_it_is(work: Path, tmp_path: Path, monkeypat
     [(io.StringIO, 0.0, ()), (Terminal, 0.0, ("--quiet",)), (Terminal, 60.0, ())],
     ids=["no terminal", "quiet", "quick"],
 )
-def test_nobody_else_is(
-    work: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, heard: type, patience: float, more: tuple[str, ...]
-) -> None:
+def test_nobody_else_is(work, tmp_path, monkeypatch, heard, patience, more):
     monkeypatch.setattr(common, "_PATIENCE", patience)
     told = said(work, monkeypatch, heard(), *SIMULATE, *more, "-o", tmp_path / "x")
     assert "simulated " not in told

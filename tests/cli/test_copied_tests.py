@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from shell import CAMPAIGN, Run
+from shell import CAMPAIGN
 
 from bushfit.model.file import load_result
 
@@ -13,7 +13,7 @@ SWEEP = "data/cmp_15961/sweep_axial.csv"
 
 
 @pytest.fixture
-def once(bushfit: Run, own: Path) -> Path:
+def once(bushfit, own) -> Path:
     """A campaign in which repeat 1 of the axial sweep is the only one."""
     sweep = pd.read_csv(own / SWEEP)
     sweep[sweep["repeat"] == 1].to_csv(own / SWEEP, index=False)
@@ -21,7 +21,7 @@ def once(bushfit: Run, own: Path) -> Path:
 
 
 @pytest.mark.parametrize("command", ["fit", "diagnose"])
-def test_copies_count_once(bushfit: Run, own: Path, once: Path, command: str) -> None:
+def test_copies_count_once(bushfit, own, once, command):
     bushfit(command, once, "-o", own / "once", "--no-plots")
     sweep, text = pd.read_csv(own / SWEEP), once.read_text(encoding="utf-8")
     repeats = [sweep.assign(repeat=number) for number in (1, 2, 3)]

@@ -24,7 +24,7 @@ TABLES = {"diagnosis.json", "model.json", "gap.csv", "candidates.csv", "report.h
 
 
 @pytest.fixture(scope="module")
-def work(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def work(root, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("work")
     for case, copy in (("000", "case_000"), ("001", "case_001"), ("003", "case_003"), ("000", "doubled")):
         shutil.copytree(root / f"data/practice/case_{case}", folder / copy)
@@ -35,22 +35,22 @@ def work(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def bushfit(work: Path) -> Run:
+def bushfit(work) -> Run:
     return typing(work)
 
 
 @pytest.fixture(scope="module")
-def done(bushfit: Run) -> Done:
+def done(bushfit) -> Done:
     """One diagnosis, its files under `found`."""
     return bushfit("diagnose", CAMPAIGN, "-o", "found", "--json", "--no-plots")
 
 
 @pytest.fixture(scope="module")
-def found(work: Path, done: Done) -> Path:
+def found(work, done) -> Path:
     return work / "found"
 
 
-def test_the_document_names_the_effect_with_its_size_and_the_gap_before_and_after(done: Done, found: Path) -> None:
+def test_the_document_names_the_effect_with_its_size_and_the_gap_before_and_after(done, found):
     assert names(found) == TABLES
     assert done.stdout == (found / "diagnosis.json").read_text(encoding="utf-8")
     for words in ("case 001: named", "inertia", "95 %", "data fitted", "held out", "where", "next test:", "wrote "):
@@ -79,7 +79,7 @@ def test_the_document_names_the_effect_with_its_size_and_the_gap_before_and_afte
     assert usable["held_out"] is True
 
 
-def test_every_residual_and_every_candidate_is_in_a_table(found: Path) -> None:
+def test_every_residual_and_every_candidate_is_in_a_table(found):
     """Their mean squares are the gaps that the document states, but for what a loop's rows tell of the next."""
     table = pd.read_csv(found / "gap.csv")
     gap = document(found / "diagnosis.json")["gap"]["calibration"]
@@ -106,7 +106,7 @@ def test_every_residual_and_every_candidate_is_in_a_table(found: Path) -> None:
     assert refitted.parameters.str.contains("=").all()
 
 
-def test_its_own_model_is_consistent_and_predicts_without_the_rig(bushfit: Run, found: Path, tmp_path: Path) -> None:
+def test_its_own_model_is_consistent_and_predicts_without_the_rig(bushfit, found, tmp_path):
     model = found / "model.json"
     again = bushfit("diagnose", CAMPAIGN, "--model", model, "-o", tmp_path / "again", "--json", "--no-plots")
     assert json.loads(again.stdout)["verdict"] == "consistent"
@@ -115,7 +115,7 @@ def test_its_own_model_is_consistent_and_predicts_without_the_rig(bushfit: Run, 
     assert "inertia" in predicted.stderr
 
 
-def test_options_reach_the_workflow(bushfit: Run, tmp_path: Path) -> None:
+def test_options_reach_the_workflow(bushfit, tmp_path):
     for options in (("--tolerance", "50 %"), ("--adopt", "inertia")):
         run = bushfit("diagnose", CAMPAIGN, *options, "-o", tmp_path / "x", "--force", "--json", "--no-plots")
         assert json.loads(run.stdout)["verdict"] == "consistent"
@@ -123,12 +123,12 @@ def test_options_reach_the_workflow(bushfit: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_an_effect_that_is_left_out_is_not_named(bushfit: Run, tmp_path: Path) -> None:
+def test_an_effect_that_is_left_out_is_not_named(bushfit, tmp_path):
     done = bushfit("diagnose", CAMPAIGN, "--without", "inertia", "-o", tmp_path / "x", "--json", "--no-plots")
     assert all(effect["name"] != "inertia" for effect in json.loads(done.stdout)["effects"])
 
 
-def test_a_clean_campaign(bushfit: Run, tmp_path: Path) -> None:
+def test_a_clean_campaign(bushfit, tmp_path):
     run = bushfit("diagnose", CLEAN, "-o", tmp_path / "x", "--no-plots")
     assert run.stdout == ""
     assert "consistent" in run.stderr
@@ -138,7 +138,7 @@ def test_a_clean_campaign(bushfit: Run, tmp_path: Path) -> None:
     assert written["nothing"] > 0.15
 
 
-def test_look_alikes_are_told_with_their_odds(work: Path, bushfit: Run) -> None:
+def test_look_alikes_are_told_with_their_odds(work, bushfit):
     """And the page says what the terminal says."""
     run = bushfit("diagnose", "case_003/bushing.toml", "-o", "alike", "--no-plots")
     written = document(work / "alike/diagnosis.json")
@@ -156,7 +156,7 @@ def test_look_alikes_are_told_with_their_odds(work: Path, bushfit: Run) -> None:
     assert f"<b>Next test:</b> {written['next_test']}." in page
 
 
-def test_it_is_told_with_its_line_and_nothing_is_mended(bushfit: Run, work: Path) -> None:
+def test_it_is_told_with_its_line_and_nothing_is_mended(bushfit, work):
     done = bushfit("diagnose", DOUBLED, "-o", "doubled_told")
     for words in ("these tests agree if the", "sweep_axial.csv are peak-to-peak", 'amplitude = "peak-to-peak"', LABEL):
         assert words in " ".join(done.stderr.split())
@@ -174,7 +174,7 @@ def test_it_is_told_with_its_line_and_nothing_is_mended(bushfit: Run, work: Path
     assert candidates.loc[LABEL, ["level", "why"]].tolist() == ["record", "closes the gap"]
 
 
-def test_a_line_in_the_campaign_or_adopted_aloud_puts_it_right(bushfit: Run, work: Path) -> None:
+def test_a_line_in_the_campaign_or_adopted_aloud_puts_it_right(bushfit, work):
     done = bushfit("diagnose", DOUBLED, "--adopt", LABEL, "-o", "adopted", "--no-plots")
     assert f"corrected by --adopt {LABEL}" in " ".join(done.stderr.split())
     assert any("corrected by" in line for line in document(work / "adopted/model.json")["warnings"])
@@ -186,7 +186,7 @@ def test_a_line_in_the_campaign_or_adopted_aloud_puts_it_right(bushfit: Run, wor
         assert document(work / folder / "diagnosis.json")["verdict"] == "consistent"
 
 
-def test_run_uses_the_tests_as_they_are_and_warns(bushfit: Run, work: Path) -> None:
+def test_run_uses_the_tests_as_they_are_and_warns(bushfit, work):
     done = bushfit("run", DOUBLED, "-o", "ran", "--no-plots")
     said = " ".join(done.stderr.split())
     assert "sweep_axial.csv are peak-to-peak" in said

@@ -15,7 +15,7 @@ import click
 import pandas as pd
 import pytest
 from commandline import Done
-from shell import Run, document, names, refused, typing
+from shell import document, names, refused, typing
 from tries import some
 
 from bushfit.cli import cli
@@ -54,7 +54,7 @@ COMMANDS = some([*zip(ARGUMENTS, cycle(("xlsx", "decimal-comma")), strict=False)
 
 
 @pytest.fixture(scope="module")
-def place(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def place(root, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("forms")
     shutil.copytree(root / "data", folder / "data")
     shutil.copy(root / "data/arm_bushing/truth.json", folder / "model.json")
@@ -68,16 +68,14 @@ def written(place: Path, name: str, *options: str) -> set[Path]:
     return {file.relative_to(folder) for file in folder.rglob("[!.]*") if file.is_file()}
 
 
-def test_every_command_that_writes_tables_or_draws_is_among_them() -> None:
+def test_every_command_that_writes_tables_or_draws_is_among_them():
     options = {"table_format", "plot_format"}
     found = [cli.get_command(CONTEXT, name) for name in cli.list_commands(CONTEXT)]
     assert {each.name for each in found if each and options & {one.name for one in each.params}} == set(ARGUMENTS)
 
 
 @pytest.mark.parametrize("case", COMMANDS, ids=" ".join)
-def test_tables_hold_the_same_in_every_form_and_pictures_are_of_every_form_asked_for(
-    place: Path, case: tuple[str, str]
-) -> None:
+def test_tables_hold_the_same_in_every_form_and_pictures_are_of_every_form_asked_for(place, case):
     name, form = case
     plain = written(place, name, "-o", f"{name}-csv", "--no-plots")
     options = ["--table-format", form] if name != "inspect" else []
@@ -95,7 +93,7 @@ def test_tables_hold_the_same_in_every_form_and_pictures_are_of_every_form_asked
         pd.testing.assert_frame_equal(found, known, check_dtype=False, rtol=1e-6, atol=1e-300)
 
 
-def test_a_variable_of_the_environment_holds_for_all_commands(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_variable_of_the_environment_holds_for_all_commands(place, monkeypatch):
     monkeypatch.setenv("BUSHFIT_TABLE_FORMAT", "xlsx")
     monkeypatch.setenv("BUSHFIT_PLOT_FORMAT", "svg png")
     assert set(map(str, written(place, "reduce", "-o", "of-all"))) == {"sweep.xlsx", "reduce.png", "reduce.svg"}
@@ -110,7 +108,7 @@ def test_a_variable_of_the_environment_holds_for_all_commands(place: Path, monke
 
 
 @pytest.mark.parametrize("form", READ)
-def test_a_wide_table_is_read_back(place: Path, form: str) -> None:
+def test_a_wide_table_is_read_back(place, form):
     options = ("--direction", "axial", "--amplitudes", "0.1, 0.25 mm", "--no-plots", "--table-format", form)
     typing(place)("predict", "model.json", "--wide", "-o", f"wide-{form}", *options)
     end = "xlsx" if form == "xlsx" else "csv"
@@ -161,9 +159,7 @@ def text_of(file: Path) -> str:
     params=some([("cmp_15961", PAPER), ("mystery_mount", MOUNT)], [("mystery_mount", MOUNT)]),
     ids=["paper", "mount"],
 )
-def ran(
-    request: pytest.FixtureRequest, root: Path, tmp_path_factory: pytest.TempPathFactory, work: Path
-) -> tuple[Path, Path, tuple[str, ...], list[str]]:
+def ran(request, root, tmp_path_factory, work) -> tuple[Path, Path, tuple[str, ...], list[str]]:
     """A campaign, the folder of its run, what must be warned of there, and all its warnings."""
     name, words = request.param
     folder, campaign = tmp_path_factory.mktemp(name) / "run", root / f"configs/{name}.toml"
@@ -171,11 +167,8 @@ def ran(
     return campaign, folder, words, json.loads(done.stdout)["warnings"]
 
 
-Ran = tuple[Path, Path, tuple[str, ...], list[str]]
-
-
 @pytest.fixture
-def model(ran: Ran, tmp_path: Path) -> Path:
+def model(ran, tmp_path) -> Path:
     """The model of the run, whose fit warned of something, too."""
     found = document(ran[1] / "model.json")
     found["warnings"].insert(0, ODD)
@@ -183,7 +176,7 @@ def model(ran: Ran, tmp_path: Path) -> Path:
     return tmp_path / "model.json"
 
 
-def test_pages_of_run_and_diagnose_say_what_the_terminal_says(ran: Ran, bushfit: Run, tmp_path: Path) -> None:
+def test_pages_of_run_and_diagnose_say_what_the_terminal_says(ran, bushfit, tmp_path):
     campaign, folder, words, told = ran
     page = text_of(folder / "report.html")
     for each in words:
@@ -202,7 +195,7 @@ def test_pages_of_run_and_diagnose_say_what_the_terminal_says(ran: Ran, bushfit:
     assert sorted(joint) == sorted(document(tmp_path / "f/model.json")["warnings"])
 
 
-def test_every_export_says_what_predict_says(ran: Ran, model: Path, bushfit: Run, tmp_path: Path) -> None:
+def test_every_export_says_what_predict_says(ran, model, bushfit, tmp_path):
     done = bushfit("predict", model, "-o", tmp_path / "p", "--no-plots", "--json", "-v")
     told = warned(done)
     assert sorted(told) == sorted(json.loads(done.stdout)["warnings"])
@@ -223,7 +216,7 @@ def test_every_export_says_what_predict_says(ran: Ran, model: Path, bushfit: Run
 ALL = [f"--format={name}" for name in ("nastran", "abaqus", "adams", "csv", "xlsx", "prony")]
 
 
-def test_every_format_at_once_and_what_it_leaves_out(bushfit: Run, tmp_path: Path) -> None:
+def test_every_format_at_once_and_what_it_leaves_out(bushfit, tmp_path):
     done = bushfit("export", "model/model.json", *ALL, "-o", tmp_path / "x", "--json")
     found = json.loads(done.stdout)
     assert names(tmp_path / "x") == {file for each in found["formats"].values() for file in each["files"]}
@@ -250,15 +243,13 @@ def test_every_format_at_once_and_what_it_leaves_out(bushfit: Run, tmp_path: Pat
         (("--format", "nastran", "--cardanic", "60 N m/rad, -1"), "a value above zero"),
     ],
 )
-def test_constants_and_time_domain_are_checked(
-    bushfit: Run, tmp_path: Path, options: tuple[str, ...], words: str
-) -> None:
+def test_constants_and_time_domain_are_checked(bushfit, tmp_path, options, words):
     done = bushfit("export", "model/model.json", *options, "-o", tmp_path / "x", status=2)
     assert words in done.stderr
     assert not (tmp_path / "x").exists()
 
 
-def test_a_prony_series_and_stated_constants(bushfit: Run, tmp_path: Path) -> None:
+def test_a_prony_series_and_stated_constants(bushfit, tmp_path):
     grid = ("--direction", "axial", "--amplitudes", "0.2 mm", "--frequencies", "5:155:50 Hz")
     options = ("--format=prony", "--format=abaqus", "--time-domain", "--cardanic", "1.2 N m/deg, 0.1")
     done = bushfit("export", "model/model.json", *options, *grid, "-o", tmp_path / "x")
@@ -274,7 +265,7 @@ def test_a_prony_series_and_stated_constants(bushfit: Run, tmp_path: Path) -> No
     assert "the stated constant, 68.755 N m/rad, loss factor 0.1" in done.stderr
 
 
-def test_without_a_grid_it_is_the_measured_one_and_files_say_where_they_hold(root: Path, tmp_path: Path) -> None:
+def test_without_a_grid_it_is_the_measured_one_and_files_say_where_they_hold(root, tmp_path):
     """By the model file alone, at levels that no other grid has."""
     typing(root)("fit", "data/practice/case_000/bushing.toml", "-o", tmp_path / "fit", "--no-plots")
     typing(root)("export", tmp_path / "fit/model.json", *ALL[:4], "-o", tmp_path / "x")
@@ -297,7 +288,7 @@ def test_without_a_grid_it_is_the_measured_one_and_files_say_where_they_hold(roo
     assert (provenance["what"] == "valid").sum() == 2
 
 
-def test_a_deck_is_of_the_temperature_asked_for(bushfit: Run, root: Path, tmp_path: Path) -> None:
+def test_a_deck_is_of_the_temperature_asked_for(bushfit, root, tmp_path):
     model = document(root / "data/arm_bushing/truth.json")
     model["effects"].append("temperature")
     for name, value in (("softening", 4e-3), ("shift", 0.08)):

@@ -15,7 +15,6 @@ from bushfit.cli.run import two_step_line
 from bushfit.fitting.procedures import TwoStep
 from bushfit.model.covariance import Covariance
 from bushfit.model.file import load_result
-from bushfit.model.model import Model
 from bushfit.model.result import Result
 
 FILES = {
@@ -29,14 +28,14 @@ ROWS_APART = "repeats of the same points differ by up to"
 
 
 @pytest.mark.parametrize("command", FILES)
-def test_fits_write_the_files_of_the_interface(bushfit: Run, tmp_path: Path, command: str) -> None:
+def test_fits_write_the_files_of_the_interface(bushfit, tmp_path, command):
     done = bushfit(command, CAMPAIGN, "-o", tmp_path / "x")
     assert names(tmp_path / "x") == FILES[command]
     for word in ("parameter", "std error", "95 % interval", "unit", "NRMSE"):
         assert word in done.stderr
 
 
-def test_the_paper_s_order_by_hand(bushfit: Run, tmp_path: Path) -> None:
+def test_the_paper_s_order_by_hand(bushfit, tmp_path):
     """fit-static, fit-dynamic --static, predict: each takes what the one before wrote."""
     s, d, p = (tmp_path / name for name in "sdp")
     bushfit("fit-static", CAMPAIGN, "-o", s, "--no-plots")
@@ -58,7 +57,7 @@ def second_off(own: Path, off: float, tilted: bool = False) -> None:
 @pytest.mark.parametrize(
     ("off", "tilted", "told"), [(0.0, False, []), (0.05, False, [REPEATS_OFF]), (0.13, True, [ROWS_APART, REPEATS_OFF])]
 )
-def test_repeats_that_disagree_do_not_excuse_themselves(own: Path, off: float, tilted: bool, told: list[str]) -> None:
+def test_repeats_that_disagree_do_not_excuse_themselves(own, off, tilted, told):
     second_off(own, off, tilted)
     for command in ("fit", "diagnose"):
         done = typing(own)(command, CAMPAIGN, "-o", command, "--no-plots", "-v")
@@ -72,7 +71,7 @@ def test_repeats_that_disagree_do_not_excuse_themselves(own: Path, off: float, t
 @pytest.mark.parametrize(
     ("kind", "file", "column"), [("loops", "loop_axial_1", "force [N]"), ("sweeps", "sweep_axial", "stiffness [N/mm]")]
 )
-def test_a_test_that_repeats_another_and_lies_far_off_is_told(own: Path, kind: str, file: str, column: str) -> None:
+def test_a_test_that_repeats_another_and_lies_far_off_is_told(own, kind, file, column):
     table = pd.read_csv(own / f"data/cmp_15961/{file}.csv")
     table[column] *= 1.15
     table.to_csv(own / "data/cmp_15961/again.csv", index=False)
@@ -84,7 +83,7 @@ def test_a_test_that_repeats_another_and_lies_far_off_is_told(own: Path, kind: s
         assert re.search(rf"again(\.csv)?: it repeats {file}, and their stiffness differs by 1\d %", told), told
 
 
-def test_the_gain_error_of_loops_is_said(own: Path) -> None:
+def test_the_gain_error_of_loops_is_said(own):
     errors, plain = {}, (own / CAMPAIGN).read_text(encoding="utf-8")
     for stated in ("", "0.5 %", "0 %"):
         campaign = plain + f'\n[rig]\ngain_error = "{stated}"\n' * bool(stated)
@@ -95,7 +94,7 @@ def test_the_gain_error_of_loops_is_said(own: Path) -> None:
     assert errors == {"": 0.005, "0.5 %": 0.005, "0 %": 0.0}
 
 
-def test_a_bar_in_tension_and_a_coupon_in_shear_of_one_rubber_have_one_fit(typed: Run, tmp_path: Path) -> None:
+def test_a_bar_in_tension_and_a_coupon_in_shear_of_one_rubber_have_one_fit(typed, tmp_path):
     """By hand: a bar has three times the modulus, and the same energy at a strain sqrt(3) times smaller."""
     frequency, strain = (axis.ravel() for axis in np.meshgrid([5, 10, 20, 40, 80], [0.2, 0.7, 2.0, 6.0]))
     modulus = 1.0 + 0.1 * frequency**0.24 + 0.6 / (1.0 + strain / 1.5)
@@ -112,7 +111,7 @@ def test_a_bar_in_tension_and_a_coupon_in_shear_of_one_rubber_have_one_fit(typed
 
 
 @pytest.mark.parametrize("ending", ["xls", "XLSX"])
-def test_a_test_file_is_no_campaign(typed: Run, tmp_path: Path, ending: str) -> None:
+def test_a_test_file_is_no_campaign(typed, tmp_path, ending):
     (tmp_path / f"x.{ending}").write_bytes(b"PK\x03\x04")
     done = typed("run", f"x.{ending}", status=2)
     assert f"x.{ending}: a campaign is needed" in done.stderr
@@ -129,7 +128,7 @@ def held(own: Path, mu: str) -> None:
 
 
 @pytest.mark.parametrize(("command", "loss"), [("fit-static", "linear"), ("fit-dynamic", "soft_l1"), ("run", "linear")])
-def test_five_held_parameters_are_checked_against_the_tests(own: Path, command: str, loss: str) -> None:
+def test_five_held_parameters_are_checked_against_the_tests(own, command, loss):
     held(own, "1.09 MPa")
     done = typing(own)(command, CAMPAIGN, "-o", "x", "--no-plots", "--loss", loss)
     assert "nothing was fitted, because every parameter is fixed; the given values meet the tests" in done.stderr
@@ -140,14 +139,14 @@ def test_five_held_parameters_are_checked_against_the_tests(own: Path, command: 
     assert all(place["held_out"] for place in found["fit"]["usable"]), "given values are predictions"
 
 
-def test_held_parameters_that_miss_the_tests_are_said_to(own: Path) -> None:
+def test_held_parameters_that_miss_the_tests_are_said_to(own):
     held(own, "1.3 MPa")
     done = typing(own)("fit", CAMPAIGN, "-o", "x", "--no-plots", "--max-nrmse", "0.02", status=1)
     assert "the given values miss the tests by" in done.stderr
     assert "every parameter is fixed" in typing(own)("diagnose", CAMPAIGN, "-o", "y", "--no-plots", status=2).stderr
 
 
-def test_a_parameter_on_a_bound_shows_no_interval(own: Path) -> None:
+def test_a_parameter_on_a_bound_shows_no_interval(own):
     """Sweeps whose stiffness falls with frequency leave the springpot nothing to do."""
     sweep = pd.read_csv(own / SWEEP)
     sweep["stiffness [N/mm]"] *= (sweep["frequency [Hz]"] / 5.0) ** -0.15
@@ -168,7 +167,7 @@ ALIKE = ("diagnosis.json", "gap.csv", "candidates.csv")
 UNKNOWN = "the tests leave mu, m, alpha open (unknown by 100 % or more)"
 
 
-def test_run_does_the_whole_chain_and_says_what_two_steps_cost(bushfit: Run, tmp_path: Path) -> None:
+def test_run_does_the_whole_chain_and_says_what_two_steps_cost(bushfit, tmp_path):
     done = bushfit("run", CAMPAIGN, "-o", tmp_path / "x", "-v")
     tables = {f"{kind}.{end}" for kind in ("loops", "sweeps", "axial", "radial") for end in ("csv", "png")}
     assert {"static.json", "dynamic.json", "model.json"} | tables <= names(tmp_path / "x")
@@ -182,7 +181,7 @@ def test_run_does_the_whole_chain_and_says_what_two_steps_cost(bushfit: Run, tmp
     pd.testing.assert_frame_equal(radial, ordered)
 
 
-def test_run_with_an_effect_shows_what_diagnose_shows(root: Path, tmp_path: Path) -> None:
+def test_run_with_an_effect_shows_what_diagnose_shows(root, tmp_path):
     done = typing(root)("run", "configs/mystery_mount.toml", "-o", tmp_path / "x", "--no-plots")
     for words in ("Mystery mount: named", "sleeve_compliance (", "  held out  ", " x noise: measured r", "next test:"):
         assert done.stderr.count(words) == 1
@@ -204,9 +203,7 @@ def both(bushfit: Run, campaign: str, folder: Path) -> tuple[Done, Done]:
     return ran, told
 
 
-def test_run_and_diagnose_write_the_model_that_fit_writes_where_nothing_is_missing(
-    bushfit: Run, work: Path, tmp_path: Path
-) -> None:
+def test_run_and_diagnose_write_the_model_that_fit_writes_where_nothing_is_missing(bushfit, work, tmp_path):
     ran, _ = both(bushfit, CAMPAIGN, tmp_path)
     words = (
         *("CMP 15 961: consistent", "  use ", "joint fit", "mu ", "NRMSE", "correlation: ", "tested range"),
@@ -225,7 +222,7 @@ def test_run_and_diagnose_write_the_model_that_fit_writes_where_nothing_is_missi
     assert document(tmp_path / "run/diagnosis.json")["usable"]["places"] == fitted["fit"]["usable"]
 
 
-def test_one_loop_alone_is_fitted_and_what_it_leaves_open_is_said_first(own: Path, tmp_path: Path) -> None:
+def test_one_loop_alone_is_fitted_and_what_it_leaves_open_is_said_first(own, tmp_path):
     text = (own / CAMPAIGN).read_text(encoding="utf-8")
     (own / CAMPAIGN).write_text(text[: text.index("[[sweeps]]")], encoding="utf-8")
     ran, told = both(typing(own), CAMPAIGN, tmp_path)
@@ -255,8 +252,8 @@ def test_one_loop_alone_is_fitted_and_what_it_leaves_open_is_said_first(own: Pat
     ],
 )
 def test_what_gives_way_in_one_direction_or_in_all_is_a_set_where_it_is_equal(
-    typed: Run, tmp_path: Path, directions: tuple[str, ...], hidden: str, sets: list[str]
-) -> None:
+    typed, tmp_path, directions, hidden, sets
+):
     """Axially the bushing is so soft that a give of the rig passes for mu; torsion, which does not give way, tells."""
     tests = [LOOP.format("axial", "0.5 mm", "0.1 Hz")] if directions == ("axial",) else []
     tests += [SWEEPS[place] for place in directions]
@@ -282,9 +279,7 @@ def test_what_gives_way_in_one_direction_or_in_all_is_a_set_where_it_is_equal(
         (1e8, 0.5, {"mu": "min"}, "1 pass, ended at a bound: mu ("),
     ],
 )
-def test_the_line_on_two_steps_counts_no_meaningless_errors(
-    paper_model: Model, error: float, off: float, bound: dict[str, str], said: str
-) -> None:
+def test_the_line_on_two_steps_counts_no_meaningless_errors(paper_model, error, off, bound, said):
     mu = 1e6
 
     def fitted(share: float, value: float, **more: object) -> Result:

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from shell import GEOMETRY, Run, document, refused, values
+from shell import GEOMETRY, document, refused, values
 
 from bushfit.campaign.campaign import load_campaign
 from bushfit.campaign.toml import toml_value
@@ -21,15 +21,13 @@ FILES = ("loop_axial_1.csv", "sweep_axial.csv", "sweep_radial.csv")
 
 
 @pytest.fixture
-def tests(root: Path, tmp_path: Path) -> list[Path]:
+def tests(root, tmp_path) -> list[Path]:
     """The tests of the paper's bushing in a folder of their own."""
     shutil.copytree(root / "data/cmp_15961", tmp_path / "lab/my tests")
     return [tmp_path / "lab/my tests" / name for name in FILES]
 
 
-def test_the_campaign_loads_and_fits_and_its_geometry_is_echoed(
-    typed: Run, tests: list[Path], tmp_path: Path, table_1: dict
-) -> None:
+def test_the_campaign_loads_and_fits_and_its_geometry_is_echoed(typed, tests, tmp_path, table_1):
     sizes = ("--inner-diameter", "20 mm", "--outer-diameter", "3.6 cm", "--length", "34 mm")
     done = typed("init", *tests, *sizes, "--name", 'Bushing "7"', "-o", "lab/campaign")
     assert "rubber from 20 to 36 mm in diameter, 8 mm thick, 34 mm long" in done.stderr
@@ -45,7 +43,7 @@ def test_the_campaign_loads_and_fits_and_its_geometry_is_echoed(
     assert fitted == pytest.approx(table_1, rel=0.02)
 
 
-def test_a_locked_folder_is_left_out(typed: Run, tests: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_locked_folder_is_left_out(typed, tests, monkeypatch):
     (tests[0].parent / "locked").mkdir()
     monkeypatch.setattr("os.access", lambda path, _: Path(path).name != "locked")  # rights do not bind root
     done = typed("init", tests[0].parent, *GEOMETRY, "-o", "lab/campaign")
@@ -54,9 +52,7 @@ def test_a_locked_folder_is_left_out(typed: Run, tests: list[Path], monkeypatch:
     )
 
 
-def test_where_it_is_written_and_that_the_next_line_can_be_pasted(
-    typed: Run, tests: list[Path], tmp_path: Path
-) -> None:
+def test_where_it_is_written_and_that_the_next_line_can_be_pasted(typed, tests, tmp_path):
     done = typed("init", *tests, *GEOMETRY, "-o", "lab/my.toml", "--json")
     text = (tmp_path / "lab/my.toml").read_text(encoding="utf-8")
     assert json.loads(done.stdout)["campaign"] == text
@@ -80,7 +76,7 @@ def change(file: Path, **renamed: str) -> Path:
     return file
 
 
-def test_what_only_the_user_knows_is_asked_for_and_written(typed: Run, tests: list[Path], tmp_path: Path) -> None:
+def test_what_only_the_user_knows_is_asked_for_and_written(typed, tests, tmp_path):
     loop = change(tests[0], time="", force="Kanal 3").rename(tests[0].with_name("first.csv"))
     known: list[str] = []
     asked = (
@@ -116,9 +112,7 @@ def test_what_only_the_user_knows_is_asked_for_and_written(typed: Run, tests: li
         ("turned.csv", "stiffness [N m/deg]", "torsion", "radial"),
     ],
 )
-def test_a_direction_that_is_stated_contradicts_no_file(
-    typed: Run, tests: list[Path], tmp_path: Path, name: str, header: str, says: str, other: str
-) -> None:
+def test_a_direction_that_is_stated_contradicts_no_file(typed, tests, tmp_path, name, header, says, other):
     """A sheet's name goes before the file's, that before headers, units of an angle before all."""
     table, file = pd.read_csv(tests[1]).rename(columns={"stiffness [N/mm]": header}), tmp_path / "bench" / name
     table = table.rename(columns={"amplitude [mm]": "amplitude [deg]"} if says == "torsion" else {})
@@ -143,13 +137,11 @@ def test_a_direction_that_is_stated_contradicts_no_file(
         (["data/cmp_15961/loop_axial_1.csv"] * 2, "a file is given twice"),
     ],
 )
-def test_what_cannot_be_a_campaign(typed: Run, root: Path, tmp_path: Path, files: list[str], said: str) -> None:
+def test_what_cannot_be_a_campaign(typed, root, tmp_path, files, said):
     refused(typed("init", *(root / file for file in files), *GEOMETRY, "-o", "x", status=2), tmp_path / "x", said)
 
 
-def test_a_time_that_does_not_go_with_the_rows_is_told_by_every_fit(
-    typed: Run, tests: list[Path], tmp_path: Path
-) -> None:
+def test_a_time_that_does_not_go_with_the_rows_is_told_by_every_fit(typed, tests, tmp_path):
     """A sine recorded without time, of which a rate was stated; silence where the time is as the rows lie."""
     loop = pd.read_csv(tests[0])
     loop.drop(columns="time [s]").to_csv(tests[0], index=False)
@@ -167,7 +159,7 @@ def test_a_time_that_does_not_go_with_the_rows_is_told_by_every_fit(
 
 
 @given(st.text(st.characters(exclude_categories=["Cs"])))
-def test_any_text_is_written_as_toml(text: str) -> None:
+def test_any_text_is_written_as_toml(text):
     assert tomllib.loads(f"x = {toml_value(text)}") == {"x": text}
 
 
@@ -193,7 +185,7 @@ ANSWERS = [
 
 
 @pytest.fixture
-def silent(tests: list[Path]) -> list[Path]:
+def silent(tests) -> list[Path]:
     """A loop and a sweep that say next to nothing of themselves."""
     loop = change(tests[0], time="").rename(tests[0].with_name("first.csv"))
     sweep = tests[1].rename(tests[1].with_name("second.csv"))
@@ -202,9 +194,7 @@ def silent(tests: list[Path]) -> list[Path]:
     return [loop, sweep]
 
 
-def test_at_a_terminal_what_lacks_is_asked_for(
-    typed: Run, silent: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_at_a_terminal_what_lacks_is_asked_for(typed, silent, tmp_path, monkeypatch):
     person = answering(monkeypatch, *ANSWERS)
     told = typed("init", *silent, "-o", "x").stderr
     assert person.read() == "", "every answer was asked for"
@@ -225,24 +215,20 @@ def test_at_a_terminal_what_lacks_is_asked_for(
 
 
 @pytest.mark.parametrize("count", [0, 3, 8, len(ANSWERS) - 1])
-def test_who_leaves_a_question_open_has_nothing_written(
-    typed: Run, silent: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: int
-) -> None:
+def test_who_leaves_a_question_open_has_nothing_written(typed, silent, tmp_path, monkeypatch, count):
     answering(monkeypatch, *ANSWERS[:count])
     assert typed("init", *silent, "-o", "x", status=2).stderr.endswith("bushfit: aborted\n")
     assert not (tmp_path / "x").exists()
 
 
 @pytest.mark.parametrize("option", ["--no-input", "--json", "--quiet"])
-def test_programs_are_asked_nothing(
-    typed: Run, silent: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str
-) -> None:
+def test_programs_are_asked_nothing(typed, silent, tmp_path, monkeypatch, option):
     person = answering(monkeypatch, *ANSWERS)
     refused(typed("init", *silent, option, "-o", "x", status=2), tmp_path / "x", "there is no column for the time")
     assert person.tell() == 0
 
 
-def test_a_file_that_names_a_direction_is_no_block_in_shear(typed: Run, tests: list[Path], tmp_path: Path) -> None:
+def test_a_file_that_names_a_direction_is_no_block_in_shear(typed, tests, tmp_path):
     (tmp_path / "mount.csv").write_bytes(tests[1].read_bytes())
     block = ("--area", "900 mm^2", "--thickness", "6 mm", "--elements", "2", "--specimen", "mount")
     typed("init", tests[1], "mount.csv", *GEOMETRY, *block, "-o", "x")

@@ -5,7 +5,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from shell import CAMPAIGN, GEOMETRY, Run
+from shell import CAMPAIGN, GEOMETRY
 
 from bushfit.campaign.campaign import load_campaign
 
@@ -17,7 +17,7 @@ def sweep(root: Path, file: Path, above: str = "") -> None:
 
 
 @pytest.mark.parametrize("name", ["axial_{number}", "{part}_axial", "part {part} axial", "{part}/axial"])
-def test_files_of_several_parts_are_campaigns_and_a_manifest(name: str, typed: Run, root: Path, tmp_path: Path) -> None:
+def test_files_of_several_parts_are_campaigns_and_a_manifest(name, typed, root, tmp_path):
     """The number is above the table, in the name of the file, or in that of a folder."""
     parts = [f"P{number:02}" for number in range(1, 11)]
     for number, part in enumerate(parts):
@@ -34,7 +34,7 @@ def test_files_of_several_parts_are_campaigns_and_a_manifest(name: str, typed: R
     assert (tmp_path / "y/campaign.toml").read_text(encoding="utf-8").count("[[sweeps]]") == 10
 
 
-def test_folders_in_folders_are_searched_and_bad_names_are_left_out(typed: Run, root: Path, tmp_path: Path) -> None:
+def test_folders_in_folders_are_searched_and_bad_names_are_left_out(typed, root, tmp_path):
     sweep(root, tmp_path / "lab/monday/sweep_axial.csv")
     sweep(root, tmp_path / "lab/tuesday/deep/sweep_radial.csv")
     (tmp_path / "lab/dangling.csv").symlink_to("nowhere.csv")
@@ -47,16 +47,14 @@ def test_folders_in_folders_are_searched_and_bad_names_are_left_out(typed: Run, 
         assert words in done.stderr
 
 
-def test_control_characters_of_a_name_are_escaped(typed: Run, root: Path, tmp_path: Path) -> None:
+def test_control_characters_of_a_name_are_escaped(typed, root, tmp_path):
     sweep(root, tmp_path / "axial_\u202e\u0085.csv")
     done = typed("inspect", "axial_\u202e\u0085.csv", "--no-plots")
     assert not {"\u202e", "\u0085"} & {*done.stdout, *done.stderr}
     assert tomllib.loads(done.stdout)["sweeps"][0]["file"].endswith("axial_\u202e\u0085.csv")
 
 
-def test_the_campaign_corrects_the_radial_formula_and_mentions_the_report(
-    typed: Run, root: Path, tmp_path: Path
-) -> None:
+def test_the_campaign_corrects_the_radial_formula_and_mentions_the_report(typed, root, tmp_path):
     sweep(root, tmp_path / "axial.csv")
     typed("init", "axial.csv", *GEOMETRY, "-o", "x.toml")
     text = (tmp_path / "x.toml").read_text(encoding="utf-8")
@@ -73,7 +71,7 @@ def test_the_campaign_corrects_the_radial_formula_and_mentions_the_report(
         ('inner_diameter = "20 mm"', "the outer size of the rubber is missing"),
     ],
 )
-def test_a_campaign_has_radii_or_diameters(bushfit: Run, own: Path, keys: str, problem: str | None) -> None:
+def test_a_campaign_has_radii_or_diameters(bushfit, own, keys, problem):
     campaign = own / CAMPAIGN
     text = campaign.read_text(encoding="utf-8")
     campaign.write_text(text.replace('inner_radius = "10 mm"\nouter_radius = "18 mm"', keys), encoding="utf-8")
@@ -87,9 +85,7 @@ def test_a_campaign_has_radii_or_diameters(bushfit: Run, own: Path, keys: str, p
 
 
 @pytest.mark.parametrize(("key", "words"), [("specimen_number", "of specimens"), ("preload", "under preloads of")])
-def test_tests_of_two_specimens_or_preloads_are_not_fitted_in_silence(
-    bushfit: Run, own: Path, key: str, words: str
-) -> None:
+def test_tests_of_two_specimens_or_preloads_are_not_fitted_in_silence(bushfit, own, key, words):
     campaign = own / CAMPAIGN
     head, loop, *sweeps = campaign.read_text(encoding="utf-8").split("[[")
     stated = [f'{test.rstrip()}\n{key} = "{value}"\n' for test, value in zip(sweeps, ("0 mm", "5 mm"), strict=True)]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from shell import BUSHING, GEOMETRY, Run, names, refused
+from shell import BUSHING, GEOMETRY, names, refused
 
 from bushfit.campaign.campaign import load_campaign
 
@@ -15,7 +15,7 @@ CLEAN = ("data/arm_bushing/loop_axial_1.csv", "data/arm_bushing/sweep_radial.csv
 RECORD = "data/cmp_15961_raw/stepped_sine_axial.csv"
 
 
-def test_files_are_told_and_the_campaign_s_text_can_be_pasted(typed: Run, root: Path, tmp_path: Path) -> None:
+def test_files_are_told_and_the_campaign_s_text_can_be_pasted(typed, root, tmp_path):
     done = typed("inspect", *(root / file for file in (*CLEAN, RECORD)), "-o", "x")
     assert names(tmp_path / "x") == {"inspect.png"}
     campaign = tomllib.loads(done.stdout)
@@ -37,7 +37,7 @@ def test_files_are_told_and_the_campaign_s_text_can_be_pasted(typed: Run, root: 
         assert words in done.stderr
 
 
-def test_json_holds_everything_and_many_files_make_several_pictures(typed: Run, root: Path, tmp_path: Path) -> None:
+def test_json_holds_everything_and_many_files_make_several_pictures(typed, root, tmp_path):
     written = json.loads(typed("inspect", *(root / file for file in CLEAN), "--json", "--no-plots").stdout)
     loop, sweep = written["files"]
     assert (loop["kind"], sweep["kind"]) == ("loop", "sweep")
@@ -48,7 +48,7 @@ def test_json_holds_everything_and_many_files_make_several_pictures(typed: Run, 
     assert names(tmp_path / "x") == {"inspect.png", "inspect_2.png"}
 
 
-def test_bad_files_are_told_in_the_order_given_the_last_as_the_error(typed: Run, root: Path, tmp_path: Path) -> None:
+def test_bad_files_are_told_in_the_order_given_the_last_as_the_error(typed, root, tmp_path):
     for name in ("one", "two", "three"):
         (tmp_path / f"{name}.csv").write_text("length [mm],colour\n1,2\n2,3\n", encoding="utf-8")
     done = typed("inspect", "one.csv", root / CLEAN[0], "two.csv", "three.csv", "-o", "x", status=2)
@@ -59,7 +59,7 @@ def test_bad_files_are_told_in_the_order_given_the_last_as_the_error(typed: Run,
     assert "[[loops]]" in done.stdout
 
 
-def test_a_sheet_of_a_workbook(typed: Run, root: Path, tmp_path: Path) -> None:
+def test_a_sheet_of_a_workbook(typed, root, tmp_path):
     with pd.ExcelWriter(tmp_path / "tests axial.xlsx") as book:
         for name, file in (("loop", CLEAN[0]), ("sweep", CLEAN[1])):
             pd.read_csv(root / file).to_excel(book, sheet_name=name, index=False)
@@ -81,9 +81,7 @@ def sweeps(folder: Path, *headers: str, cells: str = "0.1,{},0.1") -> list[str]:
 @pytest.mark.parametrize(
     ("header", "option", "said"), [("time [s],displacement [mm],force", "force=N", '--unit "force=')]
 )
-def test_an_error_names_the_option_that_settles_it(
-    typed: Run, root: Path, tmp_path: Path, header: str, option: str, said: str
-) -> None:
+def test_an_error_names_the_option_that_settles_it(typed, root, tmp_path, header, option, said):
     rows = (root / CLEAN[0]).read_text(encoding="utf-8").split("\n", 1)[1]
     (tmp_path / "axial.csv").write_text(f"{header}\n{rows}", encoding="utf-8")
     assert said in typed("inspect", "axial.csv", "--no-plots", status=2).stderr
@@ -100,7 +98,7 @@ def test_an_error_names_the_option_that_settles_it(
         ("frequency [Hz],amplitude [mm],stiffness [N/mm],K* [N/mm]", "could be the stiffness", "force"),
     ],
 )
-def test_a_hint_leads_to_what_a_sweep_lacks(typed: Run, tmp_path: Path, header: str, said: str, unsaid: str) -> None:
+def test_a_hint_leads_to_what_a_sweep_lacks(typed, tmp_path, header, said, unsaid):
     done = typed("inspect", *sweeps(tmp_path, header), "--no-plots", status=2)
     assert said in done.stderr
     assert unsaid not in done.stderr.partition("try:")[2]
@@ -110,7 +108,7 @@ def test_a_hint_leads_to_what_a_sweep_lacks(typed: Run, tmp_path: Path, header: 
     "header",
     ["f [Hz],F [N],amplitude [mm],Steifigkeit dyn. [N/mm],delta [deg]", "f Hz,F in N,ampl mm,dyn. Steifigkeit,eta"],
 )
-def test_the_unit_tells_frequency_from_force(typed: Run, tmp_path: Path, header: str) -> None:
+def test_the_unit_tells_frequency_from_force(typed, tmp_path, header):
     unit = ("--unit", "stiffness=N/mm") if "eta" in header else ()
     done = typed("inspect", *sweeps(tmp_path, header, cells="60,0.1,{},0.2"), "--no-plots", *unit)
     assert "from 5 to 45 Hz" in done.stderr
@@ -137,17 +135,13 @@ def test_the_unit_tells_frequency_from_force(typed: Run, tmp_path: Path, header:
         ("amplitude 0-p [mm]", (), "0.1 mm zero-to-peak", "is assumed"),
     ],
 )
-def test_how_amplitudes_are_counted_is_said(
-    typed: Run, tmp_path: Path, header: str, options: tuple[str, ...], said: str, unsaid: str
-) -> None:
+def test_how_amplitudes_are_counted_is_said(typed, tmp_path, header, options, said, unsaid):
     done = typed("inspect", *sweeps(tmp_path, f"f [Hz],{header},stiffness [N/mm],eta"), "--no-plots", *options)
     assert said in done.stderr
     assert unsaid not in done.stderr
 
 
-def test_a_column_is_named_where_it_stands_and_the_text_holds_in_any_folder(
-    typed: Run, tmp_path: Path, root: Path
-) -> None:
+def test_a_column_is_named_where_it_stands_and_the_text_holds_in_any_folder(typed, tmp_path, root):
     files = sweeps(tmp_path, *(f"f [Hz],{level} [mm],stiffness [N/mm],eta" for level in ("Pegel SS", "amplitude")))
     done = typed("inspect", *files, "--no-plots", "--column", "amplitude=Pegel SS [mm]")
     one, other = tomllib.loads(done.stdout)["sweeps"]
@@ -177,9 +171,7 @@ def test_a_column_is_named_where_it_stands_and_the_text_holds_in_any_folder(
         (("Pegel SS", "Niveau"), ("axial_1.csv, line 1", '--column "amplitude=Niveau [mm]"', "--at-amplitude")),
     ],
 )
-def test_a_column_that_no_file_has_is_refused(
-    typed: Run, tmp_path: Path, levels: tuple[str, ...], said: tuple[str, ...]
-) -> None:
+def test_a_column_that_no_file_has_is_refused(typed, tmp_path, levels, said):
     files = sweeps(tmp_path, *(f"f [Hz],{level} [mm],stiffness [N/mm],eta" for level in levels))
     done = typed("init", *files, *GEOMETRY, "--column", "amplitude=Pegel SS", "-o", "x", status=2)
     refused(done, tmp_path / "x", *said, "try: ")

@@ -41,7 +41,7 @@ def inspected(typed: Run, file: str) -> dict[str, object]:
     ],
     ids=str,
 )
-def test_a_ripple_is_no_loop(typed: Run, root: Path, tmp_path: Path, ripple: tuple[float, float] | str) -> None:
+def test_a_ripple_is_no_loop(typed, root, tmp_path, ripple):
     time, motion, force = measured(root)
     amplitude = 1.0
     if ripple == "hunting at the reversals":
@@ -68,7 +68,7 @@ def test_a_ripple_is_no_loop(typed: Run, root: Path, tmp_path: Path, ripple: tup
 
 
 @pytest.mark.parametrize("shape", ["triangle", "trapezoid", "zero to full", "one cycle"])
-def test_other_slow_motions_with_a_ripple(typed: Run, tmp_path: Path, shape: str) -> None:
+def test_other_slow_motions_with_a_ripple(typed, tmp_path, shape):
     cycles = {"one cycle": 1.0}.get(shape, 3.0)
     time = np.arange(0.0, 50.0 * cycles, 0.02)
     phase = 0.02 * time
@@ -86,7 +86,7 @@ def test_other_slow_motions_with_a_ripple(typed: Run, tmp_path: Path, shape: str
     assert facts["frequency"].startswith("0.02 Hz")
 
 
-def test_a_fit_is_the_same_with_a_ripple(bushfit: Run, work: Path, own: Path) -> None:
+def test_a_fit_is_the_same_with_a_ripple(bushfit, work, own):
     time, motion, force = measured(own)
     record(own / "data/cmp_15961/loop_axial_1.csv", time, motion + sine(time, 0.5, 25.0), force)
     bushfit("fit", own / CAMPAIGN, "-o", own / "rippled", "--no-plots")
@@ -109,9 +109,7 @@ def small_tests(levels: Sequence[float], mean: float, wait: float) -> tuple[Arra
 
 
 @pytest.mark.parametrize(("levels", "mean"), [((0.02,), 5.0), ((0.02, 0.05, 0.1), 5.0), ((0.02, 1.0), 0.0)])
-def test_a_small_test_with_time_for_itself_is_read(
-    typed: Run, tmp_path: Path, levels: tuple[float, ...], mean: float
-) -> None:
+def test_a_small_test_with_time_for_itself_is_read(typed, tmp_path, levels, mean):
     time, motion = small_tests(levels, mean, wait=20.0)
     record(tmp_path / "axial.csv", time, motion, 300.0 * motion + 0.4 * np.gradient(motion, time))
     typed("reduce", "axial.csv", "-o", "x", "--no-plots")

@@ -21,7 +21,7 @@ def odd(typed: Run, folder: Path, header: str, stiffness: np.ndarray, frequency:
 
 @pytest.mark.parametrize("row", [0, 1, 5, 9])
 @pytest.mark.parametrize("factor", [10.0, 0.1, 1.3])
-def test_an_outlier_without_repeats_is_found(typed: Run, tmp_path: Path, row: int, factor: float) -> None:
+def test_an_outlier_without_repeats_is_found(typed, tmp_path, row, factor):
     scatter = 1.0 + 2e-3 * np.random.default_rng(row).standard_normal(10)
     stiffness = 594.0 * (FREQUENCY / 5.0) ** 0.06 * scatter
     assert odd(typed, tmp_path, HEADER, stiffness) == []
@@ -31,7 +31,7 @@ def test_an_outlier_without_repeats_is_found(typed: Run, tmp_path: Path, row: in
     assert "off the smooth curve through the others" in sentence
 
 
-def test_a_bent_curve_is_no_outlier(typed: Run, tmp_path: Path) -> None:
+def test_a_bent_curve_is_no_outlier(typed, tmp_path):
     frequency = np.geomspace(0.1, 1000.0, 25)
     stiffness = 600.0 + 900.0 / (1.0 + (100.0 / frequency) ** 1.5)
     assert not [line for line in odd(typed, tmp_path, HEADER, stiffness, frequency) if "smooth curve" in line]
@@ -46,7 +46,7 @@ def test_a_bent_curve_is_no_outlier(typed: Run, tmp_path: Path) -> None:
         ("frequency [Hz],strain [km/m],G' [MPa],tan delta [-]", "strain of 10000 to 10000 %"),
     ],
 )
-def test_a_size_that_no_test_has_is_odd(typed: Run, tmp_path: Path, header: str, words: str) -> None:
+def test_a_size_that_no_test_has_is_odd(typed, tmp_path, header, words):
     (sentence,) = odd(typed, tmp_path, header, 500.0 + 0.5 * FREQUENCY)
     assert sentence.startswith(words)
     assert "is the unit in the header right?" in sentence

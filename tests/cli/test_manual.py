@@ -4,10 +4,10 @@ import re
 from pathlib import Path
 
 import pytest
-from shell import Run, refused, values
+from shell import refused, values
 
 
-def test_the_manual_is_one_file_whose_links_stay_in_it(bushfit: Run, root: Path, tmp_path: Path) -> None:
+def test_the_manual_is_one_file_whose_links_stay_in_it(bushfit, root, tmp_path):
     bushfit("manual", "diagnosis", "-o", tmp_path / "m")
     text = (tmp_path / "m/manual.html").read_text(encoding="utf-8")
     pages = {page.stem for page in (root / "bushfit/manual").glob("*.md")}
@@ -22,7 +22,7 @@ def test_the_manual_is_one_file_whose_links_stay_in_it(bushfit: Run, root: Path,
     assert text.count("<table>") > 20
 
 
-def test_without_a_folder_the_browser_opens_at_the_page(bushfit: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_folder_the_browser_opens_at_the_page(bushfit, monkeypatch):
     opened = list[str]()
     monkeypatch.setattr("click.launch", opened.append)
     bushfit("manual", "fitting")
@@ -31,7 +31,7 @@ def test_without_a_folder_the_browser_opens_at_the_page(bushfit: Run, monkeypatc
     refused(bushfit("manual", "fiting", status=2), Path("nowhere"), "no such page", 'did you mean "fitting"?')
 
 
-def test_the_example_runs_and_gives_back_its_parameters(bushfit: Run, table_1: dict, tmp_path: Path) -> None:
+def test_the_example_runs_and_gives_back_its_parameters(bushfit, table_1, tmp_path):
     done = bushfit("example", "-o", tmp_path / "my example")
     assert f'next: bushfit run "{tmp_path}/my example/campaign.toml"' in done.stderr
     assert "Simulated by bushfit simulate" in (tmp_path / "my example/campaign.toml").read_text(encoding="utf-8")

@@ -5,15 +5,14 @@ import os
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-from shell import Run, document, refused
+from shell import document, refused
 
 EXAMPLE = "data/example_effect/quadratic_damping.py"
 
 
-def test_an_installed_package_is_fitted_named_and_in_every_result(root: Path, tmp_path: Path) -> None:
+def test_an_installed_package_is_fitted_named_and_in_every_result(root, tmp_path):
     install = ["-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation", "--target", str(tmp_path / "site")]
     shutil.copytree(root / "data/example_effect", tmp_path / "source")
     subprocess.run([sys.executable, *install, str(tmp_path / "source")], check=True)
@@ -42,7 +41,7 @@ def test_an_installed_package_is_fitted_named_and_in_every_result(root: Path, tm
         run("predict", "d/model.json", "-o", "p")
 
 
-def test_a_file_is_run_only_with_permission_and_only_as_it_was(bushfit: Run, root: Path, tmp_path: Path) -> None:
+def test_a_file_is_run_only_with_permission_and_only_as_it_was(bushfit, root, tmp_path):
     law = tmp_path / "quadratic_damping.py"
     shutil.copy(root / EXAMPLE, law)
     text = (root / "configs/own_law.toml").read_text(encoding="utf-8")
@@ -69,7 +68,7 @@ def test_a_file_is_run_only_with_permission_and_only_as_it_was(bushfit: Run, roo
         ("x = (\n", ["SyntaxError"]),
     ],
 )
-def test_a_law_that_is_none(code: str, words: list[str], bushfit: Run, root: Path, tmp_path: Path) -> None:
+def test_a_law_that_is_none(code, words, bushfit, root, tmp_path):
     (tmp_path / "my_law.py").write_text(code)
     text = (root / "configs/own_law.toml").read_text(encoding="utf-8")
     (tmp_path / "own.toml").write_text(text.replace(f"../{EXAMPLE}", "my_law.py"))
@@ -77,7 +76,7 @@ def test_a_law_that_is_none(code: str, words: list[str], bushfit: Run, root: Pat
     refused(done, tmp_path / "x", "own.toml", *words)
 
 
-def test_a_law_cannot_take_the_name_of_another(bushfit: Run, root: Path, tmp_path: Path) -> None:
+def test_a_law_cannot_take_the_name_of_another(bushfit, root, tmp_path):
     shutil.copy(root / EXAMPLE, tmp_path / "viscous.py")
     text = (root / "configs/own_law.toml").read_text(encoding="utf-8")
     (tmp_path / "own.toml").write_text(text.replace(f"../{EXAMPLE}", "viscous.py"))

@@ -1,11 +1,10 @@
 """A unit that is wrong by a power of 1000: the test that no rubber could have given is the one to name."""
 
 import json
-from pathlib import Path
 
 import pandas as pd
 import pytest
-from shell import CAMPAIGN, Run
+from shell import CAMPAIGN
 
 SWEEP, LOOP = "sweep_axial", "loop_axial_1"
 
@@ -19,9 +18,7 @@ SWEEP, LOOP = "sweep_axial", "loop_axial_1"
         pytest.param(*(LOOP, "force [N]", "force [mN]", "thousandfold_force"), marks=pytest.mark.slow),
     ],
 )
-def test_the_unit_and_not_another_test_is_named(
-    bushfit: Run, own: Path, test: str, stated: str, wrong: str, mistake: str
-) -> None:
+def test_the_unit_and_not_another_test_is_named(bushfit, own, test, stated, wrong, mistake):
     file = own / f"data/cmp_15961/{test}.csv"
     pd.read_csv(file, comment="#").rename(columns={stated: wrong}).to_csv(file, index=False)
     bushfit("diagnose", own / CAMPAIGN, "-o", own / "x", "--no-plots")

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from shell import CAMPAIGN, Run, document, names, typing, values
+from shell import CAMPAIGN, document, names, typing, values
 
 FILES = {"compare.json", "parameters.csv", "differences.csv", "compare.png", "compare.html"}
 
 
-def test_a_folder_a_model_and_a_campaign_of_the_same_tests_differ_in_nothing(bushfit: Run, tmp_path: Path) -> None:
+def test_a_folder_a_model_and_a_campaign_of_the_same_tests_differ_in_nothing(bushfit, tmp_path):
     folder = tmp_path / "x"
     done = bushfit("compare", "model", "model/model.json", CAMPAIGN, "-o", folder, "--json")
     assert names(folder) == FILES
@@ -32,9 +32,7 @@ def test_a_folder_a_model_and_a_campaign_of_the_same_tests_differ_in_nothing(bus
         assert line in done.stderr
 
 
-def test_another_bushing_differs_and_the_places_and_grid_are_those_asked_for(
-    bushfit: Run, root: Path, tmp_path: Path
-) -> None:
+def test_another_bushing_differs_and_the_places_and_grid_are_those_asked_for(bushfit, root, tmp_path):
     truth = root / "data/arm_bushing/truth.json"
     grid = ("--frequencies", "10, 20 Hz", "--amplitudes", "0.1 mm", "--direction", "radial", "--direction", "axial")
     done = bushfit("compare", "model/model.json", truth, *grid, "-o", tmp_path / "x", "--no-plots")
@@ -48,7 +46,7 @@ def test_another_bushing_differs_and_the_places_and_grid_are_those_asked_for(
     assert "B against A, axial: stiffness 2" in done.stderr
 
 
-def test_families_of_one_campaign_are_fitted_and_held_out(bushfit: Run, tmp_path: Path) -> None:
+def test_families_of_one_campaign_are_fitted_and_held_out(bushfit, tmp_path):
     folder = tmp_path / "x"
     done = bushfit("compare", CAMPAIGN, "-o", folder, "--json", "--families", "kraus, intrinsic_time")
     assert names(folder) == {*FILES, "families.csv"}
@@ -65,9 +63,7 @@ def test_families_of_one_campaign_are_fitted_and_held_out(bushfit: Run, tmp_path
 ARM = "data/arm_bushing/truth.json"
 
 
-def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_amplitudes(
-    bushfit: Run, tmp_path: Path
-) -> None:
+def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_amplitudes(bushfit, tmp_path):
     grid = ("--frequencies", "10:30:10 Hz", "--amplitudes", "0.1, 0.3 mm")
     done = bushfit("predict", "model/model.json", "--campaign", CAMPAIGN, "-o", tmp_path / "x", *grid)
     assert names(tmp_path / "x") == {"axial.csv", "axial.png", "radial.csv", "radial.png", "measured.csv"}
@@ -94,7 +90,7 @@ def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_ampl
     assert len(pd.read_csv(tmp_path / "y/axial.csv")["amplitude [mm]"].unique()) == 30
 
 
-def test_predict_says_each_warning_once_and_in_its_document(bushfit: Run, root: Path, tmp_path: Path) -> None:
+def test_predict_says_each_warning_once_and_in_its_document(bushfit, root, tmp_path):
     truth = root / "data/mystery_mount/open_last/truth.json"
     shaken = ("--mass", "0.2 kg", "--base-acceleration", "0.1 m/s^2", "--direction", "axial")
     for said, model, *more in (
@@ -110,7 +106,7 @@ def test_predict_says_each_warning_once_and_in_its_document(bushfit: Run, root: 
         assert any(said in line for line in warnings)
 
 
-def test_predict_writes_maxwell_arms_where_asked(bushfit: Run, root: Path, tmp_path: Path) -> None:
+def test_predict_writes_maxwell_arms_where_asked(bushfit, root, tmp_path):
     folder = tmp_path / "x"
     done = bushfit("predict", root / ARM, "--arms", "0.5 %", "-o", folder, "--json")
     (part,) = json.loads(done.stdout)["arms"]
@@ -126,9 +122,7 @@ def test_predict_writes_maxwell_arms_where_asked(bushfit: Run, root: Path, tmp_p
     assert 0.001 < json.loads(done.stdout)["arms"][0]["largest_relative_error"] <= 0.01, "where no error is given"
 
 
-def test_predict_writes_the_static_curve_at_the_rate_of_the_slowest_loop(
-    bushfit: Run, work: Path, tmp_path: Path
-) -> None:
+def test_predict_writes_the_static_curve_at_the_rate_of_the_slowest_loop(bushfit, work, tmp_path):
     model = document(work / "model/model.json")
     (loop,) = (test for test in model["campaign"]["tests"] if test["kind"] == "loop")
     slow = 4.0 * loop["frequency_Hz"][0] * loop["amplitude"][1] * 60e3
@@ -151,7 +145,7 @@ def test_predict_writes_the_static_curve_at_the_rate_of_the_slowest_loop(
     assert slower["displacement [mm]"].max() == pytest.approx(0.2)
 
 
-def test_predict_on_a_large_motion_and_on_an_offset(bushfit: Run, tmp_path: Path) -> None:
+def test_predict_on_a_large_motion_and_on_an_offset(bushfit, tmp_path):
     grid = ("--direction", "axial", "--frequencies", "10, 20 Hz", "--amplitudes", "0.1 mm")
     tables = {}
     for name, motion in (("slow", "0.5 Hz 1 mm"), ("offset", "-0.8 mm"), ("alone", None)):
@@ -182,16 +176,14 @@ def test_predict_on_a_large_motion_and_on_an_offset(bushfit: Run, tmp_path: Path
         (("--static-rate", "-1 mm/min"), "a value above zero"),
     ],
 )
-def test_motions_that_cannot_be_answered_are_told(
-    bushfit: Run, tmp_path: Path, options: tuple[str, ...], words: str
-) -> None:
+def test_motions_that_cannot_be_answered_are_told(bushfit, tmp_path, options, words):
     done = bushfit("predict", "model/model.json", *options, "-o", tmp_path / "x", status=2)
     assert words in done.stderr
     assert not (tmp_path / "x").exists()
 
 
 @pytest.fixture(scope="module")
-def planned(root: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict, str]:
+def planned(root, tmp_path_factory) -> tuple[Path, dict, str]:
     """The folder of a plan for a bushing that was not tested, its document, and what was said."""
     folder = tmp_path_factory.mktemp("planned")
     options = ("--hours", "1.5", "-o", folder, "--json")
@@ -199,7 +191,7 @@ def planned(root: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path,
     return folder, json.loads(done.stdout), done.stderr
 
 
-def test_sheet_document_and_screen_tell_the_same_plan(planned: tuple[Path, dict, str]) -> None:
+def test_sheet_document_and_screen_tell_the_same_plan(planned):
     folder, plan, said = planned
     sheet = pd.read_csv(folder / "plan.csv")
     assert names(folder) == {"plan.json", "plan.csv", "campaign.toml"}
@@ -213,7 +205,7 @@ def test_sheet_document_and_screen_tell_the_same_plan(planned: tuple[Path, dict,
         assert 0.0 < reached["planned"] < reached["before"]
 
 
-def test_simulate_takes_the_plan_and_fit_its_tests(root: Path, planned: tuple[Path, dict, str], tmp_path: Path) -> None:
+def test_simulate_takes_the_plan_and_fit_its_tests(root, planned, tmp_path):
     folder, plan, _ = planned
     typing(root)("simulate", folder / "campaign.toml", "-o", tmp_path)
     both = ("--direction", "axial", "--direction", "radial", "--json", "--no-plots")
@@ -223,7 +215,7 @@ def test_simulate_takes_the_plan_and_fit_its_tests(root: Path, planned: tuple[Pa
         assert abs(np.log(found[name] / truth[name]["value"])) < 4.0 * reached["planned"]
 
 
-def test_a_plan_after_tests_counts_them(bushfit: Run, tmp_path: Path) -> None:
+def test_a_plan_after_tests_counts_them(bushfit, tmp_path):
     """Errors before are those of the campaign with the class of its rig; further tests lower them."""
     options = ("--for", "parameters", "--hours", "1.2", "--direction", "axial", "--no-plots", "--json")
     found = json.loads(bushfit("plan", CAMPAIGN, *options, "-o", tmp_path).stdout)
@@ -248,9 +240,7 @@ parameters = { mu = "1.09 MPa", m = "0.2 MPa*s^alpha", alpha = 0.24, sigma_fmax 
     [("2.5", 5, ("two blocks", "mount")), ("4", 10, ("mount", "two blocks"))],
     ids=["stated", "asked"],
 )
-def test_specimens_are_mounted_once_in_their_order_and_each_tells_its_scatter(
-    typed: Run, tmp_path: Path, hours: str, fewest: int, order: tuple[str, str]
-) -> None:
+def test_specimens_are_mounted_once_in_their_order_and_each_tells_its_scatter(typed, tmp_path, hours, fewest, order):
     """As the campaign lists them, or as asked for. Each is on a rig of its own, of which repeats have to tell."""
     (tmp_path / "plan.toml").write_text(SPECIMENS, encoding="utf-8")
     asked = [word for name in order for word in ("--direction", name)] if order[0] == "mount" else []
@@ -270,7 +260,7 @@ NEW, OTHER = "configs/new_bushing.toml", "data/practice/case_003/bushing.toml"
 TARGETS = (NEW, "--no-plots", "--json")
 
 
-def test_a_plan_for_targets_stops_once_they_are_met(root: Path, tmp_path: Path) -> None:
+def test_a_plan_for_targets_stops_once_they_are_met(root, tmp_path):
     """In less than half of the hours, in every direction whose stiffness is asked for, and said; what is not asked for
     is not planned, and tighter targets take longer."""
     bushfit = typing(root)
@@ -307,9 +297,7 @@ def test_a_plan_for_targets_stops_once_they_are_met(root: Path, tmp_path: Path) 
         (OTHER, ("stiffness.axial=1 %",), "+/-26 % at 145 Hz and 0.08 mm is the model error"),
     ],
 )
-def test_what_keeps_a_target_from_being_met_is_named(
-    root: Path, tmp_path: Path, source: str, options: tuple[str, ...], said: str
-) -> None:
+def test_what_keeps_a_target_from_being_met_is_named(root, tmp_path, source, options, said):
     done = typing(root)("plan", source, "--target", *options, "--no-plots", "-o", tmp_path, status=1)
     name, found = next(iter(document(tmp_path / "plan.json")["targets"].items()))
     assert said in found["why"]
@@ -318,14 +306,14 @@ def test_what_keeps_a_target_from_being_met_is_named(
     assert f"these targets are not met: {name}" in done.stderr.replace("\n", " ")
 
 
-def test_no_test_is_planned_for_what_is_known(bushfit: Run, tmp_path: Path) -> None:
+def test_no_test_is_planned_for_what_is_known(bushfit, tmp_path):
     done = bushfit("plan", CAMPAIGN, "--target", "mu=20 %", "-o", tmp_path)
     assert "no test is needed" in done.stderr
     assert names(tmp_path) == {"plan.json", "plan.csv"}
     assert pd.read_csv(tmp_path / "plan.csv").empty
 
 
-def test_where_nothing_was_tested_alike_the_compound_is_compared(bushfit: Run, root: Path, tmp_path: Path) -> None:
+def test_where_nothing_was_tested_alike_the_compound_is_compared(bushfit, root, tmp_path):
     bushfit("fit", root / "configs/epdm_70.toml", "--direction", "DMA", "--no-plots", "-o", tmp_path / "dma")
     done = bushfit("compare", "model", tmp_path / "dma", "-o", tmp_path / "x", "--no-plots")
     table = pd.read_csv(tmp_path / "x/differences.csv")

@@ -69,7 +69,7 @@ TABLES = ("csv", "xlsx")
 
 
 @pytest.fixture(scope="module")
-def campaign(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+def campaign(tmp_path_factory) -> Callable[[str], Path]:
     """The folder with the campaign of a shape, simulated once."""
 
     @cache
@@ -169,9 +169,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("shape", "writer", "more"), CASES)
-def test_what_a_command_writes_is_read_by_those_that_take_it(
-    campaign: Callable[[str], Path], tmp_path: Path, shape: str, writer: str, more: str
-) -> None:
+def test_what_a_command_writes_is_read_by_those_that_take_it(campaign, tmp_path, shape, writer, more):
     tests = campaign(shape)
     for model in written(tests, writer, tmp_path):
         taken(tests, model, tmp_path, more if model.stem == WRITERS[writer] else "")

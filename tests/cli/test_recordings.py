@@ -13,7 +13,7 @@ import pyuff
 import recordings
 from asammdf import MDF, Signal
 from scipy.io import savemat
-from shell import BUSHING, GEOMETRY, Run, document, refused, typing, values
+from shell import BUSHING, GEOMETRY, document, refused, typing, values
 
 #: The endings of the loop, the axial and the radial sweep of a campaign, so that each format has both kinds of test.
 MIXED = [("tdms", "mat", "mf4"), ("uff", "parquet", "v73.mat"), ("mat", "tdms", "feather"), ("v73.mat", "mf4", "tdms")]
@@ -25,7 +25,7 @@ MILLIMETRES = {
 
 
 @pytest.mark.parametrize("endings", MIXED, ids="-".join)
-def test_a_fit_of_recordings_is_the_fit_of_their_csv(own: Path, work: Path, endings: tuple[str, ...]) -> None:
+def test_a_fit_of_recordings_is_the_fit_of_their_csv(own, work, endings):
     """Of simulated tests of the paper's bushing, with noise."""
     campaign = (own / "configs/cmp_15961.toml").read_text(encoding="utf-8")
     for name, ending in zip(("loop_axial_1", "sweep_axial", "sweep_radial"), endings, strict=True):
@@ -39,7 +39,7 @@ def test_a_fit_of_recordings_is_the_fit_of_their_csv(own: Path, work: Path, endi
 
 
 @pytest.mark.parametrize(("force", "length"), [("N", "mm"), ("kN", "m"), ("NONE", "NONE"), ("nodes", "")])
-def test_frequency_responses_of_uff_are_sweeps(own: Path, force: str, length: str) -> None:
+def test_frequency_responses_of_uff_are_sweeps(own, force, length):
     """Of force over displacement, one at each amplitude, units in labels or of dataset 164, or at nodes."""
     sets: list[dict[str, Any]] = [MILLIMETRES]
     for amplitude, rows in pd.read_csv(own / "data/cmp_15961/sweep_axial.csv").groupby("amplitude [mm]"):
@@ -126,9 +126,7 @@ SPOILED: list[tuple[str, Callable[[Path], object], tuple[str, ...]]] = [
 
 
 @pytest.mark.parametrize(("name", "write", "words"), SPOILED, ids=[name for name, *_ in SPOILED])
-def test_what_cannot_be_read_is_one_clear_error(
-    typed: Run, tmp_path: Path, name: str, write: Callable[[Path], object], words: tuple[str, ...]
-) -> None:
+def test_what_cannot_be_read_is_one_clear_error(typed, tmp_path, name, write, words):
     write(tmp_path / name)
     (tmp_path / "c.toml").write_text(f'{BUSHING}\n[[loops]]\nfile = "{name}"\ndirection = "axial"\n')
     for line in (("run", "c.toml"), ("inspect", name), ("init", name, "--direction", "axial", *GEOMETRY)):
@@ -141,16 +139,14 @@ def test_what_cannot_be_read_is_one_clear_error(
     ("ending", "package"),
     [("tdms", "nptdms"), ("mf4", "asammdf"), ("uff", "pyuff"), ("v73.mat", "h5py"), ("parquet", "pyarrow")],
 )
-def test_a_missing_library_is_named(
-    typed: Run, tmp_path: Path, ending: str, package: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_library_is_named(typed, tmp_path, ending, package, monkeypatch):
     recordings.WRITERS[ending](LOOP, tmp_path / f"loop.{ending}")
     monkeypatch.setitem(sys.modules, package, None)
     done = typed("inspect", f"loop.{ending}", "-o", "x", status=2)
     refused(done, tmp_path / "x", f"no package {package}", 'pip install "bushfit[instruments]"')
 
 
-def test_what_a_file_does_not_tell_is_stated_as_of_csv(typed: Run, tmp_path: Path) -> None:
+def test_what_a_file_does_not_tell_is_stated_as_of_csv(typed, tmp_path):
     """A matrix has neither names nor units; one group of two is chosen as a sheet is."""
     slow = {"oil": np.arange(40.0)}
     savemat(tmp_path / "axial.mat", {"log": LOOP.to_numpy(), "oil": slow})

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from shell import Run
 
 N = 400
 TIME = np.arange(N) / 200.0
@@ -20,7 +19,7 @@ def write(folder: Path, name: str = "road.csv", **columns: np.ndarray) -> str:
     return str(folder / name)
 
 
-def test_each_direction_has_displacement_force_and_band(bushfit: Run, tmp_path: Path) -> None:
+def test_each_direction_has_displacement_force_and_band(bushfit, tmp_path):
     road = write(
         tmp_path, time__s=TIME, axial_displacement__mm=MOTION, torsion__deg=MOTION, radial_travel__um=50 * MOTION
     )
@@ -43,7 +42,7 @@ def test_each_direction_has_displacement_force_and_band(bushfit: Run, tmp_path: 
     assert figures["axial"]["share_of_time_above_tested_strain"] == 0.0
 
 
-def test_one_column_takes_its_direction_from_an_option(bushfit: Run, tmp_path: Path) -> None:
+def test_one_column_takes_its_direction_from_an_option(bushfit, tmp_path):
     road = write(tmp_path, t__s=TIME, Sy=MOTION)
     stated = ("--column", "displacement=Sy", "--unit", "displacement=mm", "--direction", "axial")
     bushfit("respond", "model", road, *stated, "-o", tmp_path / "a", "--no-plots")
@@ -66,9 +65,7 @@ def test_one_column_takes_its_direction_from_an_option(bushfit: Run, tmp_path: P
         (TIME, MOTION, ("--lowpass", "60 Hz"), "low-passed at 60 Hz without delay, which removes"),
     ],
 )
-def test_corrections_are_stated(
-    bushfit: Run, tmp_path: Path, time: np.ndarray, motion: np.ndarray, options: tuple[str, ...], warning: str
-) -> None:
+def test_corrections_are_stated(bushfit, tmp_path, time, motion, options, warning):
     road = write(tmp_path, time__s=time, axial_displacement__mm=motion)
     done = bushfit("respond", "model", road, *options, "-o", tmp_path / "out", "--no-plots", "-v")
     assert warning in done.stderr
@@ -99,16 +96,14 @@ def test_corrections_are_stated(
         ({"time__s": np.append(TIME[:-1], 100.0), "axial_displacement__mm": MOTION}, (), "too uneven"),
     ],
 )
-def test_what_cannot_be_used_is_one_error(
-    bushfit: Run, tmp_path: Path, columns: dict[str, np.ndarray], options: tuple[str, ...], problem: str
-) -> None:
+def test_what_cannot_be_used_is_one_error(bushfit, tmp_path, columns, options, problem):
     road = write(tmp_path, **columns)
     done = bushfit("respond", "model", road, *options, "-o", tmp_path / "out", status=2)
     assert problem in done.stderr
     assert not (tmp_path / "out").exists()
 
 
-def test_a_channel_that_never_moves_is_left_out(bushfit: Run, tmp_path: Path) -> None:
+def test_a_channel_that_never_moves_is_left_out(bushfit, tmp_path):
     still = {"radial_displacement__mm": 0.0 * TIME + 3.0}
     road = write(tmp_path, time__s=TIME, axial_displacement__mm=MOTION, **still)
     done = bushfit("respond", "model", road, "-o", tmp_path / "out", "--no-plots", "-v")
@@ -116,7 +111,7 @@ def test_a_channel_that_never_moves_is_left_out(bushfit: Run, tmp_path: Path) ->
     assert list(pd.read_csv(tmp_path / "out/response.csv"))[1] == "displacement [mm]"
 
 
-def test_channels_of_a_steady_state_keep_one_length(bushfit: Run, tmp_path: Path) -> None:
+def test_channels_of_a_steady_state_keep_one_length(bushfit, tmp_path):
     """The last row repeats the first, which one channel alone, flat at its start, does not show."""
     flat = np.maximum(np.sin(2.0 * np.pi * TIME / TIME[-1]) - 0.5, 0.0)
     sine = np.sin(2.0 * np.pi * 4.0 * TIME / TIME[-1])
@@ -125,7 +120,7 @@ def test_channels_of_a_steady_state_keep_one_length(bushfit: Run, tmp_path: Path
     assert len(pd.read_csv(tmp_path / "out/response.csv")) == N - 1
 
 
-def test_a_batch_responds_for_each_part(bushfit: Run, work: Path, tmp_path: Path) -> None:
+def test_a_batch_responds_for_each_part(bushfit, work, tmp_path):
     write(tmp_path, time__s=TIME, axial_displacement__mm=MOTION)
     model, campaign = work / "model/model.json", work / "configs/cmp_15961.toml"
     settings = f"commands = ['respond']\nmodel = '{model}'\n"
@@ -143,7 +138,7 @@ def test_a_batch_responds_for_each_part(bushfit: Run, work: Path, tmp_path: Path
 
 
 @pytest.mark.slow
-def test_a_million_rows(bushfit: Run, tmp_path: Path) -> None:
+def test_a_million_rows(bushfit, tmp_path):
     time = np.arange(1_000_000) * 1e-3
     random = np.random.default_rng(1)
     motion = sum(np.sin(2.0 * np.pi * f * time + p) for f, p in random.uniform(0.5, 7.0, (20, 2)))

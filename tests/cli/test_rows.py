@@ -9,7 +9,7 @@ import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
-from shell import BUSHING, GEOMETRY, Run, refused
+from shell import BUSHING, GEOMETRY, refused
 
 from bushfit.campaign.campaign import load_campaign
 
@@ -24,7 +24,7 @@ Rows = list[tuple[float, ...]]
 
 
 @pytest.fixture(scope="module")
-def points(root: Path) -> dict[str, Rows]:
+def points(root) -> dict[str, Rows]:
     """The first pass of the paper's sweeps by direction: frequency, amplitude, stiffness and loss factor."""
     tables = {way: pd.read_csv(root / f"data/cmp_15961/sweep_{way}.csv") for way in ("axial", "radial")}
     return {
@@ -47,9 +47,7 @@ def export(file: Path, header: Sequence[str], rows: Sequence[Sequence[object]], 
 
 
 @pytest.mark.parametrize(("language", "ending"), [*((language, "csv") for language in DIRECTIONS), ("English", "xlsx")])
-def test_directions_are_tests_of_their_own(
-    typed: Run, points: dict[str, Rows], tmp_path: Path, language: str, ending: str
-) -> None:
+def test_directions_are_tests_of_their_own(typed, points, tmp_path, language, ending):
     head, axial, radial, delimiter = DIRECTIONS[language]
     # in a workbook the cells of one direction are merged, and empty but for the first
     word = {
@@ -70,7 +68,7 @@ def test_directions_are_tests_of_their_own(
     assert [str(sweep.direction) for sweep in load_campaign(tmp_path / "y/campaign.toml").sweeps] == ["axial"]
 
 
-def test_parts_are_a_batch(typed: Run, points: dict[str, Rows], tmp_path: Path) -> None:
+def test_parts_are_a_batch(typed, points, tmp_path):
     factors = {"17": 1.0, "A/1": 1.1, "19": 0.9}
     rows = [
         (part, way, *row[:2], row[2] * by, row[3])
@@ -95,7 +93,7 @@ def test_parts_are_a_batch(typed: Run, points: dict[str, Rows], tmp_path: Path) 
 
 
 @pytest.mark.parametrize(("ending", "delimiter"), [("csv", ","), ("csv", ";"), ("xlsx", "")])
-def test_runs_are_repeats(typed: Run, points: dict[str, Rows], tmp_path: Path, ending: str, delimiter: str) -> None:
+def test_runs_are_repeats(typed, points, tmp_path, ending, delimiter):
     """A row that begins with #1 is no comment where all do."""
     rows = [(f"#{run}", *row[:2], row[2] * (1.0 + run / 1e3), row[3]) for run in (1, 2, 3) for row in points["axial"]]
     export(tmp_path / f"axial.{ending}", ("Run", *HEADERS), rows, delimiter)
@@ -104,7 +102,7 @@ def test_runs_are_repeats(typed: Run, points: dict[str, Rows], tmp_path: Path, e
     assert not [sentence for sentence in seen["odd"] if "not understood" in sentence]
 
 
-def test_what_is_not_understood_is_named(typed: Run, points: dict[str, Rows], tmp_path: Path) -> None:
+def test_what_is_not_understood_is_named(typed, points, tmp_path):
     rows = [
         (*row[:2], row[2] * by, row[3], name, k)
         for name, by in (("NR45", 1.0), ("NR60", 1.1))
@@ -131,9 +129,7 @@ def test_what_is_not_understood_is_named(typed: Run, points: dict[str, Rows], tm
         ('direction = "axial"\n[[sweeps]]\nfile = "both.csv"\ndirection = "axial"', ["a file is listed twice"]),
     ],
 )
-def test_a_campaign_that_contradicts_a_column(
-    typed: Run, points: dict[str, Rows], tmp_path: Path, entries: str, said: list[str]
-) -> None:
+def test_a_campaign_that_contradicts_a_column(typed, points, tmp_path, entries, said):
     export(tmp_path / "both.csv", ("Direction", *HEADERS), [(way, *row) for way in points for row in points[way]])
     (tmp_path / "c.toml").write_text(f'{BUSHING}[[sweeps]]\nfile = "both.csv"\n{entries}\n', encoding="utf-8")
     refused(typed("fit", "c.toml", "-o", "x", status=2), tmp_path / "x", *said)

@@ -1,14 +1,12 @@
 """Commands on several bushings of one compound: names of bushings and directions, and other campaigns."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from shell import Run, typing
+from shell import typing
 
 from bushfit.geometry import Specimen
 from bushfit.report.results import place_names
@@ -20,7 +18,7 @@ SIZES = 'inner_radius = "10 mm"\nouter_radius = "18 mm"\nlength = "50 mm"\n'
 
 
 @pytest.fixture(scope="module")
-def shapes(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def shapes(root, tmp_path_factory) -> Path:
     """A folder with the fit of three shapes under `model`, and displacement histories."""
     folder = tmp_path_factory.mktemp("shapes")
     typing(folder)("fit", root / "configs/three_shapes.toml", "-o", "model", "--no-plots")
@@ -50,9 +48,7 @@ def shapes(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("turn", "thick", "thick torsion"),
     ],
 )
-def test_a_history_moves_the_bushings_asked_for(
-    shapes: Path, tmp_path: Path, history: str, direction: str | None, places: str
-) -> None:
+def test_a_history_moves_the_bushings_asked_for(shapes, tmp_path, history, direction, places):
     options = ("--direction", direction) if direction else ()
     done = typing(shapes)("respond", "model", f"{history}.csv", *options, "-o", tmp_path / "x", "--no-plots", "--json")
     assert list(json.loads(done.stdout)["directions"]) == places.split(", ")
@@ -66,9 +62,7 @@ def test_a_history_moves_the_bushings_asked_for(
         ("road", ("--direction", "lon"), 'did you mean "long"?'),
     ],
 )
-def test_a_history_of_no_known_bushing_or_direction_is_refused(
-    shapes: Path, tmp_path: Path, history: str, options: tuple[str, ...], problem: str
-) -> None:
+def test_a_history_of_no_known_bushing_or_direction_is_refused(shapes, tmp_path, history, options, problem):
     done = typing(shapes)("respond", "model", f"{history}.csv", *options, "-o", tmp_path / "x", status=2)
     assert problem in done.stderr
 
@@ -80,9 +74,7 @@ def test_a_history_of_no_known_bushing_or_direction_is_refused(
         (("--direction", "radial"), {"short radial", "long radial", "thick radial"}),
     ],
 )
-def test_results_are_compared_for_the_bushings_asked_for(
-    bushfit: Run, shapes: Path, tmp_path: Path, options: tuple[str, ...], places: set[str]
-) -> None:
+def test_results_are_compared_for_the_bushings_asked_for(bushfit, shapes, tmp_path, options, places):
     bushfit("compare", shapes / "model", shapes / "model", *options, "-o", tmp_path / "x", "--no-plots")
     assert set(pd.read_csv(tmp_path / "x/differences.csv")["place"]) == places
     done = bushfit("compare", shapes / "model", "model", *options, "-o", tmp_path / "y", status=2)
@@ -99,9 +91,7 @@ def test_results_are_compared_for_the_bushings_asked_for(
         (("--bushing", "mine.toml", "--campaign", "mine.toml"), {"axial", "radial", "measured"}),
     ],
 )
-def test_predictions_are_of_the_bushing_asked_for(
-    shapes: Path, tmp_path: Path, options: tuple[str, ...], files: set[str]
-) -> None:
+def test_predictions_are_of_the_bushing_asked_for(shapes, tmp_path, options, files):
     """A campaign with a [bushing] is of the fitted bushing with its geometry."""
     done = typing(shapes)("predict", "model", *options, "-o", tmp_path / "x", "--no-plots")
     assert {file.stem for file in (tmp_path / "x").glob("*.csv")} == files
@@ -117,9 +107,7 @@ def test_predictions_are_of_the_bushing_asked_for(
         (("--campaign", "longer.toml"), "longer.toml: the campaign tests another bushing\n  found: long\n"),
     ],
 )
-def test_bushings_that_do_not_fit_the_model_are_refused(
-    shapes: Path, root: Path, tmp_path: Path, options: tuple[str, ...], problem: str
-) -> None:
+def test_bushings_that_do_not_fit_the_model_are_refused(shapes, root, tmp_path, options, problem):
     stated = [root / "configs/cmp_15961.toml" if option == "CMP" else option for option in options]
     done = typing(shapes)("predict", "model", *stated, "-o", tmp_path / "x", status=2)
     assert problem in done.stderr
@@ -130,9 +118,7 @@ def test_bushings_that_do_not_fit_the_model_are_refused(
     ("commands", "tables"),
     [("'run'", set()), ("'fit', 'diagnose', 'predict', 'respond'", {"response.csv", "measured.csv"})],
 )
-def test_a_batch_of_several_bushings_has_their_columns_files_and_limits(
-    shapes: Path, root: Path, tmp_path: Path, commands: str, tables: set[str]
-) -> None:
+def test_a_batch_of_several_bushings_has_their_columns_files_and_limits(shapes, root, tmp_path, commands, tables):
     campaign, history = root / "configs/three_shapes.toml", shapes / "road.csv" if tables else None
     settings = f"commands = [{commands}]\nat = ['long axial 25 Hz 0.1 mm', 'thick torsion 5 Hz 1 deg']\n"
     settings += f"history = '{history}'\n" if history else ""
@@ -167,7 +153,7 @@ def test_a_batch_of_several_bushings_has_their_columns_files_and_limits(
         ("lung axial 25 Hz 0.1 mm", "no such direction or specimen; found: lung axial"),
     ],
 )
-def test_an_operating_point_is_of_one_bushing(root: Path, tmp_path: Path, at: str, problem: str) -> None:
+def test_an_operating_point_is_of_one_bushing(root, tmp_path, at, problem):
     batch = ("batch", root / "configs/three_shapes.toml", "--at", at, "-o", "out", "--jobs", 1)
     done = typing(tmp_path)(*batch, status=1)
     assert problem in " ".join(done.stderr.split())
@@ -181,28 +167,26 @@ def test_an_operating_point_is_of_one_bushing(root: Path, tmp_path: Path, at: st
         ('"thick"', '"long axial"', "two bodies have one name"),
     ],
 )
-def test_a_test_of_another_name_is_refused(root: Path, tmp_path: Path, old: str, new: str, problem: str) -> None:
+def test_a_test_of_another_name_is_refused(root, tmp_path, old, new, problem):
     text = (root / "configs/three_shapes.toml").read_text(encoding="utf-8").replace("../data", f"{root}/data")
     (tmp_path / "c.toml").write_text(text.partition("[simulate]")[0].replace(old, new), encoding="utf-8")
     assert problem in typing(tmp_path)("fit", "c.toml", "-o", "x", status=2).stderr
 
 
-def test_the_axial_formula_of_an_untested_bushing_is_that_of_a_tested_one(
-    shapes: Path, root: Path, tmp_path: Path
-) -> None:
+def test_the_axial_formula_of_an_untested_bushing_is_that_of_a_tested_one(shapes, root, tmp_path):
     run = typing(tmp_path)
     run("fit", root / "configs/three_shapes.toml", "--direction", "short", "-o", "m", "--no-plots")
     done = run("predict", "m", "--bushing", "long", "--direction", "axial", "-o", "x", "--no-plots", "-v")
     assert "formula" not in done.stderr
 
 
-def test_files_of_bushings_differ_where_a_system_ignores_case() -> None:
+def test_files_of_bushings_differ_where_a_system_ignores_case():
     names = place_names([Specimen("Long", "modulus"), Specimen("long", "modulus")])
     assert names[0].casefold() != names[1].casefold()
 
 
 @pytest.mark.parametrize("option", ["--adopt", "--without"])
-def test_a_diagnosis_knows_the_places_of_its_effects(root: Path, tmp_path: Path, option: str) -> None:
+def test_a_diagnosis_knows_the_places_of_its_effects(root, tmp_path, option):
     campaign = root / "configs/three_shapes.toml"
     done = typing(tmp_path)("diagnose", campaign, option, "stiffness_factor.lung", "-o", "x", status=2)
     assert "no such direction or specimen" in done.stderr

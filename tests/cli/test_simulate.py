@@ -2,20 +2,18 @@
 
 import json
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from shell import BUSHING, Run, document, names, refused, values
+from shell import BUSHING, document, names, refused, values
 
 from bushfit.geometry import Direction
-from bushfit.model.model import Model
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.sweeps import read_sweep
 
 
-def test_simulate_writes_a_campaign_that_run_takes(bushfit: Run, tmp_path: Path) -> None:
+def test_simulate_writes_a_campaign_that_run_takes(bushfit, tmp_path):
     for folder, seed in (("one", 7), ("same", 7), ("other", 8)):
         bushfit("simulate", "model/model.json", "--seed", seed, "--noise", "0.5 %", "-o", tmp_path / folder)
     one, same, other = ((tmp_path / name / "sweep_axial.csv").read_text() for name in ("one", "same", "other"))
@@ -34,9 +32,7 @@ RESONANCE = "data/measured/epdm_70/shaker_1g_573g.csv"
 MASS = ("--mass", "0.573 kg", "--mass-added", "14.8 g")
 
 
-def test_a_raw_record_becomes_a_sweep_that_fits(
-    typed: Run, root: Path, tmp_path: Path, paper_model: Model, table_1: dict[str, float]
-) -> None:
+def test_a_raw_record_becomes_a_sweep_that_fits(typed, root, tmp_path, paper_model, table_1):
     done = typed("reduce", root / RECORD, "-o", "x", "--json", "--cycles", "4")
     assert names(tmp_path / "x") == {"sweep.csv", "reduce.png"}
     assert "15 points found" in done.stderr
@@ -73,11 +69,11 @@ def test_a_raw_record_becomes_a_sweep_that_fits(
         (("--cycles", "40"), "no steady sine was found"),
     ],
 )
-def test_options_that_do_not_fit(typed: Run, root: Path, tmp_path: Path, options: tuple[str, str], said: str) -> None:
+def test_options_that_do_not_fit(typed, root, tmp_path, options, said):
     refused(typed("reduce", root / RECORD, "-o", "x", *options, status=2), tmp_path / "x", said)
 
 
-def test_a_measured_test_becomes_a_sweep(typed: Run, root: Path, tmp_path: Path) -> None:
+def test_a_measured_test_becomes_a_sweep(typed, root, tmp_path):
     done = typed("reduce", root / RESONANCE, *MASS, "--direction", "axial", "-o", "x", "--json")
     assert names(tmp_path / "x") == {"sweep.csv", "reduce.png"}
     document = json.loads(done.stdout)
@@ -92,7 +88,7 @@ def test_a_measured_test_becomes_a_sweep(typed: Run, root: Path, tmp_path: Path)
     assert table["frequency [Hz]"].is_monotonic_increasing
 
 
-def test_other_words_for_the_same_test(typed: Run, root: Path, tmp_path: Path) -> None:
+def test_other_words_for_the_same_test(typed, root, tmp_path):
     """As a transmissibility in a German file, with its base stated, and phases that have the opposite sign."""
     raw = pd.read_csv(root / RESONANCE)
     ratio = raw["mass_accel_ms2"] / raw["base_accel_ms2"]

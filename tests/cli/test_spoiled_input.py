@@ -21,7 +21,7 @@ ERROR = re.compile(r"^(bushfit: error: |Error: )", re.MULTILINE)
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     """One folder for all, because most rows spoil one file of five."""
     return tmp_path_factory.mktemp("spoiled")
 
@@ -50,14 +50,14 @@ def assert_refused(row: Spoiled, done: Done | subprocess.CompletedProcess[str]) 
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
-def test_one_error_and_nothing_written(row: Spoiled, folder: Path) -> None:
+def test_one_error_and_nothing_written(row, folder):
     before = lay_out(folder, row)
     assert_refused(row, call(folder, *row.arguments))
     assert {path.name for path in folder.iterdir()} == before
 
 
 @pytest.mark.parametrize("command", ["predict", "simulate"])
-def test_a_disk_that_fills_up_after_the_work(command: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_fills_up_after_the_work(command, folder, monkeypatch):
     def full(_: int) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
@@ -70,7 +70,7 @@ def test_a_disk_that_fills_up_after_the_work(command: str, folder: Path, monkeyp
     assert {path.name for path in folder.iterdir()} == before
 
 
-def test_every_command_is_among_them() -> None:
+def test_every_command_is_among_them():
     commands = {row.command[0] for row in ROWS}
     assert set(cli.commands or cli.list_commands(None)) <= commands  # type: ignore[arg-type]
 
@@ -97,14 +97,14 @@ def bounded(folder: Path, *arguments: str, times: int = 1) -> Done:
 
 
 @pytest.fixture
-def bombed(tmp_path: Path) -> Path:
+def bombed(tmp_path) -> Path:
     for name, content in FILES.items():
         (tmp_path / name).write_text(content)
     (tmp_path / "book.toml").write_text(CAMPAIGN.replace("loop.csv", "book.xlsx"))
     return tmp_path
 
 
-def test_a_workbook_with_a_forgotten_cell_far_away(bombed: Path) -> None:
+def test_a_workbook_with_a_forgotten_cell_far_away(bombed):
     (bombed / "book.xlsx").write_bytes(
         workbook(['</sheetData><dimension ref="A1:XFD1048576"/><sheetData>' + far_apart()])
     )
@@ -114,7 +114,7 @@ def test_a_workbook_with_a_forgotten_cell_far_away(bombed: Path) -> None:
 
 
 @pytest.fixture
-def long_runs(bombed: Path) -> Path:
+def long_runs(bombed) -> Path:
     """Two runs of 12,000 points: what grew with the square of them took 1.2 GB for each matrix."""
     rng = np.random.default_rng(1)
     frequency, level = np.tile(np.linspace(1.0, 200.0, 12_000), 2), np.repeat([0.1, 0.2], 12_000)
@@ -126,7 +126,7 @@ def long_runs(bombed: Path) -> Path:
     return bombed
 
 
-def test_a_fit_to_runs_of_12_000_points(long_runs: Path) -> None:
+def test_a_fit_to_runs_of_12_000_points(long_runs):
     done = bounded(long_runs, "fit-dynamic", "campaign.toml", "--static", "model.json", "-o", "x", "--no-plots")
     assert done.returncode == 0, done.stderr
     assert json.loads((long_runs / "x" / "dynamic.json").read_text())["fit"]["points"] == 2 * 12_000

@@ -1,10 +1,8 @@
 """Unlucky files, folders and machines: one clear error or a result, soon, and nothing of a file that is no test."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from shell import BUSHING, Run, refused
+from shell import BUSHING, refused
 
 LOOP = '[[loops]]\nfile = "{}"\ndirection = "axial"\n'
 SECRET = 'url = https://user:TOPSECRET@host\n\tTOPSECRET = "more"\n' * 3
@@ -20,7 +18,7 @@ def loop(points_a_cycle: int = 100, header: str = "time [s],displacement [mm],fo
 @pytest.mark.parametrize(
     "more", ["", "header_line = 2\n", 'encoding = "utf-16"\n', 'columns = { force = "TOP" }\n', 'sheet = "x"\n']
 )
-def test_a_message_shows_nothing_of_a_file_that_is_no_test(typed: Run, tmp_path: Path, more: str) -> None:
+def test_a_message_shows_nothing_of_a_file_that_is_no_test(typed, tmp_path, more):
     (tmp_path / ".env").write_text(SECRET)
     (tmp_path / "c.toml").write_text(BUSHING + LOOP.format(".env") + more)
     for command in (("fit", "c.toml"), ("predict", ".env"), ("batch", "c.toml", "--jobs", "1")):
@@ -28,7 +26,7 @@ def test_a_message_shows_nothing_of_a_file_that_is_no_test(typed: Run, tmp_path:
         assert "TOPSECRET" not in done.stderr + "".join(file.read_text() for file in tmp_path.glob("x/batch.*"))
 
 
-def test_data_that_are_in_another_file_are_not_read(typed: Run, tmp_path: Path) -> None:
+def test_data_that_are_in_another_file_are_not_read(typed, tmp_path):
     h5py = pytest.importorskip("h5py")
     (tmp_path / "secret.bin").write_bytes(b"TOPSECRET" * 1000)
     with h5py.File(tmp_path / "axial.mat", "w", userblock_size=512) as file:
@@ -40,7 +38,7 @@ def test_data_that_are_in_another_file_are_not_read(typed: Run, tmp_path: Path) 
     refused(done, tmp_path / "x", "its data are in other files")
 
 
-def test_a_name_is_printed_as_it_is(typed: Run, tmp_path: Path) -> None:
+def test_a_name_is_printed_as_it_is(typed, tmp_path):
     (tmp_path / "loop.csv").write_text(loop())
     text = BUSHING.replace('name = "B"', 'name = "a :smile: [red]b"') + LOOP.format("loop.csv")
     (tmp_path / "c.toml").write_text(text)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from shell import BUSHING, RUBBER, Run
+from shell import BUSHING, RUBBER
 
 SIMULATED = f"""{BUSHING}
 [simulate]
@@ -54,7 +54,7 @@ duration = "4 s"
 
 
 @pytest.fixture(scope="module")
-def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def campaign(tmp_path_factory) -> Path:
     """A simulated campaign with three validation records and a hidden mass."""
     from shell import typing
 
@@ -64,7 +64,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "tests/campaign.toml"
 
 
-def test_simulated_motions_have_the_stated_spectra(campaign: Path) -> None:
+def test_simulated_motions_have_the_stated_spectra(campaign):
     random, sines, road = (pd.read_csv(campaign.parent / f"record_axial_{number}.csv") for number in (1, 2, 3))
     for table, rms, duration in ((random, 0.05, 3.0), (road, 0.1, 4.0)):
         assert table["displacement [mm]"].std() == pytest.approx(rms, rel=0.05)
@@ -81,7 +81,7 @@ def test_simulated_motions_have_the_stated_spectra(campaign: Path) -> None:
         assert np.sqrt(low / high) == pytest.approx(ratio, rel=0.25)
 
 
-def test_run_compares_measured_and_predicted_force(campaign: Path, bushfit: Run, tmp_path: Path) -> None:
+def test_run_compares_measured_and_predicted_force(campaign, bushfit, tmp_path):
     done = bushfit("run", campaign, "-o", tmp_path / "run")
     assert "validation records, never fitted" in done.stderr
     table = pd.read_csv(tmp_path / "run/validation.csv")
@@ -111,7 +111,7 @@ def test_run_compares_measured_and_predicted_force(campaign: Path, bushfit: Run,
     assert "Validation record record_axial_1, never fitted" in (tmp_path / "page/report.html").read_text()
 
 
-def test_a_gain_of_the_force_is_visible(campaign: Path, bushfit: Run, tmp_path: Path) -> None:
+def test_a_gain_of_the_force_is_visible(campaign, bushfit, tmp_path):
     for file in campaign.parent.glob("*.*"):
         (tmp_path / file.name).write_bytes(file.read_bytes())
     table = pd.read_csv(tmp_path / "record_axial_1.csv")
@@ -125,7 +125,7 @@ def test_a_gain_of_the_force_is_visible(campaign: Path, bushfit: Run, tmp_path: 
     assert found["NRMSE [%]"][0] > 5.0 * found["NRMSE [%]"][1]
 
 
-def test_a_low_pass_and_corrections_of_a_record_are_stated(campaign: Path, bushfit: Run, tmp_path: Path) -> None:
+def test_a_low_pass_and_corrections_of_a_record_are_stated(campaign, bushfit, tmp_path):
     """Noise of the displacement, its offset of a metre, and missing rows."""
     for file in campaign.parent.glob("*.*"):
         (tmp_path / file.name).write_bytes(file.read_bytes())
@@ -162,6 +162,6 @@ def test_a_low_pass_and_corrections_of_a_record_are_stated(campaign: Path, bushf
         ('duration = "3 s"', 'duration = "3000 s"', "too long to simulate"),
     ],
 )
-def test_impossible_records_are_one_error(bushfit: Run, tmp_path: Path, old: str, new: str, problem: str) -> None:
+def test_impossible_records_are_one_error(bushfit, tmp_path, old, new, problem):
     (tmp_path / "plan.toml").write_text(SIMULATED.replace(old, new, 1))
     assert problem in bushfit("simulate", tmp_path / "plan.toml", "-o", tmp_path / "out", status=2).stderr

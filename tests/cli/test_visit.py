@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from shell import Run, values
+from shell import values
 
 from bushfit.campaign.campaign import load_campaign
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
@@ -90,16 +90,14 @@ def mts(sweep: Sweep) -> str:
 
 
 @pytest.fixture(scope="module")
-def visited(paper_model: Model, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def visited(paper_model, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("lab") / "visit"
     folder.mkdir()
     write_visit(folder, paper_model)
     return folder
 
 
-def test_a_visit_makes_a_campaign_that_fits(
-    typed: Run, visited: Path, tmp_path: Path, table_1: dict[str, float], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_visit_makes_a_campaign_that_fits(typed, visited, tmp_path, table_1, monkeypatch):
     """A workbook with an info sheet, four CSVs named by amplitude, a wide table, an MTS export, a German loop."""
     done = typed("init", visited, *GEOMETRY, "-o", "x")
     for words in (
@@ -143,9 +141,7 @@ def test_a_visit_makes_a_campaign_that_fits(
         ("measured/epdm_70/shaker_1g_573g.csv", "this is a resonance test, not a sweep"),
     ],
 )
-def test_what_has_to_be_reduced_is_left_out_with_the_way_on(
-    typed: Run, root: Path, visited: Path, tmp_path: Path, file: str, said: str
-) -> None:
+def test_what_has_to_be_reduced_is_left_out_with_the_way_on(typed, root, visited, tmp_path, file, said):
     (tmp_path / "lab").mkdir()
     for each in (root / "data" / file, *visited.glob("Dyn_*0,1*.csv")):
         (tmp_path / "lab" / each.name).write_bytes(each.read_bytes())
@@ -165,7 +161,7 @@ def coupon(model: Model, file: Path, strain: float) -> None:
     file.write_text("\n".join(["Frequency [Hz],G' [MPa],G'' [MPa]", *rows]) + "\n", encoding="utf-8")
 
 
-def test_coupons_need_no_radii(typed: Run, paper_model: Model, tmp_path: Path, table_1: dict[str, float]) -> None:
+def test_coupons_need_no_radii(typed, paper_model, tmp_path, table_1):
     (tmp_path / "dma").mkdir()
     for strain in (0.001, 0.005, 0.02, 0.1):
         coupon(paper_model, tmp_path / f"dma/coupon {100 * strain:g}% 23C.csv", strain)
@@ -180,7 +176,7 @@ def test_coupons_need_no_radii(typed: Run, paper_model: Model, tmp_path: Path, t
     assert fitted == pytest.approx(table_1, rel=0.01)
 
 
-def test_a_block_in_shear_is_a_specimen_with_its_sizes(typed: Run, tmp_path: Path) -> None:
+def test_a_block_in_shear_is_a_specimen_with_its_sizes(typed, tmp_path):
     rows = "\n".join(f"{a / 100},{300 - a},0.15" for a in range(5, 100, 5))
     (tmp_path / "mount_10Hz.csv").write_text(f"amplitude [mm],K* [N/mm],tan delta\n{rows}\n", encoding="utf-8")
     sizes = ("--specimen", "mount", "--area", "772 mm^2", "--thickness", "6 mm", "--elements", 2)

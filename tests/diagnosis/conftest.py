@@ -1,7 +1,6 @@
 """Campaigns off the virtual rig with two loops and two sweeps, their fits and their diagnoses, each made once."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,14 +21,14 @@ from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
 
 @pytest.fixture(scope="session")
-def reference_shapes(root: Path) -> dict[tuple[float, ...], float]:
+def reference_shapes(root) -> dict[tuple[float, ...], float]:
     """Radial stiffness over modulus [m] from finite elements, by inner radius, outer radius and length [mm]."""
     table = np.loadtxt(root / "data/reference/radial_fe.csv", delimiter=",", skiprows=1)
     return {tuple(row[:3]): float(row[3]) for row in table}
 
 
 @pytest.fixture(scope="session")
-def measured(paper_model: Model) -> Measured:
+def measured(paper_model) -> Measured:
     """measured({"inertia": {"mass": 0.1}}, plan, seed): the paper's bushing with effects, on the rig."""
     cleaned: dict[tuple[object, ...], Undisturbed] = {}
 
@@ -46,7 +45,7 @@ def measured(paper_model: Model) -> Measured:
 
 
 @pytest.fixture(scope="session")
-def diagnosed(measured: Measured) -> Diagnosed:
+def diagnosed(measured) -> Diagnosed:
     """diagnosed(effects, plan, seed, **settings): the same campaign, diagnosed once."""
     known: dict[str, Diagnosis] = {}
 
@@ -78,6 +77,6 @@ def fitted() -> Fitted:
 
 
 @pytest.fixture(scope="session")
-def bare(measured: Measured, fitted: Fitted) -> Evidence:
+def bare(measured, fitted) -> Evidence:
     """The paper's model fitted to a clean campaign, its residuals in units of what scatters from point to point."""
     return in_scatter_units(fitted(measured(plan=SHARED)))

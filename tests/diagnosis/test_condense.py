@@ -58,7 +58,7 @@ def off(sweep: Sweep) -> Array:
     return np.asarray(np.log(sweep.stiffness / PAPER.stiffness(Direction.AXIAL, sweep.frequency, sweep.amplitude)))
 
 
-def test_means_are_as_sharp_as_their_points() -> None:
+def test_means_are_as_sharp_as_their_points():
     """Scatter of 900 points in 100 bands falls with the root of 9, and so does the noise that is estimated."""
     (sweep,), said = condensed(data_of(swept(PAPER)))[0].sweeps, condensed(data_of(swept(PAPER)))[1]
     assert said == ("swept: 5400 points are averaged to 600 narrow bands for the diagnosis",)
@@ -69,7 +69,7 @@ def test_means_are_as_sharp_as_their_points() -> None:
     assert set(sweep.sweep.amplitude) == set(LEVELS)
 
 
-def test_of_very_many_levels_some_are_diagnosed_and_none_forgotten() -> None:
+def test_of_very_many_levels_some_are_diagnosed_and_none_forgotten():
     """Rows of levels that are not looked at were measured all the same, and the rubber remembers them."""
     levels = np.random.default_rng(1).permutation(np.geomspace(1e-5, 1e-3, 300))
     data = data_of(grid(levels))
@@ -101,7 +101,7 @@ BENT = [1.0 + 9.0 / (1.0 + (f - middle) ** 2) for f, middle in ((UP, 25.0), (UP[
     ],
     ids=["from 0.5 Hz", "from 5 Hz", "up and down through a resonance", "amplitudes"],
 )
-def test_means_lie_on_the_curve(sweep: Sweep, largest: float) -> None:
+def test_means_lie_on_the_curve(sweep, largest):
     """Evenly in frequency the first bands are wide in its logarithm; where neither is held, points at one frequency may
     have amplitudes far apart, and are taken in turn."""
     made = condensed(data_of(sweep))[0].sweeps[0].sweep
@@ -113,7 +113,7 @@ def test_means_lie_on_the_curve(sweep: Sweep, largest: float) -> None:
         assert made.frequency.tolist() == [10.0] * 100 + [100.0] * 100
 
 
-def test_a_hidden_lag_is_named_in_a_long_sweep_and_the_means_are_told() -> None:
+def test_a_hidden_lag_is_named_in_a_long_sweep_and_the_means_are_told():
     lagging = PAPER.with_effect("delay", {"delay.tau": 2e-4})
     found = diagnose(data_of(swept(lagging)))
     assert [effect.name for effect in found.effects] == ["delay"]
@@ -123,9 +123,7 @@ def test_a_hidden_lag_is_named_in_a_long_sweep_and_the_means_are_told() -> None:
 
 
 @pytest.mark.parametrize(("most", "kept"), [(6.0, "012345"), (5.0, "01235"), (4.1, "0125"), (3.2, "015"), (0.1, "15")])
-def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_repeated(
-    root: Path, monkeypatch: pytest.MonkeyPatch, most: float, kept: str
-) -> None:
+def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_repeated(root, monkeypatch, most, kept):
     """Three that differ, one of them radial and of a third as many rows, and three repeats of one."""
     campaign = load_campaign(root / "configs/cmp_15961.toml")
     (loop,) = campaign.loops

@@ -12,15 +12,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigged import LEVELS, PLAN, Fitted, Measured, asked, changed
+from rigged import LEVELS, PLAN, Fitted, asked, changed
 from scipy.stats import binomtest
 from test_schemas import complaints
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import Residuals, RigSettings
+from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.described import GapDescription, describe
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.power_law import Measure, PowerLaw, Term, nearest_power_law
+from bushfit.diagnosis.power_law import PowerLaw, Term, nearest_power_law
 from bushfit.effects.contract import Array, Level, Setting
 from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -47,25 +47,25 @@ def with_relaxation(campaign: Campaign, size: float = 0.06) -> Campaign:
 
 
 @pytest.fixture(scope="module")
-def evidence(measured: Measured, fitted: Fitted) -> Evidence:
+def evidence(measured, fitted) -> Evidence:
     return fitted(with_relaxation(measured()))
 
 
 @pytest.fixture(scope="module")
-def described(evidence: Evidence) -> GapDescription:
+def described(evidence) -> GapDescription:
     found = describe(evidence, RigSettings(), evidence.model.values, (), {})
     assert found is not None
     return found
 
 
 @pytest.fixture(scope="module")
-def result(described: GapDescription) -> Result:
+def result(described) -> Result:
     strain = tuple(x * described.after.model.unit_strain(Direction.AXIAL) for x in LEVELS)
     measured = Range((5.0, 155.0), (min(strain), max(strain)), ("axial", "radial"))
     return Result(described.after.model, measured=measured)
 
 
-def test_what_the_diagnosis_says(measured: Measured) -> None:
+def test_what_the_diagnosis_says(measured):
     """On a rig of which it is known that no error of a level makes it up."""
     rig = RigSettings(gain_error=5e-4, phase_error=5e-4)
     found = asked(replace(with_relaxation(measured()), rig=rig), max_effects=1)
@@ -84,7 +84,7 @@ def test_what_the_diagnosis_says(measured: Measured) -> None:
     assert np.all(inside.high - inside.value < 0.01 * inside.value)
 
 
-def test_predictions_use_it_inside_the_range_and_open_outside(result: Result) -> None:
+def test_predictions_use_it_inside_the_range_and_open_outside(result):
     """Inside, the corrected stiffness has a narrow band; at ten times the frequency it is that of the parameters."""
     plain, amplitude = Result(result.model.without("unnamed")), [LEVELS[1]]
     inside, outside = np.array([45.0, 95.0]), np.array([2000.0])
@@ -124,7 +124,7 @@ def radial(model: Model) -> Array:
     return np.abs(bare.stiffness(Direction.RADIAL, *np.meshgrid(FREQUENCIES, AMPLITUDES)).ravel())
 
 
-def test_bands_hold_each_model_that_may_be_right(measured: Measured) -> None:
+def test_bands_hold_each_model_that_may_be_right(measured):
     found = asked(changed(measured(), 1, STIFFER))
     assert found.verdict == "ambiguous"
     result = found.result
@@ -141,7 +141,7 @@ def test_bands_hold_each_model_that_may_be_right(measured: Measured) -> None:
     np.testing.assert_array_equal(predict(again, Direction.RADIAL, FREQUENCIES, AMPLITUDES).stiffness.low, band.low)
 
 
-def test_they_are_told_of_a_resonance_and_stay_with_a_compound_that_is_carried(measured: Measured) -> None:
+def test_they_are_told_of_a_resonance_and_stay_with_a_compound_that_is_carried(measured):
     result = asked(changed(measured(), 1, STIFFER)).result
     shaken = Direction.RADIAL, 50.0, 1.0, np.linspace(30.0, 80.0, 501)
     peaks = [predict_resonance(Result(each.model), *shaken).peak[0] for each in result.alternatives]
@@ -155,7 +155,7 @@ def test_they_are_told_of_a_resonance_and_stay_with_a_compound_that_is_carried(m
     assert any("permit other values of the parameters" in line for line in said)
 
 
-def test_at_a_node_a_correction_has_the_value_and_the_two_errors_of_the_node(paper_model: Model) -> None:
+def test_at_a_node_a_correction_has_the_value_and_the_two_errors_of_the_node(paper_model):
     rows = ((20.0, 200.0), (0.01, 0.01), (0.05, 0.02), (0.01, 0.0), (0.004, 0.004), (0.02, 0.02))
     data = Unnamed(0.1, (0.3, 0.3), (Patch(("axial",), *rows),))
     omega, amplitude = 2.0 * np.pi * np.array(rows[0]), 0.01 / paper_model.unit_strain(Direction.AXIAL)
@@ -165,7 +165,7 @@ def test_at_a_node_a_correction_has_the_value_and_the_two_errors_of_the_node(pap
     assert weight.tolist() == [1.0, 1.0]
 
 
-def test_what_was_corrected_counts_as_error_where_the_compound_is_carried(paper_model: Model) -> None:
+def test_what_was_corrected_counts_as_error_where_the_compound_is_carried(paper_model):
     rows = ((5.0, 155.0), (0.001, 0.1), (0.05, 0.05), (0.0, 0.0), (0.001, 0.001), (0.001, 0.001))
     data = Unnamed(0.05, (2.0, 2.0), (Patch(("axial", "radial"), *rows),))
     corrected = Result(replace(paper_model, effects=(*paper_model.effects, "unnamed"), unnamed=data))
@@ -175,7 +175,7 @@ def test_what_was_corrected_counts_as_error_where_the_compound_is_carried(paper_
 
 
 @pytest.mark.slow
-def test_bands_hold_the_truth_whichever_it_is(measured: Measured, paper_model: Model) -> None:
+def test_bands_hold_the_truth_whichever_it_is(measured, paper_model):
     """Of the campaigns that are told to be ambiguous; simulated, three effects, five seeds each: a bushing that is
     stiffer radially, a rig that is, and a sleeve that gives way."""
     soft, shares = 4e-8, list[float]()
@@ -237,9 +237,7 @@ def surely(campaign: Campaign, fitted: Fitted) -> PowerLaw:
         ((60e3, -60.0, 0.6, -0.6), ""),
     ],
 )
-def test_laws_are_found_with_their_phase_and_powers(
-    law: tuple[float, float, float, float], words: str, measured: Measured, fitted: Fitted
-) -> None:
+def test_laws_are_found_with_their_phase_and_powers(law, words, measured, fitted):
     """Of 3 % of the stiffness, each within three and a half standard errors, and called what they act like."""
     found = surely(with_term(measured(), power_law(*law)), fitted)
     assert found.measure == "stiffness"
@@ -255,9 +253,7 @@ def test_laws_are_found_with_their_phase_and_powers(
 
 @pytest.mark.parametrize("measure", ["stiffness", "modulus", "gain"])
 @pytest.mark.parametrize("residuals", ["complex", "magnitude_loss_factor"])
-def test_derivatives_beside_a_large_term(
-    residuals: Residuals, measure: Measure, measured: Measured, fitted: Fitted
-) -> None:
+def test_derivatives_beside_a_large_term(residuals, measure, measured, fitted):
     """Of residuals of sweeps and loops with a tenth of the stiffness added, against central differences."""
     campaign = measured()
     evidence = fitted(replace(campaign, fit=replace(campaign.fit, residuals=residuals)))
@@ -275,7 +271,7 @@ def test_derivatives_beside_a_large_term(
     assert row == pytest.approx((ends[0] - ends[1]) / (2.0 * step), rel=1e-5, abs=1e-5 * np.abs(row).max())
 
 
-def test_a_resonance_is_no_power_law(measured: Measured, fitted: Fitted) -> None:
+def test_a_resonance_is_no_power_law(measured, fitted):
     def resonance(frequency: Array, amplitude: Array, _: Array) -> Array:
         ratio = frequency / 80.0
         return 120e3 * ratio**2 / (1.0 - ratio**2 + 0.3j * ratio) * np.ones_like(amplitude)
@@ -284,7 +280,7 @@ def test_a_resonance_is_no_power_law(measured: Measured, fitted: Fitted) -> None
 
 
 @pytest.mark.slow
-def test_intervals_hold_the_phase_and_the_powers_in_95_of_100(measured: Measured, fitted: Fitted) -> None:
+def test_intervals_hold_the_phase_and_the_powers_in_95_of_100(measured, fitted):
     """Random laws in N/m, in a modulus and in shares of the stiffness, 3 to 12 % of it at the most, simulated."""
     random, held = np.random.default_rng(20), {"phase": [], "p": [], "q": []}  # type: ignore[var-annotated]
     for seed in range(RANDOM):

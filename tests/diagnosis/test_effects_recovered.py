@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hidden import hidden_campaign, hideable
-from rigged import BOTH, PLAN, Diagnosed, Measured, changed, in_closed_form
+from rigged import BOTH, PLAN, changed, in_closed_form
 from tries import some
 
 from bushfit.campaign.campaign import Campaign
@@ -33,7 +33,7 @@ SINGLE = [name for name in hideable() if twins_of(name)[0] == name]
 
 
 @pytest.mark.parametrize("name", some(SINGLE, set(SINGLE[::3]) - SLOW))
-def test_known_effects_are_recovered(name: str) -> None:
+def test_known_effects_are_recovered(name):
     simulated = hidden_campaign(1, [name])
     near = {key: ParameterSetting(0.95 * simulated.truth.values[key]) for key in NEAR if key in simulated.truth.values}
     campaign = replace(simulated.campaign(), fit=FitSettings(parameters=near))
@@ -44,7 +44,7 @@ def test_known_effects_are_recovered(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [name for name, effect in LIBRARY.items() if effect.harmonic_only])
-def test_effects_without_a_law_in_time_are_recovered_from_their_first_harmonic(name: str, paper_model: Model) -> None:
+def test_effects_without_a_law_in_time_are_recovered_from_their_first_harmonic(name, paper_model):
     """The rig refuses them: the data are the closed form of the steady state with noise, for loops too."""
     effect = LIBRARY[name]
     truth = paper_model.with_effect(name, {qualified_name(effect, effect.amount): effect.amount.value_at_share(1.0)})
@@ -54,7 +54,7 @@ def test_effects_without_a_law_in_time_are_recovered_from_their_first_harmonic(n
 
 
 @pytest.mark.slow
-def test_a_second_relaxation_is_no_other_effect(diagnosed: Diagnosed) -> None:
+def test_a_second_relaxation_is_no_other_effect(diagnosed):
     """Two are named, or described where the two cannot be told from one of another shape; one is one."""
     one = {"maxwell": {"mu1": 3e5, "tau": 2e-2}}
     two = {**one, "second_maxwell": {"mu1": 6e5, "tau": 8e-4}}
@@ -79,7 +79,7 @@ SMALL = {"interface_slip.force": 5.0, "self_heating.beta": 1e-3, "viscous.eta": 
 
 
 @pytest.mark.parametrize("name", SMALL)
-def test_a_small_effect_is_not_taken_for_one_at_rest_on_its_bound(measured: Measured, name: str) -> None:
+def test_a_small_effect_is_not_taken_for_one_at_rest_on_its_bound(measured, name):
     """However wide the bounds: it has an error of its own, and the others carry their share of it."""
     effect, _, key = name.partition(".")
     campaign = measured({effect: {key: SMALL[name]}}, seed=1)
@@ -90,7 +90,7 @@ def test_a_small_effect_is_not_taken_for_one_at_rest_on_its_bound(measured: Meas
     assert interval[0] <= SMALL[name] <= interval[1]
 
 
-def test_what_the_data_push_below_zero_rests_on_its_bound(measured: Measured) -> None:
+def test_what_the_data_push_below_zero_rests_on_its_bound(measured):
     """Loss that shrinks in proportion to frequency, as of a late force, is no dashpot."""
     campaign = measured()
     for number, sweep in enumerate(campaign.sweeps):
@@ -127,7 +127,7 @@ def families(model: Model, truth: str, values: Mapping[str, float]) -> dict[str,
 
 
 @pytest.mark.parametrize("truth", some(TRUTHS, {"kraus", "intrinsic_time", "paper"}))
-def test_the_family_that_made_the_tests_is_the_best_and_known_to_be(paper_model: Model, truth: str) -> None:
+def test_the_family_that_made_the_tests_is_the_best_and_known_to_be(paper_model, truth):
     found = families(paper_model, truth, TRUTHS[truth])
     assert list(found) == ["paper", *NAMES]
     assert found[truth].evidence.reduced_chi_square == pytest.approx(1.0, abs=0.05)
@@ -146,7 +146,7 @@ def test_the_family_that_made_the_tests_is_the_best_and_known_to_be(paper_model:
 
 
 @pytest.mark.slow
-def test_the_interval_of_the_gain_is_that_of_noise(paper_model: Model) -> None:
+def test_the_interval_of_the_gain_is_that_of_noise(paper_model):
     """Two wrong families: redrawn noise moves the gain of one over the other as its interval says."""
     gains = []
     made = paper_model.with_effect("intrinsic_time", {"intrinsic_time.d": 1.0})
@@ -161,7 +161,7 @@ def test_the_interval_of_the_gain_is_that_of_noise(paper_model: Model) -> None:
     assert 0.4 < said / real < 2.5
 
 
-def test_the_interval_of_the_gain_grows_with_the_misfit(paper_model: Model) -> None:
+def test_the_interval_of_the_gain_grows_with_the_misfit(paper_model):
     """Noise that is stated as half makes residuals of twice the size, and four times the gain and its interval."""
     made = paper_model.with_effect("intrinsic_time", {"intrinsic_time.d": 3.0})
     campaign = replace(measure(undisturbed(made, PLAN), PLAN).campaign(), loops=())
@@ -176,7 +176,7 @@ def test_the_interval_of_the_gain_grows_with_the_misfit(paper_model: Model) -> N
     assert gains[1] == pytest.approx(4.0 * gains[0], rel=0.05)
 
 
-def test_known_families_are_each_law_of_rate_with_each_of_amplitude(paper_model: Model, campaign: Campaign) -> None:
+def test_known_families_are_each_law_of_rate_with_each_of_amplitude(paper_model, campaign):
     tests = PreparedCampaign.from_campaign(campaign).sweeps
     found = known_families(paper_model, tests)
     assert len(found) == 4 * 6 - 1 - 1  # less the paper's own, and a second springpot on intrinsic time
@@ -189,7 +189,7 @@ def test_known_families_are_each_law_of_rate_with_each_of_amplitude(paper_model:
 
 
 @pytest.mark.slow
-def test_the_likeliest_of_all_families_are_held_out(paper_model: Model) -> None:
+def test_the_likeliest_of_all_families_are_held_out(paper_model):
     """Kraus' law with a spring in series with the springpot: it leads, or what leads has both in it."""
     made = paper_model.with_effect("kraus", {f"kraus.{key}": value for key, value in TRUTHS["kraus"].items()})
     made = made.with_effect("fractional_zener", {"fractional_zener.c": 0.5})

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigged import LEVELS, SHARED, Fitted, Measured, Tamper, both, loop_too_strong, off
+from rigged import LEVELS, SHARED, both, loop_too_strong, off
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
@@ -51,9 +51,7 @@ def best(evidence: Evidence, every: Sequence[Explanation]) -> Explanation:
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_the_place_that_went_wrong_is_the_likeliest(
-    measured: Measured, fitted: Fitted, tamper: Tamper, kind: str, words: str
-) -> None:
+def test_the_place_that_went_wrong_is_the_likeliest(measured, fitted, tamper, kind, words):
     """Errors of the rig, of all sizes, are counted beside it."""
     evidence = in_scatter_units(fitted(tamper(measured(plan=SHARED))))
     found = best(evidence, find_faulty_parts(evidence))
@@ -61,7 +59,7 @@ def test_the_place_that_went_wrong_is_the_likeliest(
     assert found.name == words
 
 
-def test_every_effect_is_proposed_but_twins_and_what_the_tests_do_not_state(bare: Evidence) -> None:
+def test_every_effect_is_proposed_but_twins_and_what_the_tests_do_not_state(bare):
     found = {each.name: each for each in proposals(bare, (), ())}
     twins = {twin for effect in LIBRARY.values() for twin in effect.twins}
     later = {name for name, effect in LIBRARY.items() if effect.after}
@@ -72,7 +70,7 @@ def test_every_effect_is_proposed_but_twins_and_what_the_tests_do_not_state(bare
     assert (temperature.score, temperature.visible) == (0.0, False)
 
 
-def test_scores_are_those_of_a_linear_refit(bare: Evidence) -> None:
+def test_scores_are_those_of_a_linear_refit(bare):
     """Chi-square of the residual regressed on the model's Jacobian, less that on Jacobian and column."""
     random = np.random.default_rng(0)
     residual, own = random.standard_normal(bare.residual.size), bare.solution.jacobian
@@ -86,7 +84,7 @@ def test_scores_are_those_of_a_linear_refit(bare: Evidence) -> None:
         assert amount == pytest.approx(-answer[-1], rel=1e-6)
 
 
-def test_the_compound_bends_a_loop_in_odd_overtones_and_in_the_first_cycle(bare: Evidence) -> None:
+def test_the_compound_bends_a_loop_in_odd_overtones_and_in_the_first_cycle(bare):
     """In steady cycles the h-th overtone has 1/h^2 of the deviation of the stiffness, and no even one occurs."""
     loop = split_by_kind(bare.data_sets)[0][0]
     unit = np.abs(loop.smooth_changes()[1]).max()

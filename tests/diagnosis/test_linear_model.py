@@ -73,7 +73,7 @@ def over_nodes(of: LinearModel, values: Sequence[float], *, wide: bool = False) 
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_worth_is_that_of_the_covariance_in_full(seed: int) -> None:
+def test_worth_is_that_of_the_covariance_in_full(seed):
     """Of the rig and the parameters; and beside them of columns that move together, and of those of which one is
     chosen, over all sizes and nodes."""
     of = ledger(seed)
@@ -96,7 +96,7 @@ def test_worth_is_that_of_the_covariance_in_full(seed: int) -> None:
 
 
 @pytest.mark.parametrize("sense", [1, -1, 0])
-def test_an_amount_is_integrated_over_its_sense(sense: int) -> None:
+def test_an_amount_is_integrated_over_its_sense(sense):
     """Numerically, and the free parameter with it: where an effect is missing, the model stays below the tests."""
     of = ledger(4, flat=1, known=0)
     column, unit, own = of.groups[0].columns[0], 0.7, of.jacobian[0]
@@ -117,7 +117,7 @@ def test_an_amount_is_integrated_over_its_sense(sense: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed: int) -> None:
+def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed):
     """At every node of some size, beside nothing more and beside a group; at the others there is none."""
     plain = ledger(seed)
     columns = np.random.default_rng(seed).normal(size=(2, plain.residual.size))
@@ -145,7 +145,7 @@ def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed: int) -> Non
 
 
 @pytest.mark.parametrize("number", [0, 1])
-def test_amounts_are_those_of_a_dense_posterior(number: int) -> None:
+def test_amounts_are_those_of_a_dense_posterior(number):
     """By Gaussian conditioning at each node within the class and each size, mixed by their evidence."""
     of = ledger(9)
     group, log_weights, means, seconds = of.groups[number], [], [], []
@@ -166,7 +166,7 @@ def test_amounts_are_those_of_a_dense_posterior(number: int) -> None:
 
 
 @pytest.mark.parametrize("node", range(2))
-def test_the_chance_of_clean_tests_is_even(node: int) -> None:
+def test_the_chance_of_clean_tests_is_even(node):
     """Drawn as the ledger says; with several nodes sizes adapt themselves, and extremes are rarer."""
     of, random = ledger(7, groups=False, rows=14), np.random.default_rng(2)
     noise = np.linalg.cholesky(covariance(of, NODES[node]))

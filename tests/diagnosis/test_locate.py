@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from rigged import INERTIA, LEVELS, SHARED, SLIP, TWO, Effects, Fitted, Measured
+from rigged import INERTIA, LEVELS, SHARED, SLIP, TWO, Effects
 
 from bushfit.diagnosis.evidence import fit
 from bushfit.diagnosis.holdout import hold_out, parts
@@ -21,13 +21,13 @@ def one(found: tuple[MisfitRegion, ...], direction: str, component: str) -> Misf
     return where
 
 
-def test_a_clean_campaign_has_no_place(measured: Measured, fitted: Fitted) -> None:
+def test_a_clean_campaign_has_no_place(measured, fitted):
     evidence = fitted(measured(plan=SHARED))
     assert find_regions(evidence) == ()
 
 
 @pytest.fixture(scope="module")
-def where_of(measured: Measured, fitted: Fitted) -> Callable[[Effects], tuple[MisfitRegion, ...]]:
+def where_of(measured, fitted) -> Callable[[Effects], tuple[MisfitRegion, ...]]:
     return lambda effects: find_regions(fitted(measured(effects, SHARED)))
 
 
@@ -39,13 +39,7 @@ def where_of(measured: Measured, fitted: Fitted) -> Callable[[Effects], tuple[Mi
         (DELAY, "radial", "loss", "in proportion to frequency"),
     ],
 )
-def test_trends(
-    where_of: Callable[[Effects], tuple[MisfitRegion, ...]],
-    effects: Effects,
-    direction: str,
-    component: str,
-    trend: str,
-) -> None:
+def test_trends(where_of, effects, direction, component, trend):
     """The worst comes first, and all are real."""
     found = where_of(effects)
     excess = [where.excess for where in found]
@@ -62,9 +56,7 @@ def test_trends(
     assert where.amplitude == pytest.approx((LEVELS[0], LEVELS[-1]))
 
 
-def test_slip_shows_at_the_smallest_amplitude_and_in_odd_harmonics(
-    where_of: Callable[[Effects], tuple[MisfitRegion, ...]],
-) -> None:
+def test_slip_shows_at_the_smallest_amplitude_and_in_odd_harmonics(where_of):
     found = where_of(SLIP)
     loss = one(found, "axial", "loss")
     assert loss.amplitude == pytest.approx((LEVELS[0], LEVELS[0]))
@@ -73,7 +65,7 @@ def test_slip_shows_at_the_smallest_amplitude_and_in_odd_harmonics(
 
 
 @pytest.mark.parametrize("effects", [{"force_offset": {"offset": 15.0}}, {"asymmetry": {"c2": 2.0}}])
-def test_loops_alone(where_of: Callable[[Effects], tuple[MisfitRegion, ...]], effects: Effects) -> None:
+def test_loops_alone(where_of, effects):
     found = where_of(effects)
     assert {where.kind for where in found} == {"loop"}
     assert all("a constant force" in where.reading for where in found)
@@ -93,9 +85,7 @@ HEAVY = {"inertia": {"mass": 0.2}}
     ],
     ids=["right", "right level", "lacking", "lacking loop", "far", "far loop"],
 )
-def test_the_gap_is_that_of_a_refit(
-    measured: Measured, fitted: Fitted, hidden: Effects, effects: tuple[str, ...], which: str
-) -> None:
+def test_the_gap_is_that_of_a_refit(measured, fitted, hidden, effects, which):
     """Of the right model, and of one that has far to go without the part: one step would miss the last two by 60 and
     30 %."""
     evidence = fitted(measured(hidden, SHARED), *effects)
@@ -109,7 +99,7 @@ def test_the_gap_is_that_of_a_refit(
     assert effects or "third" not in which or found.after > 1.05 * as_fitted
 
 
-def test_the_prediction_s_own_error_is_that_of_a_sandwich_of_runs_and_loops(measured: Measured, fitted: Fitted) -> None:
+def test_the_prediction_s_own_error_is_that_of_a_sandwich_of_runs_and_loops(measured, fitted):
     """In full, by parameters: A^-1 M A^-1, M of what each run and each loop of the rest pulls, and at least A."""
     evidence, which = fitted(measured(INERTIA, SHARED)), "amplitude level 3"
     (found,) = [part for part in hold_out(evidence, evidence, {}).parts if part.part == which]

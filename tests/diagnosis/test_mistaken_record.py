@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from rigged import SHARED, Measured, Tamper, asked, said
+from rigged import SHARED, Tamper, asked, said
 from tries import some
 
 from bushfit.campaign.campaign import Campaign, load_campaign
@@ -57,7 +57,7 @@ MADE: dict[str, Tamper] = {
 
 
 @pytest.mark.parametrize("truth", some(MADE, {AXIAL}))
-def test_a_mistake_is_named_with_the_line_that_puts_it_right(truth: str, measured: Measured) -> None:
+def test_a_mistake_is_named_with_the_line_that_puts_it_right(truth, measured):
     campaign = MADE[truth](measured(None, SHARED))
     diagnosis = asked(campaign)
     assert diagnosis.verdict == "named"
@@ -88,7 +88,7 @@ IMPOSSIBLE = {
 
 
 @pytest.mark.parametrize("truth", some(IMPOSSIBLE, {"thousandth_of_displacement:loop_axial_1"}))
-def test_where_no_fit_can_begin_the_option_is_offered_that_corrects_the_unit(truth: str, measured: Measured) -> None:
+def test_where_no_fit_can_begin_the_option_is_offered_that_corrects_the_unit(truth, measured):
     factor = IMPOSSIBLE[truth]
     of_loop = on_loops(lambda x: replace(x, displacement=factor * x.displacement), 0)
     of_sweep = on_sweeps(lambda s: replace(s, amplitude=factor * s.amplitude), 0)
@@ -99,7 +99,7 @@ def test_where_no_fit_can_begin_the_option_is_offered_that_corrects_the_unit(tru
 
 
 @pytest.mark.slow
-def test_what_cannot_be_told_apart_is_ambiguous(measured: Measured) -> None:
+def test_what_cannot_be_told_apart_is_ambiguous(measured):
     """Loops in kgf, or sweeps multiplied by 9.81 once too often: the same ratio."""
     diagnosis = asked(in_kilograms(measured(None, SHARED)))
     assert diagnosis.verdict == "ambiguous"
@@ -111,7 +111,7 @@ def test_what_cannot_be_told_apart_is_ambiguous(measured: Measured) -> None:
     assert diagnosis.after is diagnosis.before
 
 
-def test_what_all_tests_share_is_not_seen_and_not_named(measured: Measured) -> None:
+def test_what_all_tests_share_is_not_seen_and_not_named(measured):
     """All forces in kgf are all moduli 9.81 times too small: the tests agree."""
     campaign = in_kilograms(measured(None, SHARED))
     campaign = on_sweeps(lambda s: replace(s, stiffness=s.stiffness / 9.80665), 0, 1)(campaign)
@@ -152,7 +152,7 @@ def hum(table: pd.DataFrame, name: str) -> None:
 
 
 @pytest.mark.slow
-def test_verdict_does_not_depend_on_how_sweeps_are_parted(root: Path, tmp_path: Path) -> None:
+def test_verdict_does_not_depend_on_how_sweeps_are_parted(root, tmp_path):
     """Nor the odds of what is told: a disturbance at one frequency."""
     one, many = map(diagnosed, parted(root / "data/practice/case_000", tmp_path))
     assert many.verdict == one.verdict == "unexplained"

@@ -1,6 +1,5 @@
 """Simulated campaigns that earlier searches named wrongly, or not at all, each with the step that it taught."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -53,9 +52,7 @@ WITHOUT_NAME = pytest.mark.xfail(
         pytest.param(949206328, ("second_friction",), (0.015, 0.12), 1, marks=WITHOUT_NAME),
     ],
 )
-def test_what_is_hidden_is_named_and_nothing_else(
-    seed: int, hidden: Sequence[str], visible: tuple[float, float], least: int
-) -> None:
+def test_what_is_hidden_is_named_and_nothing_else(seed, hidden, visible, least):
     diagnosis = asked(hidden_campaign(seed, hidden, visible).campaign())
     told = {name for effect in diagnosis.effects for name in twins_of(effect.name)}
     assert len({*hidden} & told) >= least
@@ -91,13 +88,13 @@ def of_rubber(kind: type[Model], seed: int) -> tuple[Campaign, np.random.Generat
     return measure(replace(undisturbed(rubber, plan, steps_per_cycle=STEPS), truth=plain), plan).campaign(), random
 
 
-def test_sticking_is_not_called_sliders() -> None:
+def test_sticking_is_not_called_sliders():
     """What stands in place of a branch is asked for the form of its law, too."""
     campaign, _ = of_rubber(StickSlip, 979478117)
     assert not {*kept(asked(campaign))} - {"unnamed"}
 
 
-def test_errors_of_levels_are_no_saturated_force() -> None:
+def test_errors_of_levels_are_no_saturated_force():
     """A force channel that saturates explained the top level as well as an error of the rig does."""
     campaign, random = of_rubber(Model, 1920798623)
     sweeps = []

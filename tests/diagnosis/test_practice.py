@@ -48,7 +48,7 @@ SIZES = {
 
 
 @pytest.fixture(scope="module")
-def truths(root: Path) -> Truths:
+def truths(root) -> Truths:
     """The answers; of twins the name of the bushing's, as these tests cannot tell more."""
     answers = json.loads((root / "data/practice/answers.json").read_text())
     return {case: {**truth, "truth": [twins_of(name)[0] for name in truth["truth"]]} for case, truth in answers.items()}
@@ -70,7 +70,7 @@ class Found(dict[str, Diagnosis]):
 
 
 @pytest.fixture(scope="module")
-def found(root: Path) -> Found:
+def found(root) -> Found:
     return Found(root / "data/practice")
 
 
@@ -85,7 +85,7 @@ def right(truth: dict[str, Any], diagnosis: Diagnosis) -> bool:
     return everything and len(sets) == len(truth["truth"]) and diagnosis.verdict in ("named", "ambiguous")
 
 
-def test_nothing_is_nothing_and_the_unknown_is_unknown(truths: Truths, found: Found) -> None:
+def test_nothing_is_nothing_and_the_unknown_is_unknown(truths, found):
     for unknown in (False, True):
         case = next(
             case for case, each in truths.items() if not each["truth"] and bool(each["out_of_library"]) == unknown
@@ -94,7 +94,7 @@ def test_nothing_is_nothing_and_the_unknown_is_unknown(truths: Truths, found: Fo
 
 
 @pytest.mark.slow
-def test_at_most_one_of_sixteen_is_wrong_and_plain_effects_are_named_alone(truths: Truths, found: Found) -> None:
+def test_at_most_one_of_sixteen_is_wrong_and_plain_effects_are_named_alone(truths, found):
     """From a gain of 200 in chi-square on a set would be too little; a name closes the gap where nothing was fitted."""
     wrong, plain = [], []
     for case, truth in truths.items():
@@ -114,7 +114,7 @@ def test_at_most_one_of_sixteen_is_wrong_and_plain_effects_are_named_alone(truth
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SIZES)
-def test_sizes(root: Path, truths: Truths, found: Found, name: str) -> None:
+def test_sizes(root, truths, found, name):
     effect, (theirs, key) = name.partition(".")[0], SIZES[name]
     cases = [case for case, truth in truths.items() if truth["truth"] and theirs in truth["effects"]]
     assert cases
@@ -142,12 +142,12 @@ SCALE = "strain_scale.radial"
 
 
 @pytest.fixture(scope="module")
-def truth(root: Path) -> Model:
+def truth(root) -> Model:
     return model_of(load_campaign(root / "configs/table_1.toml"))
 
 
 @pytest.fixture(scope="module")
-def clean(truth: Model) -> Undisturbed:
+def clean(truth) -> Undisturbed:
     return undisturbed(truth, PLAN, steps_per_cycle=STEPS)
 
 
@@ -169,7 +169,7 @@ def asked(tests: Undisturbed) -> list[Diagnosis]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("reached", "seen"), [(0.9, 1.0), (0.3, 0.3)])
-def test_a_level_of_another_amplitude_is_to_be_measured_again(clean: Undisturbed, reached: float, seen: float) -> None:
+def test_a_level_of_another_amplitude_is_to_be_measured_again(clean, reached, seen):
     """Moved by 10 % less than was read; and run at 0.15 mm, read rightly and filed under 0.5 mm."""
     for diagnosis in asked(misread(clean, reached, seen)):
         # the largest level may also deviate by a law of amplitude, which is described without a name
@@ -182,7 +182,7 @@ def test_a_level_of_another_amplitude_is_to_be_measured_again(clean: Undisturbed
 
 
 @pytest.mark.slow
-def test_a_wrong_strain_scale_is_named(truth: Model) -> None:
+def test_a_wrong_strain_scale_is_named(truth):
     """By as much as finite elements of this shape say of Eq. 8."""
     scale = 0.74
     found = asked(undisturbed(truth.with_effect(SCALE, {SCALE: scale}), PLAN, steps_per_cycle=STEPS))
@@ -198,7 +198,7 @@ def test_a_wrong_strain_scale_is_named(truth: Model) -> None:
 
 
 @pytest.mark.parametrize("label", some(("level", "scale"), {"level"}))
-def test_what_is_too_small_to_show_is_left_alone(truth: Model, clean: Undisturbed, label: str) -> None:
+def test_what_is_too_small_to_show_is_left_alone(truth, clean, label):
     """A level off by 20 % in amplitude alone, and a strain scale off by 10 %, change these tests by less than 1 %."""
     small = misread(clean, 0.8, 0.8)
     if label == "scale":

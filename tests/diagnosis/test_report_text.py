@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigged import SHARED, Measured, asked, no_repeats, said
+from rigged import SHARED, asked, no_repeats, said
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.next_test import BUSHING_TESTS, FIXTURE_TESTS, deciding_test, remaining_entropy
@@ -18,7 +18,7 @@ from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
 
 
-def test_the_class_of_a_rig_that_is_assumed_is_said(measured: Measured) -> None:
+def test_the_class_of_a_rig_that_is_assumed_is_said(measured):
     campaign = no_repeats(measured({}, SHARED))
     for rig, words in (
         (RigSettings(), "0.5 % gain and 0.25 deg phase, gain and phase assumed"),
@@ -37,7 +37,7 @@ TURNED = replace(SHARED, sweeps=(*FEW, replace(FEW[0], direction=Direction.TORSI
 
 
 @pytest.mark.slow
-def test_compliance_in_one_direction_alone_is_never_a_bold_name(measured: Measured) -> None:
+def test_compliance_in_one_direction_alone_is_never_a_bold_name(measured):
     """A softer rig and a softer rubber look alike in one direction; two leave open which gives way, torsion tells."""
     campaign = measured(SOFT_RIG, TURNED)
     whole = asked(campaign)
@@ -73,7 +73,7 @@ EVEN = (0.5, 0.5)
 
 
 @pytest.fixture
-def data_sets(measured: Measured) -> list[MeasuredTest]:
+def data_sets(measured) -> list[MeasuredTest]:
     data = PreparedCampaign.from_campaign(measured())
     return [*data.loops, *data.sweeps]
 
@@ -100,13 +100,7 @@ STOP = {"bump_stop.gap": 4e-4, "bump_stop.stiffness": 1e5}
     ],
     ids=lambda value: next(iter(value)).partition(".")[0] if isinstance(value, dict) else "",
 )
-def test_pairs(
-    paper_model: Model,
-    data_sets: list[MeasuredTest],
-    one: dict[str, float],
-    other: dict[str, float],
-    words: tuple[str, ...],
-) -> None:
+def test_pairs(paper_model, data_sets, one, other, words):
     models = with_each(paper_model, one, other)
     found = deciding_test(models, EVEN, data_sets)
     assert found in SENTENCES
@@ -114,7 +108,7 @@ def test_pairs(
     assert deciding_test(models[::-1], EVEN, data_sets) == found
 
 
-def test_the_next_test_is_within_the_limits_of_the_rig(paper_model: Model, data_sets: list[MeasuredTest]) -> None:
+def test_the_next_test_is_within_the_limits_of_the_rig(paper_model, data_sets):
     models = with_each(paper_model, {"viscous.eta": 60.0}, {"maxwell.mu1": 1e5, "maxwell.tau": 6e-4})
     top = max(float(data_set.frequency.max()) for data_set in data_sets)
     assert "highest frequency" in deciding_test(models, EVEN, data_sets)
@@ -122,7 +116,7 @@ def test_the_next_test_is_within_the_limits_of_the_rig(paper_model: Model, data_
 
 
 @pytest.mark.parametrize("odds", [(1.0, 1.0), (0.8, 0.2)])
-def test_what_stays_open_is_bounded_from_above(odds: tuple[float, float]) -> None:
+def test_what_stays_open_is_bounded_from_above(odds):
     """Against the entropy that is left of two normal distributions a distance apart, by integration."""
     p, x = np.array(odds) / sum(odds), np.linspace(-12.0, 20.0, 20_001)
     for distance in (0.0, 0.5, 3.0, 8.0):
@@ -137,7 +131,7 @@ def test_what_stays_open_is_bounded_from_above(odds: tuple[float, float]) -> Non
 
 
 @pytest.mark.parametrize("bushing", [True, False])
-def test_coupons_with_a_bushing_are_followed_by_a_sweep_of_it(bushing: bool, paper_model: Model) -> None:
+def test_coupons_with_a_bushing_are_followed_by_a_sweep_of_it(bushing, paper_model):
     """A bushing that was not tested is proposed, and no test of a bushing if the campaign has none."""
     model = paper_model if bushing else replace(paper_model, bushing=None)
     coupon = Specimen("DMA", "modulus")

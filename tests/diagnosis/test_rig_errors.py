@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigged import LEVELS, SHARED, Fitted, Measured, no_sweeps
+from rigged import LEVELS, SHARED, no_sweeps
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
@@ -29,9 +29,7 @@ def off(evidence: Evidence, sweep: MeasuredSweep, change: Callable[[MeasuredSwee
 
 @pytest.mark.parametrize("unit", [1.0, 1.0j], ids=["gain", "phase"])
 @pytest.mark.parametrize(("kind", "repeats"), [(RUN, (2,)), (LEVEL, (1, 2, 3))])
-def test_what_shares_an_error_moves_together(
-    bare: Evidence, unit: complex, kind: int, repeats: tuple[int, ...]
-) -> None:
+def test_what_shares_an_error_moves_together(bare, unit, kind, repeats):
     """A column is what an error of the class makes of a run, or of all runs of a level, in gain or in phase."""
     sweep = split_by_kind(bare.data_sets)[1][1]
     there = (sweep.sweep.amplitude == LEVELS[1]) & np.isin(sweep.sweep.repeat, repeats)
@@ -49,7 +47,7 @@ def test_what_shares_an_error_moves_together(
     assert np.abs(best - wanted).max() < 0.02 * np.abs(wanted).max()
 
 
-def test_waves_are_independent_of_what_the_run_shares(bare: Evidence) -> None:
+def test_waves_are_independent_of_what_the_run_shares(bare):
     """And fall in variance as the square of their order."""
     block = next(block for block in blocks(bare, RIG) if block.scatters)
     (level, *_), waves = block.columns[block.kinds == LEVEL], block.columns[block.kinds == WAVE]
@@ -58,7 +56,7 @@ def test_waves_are_independent_of_what_the_run_shares(bare: Evidence) -> None:
     assert size[0] / size == pytest.approx(np.arange(1, WAVES + 1), rel=0.02)
 
 
-def test_repeated_loops_share_their_gain(measured: Measured, fitted: Fitted) -> None:
+def test_repeated_loops_share_their_gain(measured, fitted):
     campaign = no_sweeps(measured(plan=SHARED))
     first, second = campaign.loops
     bare = in_scatter_units(fitted(replace(campaign, loops=(first, second, replace(first, name="again")))))

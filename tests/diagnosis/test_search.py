@@ -7,26 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigged import (
-    INERTIA,
-    LEVELS,
-    SHARED,
-    SLIP,
-    TWO,
-    Diagnosed,
-    Effects,
-    Measured,
-    Tamper,
-    asked,
-    changed,
-    loop_too_strong,
-    names,
-    off,
-    said,
-)
+from rigged import INERTIA, LEVELS, SHARED, SLIP, TWO, asked, changed, loop_too_strong, names, off, said
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.campaign.schema import Loss
 from bushfit.diagnosis.explanations import outlier_clusters
 from bushfit.effects import BASE
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -40,7 +23,7 @@ level_too_stiff = off(0, 1.05, amplitude=LEVELS[1])
 @pytest.mark.parametrize(
     "truth", [TWO, *(pytest.param(one, marks=pytest.mark.slow) for one in (INERTIA, SLIP))], ids="+".join
 )
-def test_what_is_there_is_all_but_sure(diagnosed: Diagnosed, truth: Effects) -> None:
+def test_what_is_there_is_all_but_sure(diagnosed, truth):
     """A mass is no fixture resonance far above, which fits as well and says more; slip is no fault of one level."""
     diagnosis = diagnosed(truth, SHARED)
     assert diagnosis.verdict == "named"
@@ -57,7 +40,7 @@ def test_what_is_there_is_all_but_sure(diagnosed: Diagnosed, truth: Effects) -> 
     [(level_too_stiff, "the axial level 0.2 mm"), (loop_too_strong, "the loop loop_axial_2")],
     ids=["level", "loop"],
 )
-def test_what_one_place_alone_shows_is_to_be_measured_again(measured: Measured, tamper: Tamper, place: str) -> None:
+def test_what_one_place_alone_shows_is_to_be_measured_again(measured, tamper, place):
     """However far the levels' own errors could stretch; the other sorts of places stand in test_explanations.py."""
     diagnosis = asked(tamper(measured(plan=SHARED)))
     assert said(diagnosis) == "unexplained "
@@ -69,14 +52,14 @@ def test_what_one_place_alone_shows_is_to_be_measured_again(measured: Measured, 
 
 
 @pytest.mark.slow
-def test_a_fault_beside_an_effect_hides_neither(measured: Measured) -> None:
+def test_a_fault_beside_an_effect_hides_neither(measured):
     diagnosis = asked(level_too_stiff(measured(INERTIA, SHARED)))
     assert "the axial level 0.2 mm" in diagnosis.summary
     assert "inertia + fault: the axial level 0.2 mm" in diagnosis.odds.labels
     assert diagnosis.odds.nothing < 1e-6
 
 
-def test_errors_of_every_level_within_the_class_are_nothing(measured: Measured) -> None:
+def test_errors_of_every_level_within_the_class_are_nothing(measured):
     campaign, random = measured(plan=SHARED), np.random.default_rng(3)
     for number, sweep in enumerate(campaign.sweeps):
         levels, place = np.unique(sweep.amplitude, return_inverse=True)
@@ -88,7 +71,7 @@ def test_errors_of_every_level_within_the_class_are_nothing(measured: Measured) 
     ("effects", "factor", "loss"),
     [({}, 1.04, "linear"), ({}, 1.04, "soft_l1"), pytest.param(SLIP, 1.15, "linear", marks=pytest.mark.slow)],
 )
-def test_a_wild_row_is_a_warning(measured: Measured, effects: Effects, factor: float, loss: Loss) -> None:
+def test_a_wild_row_is_a_warning(measured, effects, factor, loss):
     """One row of 288 is left out and named by its number; it neither makes a gap nor hides one."""
     campaign = measured(effects, SHARED)
     campaign = replace(campaign, fit=replace(campaign.fit, loss=loss))
@@ -112,7 +95,7 @@ def wild(campaign: Campaign, frequencies: tuple[float, ...]) -> Campaign:
     return campaign
 
 
-def test_hum_is_told_though_its_rows_are_left_out(measured: Measured) -> None:
+def test_hum_is_told_though_its_rows_are_left_out(measured):
     """At 65 Hz; whatever its phase in a run, so that no share of the stiffness is common to them."""
     diagnosis = asked(wild(measured({}, SHARED), (65.0,)))
     assert diagnosis.verdict == "unexplained"
@@ -124,7 +107,7 @@ def test_hum_is_told_though_its_rows_are_left_out(measured: Measured) -> None:
 
 
 @pytest.fixture
-def left(measured: Measured, paper_model: Model) -> tuple[PreparedCampaign, Model]:
+def left(measured, paper_model) -> tuple[PreparedCampaign, Model]:
     return PreparedCampaign.from_campaign(measured({}, SHARED)), paper_model
 
 
@@ -138,7 +121,7 @@ def at(data: PreparedCampaign, *points: tuple[int, float, int]) -> list[Outlier]
     return found
 
 
-def test_odds_by_hand(left: tuple[PreparedCampaign, Model]) -> None:
+def test_odds_by_hand(left):
     data, model = left
     count = np.unique(np.concatenate([sweep.frequency for sweep in data.sweeps])).size
     (three,) = outlier_clusters(at(data, (0, 65.0, 0), (0, 65.0, 1), (1, 65.0, 0)), data.sweeps, model)

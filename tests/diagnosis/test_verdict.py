@@ -60,20 +60,20 @@ def told(finding: Finding) -> dict[str, float]:
     ],
     ids=str,
 )
-def test_verdicts(odds: dict[str, float], verdict: str, expected: dict[str, float]) -> None:
+def test_verdicts(odds, verdict, expected):
     finding = of(**odds)
     assert (finding.verdict, told(finding)) == (verdict, expected)
     assert finding.nothing == pytest.approx(odds.get("", 0.0))
 
 
-def test_what_changes_less_than_the_tolerance_is_nothing() -> None:
+def test_what_changes_less_than_the_tolerance_is_nothing():
     small, large = one("inertia", 0.2, size=0.009), one("inertia+delay", 0.8)
     assert decide_verdict([large, small], TOLERANCE).verdict == "consistent"
     finding = decide_verdict([large, small], 0.001)
     assert (finding.verdict, finding.nothing) == ("named", 0.0)
 
 
-def test_of_more_than_can_be_told_it_is_described_by_what_nearly_all_have_in_common() -> None:
+def test_of_more_than_can_be_told_it_is_described_by_what_nearly_all_have_in_common():
     others = ("inertia", "viscous", "maxwell", "high_pass", "clearance", "asymmetry")
     finding = of(**{f"delay+{name}": 1.0 for name in others})
     assert (finding.verdict, finding.leads, len(finding.reported)) == ("described", ("delay",), 4)
@@ -81,7 +81,7 @@ def test_of_more_than_can_be_told_it_is_described_by_what_nearly_all_have_in_com
 
 
 @pytest.mark.parametrize(("last", "verdict"), [(0.002, "partly"), (0.02, "described")])
-def test_names_stand_beside_what_has_none_where_they_change_most(last: float, verdict: str) -> None:
+def test_names_stand_beside_what_has_none_where_they_change_most(last, verdict):
     finding = decide_verdict([one("inertia+unnamed", 0.99, size=0.05, last=last), one("inertia", 0.01)], TOLERANCE)
     assert finding.verdict == verdict
     assert finding.leads == (("inertia",) if verdict == "described" else ())
@@ -97,9 +97,7 @@ def test_names_stand_beside_what_has_none_where_they_change_most(last: float, ve
     ],
     ids=str,
 )
-def test_beside_a_gap_that_stays_a_name_must_be_sure_in_a_compound_that_deviates(
-    odds: dict[str, float], named: str, beside_a_gap: tuple[str, tuple[str, ...]]
-) -> None:
+def test_beside_a_gap_that_stays_a_name_must_be_sure_in_a_compound_that_deviates(odds, named, beside_a_gap):
     hypotheses = [one(parts, share) for parts, share in odds.items()]
     assert decide_verdict(hypotheses, TOLERANCE).names == (named,)
     finding = decide_verdict(hypotheses, TOLERANCE, gap_stays=True)
@@ -107,12 +105,12 @@ def test_beside_a_gap_that_stays_a_name_must_be_sure_in_a_compound_that_deviates
 
 
 @pytest.mark.parametrize("companion", ["inertia", "frequency:50 Hz+frequency:90 Hz"])
-def test_a_mistake_that_does_not_close_the_gap_alone_is_a_lead(companion: str) -> None:
+def test_a_mistake_that_does_not_close_the_gap_alone_is_a_lead(companion):
     finding = decide_verdict([one(f"peak_to_peak+{companion}", 0.99)], TOLERANCE)
     assert (finding.verdict, finding.leads[0]) == ("described", "peak_to_peak")
 
 
 @pytest.mark.parametrize("parts", ["inertia+compound", "peak_to_peak", "peak_to_peak+compound"])
-def test_what_does_not_fit_the_tests_is_a_lead_and_no_name(parts: str) -> None:
+def test_what_does_not_fit_the_tests_is_a_lead_and_no_name(parts):
     finding = decide_verdict([one(parts, 0.99, p_value=1e-4)], TOLERANCE)
     assert (finding.verdict, finding.names, finding.leads) == ("described", (), (parts.partition("+")[0],))

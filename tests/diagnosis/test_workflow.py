@@ -1,7 +1,6 @@
 """The workflow: what is there is named, what is not is not, and with less data less is said."""
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +9,6 @@ from rigged import (
     INERTIA,
     PLAN,
     SHARED,
-    Effects,
-    Fitted,
-    Measured,
     asked,
     changed,
     missing_points,
@@ -26,7 +22,6 @@ from rigged import (
     said,
 )
 
-from bushfit.campaign.campaign import Campaign
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Bushing, Direction
@@ -37,9 +32,7 @@ from bushfit.simulation.undisturbed import undisturbed
 
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", [(10, 18, 68), (12, 30, 50), (20, 30, 30)], ids=str)
-def test_a_radial_stiffness_off_the_formula_is_not_blamed_on_the_rig(
-    reference_shapes: dict[tuple[float, ...], float], paper_model: Model, shape: tuple[float, ...]
-) -> None:
+def test_a_radial_stiffness_off_the_formula_is_not_blamed_on_the_rig(reference_shapes, paper_model, shape):
     """Radial stiffness as finite elements have it, on data that the effect itself did not make; 2 % are little enough
     for a rig that gives way to do the same."""
     model = replace(paper_model, bushing=Bushing("shape", *(1e-3 * length for length in shape)))
@@ -59,7 +52,7 @@ def test_a_radial_stiffness_off_the_formula_is_not_blamed_on_the_rig(
     assert low - 0.003 < ratio < high + 0.003
 
 
-def test_a_branch_of_the_paper_that_a_model_lacks_is_named(measured: Measured, fitted: Fitted) -> None:
+def test_a_branch_of_the_paper_that_a_model_lacks_is_named(measured, fitted):
     """What has no neutral logarithm to begin at begins at the amount that its score suggests."""
     campaign = measured({}, SHARED)
     lacking = Model.with_defaults(campaign.bushing, ("elastic", "friction"), {"eps_half": 0.01})
@@ -78,7 +71,7 @@ CUTS = (*SHOW_MASS, no_sweeps, one_loop, one_frequency)
     ("part", "effects"),
     [(one_direction, {}), (one_frequency, {}), *(pytest.param(part, INERTIA, marks=pytest.mark.slow) for part in CUTS)],
 )
-def test_with_less_no_bolder_name(measured: Measured, part: Callable[..., Campaign], effects: Effects) -> None:
+def test_with_less_no_bolder_name(measured, part, effects):
     found = asked(part(measured(effects, SHARED)))
     if effects and part in SHOW_MASS:  # with less, what has a mass as its limit is as likely
         assert said(found) == "named inertia" or found.verdict == "ambiguous"
@@ -88,7 +81,7 @@ def test_with_less_no_bolder_name(measured: Measured, part: Callable[..., Campai
 
 
 @pytest.mark.slow
-def test_inputs_are_left_alone_and_the_same_comes_twice(measured: Measured) -> None:
+def test_inputs_are_left_alone_and_the_same_comes_twice(measured):
     campaign = measured(INERTIA, SHARED)
     tests = [vars(test) for test in (*campaign.sweeps, *campaign.loops)]
     arrays = [array for test in tests for array in test.values() if isinstance(array, np.ndarray)]

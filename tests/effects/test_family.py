@@ -26,7 +26,7 @@ from bushfit.model.model import Model
 from bushfit.model.rig import lock_in, record
 from bushfit.model.sensitivity import force_and_slopes, stiffness_and_slopes
 from bushfit.model.structure import Structure
-from bushfit.testing import CONDITIONS, AddEffect, check_effect, operating_point, random_model
+from bushfit.testing import CONDITIONS, check_effect, operating_point, random_model
 
 
 @pytest.fixture
@@ -35,7 +35,7 @@ def rng() -> np.random.Generator:
 
 
 @pytest.fixture(params=ADDED)
-def effect(request: pytest.FixtureRequest) -> Effect:
+def effect(request) -> Effect:
     return LIBRARY[request.param]
 
 
@@ -82,7 +82,7 @@ def sized_in_another_time(model: Model, name: str, *point: Any) -> Model:
 
 
 @pytest.mark.parametrize("add", [sized, sized_in_another_time], ids=["alone", "in another time"])
-def test_the_effect_keeps_its_contract(effect: Effect, add: AddEffect) -> None:
+def test_the_effect_keeps_its_contract(effect, add):
     check_effect(effect.name, add=sized if effect.name == "loop_clock" else add)
 
 
@@ -96,9 +96,7 @@ def test_the_effect_keeps_its_contract(effect: Effect, add: AddEffect) -> None:
         ("strain_stiffening", {"stress": lambda _, history: 0.0 * history.value}, "differ by 0."),
     ],
 )
-def test_a_broken_effect_is_found(
-    name: str, change: dict[str, Any], words: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_broken_effect_is_found(name, change, words, monkeypatch):
     monkeypatch.setitem(LIBRARY, name, replace(get_effect(name), **change))
     Structure.from_names.cache_clear()
     with pytest.raises((AssertionError, IndexError), match=words):
@@ -107,7 +105,7 @@ def test_a_broken_effect_is_found(
 
 
 @pytest.mark.parametrize("name", [name for name in ADDED if name not in {"fixture_resonance", *HARMONIC_ONLY}])
-def test_the_rig_from_rest_finds_the_frequency_face(name: str, rng: np.random.Generator) -> None:
+def test_the_rig_from_rest_finds_the_frequency_face(name, rng):
     """To the errors of the rig: Gruenwald-Letnikov is first order in the step, and friction takes cycles to settle."""
     plain = random_model(rng)
     direction, frequency, amplitude = operating_point(plain, rng)
@@ -124,9 +122,7 @@ def test_the_rig_from_rest_finds_the_frequency_face(name: str, rng: np.random.Ge
 
 
 @pytest.mark.parametrize("name", HARMONIC_ONLY)
-def test_what_has_no_law_in_time_answers_the_first_harmonic_and_the_rig_refuses_it(
-    name: str, rng: np.random.Generator
-) -> None:
+def test_what_has_no_law_in_time_answers_the_first_harmonic_and_the_rig_refuses_it(name, rng):
     plain = random_model(rng)
     direction, frequency, amplitude = operating_point(plain, rng)
     model, plain = sized(plain, name, direction, amplitude, rng), beside(plain, name)
@@ -155,7 +151,7 @@ def random_cycle(rng: np.random.Generator, amplitude: float) -> History:
 
 
 @pytest.mark.parametrize("name", [name for name in ADDED if name != "delay"])  # a late channel is not passive
-def test_passive_effects_dissipate_in_any_closed_cycle(name: str, rng: np.random.Generator) -> None:
+def test_passive_effects_dissipate_in_any_closed_cycle(name, rng):
     for _ in range(15):
         _, model, direction, frequency, amplitude = drawn(rng, name)
         if not isinstance(LIBRARY[name], Modifier):
@@ -179,7 +175,7 @@ def five_point(model: Model, key: str, respond: object, relative: float = 2e-3) 
     return (at[0] - 8.0 * at[1] + 8.0 * at[2] - at[3]) / (12.0 * step)
 
 
-def test_sensitivities_match_finite_differences(effect: Effect, rng: np.random.Generator) -> None:
+def test_sensitivities_match_finite_differences(effect, rng):
     _, model, direction, _, amplitude = drawn(rng, effect.name)
     names = list(model.parameters)
     frequency = np.array([5.0, 60.0, 155.0])
@@ -206,7 +202,7 @@ def test_sensitivities_match_finite_differences(effect: Effect, rng: np.random.G
     assert worst < 2e-6
 
 
-def test_twins_answer_alike_in_both_faces_and_only_the_bushings_is_proposed(rng: np.random.Generator) -> None:
+def test_twins_answer_alike_in_both_faces_and_only_the_bushings_is_proposed(rng):
     sets = [twins_of(name) for name, each in LIBRARY.items() if each.twins]
     assert len(sets) == 5
     proposed = effects_for_places(["radial", "axial", "mount", "torsion"])
@@ -234,7 +230,7 @@ def test_twins_answer_alike_in_both_faces_and_only_the_bushings_is_proposed(rng:
 
 
 @pytest.mark.slow
-def test_any_two_compose(effect: Effect, rng: np.random.Generator) -> None:
+def test_any_two_compose(effect, rng):
     for other in ADDED[ADDED.index(effect.name) + 1 :]:
         plain, model, direction, frequency, amplitude = drawn(rng, effect.name)
         both = sized(model, other, direction, amplitude, rng)
@@ -246,7 +242,7 @@ def test_any_two_compose(effect: Effect, rng: np.random.Generator) -> None:
         assert gap <= 2.0 * harmonic_error(both) + 1e-6, (other, gap)
 
 
-def test_a_model_survives_processes(effect: Effect, rng: np.random.Generator) -> None:
+def test_a_model_survives_processes(effect, rng):
     model = sized(random_model(rng), effect.name, Direction.AXIAL, 2e-4, rng)
     copy = pickle.loads(pickle.dumps(model))
     assert copy.effects == tuple(e.name for e in model.records)

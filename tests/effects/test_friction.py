@@ -27,7 +27,7 @@ def relative_error(found: float, exact: mpmath.mpf) -> float:
     return abs(float(mpmath.mpf(float(found)) / exact - 1))
 
 
-def test_modulus_has_ten_digits_from_1e_8_to_1e6() -> None:
+def test_modulus_has_ten_digits_from_1e_8_to_1e6():
     found = harmonic_shape(X)
     with mpmath.workdps(60):
         exact = [exact_shape(x) for x in X]
@@ -35,7 +35,7 @@ def test_modulus_has_ten_digits_from_1e_8_to_1e6() -> None:
             assert max(relative_error(value, e[part]) for value, e in zip(side, exact, strict=True)) <= 1e-10
 
 
-def test_derivative_of_the_modulus() -> None:
+def test_derivative_of_the_modulus():
     slope = harmonic_slope(X, harmonic_shape(X))
     with mpmath.workdps(60):
         for s, x in zip(slope[::5], X[::5], strict=True):
@@ -44,7 +44,7 @@ def test_derivative_of_the_modulus() -> None:
             assert max(abs(s.real - exact.real), abs(s.imag - exact.imag)) <= 1e-9 * abs(exact)
 
 
-def test_limits_of_small_and_large_strain() -> None:
+def test_limits_of_small_and_large_strain():
     half = VALUES["sigma_fmax"] / (2.0 * VALUES["eps_half"])
     omega = np.ones(1)
     assert modulus(VALUES, omega, np.zeros(1))[0] == half + 0j
@@ -56,7 +56,7 @@ def test_limits_of_small_and_large_strain() -> None:
 
 
 @pytest.mark.parametrize("x", [1e-3, 0.3, 1.0, 20.0])
-def test_a_cycle_lowers_a_mean_stress_as_the_walk_along_it_does(x: float) -> None:
+def test_a_cycle_lowers_a_mean_stress_as_the_walk_along_it_does(x):
     begin = 2.0 * x / (math.sqrt(x * (x + 6.0) + 1.0) + x + 1.0)
     path = _strokes([-1.0, 1.0], [2.0 * x, 2.0 * x], begin)
     end, _, kept = path[-1]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from bushfit.effects import BASE, LIBRARY, Effect, History, distributed_sliders, qualified_name, sliders
+from bushfit.effects import BASE, LIBRARY, History, distributed_sliders, qualified_name, sliders
 from bushfit.effects.contract import RubberConditions
 from bushfit.effects.dead_zone import first_harmonic
 from bushfit.effects.temperature import log_shift
@@ -55,11 +55,11 @@ def same(one: Model, other: Model, tolerance: float) -> None:
     ],
     ids=["fast arm: dashpot", "slow arm: spring", "second friction like the first: twice it", "stiff fixture: mass"],
 )
-def test_at_the_end_of_its_range_an_effect_is_a_simpler_one(one: Model, other: Model, tolerance: float) -> None:
+def test_at_the_end_of_its_range_an_effect_is_a_simpler_one(one, other, tolerance):
     same(one, other, tolerance)
 
 
-def test_a_fixture_from_rest_rings_down_to_its_steady_state() -> None:
+def test_a_fixture_from_rest_rings_down_to_its_steady_state():
     model = added("fixture_resonance", mass=0.1, frequency=60.0, damping=0.2)
     last = slice(-2048, None)
     tail = History.steady(STARTED.value[last], 20.0)
@@ -68,7 +68,7 @@ def test_a_fixture_from_rest_rings_down_to_its_steady_state() -> None:
     assert np.max(np.abs(extra - steady)) < 1e-4 * np.max(np.abs(steady))
 
 
-def test_compliances_in_series_add() -> None:
+def test_compliances_in_series_add():
     both = added("sleeve_compliance.axial", added("sleeve_compliance", compliance=2e-8), factor=3e-8)
     one = added("sleeve_compliance", compliance=5e-8)
     np.testing.assert_array_equal(both.stiffness("axial", 20.0, 1e-4), one.stiffness("axial", 20.0, 1e-4))
@@ -76,7 +76,7 @@ def test_compliances_in_series_add() -> None:
     np.testing.assert_allclose(*forces, rtol=1e-10)
 
 
-def test_a_rig_in_series_leaves_the_bushing_its_share_of_the_amplitude() -> None:
+def test_a_rig_in_series_leaves_the_bushing_its_share_of_the_amplitude():
     """1/K = 1/K_b + c, where K_b is the bushing's stiffness at |1 - c K| of the amplitude."""
     total = added("rig_compliance", compliance=4e-7).stiffness(*AXIAL)
     inside = PLAIN.stiffness("axial", FREQUENCY, AMPLITUDE * np.abs(1.0 - 4e-7 * total))
@@ -95,7 +95,7 @@ def test_a_rig_in_series_leaves_the_bushing_its_share_of_the_amplitude() -> None
     ],
     ids=lambda model: model.effects[-1],
 )
-def test_rig_and_bushing_share_the_motion(alone: Model, history: History) -> None:
+def test_rig_and_bushing_share_the_motion(alone, history):
     """x = x_b + c F, where F is what the bushing alone answers to x_b."""
     force = added("rig_compliance", alone, compliance=4e-8).force("radial", replace(history, solved={}))
     again = alone.force("radial", history.with_value(history.value - 4e-8 * force))
@@ -103,7 +103,7 @@ def test_rig_and_bushing_share_the_motion(alone: Model, history: History) -> Non
 
 
 @pytest.mark.parametrize("effect", [effect for effect in LIBRARY.values() if effect.corrects], ids=lambda one: one.name)
-def test_what_corrects_a_formula_scales_that_direction_and_no_other(effect: Effect) -> None:
+def test_what_corrects_a_formula_scales_that_direction_and_no_other(effect):
     (parameter,) = effect.parameters
     model = PLAIN.with_effect(effect.name, {qualified_name(effect, parameter): parameter.value_at_share(1.0)})
     for direction in Direction:
@@ -114,7 +114,7 @@ def test_what_corrects_a_formula_scales_that_direction_and_no_other(effect: Effe
 
 
 @pytest.mark.parametrize("shift", [0.01, 0.03, 0.13])
-def test_warm_rubber_is_softer_and_faster(shift: float) -> None:
+def test_warm_rubber_is_softer_and_faster(shift):
     """At 33 degC with 0.3 % a kelvin: moduli times exp(-0.03), the spring's times 306.15/296.15, the springpot's also
     times a_T^alpha; and so is the second one, with its own order."""
     warm_test = RubberConditions(
@@ -134,7 +134,7 @@ def test_warm_rubber_is_softer_and_faster(shift: float) -> None:
     same(warm, plain, 0.0)
 
 
-def test_the_shift_factor_is_that_of_williams_landel_and_ferry() -> None:
+def test_the_shift_factor_is_that_of_williams_landel_and_ferry():
     """With 17.44 and 51.6 K at a glass transition of -50 degC; of a small shift it is Arrhenius' law, and below the
     glass transition it goes on along a line."""
     kelvin, glass = np.array([233.15, 263.15, 296.15, 326.15, 373.15]), 223.15
@@ -149,7 +149,7 @@ def test_the_shift_factor_is_that_of_williams_landel_and_ferry() -> None:
     assert np.diff(below) == pytest.approx([np.diff(below)[0]] * 2)
 
 
-def test_mullins_softens_below_the_largest_strain_so_far_and_not_there() -> None:
+def test_mullins_softens_below_the_largest_strain_so_far_and_not_there():
     softened = added("mullins_levels", share=0.2)
     strain = np.full(3, AMPLITUDE[1] * PLAIN.unit_strain(Direction.AXIAL))
     ratio = softened.stiffness(*AXIAL, conditions=RubberConditions(largest_strain=strain)) / PLAIN.stiffness(*AXIAL)
@@ -157,7 +157,7 @@ def test_mullins_softens_below_the_largest_strain_so_far_and_not_there() -> None
     same(softened, PLAIN, 0.0)
 
 
-def test_friction_recovers_after_a_larger_strain() -> None:
+def test_friction_recovers_after_a_larger_strain():
     """Left at twice the strain, three quarters of the share are lost at first, 1/e of that a time constant later."""
     broken = added("filler_recovery", share=0.4, tau=0.1)
     previous_strain = 2.0 * AMPLITUDE * PLAIN.unit_strain(Direction.AXIAL)
@@ -170,7 +170,7 @@ def test_friction_recovers_after_a_larger_strain() -> None:
     same(broken, PLAIN, 0.0)
 
 
-def test_a_spring_alone_under_a_force_channel_that_saturates() -> None:
+def test_a_spring_alone_under_a_force_channel_that_saturates():
     """Its force is a sine, of which the describing function tells what lies beyond the level."""
     spring = Model(PLAIN.bushing, ("elastic",), {"mu": 1e6})
     k = spring.stiffness(*AXIAL)
@@ -183,7 +183,7 @@ SLIDERS = {"sigma": 2.5e4, "e_s": 0.015, "spread": 1.3}
 
 
 @pytest.mark.parametrize("strain", [1e-6, 3e-3, 5e-3, 0.015, 0.05, 0.1, 1.0])
-def test_sliders_are_the_mean_of_very_many(strain: float) -> None:
+def test_sliders_are_the_mean_of_very_many(strain):
     """Below the range of their slip strains (4e-3 to 0.055), in it and beyond."""
     places = (np.arange(100_000) + 0.5) / 50_000 - 1.0
     slip = SLIDERS["e_s"] * np.exp(SLIDERS["spread"] * places)
@@ -195,7 +195,7 @@ def test_sliders_are_the_mean_of_very_many(strain: float) -> None:
 
 
 @pytest.mark.parametrize("strain", [1e-5, 2e-3, 0.01, 0.05, 1.0])
-def test_distributed_sliders_are_the_mean_of_very_many(strain: float) -> None:
+def test_distributed_sliders_are_the_mean_of_very_many(strain):
     """First harmonic of 100,000 equal springs with sliders, at strains far below, in and far above the distribution."""
     probability = (np.arange(100_000) + 0.5) / 100_000
     yield_strain = 0.01 * np.exp(0.9 * scipy.stats.norm.ppf(probability))

@@ -28,7 +28,7 @@ def mended(name: str, test: Any) -> Any:
 
 
 @given(st.floats(0.02, 0.6), st.floats(1e5, 1e7))
-def test_the_loss_is_mended_as_it_was_measured(loss: float, magnitude: float) -> None:
+def test_the_loss_is_mended_as_it_was_measured(loss, magnitude):
     truth = swept(loss, magnitude=magnitude).stiffness
     angle = np.arctan(loss)
     as_stated = {
@@ -44,7 +44,7 @@ def test_the_loss_is_mended_as_it_was_measured(loss: float, magnitude: float) ->
         np.testing.assert_allclose(mended(name, test).stiffness, truth, rtol=1e-9, err_msg=name)
 
 
-def test_amplitudes_rates_units_and_directions_are_mended() -> None:
+def test_amplitudes_rates_units_and_directions_are_mended():
     assert mended("peak_to_peak", swept(0.1)).amplitude == pytest.approx(1e-4)
     assert mended("zero_to_peak", swept(0.1)).amplitude == pytest.approx(4e-4)
     assert np.array_equal(mended("peak_to_peak", swept(0.1)).stiffness, swept(0.1).stiffness)

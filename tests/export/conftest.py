@@ -12,21 +12,20 @@ from readers import HASH
 from bushfit.export.contract import Exported, ExportRequest
 from bushfit.export.fmu import export
 from bushfit.geometry import Direction
-from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.prediction.stiffness import predict
 from bushfit.reading.measurement import Source
 
 
 @pytest.fixture(scope="session")
-def known(root: Path) -> pd.DataFrame:
+def known(root) -> pd.DataFrame:
     """Direction, frequency, amplitude, |K| and loss factor in SI, from an independent computation in time."""
     table = pd.read_csv(root / "data/reference/stiffness_table1.csv")
     return table.set_axis(["direction", "frequency", "amplitude", "stiffness", "loss"], axis=1)
 
 
 @pytest.fixture(scope="session")
-def export_request(known: pd.DataFrame, paper_model: Model) -> ExportRequest:
+def export_request(known, paper_model) -> ExportRequest:
     """All directions; axially five amplitudes, radially four, in torsion three."""
     result = Result(paper_model)
     predictions = [
@@ -38,7 +37,7 @@ def export_request(known: pd.DataFrame, paper_model: Model) -> ExportRequest:
 
 
 @pytest.fixture(scope="session")
-def named(export_request: ExportRequest) -> Callable[[str], ExportRequest]:
+def named(export_request) -> Callable[[str], ExportRequest]:
     """The same of its axial direction, of a bushing and from a file of any name."""
 
     def called(name: str) -> ExportRequest:
@@ -51,13 +50,13 @@ def named(export_request: ExportRequest) -> Callable[[str], ExportRequest]:
 
 
 @pytest.fixture(scope="session")
-def exported(paper_model: Model) -> Exported:
+def exported(paper_model) -> Exported:
     """The paper's bushing in three directions."""
     return export(request_of(paper_model))
 
 
 @pytest.fixture(scope="session")
-def paper(exported: Exported, tmp_path_factory: pytest.TempPathFactory) -> Running:
+def paper(exported, tmp_path_factory) -> Running:
     """The same, ready to run."""
     folder = tmp_path_factory.mktemp("fmu")
     ((name, content),) = exported.files.items()

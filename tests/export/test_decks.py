@@ -45,9 +45,7 @@ def read(name: str, export_request: ExportRequest, folder: Path) -> tuple[Export
 
 @pytest.mark.parametrize("units", SYSTEMS)
 @pytest.mark.parametrize("name", ["nastran", "optistruct", "abaqus"])
-def test_every_value_of_the_grid_is_read_back(
-    name: str, units: str, export_request: ExportRequest, known: pd.DataFrame, tmp_path: Path
-) -> None:
+def test_every_value_of_the_grid_is_read_back(name, units, export_request, known, tmp_path):
     """In whatever units, turned back into SI by factors that are typed here."""
     newton, metre, second = {
         "N, s, t, mm": (1.0, 1e3, 1.0),
@@ -80,7 +78,7 @@ def amplitude_of(known: pd.DataFrame, direction: Direction, rank: int) -> float:
     return float(amplitudes[min(rank, amplitudes.size) - 1])
 
 
-def test_the_compound_of_abaqus_is_the_model_at_that_strain(export_request: ExportRequest, paper_model: Model) -> None:
+def test_the_compound_of_abaqus_is_the_model_at_that_strain(export_request, paper_model):
     """*HYPERELASTIC: C10 = G/2. *VISCOELASTIC: omega Re(g*) = G''/G, omega Im(g*) = 1 - G'/G, bulk, frequency.
 
     Source: Abaqus Analysis User's Guide, "Frequency domain viscoelasticity": storage modulus
@@ -107,8 +105,8 @@ def test_the_compound_of_abaqus_is_the_model_at_that_strain(export_request: Expo
 
 @pytest.mark.parametrize("units", ["N, s, t, mm", "mm kg ms kN"])
 def test_the_prony_series_of_abaqus_and_of_the_table_is_the_model_within_the_stated_error(
-    export_request: ExportRequest, paper_model: Model, units: str
-) -> None:
+    export_request, paper_model, units
+):
     """G* = G_0 (1 - sum g_i) + G_0 sum g_i i omega tau_i/(1 + i omega tau_i), read back at its strain amplitude.
 
     Source: Abaqus Keywords Reference Guide, *VISCOELASTIC, TIME=PRONY: g_i, k_i, tau_i, a line per term.
@@ -149,9 +147,7 @@ def test_the_prony_series_of_abaqus_and_of_the_table_is_the_model_within_the_sta
         assert rows["shear strain amplitude [%]"].iloc[0] == pytest.approx(100.0 * strain, rel=1e-6)
 
 
-def test_without_friction_a_prony_series_reaches_the_accuracy_and_has_no_amplitude(
-    export_request: ExportRequest, paper_model: Model
-) -> None:
+def test_without_friction_a_prony_series_reaches_the_accuracy_and_has_no_amplitude(export_request, paper_model):
     model = paper_model.without("friction")
     grid = predict(Result(model), Direction.AXIAL, [5.0, 155.0], [1e-4, 5e-4])
     request = replace(export_request, result=Result(model), predictions=(grid,), accuracy=0.002)
@@ -163,9 +159,7 @@ def test_without_friction_a_prony_series_reaches_the_accuracy_and_has_no_amplitu
 
 
 @pytest.mark.parametrize("name", ["nastran", "optistruct", "abaqus"])
-def test_stated_constants_are_the_rotations_without_a_law(
-    name: str, export_request: ExportRequest, tmp_path: Path
-) -> None:
+def test_stated_constants_are_the_rotations_without_a_law(name, export_request, tmp_path):
     stated = replace(export_request, cardanic=60.0 + 6.0j)
     exported, found = read(name, stated, tmp_path)
     assert {dof for dof, _ in found} == {1, 2, 3, 4, 5, 6}
@@ -176,7 +170,7 @@ def test_stated_constants_are_the_rotations_without_a_law(
     assert "no stiffness in" not in " ".join(exported.losses)
 
 
-def test_stated_constants_in_adams(export_request: ExportRequest) -> None:
+def test_stated_constants_in_adams(export_request):
     files = adams.export(replace(export_request, cardanic=60.0 + 6.0j)).files
     for kind, damping in (
         ("car", 6.0 * 1e3 * np.radians(1.0) / (2.0 * np.pi * 75.0)),
@@ -189,7 +183,7 @@ def test_stated_constants_in_adams(export_request: ExportRequest) -> None:
             assert float(blocks["DAMPING"][0][f"{end}_DAMPING"]) == pytest.approx(damping, rel=DIGITS)
 
 
-def test_adams_holds_curve_and_damping(export_request: ExportRequest, known: pd.DataFrame) -> None:
+def test_adams_holds_curve_and_damping(export_request, known):
     """Static curve, damper or loss angle in the middle of the grid; mm, newton, degrees, second."""
     exported = adams.export(export_request)
     factors = {"x": (1e3, 1.0), "ax": (np.degrees(1.0), 1e3)}
@@ -221,7 +215,7 @@ def test_adams_holds_curve_and_damping(export_request: ExportRequest, known: pd.
 
 
 @pytest.mark.parametrize("kind", ["car", "ride"])
-def test_adams_says_how_far_its_element_is_off(export_request: ExportRequest, known: pd.DataFrame, kind: str) -> None:
+def test_adams_says_how_far_its_element_is_off(export_request, known, kind):
     """The first harmonic of the curve as it is in the file, beside a damper or at a loss angle."""
     exported = adams.export(export_request)
     text = exported.files[f"bushing_{kind}.bus"].decode("ascii")
@@ -262,14 +256,7 @@ def resting(model: Model, place: Direction, amplitude: float) -> float:
     ids=["cubic", "quintic", "asymmetric"],
 )
 @pytest.mark.parametrize("place", [Direction.AXIAL, Direction.TORSION])
-def test_the_curve_of_adams_is_the_law_to_half_a_percent(
-    paper_model: Model,
-    export_request: ExportRequest,
-    place: Direction,
-    effect: str,
-    value: float,
-    law: Callable[[Array], Array],
-) -> None:
+def test_the_curve_of_adams_is_the_law_to_half_a_percent(paper_model, export_request, place, effect, value, law):
     """Of elastic effects alone, whose force has a closed form; Adams draws Akima splines through the rows."""
     model = paper_model.without("springpot", "friction").with_effect(effect.partition(".")[0], {effect: value})
     reach = 0.15 / model.unit_strain(place)
@@ -286,7 +273,7 @@ def test_the_curve_of_adams_is_the_law_to_half_a_percent(
     assert np.abs(error).max() < 0.005
 
 
-def test_the_rate_of_adams_is_the_stated_one(export_request: ExportRequest) -> None:
+def test_the_rate_of_adams_is_the_stated_one(export_request):
     slow, fast = (
         teimorbit(adams.export(replace(export_request, static_rates=rates)).files["bushing_car.bus"].decode("ascii"))
         for rates in (None, {"m": 10.0 / 60.0})
@@ -303,9 +290,7 @@ WRITERS: list[Callable[[ExportRequest], Exported]] = [nastran.export, abaqus.exp
 
 
 @pytest.mark.parametrize("export", WRITERS)
-def test_every_deck_says_what_it_is_of_and_takes_directions_of_one_grid_alone(
-    export: Callable[[ExportRequest], Exported], export_request: ExportRequest
-) -> None:
+def test_every_deck_says_what_it_is_of_and_takes_directions_of_one_grid_alone(export, export_request):
     body = predict(export_request.result, Specimen("DMA =1+1", "modulus"), [5.0, 10.0], [0.01])
     exported = export(replace(export_request, units=MM_T_S_N, predictions=(body, *export_request.predictions)))
     assert "specimens: DMA =1+1" in exported.losses
@@ -321,9 +306,7 @@ def test_every_deck_says_what_it_is_of_and_takes_directions_of_one_grid_alone(
 
 
 @pytest.mark.parametrize(("name", "at_most"), [("nastran", 0.006), ("optistruct", 0.006), ("abaqus", 0.06)])
-def test_the_error_between_frequencies_that_is_told_is_the_one_there_is(
-    name: str, at_most: float, export_request: ExportRequest, tmp_path: Path
-) -> None:
+def test_the_error_between_frequencies_that_is_told_is_the_one_there_is(name, at_most, export_request, tmp_path):
     """Read back, drawn as straight lines between the rows, and compared with the model, without its rig, everywhere."""
     rigged = Result(export_request.result.model.with_effect("rig_compliance", {"rig_compliance.compliance": 1e-7}))
     exported, found = read(

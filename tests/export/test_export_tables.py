@@ -1,8 +1,6 @@
 """CSV files and the workbook, read back over the whole grid; no name does harm in any format."""
 
 import io
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import openpyxl
@@ -30,9 +28,7 @@ def sheets(content: bytes) -> dict[str, pd.DataFrame]:
 
 
 @pytest.mark.parametrize("kind", ["csv", "xlsx"])
-def test_long_and_wide_tables_hold_the_whole_grid(
-    kind: str, export_request: ExportRequest, known: pd.DataFrame
-) -> None:
+def test_long_and_wide_tables_hold_the_whole_grid(kind, export_request, known):
     if kind == "csv":
         files = spreadsheets.csv(export_request).files
         tables = {name.removesuffix(".csv").replace("_", " "): pd.read_csv(io.BytesIO(files[name])) for name in files}
@@ -70,9 +66,7 @@ NASTY = (
 
 
 @pytest.mark.parametrize("name", NASTY)
-def test_decks_and_workbook_hold_the_same_under_any_name(
-    name: str, named: Callable[[str], ExportRequest], tmp_path: Path
-) -> None:
+def test_decks_and_workbook_hold_the_same_under_any_name(name, named, tmp_path):
     def content(export_request: ExportRequest) -> tuple[object, ...]:
         texts = {
             file: text.decode("ascii")

@@ -1,7 +1,6 @@
 """The FMU against the rig: sweeps, loops and random motions in every direction, and each effect that runs in time."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -61,14 +60,14 @@ def worst(running: Running, model: Model, what: str, level: int = 1, values: dic
 
 @pytest.mark.parametrize("level", range(3))
 @pytest.mark.parametrize("what", ["sweep 5", "sweep 55", "sweep 155", "sine 0.1", "triangle 0.1", "random"])
-def test_force_follows_the_rig_in_every_direction(paper: Running, paper_model: Model, what: str, level: int) -> None:
+def test_force_follows_the_rig_in_every_direction(paper, paper_model, what, level):
     motion, _, _ = motions(what, level)
     assert np.sum(np.diff(np.sign(np.diff(motion[:, 0]))) != 0.0) > 100 or what != "random", "turning points"
     assert worst(paper, paper_model, what, level) < LARGEST
 
 
 @pytest.fixture(scope="module")
-def every(paper_model: Model, tmp_path_factory: pytest.TempPathFactory) -> tuple[Model, Running]:
+def every(paper_model, tmp_path_factory) -> tuple[Model, Running]:
     """A model with every law at its neutral values, and its FMU."""
     folder = tmp_path_factory.mktemp("every")
     model = Model.with_defaults(paper_model.bushing, (*paper_model.effects, *SETTABLE), paper_model.values)
@@ -76,7 +75,7 @@ def every(paper_model: Model, tmp_path_factory: pytest.TempPathFactory) -> tuple
 
 
 @pytest.mark.parametrize("name", SETTABLE)
-def test_each_effect_follows_the_rig(every: tuple[Model, Running], name: str) -> None:
+def test_each_effect_follows_the_rig(every, name):
     """At the sample of a turn itself dry friction has the sense of the step before it, and the rig that of both: such
     samples do not count."""
     neutral, running = every
@@ -95,7 +94,7 @@ def test_each_effect_follows_the_rig(every: tuple[Model, Running], name: str) ->
     assert counted.mean() > 0.98
 
 
-def test_what_fades_with_memory_or_a_preload_follows_the_rig(paper_model: Model, tmp_path: Path) -> None:
+def test_what_fades_with_memory_or_a_preload_follows_the_rig(paper_model, tmp_path):
     names = tuple(dict.fromkeys(name.partition(".")[0] for name in FADING))
     model = Model.with_defaults(paper_model.bushing, (*paper_model.effects, *names), {**paper_model.values, **FADING})
     running = Running(written(request_of(model, accuracy=2e-3), tmp_path), tmp_path / "fading")
@@ -108,7 +107,7 @@ def test_what_fades_with_memory_or_a_preload_follows_the_rig(paper_model: Model,
     assert worst(running, model, "random") < LARGEST
 
 
-def test_an_fmu_is_of_the_temperature_asked_for(paper_model: Model, tmp_path: Path) -> None:
+def test_an_fmu_is_of_the_temperature_asked_for(paper_model, tmp_path):
     """Springs that soften, and a springpot that shifts as well."""
     values = {"temperature.softening": 4e-3, "temperature.shift": 0.08}
     model = paper_model.with_effect("temperature", values)
@@ -123,7 +122,7 @@ def test_an_fmu_is_of_the_temperature_asked_for(paper_model: Model, tmp_path: Pa
     assert abs(found / warm - 1.0) < LARGEST < 0.2 * abs(found / model.stiffness("axial", frequency, amplitude) - 1.0)
 
 
-def test_the_description_is_valid(paper: Running) -> None:
+def test_the_description_is_valid(paper):
     assert validate_fmu(str(paper.file)) == []
     variables = {each.name: each for each in paper.description.modelVariables}
     assert paper.inputs == ["displacement.axial", "displacement.radial", "rotation.torsion"]
@@ -134,7 +133,7 @@ def test_the_description_is_valid(paper: Running) -> None:
     assert (variables["alpha"].variability, float(variables["alpha"].start)) == ("constant", 0.24)
 
 
-def test_every_effect_is_written_or_refused_in_one_error_and_every_law_is_tested() -> None:
+def test_every_effect_is_written_or_refused_in_one_error_and_every_law_is_tested():
     """No effect of the library is left out without a word: what is not in the sources has another way."""
     for effect in LIBRARY.values():
         known = effect.name if "." not in effect.name else f"{effect.name.partition('.')[0]}."
@@ -151,7 +150,7 @@ def test_every_effect_is_written_or_refused_in_one_error_and_every_law_is_tested
     assert kinds | {"elastic", "friction"} == set(FIELDS)
 
 
-def test_another_shape_is_set_by_its_two_numbers(paper: Running, paper_model: Model) -> None:
+def test_another_shape_is_set_by_its_two_numbers(paper, paper_model):
     other = Bushing("other", 0.012, 0.020, 0.05)
     values = {
         **{f"unit_strain.{place}": other.unit_strain(place) for place in Direction},

@@ -6,7 +6,6 @@ import re
 import sys
 import zipfile
 from dataclasses import replace
-from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -49,7 +48,7 @@ def archive(exported: Exported) -> dict[str, bytes]:
         return {name: opened.read(name) for name in opened.namelist()}
 
 
-def test_the_library_exports_the_interface_and_needs_no_other(exported: Exported) -> None:
+def test_the_library_exports_the_interface_and_needs_no_other(exported):
     """Names that a stripped library exports and needs are texts in it."""
     content = archive(exported)
     ((path, library),) = [(path, data) for path, data in content.items() if path.startswith("binaries/")]
@@ -63,7 +62,7 @@ def test_the_library_exports_the_interface_and_needs_no_other(exported: Exported
     assert {f"sources/{name}" for name in (*listed, "bushing.h", "fmi2.h", "model.h")} <= set(content)
 
 
-def test_the_same_model_gives_the_same_bytes_and_another_its_own_guid(paper_model: Model) -> None:
+def test_the_same_model_gives_the_same_bytes_and_another_its_own_guid(paper_model):
     once, again = (export(request_of(paper_model)).files for _ in range(2))
     assert once == again
     stiffer = archive(export(request_of(paper_model.with_values({"mu": 2e6}))))
@@ -71,7 +70,7 @@ def test_the_same_model_gives_the_same_bytes_and_another_its_own_guid(paper_mode
     assert ET.fromstring(stiffer["modelDescription.xml"]).get("guid") != own
 
 
-def test_names_with_quotes_and_markup_come_through(paper_model: Model, tmp_path: Path) -> None:
+def test_names_with_quotes_and_markup_come_through(paper_model, tmp_path):
     assert paper_model.bushing
     bushing = replace(paper_model.bushing, name='"A" & <b>\'\x07é</b> ]]>')
     mount = Specimen('<mount> "&1"', "shear", area=1e-3, thickness=5e-3)
@@ -91,7 +90,7 @@ def test_names_with_quotes_and_markup_come_through(paper_model: Model, tmp_path:
     assert (running.inputs, running.outputs) == (["strain.DMA"], ["stress.DMA"])
 
 
-def test_instances_do_not_see_each_other_and_a_state_is_taken_up_again(paper: Running) -> None:
+def test_instances_do_not_see_each_other_and_a_state_is_taken_up_again(paper):
     motion = 2e-4 * wandering(300, 1e-3, seed=3)[:, None] * np.array([1.0, 1.0, 50.0])
     expected = paper.run(motion, 1e-3)
     first, second = (paper.begun(paper.instance()) for _ in range(2))
@@ -122,13 +121,13 @@ def test_instances_do_not_see_each_other_and_a_state_is_taken_up_again(paper: Ru
 
 
 @pytest.mark.parametrize("name", ["kraus", "hysteretic_loss"])
-def test_effects_without_a_law_in_time_are_refused(paper_model: Model, name: str) -> None:
+def test_effects_without_a_law_in_time_are_refused(paper_model, name):
     with pytest.raises(ModelError, match="for which this effect has no law") as refused:
         time_model(request_of(paper_model.with_effect(name)))
     assert refused.value.place == name
 
 
-def test_effects_of_the_rig_are_left_out_and_what_is_held_is_said_with_its_error(paper_model: Model) -> None:
+def test_effects_of_the_rig_are_left_out_and_what_is_held_is_said_with_its_error(paper_model):
     plain, *others = (
         [value.name for value in time_model(request_of(model, (Direction.AXIAL,))).values]
         for model in (paper_model, *(paper_model.with_effect(name) for name in OF_THE_RIG))
@@ -151,7 +150,7 @@ def test_effects_of_the_rig_are_left_out_and_what_is_held_is_said_with_its_error
     assert [line for line in soft.losses if "mullins_softening: error of the stiffness up to" in line]
 
 
-def test_without_a_compiler_it_is_said_how_to_get_one(paper_model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_compiler_it_is_said_how_to_get_one(paper_model, monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
     with pytest.raises(OutputError, match="no compiler") as refused:
         export(request_of(paper_model))

@@ -20,7 +20,7 @@ SHARED_NOISE = replace(PAPER_NOISE, gain_error=4e-3, phase_error=3.5e-3)
 
 
 @pytest.fixture(scope="session")
-def rig(paper_model: Model) -> Callable[..., Campaign]:
+def rig(paper_model) -> Callable[..., Campaign]:
     """rig(seed, model, settings=, shared=, ...): the paper's tests of a model, by default with the noise of
     data/cmp_15961, or what else is set of a simulation."""
     cleaned: dict[tuple[object, ...], Undisturbed] = {}
@@ -43,6 +43,6 @@ def rig(paper_model: Model) -> Callable[..., Campaign]:
 
 
 @pytest.fixture(scope="session")
-def measured(campaign: Campaign) -> PreparedCampaign:
+def measured(campaign) -> PreparedCampaign:
     """The paper's bushing as an independent rig simulation measured it; its joint fit is `result`."""
     return PreparedCampaign.from_campaign(campaign)

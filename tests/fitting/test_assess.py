@@ -3,7 +3,6 @@
 And what a fit says of the tests it left out, and of tests that no rubber could have given.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -27,9 +26,7 @@ from bushfit.reading.measurement import Sweep
 BAND = (5.0, 15.0, 45.0, 100.0, 155.0)
 
 
-def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(
-    measured: PreparedCampaign, result: Result
-) -> None:
+def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(measured, result):
     """The noise is estimated too, which can only add to the inverse of J J^T."""
     model, data_sets = result.model, measured.select_tests(None)
     found = covariance(model, [FitStage(FIVE, data_sets)])
@@ -44,7 +41,7 @@ def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(
 
 
 @pytest.fixture
-def small(rig: Callable[..., Campaign]) -> Campaign:
+def small(rig) -> Campaign:
     """An axial loop, an axial and a radial sweep."""
     sweeps = tuple(SimulatedSweep(direction, (1e-4, 5e-4), BAND) for direction in (Direction.AXIAL, Direction.RADIAL))
     return rig(1, loops=(SimulatedLoop(Direction.AXIAL, 1e-3, 0.1),), sweeps=sweeps)
@@ -59,7 +56,7 @@ def without(campaign: Campaign, direction: Direction) -> tuple[Sweep, ...]:
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.05])
-def test_a_test_that_was_left_out_is_told_where_the_model_misses_it(small: Campaign, factor: float) -> None:
+def test_a_test_that_was_left_out_is_told_where_the_model_misses_it(small, factor):
     radial = [stiffer(sweep, factor) for sweep in without(small, Direction.AXIAL)]
     data = PreparedCampaign.from_campaign(replace(small, sweeps=(*without(small, Direction.RADIAL), *radial)))
     told = [line for line in fit_joint(data).warnings if "was not fitted" in line]
@@ -71,7 +68,7 @@ def test_a_test_that_was_left_out_is_told_where_the_model_misses_it(small: Campa
     assert not any("was not fitted" in line for line in both.warnings)
 
 
-def test_kilonewtons_taken_for_newtons_are_told(small: Campaign) -> None:
+def test_kilonewtons_taken_for_newtons_are_told(small):
     """In the sweep, and in the loop as well."""
     axial = without(small, Direction.RADIAL)
     slip = replace(small, sweeps=tuple(stiffer(sweep, 1e-3) for sweep in axial))
@@ -87,7 +84,7 @@ def test_kilonewtons_taken_for_newtons_are_told(small: Campaign) -> None:
     assert "kPa is that of no rubber" in told
 
 
-def test_what_wrong_weights_cost_is_that_of_a_mean_of_two_groups(paper_model: Model) -> None:
+def test_what_wrong_weights_cost_is_that_of_a_mean_of_two_groups(paper_model):
     """One parameter from two loops of unsure noise, as P. Meier (Biometrics 9 (1953) 59) has a mean of two groups: its
     variance grows by 4 sum p (1 - p)/f, p the weights and f the degrees of freedom; and has those of Satterthwaite."""
     new = {400: (1e-3, 0.01), 1000: (4e-4, 0.006)}  # rows, amplitude and noise
@@ -113,7 +110,7 @@ LEVELS = (1e-4, 2e-4, 5e-4)
 
 
 @pytest.fixture
-def levelled(rig: Callable[..., Campaign]) -> Campaign:
+def levelled(rig) -> Campaign:
     """Simulated: an axial loop, an axial and a radial sweep of three levels."""
     frequencies = tuple(np.arange(5.0, 156.0, 10.0))
     sweeps = tuple(SimulatedSweep(direction, LEVELS, frequencies) for direction in (Direction.AXIAL, Direction.RADIAL))
@@ -132,7 +129,7 @@ def runs(result: Result, direction: str) -> dict[float | None, Misfit]:
     return {test.value: test for test in result.tests if test.place == direction and test.points < 1000}
 
 
-def test_thousands_of_rows_of_a_loop_do_not_hide_a_level_that_is_off(levelled: Campaign) -> None:
+def test_thousands_of_rows_of_a_loop_do_not_hide_a_level_that_is_off(levelled):
     result = fit_joint(PreparedCampaign.from_campaign(level_off(levelled, 1, 2e-4, 1.03)))
     assert result.quality is not None
     told = runs(result, "radial")
@@ -143,7 +140,7 @@ def test_thousands_of_rows_of_a_loop_do_not_hide_a_level_that_is_off(levelled: C
     assert [test.fitted for test in result.tests if test.held is None] == [True, True, False]
 
 
-def test_a_run_held_out_is_a_refit_without_it(levelled: Campaign) -> None:
+def test_a_run_held_out_is_a_refit_without_it(levelled):
     """One Gauss-Newton step against the real refit: the same to a tenth of the standard errors."""
     data = PreparedCampaign.from_campaign(replace(levelled, loops=()))
     (sweep,) = data.select_tests(None)
@@ -160,7 +157,7 @@ def test_a_run_held_out_is_a_refit_without_it(levelled: Campaign) -> None:
         np.testing.assert_allclose(step / errors, moved / errors, atol=0.5)
 
 
-def test_usable_within_what_95_of_a_hundred_points_show(levelled: Campaign) -> None:
+def test_usable_within_what_95_of_a_hundred_points_show(levelled):
     result = fit_joint(PreparedCampaign.from_campaign(level_off(levelled, 1, 5e-4, 1.05)))
     by_place = {place.place: place for place in result.usable}
     assert by_place["axial"].held_out

@@ -33,7 +33,6 @@ from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reduction.harmonics import basis
 
-Rig = Callable[..., Campaign]
 #: Relative error of the stiffness at frequencies [Hz] and amplitudes [m].
 Off = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -113,9 +112,7 @@ def held(result: Result, truth: Model, off: Off) -> tuple[list[float], np.ndarra
     [(0.02, 8), *(pytest.param(size, SEEDS // 5, marks=pytest.mark.slow) for size in (0.005, 0.02, 0.05))],
 )
 @pytest.mark.parametrize("loops", [True, False], ids=["loop and sweeps", "sweeps"])
-def test_bands_hold_a_rubber_that_is_not_quite_the_model(
-    rig: Rig, paper_model: Model, size: float, seeds: int, loops: bool
-) -> None:
+def test_bands_hold_a_rubber_that_is_not_quite_the_model(rig, paper_model, size, seeds, loops):
     counted, shares, inside = 0, [], []
     for seed in range(seeds):
         off = waves(size, seed)
@@ -142,12 +139,12 @@ def test_bands_hold_a_rubber_that_is_not_quite_the_model(
 
 
 @pytest.fixture
-def off_by_waves(rig: Rig) -> tuple[Campaign, Result]:
+def off_by_waves(rig) -> tuple[Campaign, Result]:
     campaign = spoiled(rig(3, shared=True), waves(0.03, 3))
     return campaign, fit_joint(PreparedCampaign.from_campaign(campaign))
 
 
-def test_a_model_error_is_told_and_kept_in_the_file(off_by_waves: tuple[Campaign, Result]) -> None:
+def test_a_model_error_is_told_and_kept_in_the_file(off_by_waves):
     result = off_by_waves[1]
     (line,) = [line for line in result.warnings if "the model misses the tests by " in line]
     assert "parameters are the closest fit, and their intervals include this misfit" in line
@@ -159,7 +156,7 @@ def test_a_model_error_is_told_and_kept_in_the_file(off_by_waves: tuple[Campaign
         assert np.allclose(before.low, after.low, rtol=1e-12)
 
 
-def test_a_band_opens_by_the_model_error_beyond_the_tests(off_by_waves: tuple[Campaign, Result]) -> None:
+def test_a_band_opens_by_the_model_error_beyond_the_tests(off_by_waves):
     result = off_by_waves[1]
     assert result.model_error is not None
     far = predict(result, Direction.AXIAL, [5000.0], [1e-4])
@@ -169,7 +166,7 @@ def test_a_band_opens_by_the_model_error_beyond_the_tests(off_by_waves: tuple[Ca
     assert np.hypot(narrow, own) == pytest.approx(wider, rel=1e-3)
 
 
-def test_the_closest_fit_is_as_near_as_five_parameters_can_be(off_by_waves: tuple[Campaign, Result]) -> None:
+def test_the_closest_fit_is_as_near_as_five_parameters_can_be(off_by_waves):
     """Root mean square of the relative misfit, each operating point alike, against plain least squares from there."""
     campaign, result = off_by_waves
     data_sets = PreparedCampaign.from_campaign(campaign).select_tests(None)
@@ -190,7 +187,7 @@ def test_the_closest_fit_is_as_near_as_five_parameters_can_be(off_by_waves: tupl
 
 
 @pytest.mark.parametrize("seed", some(range(12), {0, 3}))
-def test_a_ripple_of_a_dense_sweep_bends_no_parameter(rig: Rig, paper_model: Model, seed: int) -> None:
+def test_a_ripple_of_a_dense_sweep_bends_no_parameter(rig, paper_model, seed):
     """Three levels of 600 frequencies, a ripple of 0.3 to 1 %, noise of 0.5 %."""
     rng = np.random.default_rng(seed)
     frequency, amplitude = (axis.ravel() for axis in np.meshgrid(np.geomspace(5.0, 155.0, 600), [1e-4, 2e-4, 5e-4]))
@@ -209,14 +206,14 @@ def test_a_ripple_of_a_dense_sweep_bends_no_parameter(rig: Rig, paper_model: Mod
 
 
 @pytest.fixture
-def refitted(rig: Rig) -> FitResult:
+def refitted(rig) -> FitResult:
     """The sweeps of a rubber that is not quite the model, fitted with a model error."""
     data = PreparedCampaign.from_campaign(replace(spoiled(rig(3, shared=True), waves(0.03, 3)), loops=()))
     plain = estimate(FitProblem(data.starting_model(data.effects, data.sweeps, {}), data.sweeps, FIVE, data.bounds))
     return with_model_error(plain, data.bounds)[0]
 
 
-def test_the_covariance_is_the_sandwich_of_noise_and_process(refitted: FitResult) -> None:
+def test_the_covariance_is_the_sandwich_of_noise_and_process(refitted):
     """In full, J^+ V J^+^T, V by one standard deviation of each independent source of error."""
     found = refitted
     (sweep,) = found.covariance_tests
@@ -238,7 +235,7 @@ def test_the_covariance_is_the_sandwich_of_noise_and_process(refitted: FitResult
     np.testing.assert_allclose(known.matrix, moved @ moved.T, rtol=1e-6)
 
 
-def test_the_likelihood_is_averaged_over_the_process(refitted: FitResult) -> None:
+def test_the_likelihood_is_averaged_over_the_process(refitted):
     """In full: -(r^T C^-1 r + ln|C|)/2 over sizes and lengths, and Laplace's -ln|J C^-1 J^T + prior|/2 at the best."""
     (sweep,) = (replace(test, model_error=0.0) for test in refitted.minimised)
     solution, free = refitted.moved_to(refitted.model, [sweep]), ["mu", "m"]
@@ -258,7 +255,7 @@ def test_the_likelihood_is_averaged_over_the_process(refitted: FitResult) -> Non
     assert log_likelihood(refitted, dict.fromkeys(free, 1.0)) == pytest.approx(expected, abs=0.1)
 
 
-def test_conditioning_is_that_of_a_normal_distribution() -> None:
+def test_conditioning_is_that_of_a_normal_distribution():
     points, nodes = np.random.default_rng(0).normal(size=(2, 5, 2))
     weights, variance = condition(points, nodes)
     solved = np.linalg.solve(matern(nodes, nodes), matern(nodes, points))

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings
 from bushfit.fitting.noise import SweepNoise, sweep_noise
 from bushfit.fitting.preparation import MeasuredLoop
@@ -14,7 +13,6 @@ from bushfit.fitting.prepared_loop import prepare_loop
 from bushfit.fitting.rig_class import ASSUMED
 from bushfit.fitting.row_noise import RowNoise, row_noise
 from bushfit.geometry import Direction
-from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
 
 FREQUENCIES = np.arange(5.0, 156.0, 10.0)
@@ -25,7 +23,7 @@ Noisy = Callable[..., Sweep]
 
 
 @pytest.fixture
-def noisy_sweep(paper_model: Model) -> Noisy:
+def noisy_sweep(paper_model) -> Noisy:
     """Sweep(seed, random, gain, phase, repeats): errors of each kind, relative and [rad]."""
 
     def draw(
@@ -55,7 +53,7 @@ def scatter_of(found: Sequence[SweepNoise]) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("random", "gain", "phase"), [(5e-3, 0.0, 0.0), (1e-3, 8e-3, 1e-3), (1e-2, 3e-3, 6e-3)])
-def test_both_parts_are_recovered(noisy_sweep: Noisy, random: float, gain: float, phase: float) -> None:
+def test_both_parts_are_recovered(noisy_sweep, random, gain, phase):
     found = [sweep_noise([noisy_sweep(seed, random, gain, phase)]) for seed in range(200)]
     shared = np.sqrt(np.mean([np.square(noise.shared) for noise in found], axis=0))
     assert {noise.origin for noise in found} == {"repeats"}
@@ -65,7 +63,7 @@ def test_both_parts_are_recovered(noisy_sweep: Noisy, random: float, gain: float
     np.testing.assert_allclose(shared, [gain, phase], rtol=0.1, atol=0.25 * random)
 
 
-def test_scatter_grows_towards_low_frequency_where_repeats_show_it(noisy_sweep: Noisy) -> None:
+def test_scatter_grows_towards_low_frequency_where_repeats_show_it(noisy_sweep):
     flat = [sweep_noise([noisy_sweep(seed)]) for seed in range(200)]
     assert sum(bool(noise.slopes) for noise in flat) <= 2
     found = []
@@ -78,7 +76,7 @@ def test_scatter_grows_towards_low_frequency_where_repeats_show_it(noisy_sweep: 
     np.testing.assert_allclose(np.mean(found, axis=0), 1.0, rtol=0.2)  # without growth they are 0.3 and 2.4
 
 
-def test_the_class_of_a_rig_is_an_error_of_each_level(noisy_sweep: Noisy) -> None:
+def test_the_class_of_a_rig_is_an_error_of_each_level(noisy_sweep):
     rig = RigSettings(gain_error=3e-3, displacement_error=4e-3)
     repeated, single = (sweep_noise([noisy_sweep(0, repeats=repeats)], rig) for repeats in (3, 1))
     assert repeated.level == pytest.approx((5e-3, 0.0))
@@ -87,7 +85,7 @@ def test_the_class_of_a_rig_is_an_error_of_each_level(noisy_sweep: Noisy) -> Non
     assert "[rig]" in single.describe()
 
 
-def test_no_repeats_fall_back_to_a_smooth_curve_and_an_assumption(noisy_sweep: Noisy) -> None:
+def test_no_repeats_fall_back_to_a_smooth_curve_and_an_assumption(noisy_sweep):
     found = [sweep_noise([noisy_sweep(seed, 5e-3, repeats=1)]) for seed in range(50)]
     np.testing.assert_allclose(scatter_of(found), 5e-3, rtol=0.1)
     assert {noise.shared for noise in found} == {ASSUMED}
@@ -95,7 +93,6 @@ def test_no_repeats_fall_back_to_a_smooth_curve_and_an_assumption(noisy_sweep: N
     assert "from the class of [rig]" in found[0].describe()
 
 
-Rig = Callable[..., Campaign]
 ROWS = 3000
 
 
@@ -118,7 +115,7 @@ def low_passed(random: np.random.Generator, rows: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.9, 0.98])
-def test_the_rig_s_filter_is_found_and_taken_out(rig: Rig, paper_model: Model, correlation: float) -> None:
+def test_the_rig_s_filter_is_found_and_taken_out(rig, paper_model, correlation):
     found = [MeasuredLoop(prepare_loop(rig(seed, force_correlation=correlation).loops[0])) for seed in range(15)]
     rows = np.array([data_set.prepared.row_noise.rows_as_one for data_set in found])
     true = (1.0 + correlation) / (1.0 - correlation)
@@ -137,7 +134,7 @@ def test_the_rig_s_filter_is_found_and_taken_out(rig: Rig, paper_model: Model, c
         assert found[0].prepared.correlation_text.startswith(", correlated over about ")
 
 
-def test_whitening_is_exact_from_the_first_row_on() -> None:
+def test_whitening_is_exact_from_the_first_row_on():
     found, size = row_noise(*2 * [2.0 * low_passed(np.random.default_rng(0), ROWS)], 3)
     assert size == pytest.approx(2.0, rel=0.1)
     whitening = found.whiten(np.eye(ROWS)[:200]).T[:200]
@@ -146,7 +143,7 @@ def test_whitening_is_exact_from_the_first_row_on() -> None:
     np.testing.assert_allclose(np.diag(covariance, 3), covariance[0, 3], atol=1e-6)
 
 
-def test_rows_of_other_cycles_are_whitened_anew() -> None:
+def test_rows_of_other_cycles_are_whitened_anew():
     """Means over other cycles tell nothing of one another: between them the correlation is none."""
     from scipy.linalg import block_diag, toeplitz
 
@@ -171,7 +168,7 @@ def test_rows_of_other_cycles_are_whitened_anew() -> None:
         pytest.param("filtered", 8, 2000, 0.95, marks=pytest.mark.slow),
     ],
 )
-def test_harmonics_err_as_the_noise_says(kind: str, cycles: int, rows: int, correlation: float) -> None:
+def test_harmonics_err_as_the_noise_says(kind, cycles, rows, correlation):
     """Of low-passed noise too, and of a lone cycle's. Long loops are counted in bins over groups of cycles: where these
     met, or bins held one row and two in turn, the mean squares here were 4.0, 4.4 and 2.7."""
     phase = np.arange(cycles * rows + 1) / rows

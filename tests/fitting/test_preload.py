@@ -128,7 +128,7 @@ CASES = {
 
 @pytest.mark.parametrize("seeds", [4, pytest.param(SEEDS, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("case", CASES)
-def test_bands_hold_the_truth_within_the_tested_preloads(case: str, seeds: int) -> None:
+def test_bands_hold_the_truth_within_the_tested_preloads(case, seeds):
     rubber, preloads, effects = CASES[case]
     largest, claimed, inside = max(preload.value for preload in preloads), 0, []
     ends = min(preload.value for preload in preloads), largest
@@ -150,7 +150,7 @@ def test_bands_hold_the_truth_within_the_tested_preloads(case: str, seeds: int) 
     assert 0.93 <= held.mean() <= 0.99 if seeds == SEEDS else held.mean() > 0.85
 
 
-def test_two_preloads_give_a_line_with_a_warning_and_one_is_a_label() -> None:
+def test_two_preloads_give_a_line_with_a_warning_and_one_is_a_label():
     result = fit_joint(PreparedCampaign.from_campaign(campaign(STIFF, newtons(0.0, 800.0), seed=1)))
     curvatures = [result.model.values[f"preload.{name}"] for name in ("c3", "friction_square", "rate_square")]
     assert curvatures == [0.0, 0.0, 0.0]
@@ -161,7 +161,7 @@ def test_two_preloads_give_a_line_with_a_warning_and_one_is_a_label() -> None:
     assert single.measured.preloads == ()
 
 
-def test_a_preload_without_influence_is_a_sentence_and_can_be_predicted() -> None:
+def test_a_preload_without_influence_is_a_sentence_and_can_be_predicted():
     data = PreparedCampaign.from_campaign(campaign(Rubber(), newtons(0.0, 500.0, 1000.0), seed=2))
     result = fit_joint(data)
     assert any("show no influence of the preload" in line for line in result.warnings)
@@ -171,7 +171,7 @@ def test_a_preload_without_influence_is_a_sentence_and_can_be_predicted() -> Non
     assert loaded.stiffness.value == without.stiffness.value
 
 
-def test_only_tested_preloads_are_predicted_also_from_the_model_file() -> None:
+def test_only_tested_preloads_are_predicted_also_from_the_model_file():
     fitted = fit_joint(PreparedCampaign.from_campaign(campaign(STIFF, newtons(300.0, 600.0, 900.0), seed=3)))
     result = from_document(to_document(fitted))
     stated = predict(result, Direction.AXIAL, [20.0], [1e-4], preload=Preload(300.0, "N"))
@@ -188,7 +188,7 @@ def test_only_tested_preloads_are_predicted_also_from_the_model_file() -> None:
             predict(result, direction, [20.0], [1e-4], preload=preload)
 
 
-def test_static_curves_and_comparisons_are_about_a_preload() -> None:
+def test_static_curves_and_comparisons_are_about_a_preload():
     result = fit_joint(PreparedCampaign.from_campaign(campaign(STIFF, newtons(0.0, 500.0, 1000.0), seed=3)))
     preload, reach, rate = Preload(700.0, "N"), 2e-4, 1e-4
     curve = static_curve(result, Direction.AXIAL, reach, rate, preload=preload)
@@ -211,7 +211,7 @@ def test_static_curves_and_comparisons_are_about_a_preload() -> None:
         compare(result, result, preload="1100 N")
 
 
-def test_a_diagnosis_takes_stated_preloads_as_known() -> None:
+def test_a_diagnosis_takes_stated_preloads_as_known():
     data = PreparedCampaign.from_campaign(campaign(STIFF, newtons(0.0, 500.0, 1000.0), seed=4))
     diagnosis = diagnose(data)
     assert "preload" in diagnosis.result.model.effects
@@ -231,11 +231,11 @@ def test_a_diagnosis_takes_stated_preloads_as_known() -> None:
         (None, None),
     ],
 )
-def test_preloads_are_read_from_texts(text: str | None, preload: Preload | None) -> None:
+def test_preloads_are_read_from_texts(text, preload):
     assert parse_preload(text, Direction.AXIAL) == preload
 
 
-def test_equal_preloads_are_one_and_mixed_quantities_are_none() -> None:
+def test_equal_preloads_are_one_and_mixed_quantities_are_none():
     assert distinct_preloads(newtons(505.0, 0.0, 500.0, 1000.0)) == newtons(0.0, 500.0, 1000.0)
     assert distinct_preloads([*newtons(0.0), *metres(1e-3)]) == metres(0.0, 1e-3)
     assert distinct_preloads([*newtons(500.0), *metres(1e-3)]) == []

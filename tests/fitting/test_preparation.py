@@ -1,28 +1,25 @@
 """Residuals of loops and sweeps in units of noise, white where the model is right; and which tests count in a fit."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings, RigSettings
 from bushfit.errors import FitError
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, prepare_loops
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Direction
-from bushfit.model.model import FIVE, Model
+from bushfit.model.model import FIVE
 from bushfit.reading.measurement import Sweep
 
-Rig = Callable[..., Campaign]
 RANDOM, SHARED = (5e-3, 7e-3), (4e-3, 3.5e-3)
 BLOCKS = {(1e-4, 1): 16, (1e-4, 2): 9, (5e-4, 1): 16}
 
 
 @pytest.fixture
-def sweep(paper_model: Model) -> MeasuredSweep:
+def sweep(paper_model) -> MeasuredSweep:
     """Three blocks, one of them short, in scrambled order, exactly on the model."""
     amplitude = np.concatenate([np.full(n, x) for (x, _), n in BLOCKS.items()])
     repeat = np.concatenate([np.full(n, r) for (_, r), n in BLOCKS.items()])
@@ -36,7 +33,7 @@ def sweep(paper_model: Model) -> MeasuredSweep:
 
 
 @pytest.fixture
-def loop(rig: Rig) -> MeasuredLoop:
+def loop(rig) -> MeasuredLoop:
     """A loop of a rig whose gain is known: its rows are independent."""
     return prepare_loops(rig(1).loops, RigSettings(gain_error=0.0))[0]
 
@@ -51,13 +48,13 @@ def covariance_of(sweep: MeasuredSweep) -> np.ndarray:
     return np.block([[halves[0], zero], [zero, halves[1]]])
 
 
-def test_whitening_gives_the_identity(sweep: MeasuredSweep) -> None:
+def test_whitening_gives_the_identity(sweep):
     n = sweep.frequency.size
     whitening = sweep.whiten(np.concatenate([np.eye(n), 1j * np.eye(n)])).T
     np.testing.assert_allclose(whitening @ covariance_of(sweep) @ whitening.T, np.eye(2 * n), atol=1e-12)
 
 
-def test_unsure_noise_moves_the_covariance_by_its_derivatives(sweep: MeasuredSweep) -> None:
+def test_unsure_noise_moves_the_covariance_by_its_derivatives(sweep):
     """Of whitened residuals, by each variance times its standard error: scatter, what runs and what levels share."""
     level, freedom = (3e-3, 2e-3), {"scatter": 20, "shared": 6, "level": 5}
     noise = replace(sweep.noise, level=level, scatter_freedom=20, level_freedom=5)
@@ -86,7 +83,7 @@ def test_unsure_noise_moves_the_covariance_by_its_derivatives(sweep: MeasuredSwe
 
 
 @pytest.mark.parametrize("kind", ["complex", "magnitude_loss_factor", "loop", "loop of correlated rows"])
-def test_the_jacobian_is_that_of_the_residual(rig: Rig, sweep: MeasuredSweep, paper_model: Model, kind: str) -> None:
+def test_the_jacobian_is_that_of_the_residual(rig, sweep, paper_model, kind):
     data_set: MeasuredTest
     if kind.startswith("loop"):
         (data_set,) = prepare_loops(rig(1, force_correlation=0.98 if "correlated" in kind else 0.0).loops)
@@ -101,7 +98,7 @@ def test_the_jacobian_is_that_of_the_residual(rig: Rig, sweep: MeasuredSweep, pa
         np.testing.assert_allclose(found, expected, atol=1e-7 * np.abs(expected).max())
 
 
-def test_magnitude_and_loss_factor_are_what_they_say(sweep: MeasuredSweep, paper_model: Model) -> None:
+def test_magnitude_and_loss_factor_are_what_they_say(sweep, paper_model):
     stiffer = paper_model.with_values({"mu": 1.2e6})
     found, measured = sweep.stiffness(stiffer), sweep.measured
     deviation = replace(sweep, residuals="magnitude_loss_factor").deviation(sweep.stiffness(stiffer))
@@ -110,7 +107,7 @@ def test_magnitude_and_loss_factor_are_what_they_say(sweep: MeasuredSweep, paper
     np.testing.assert_allclose(deviation.imag, loss * (measured.real / np.abs(measured)) ** 2, atol=1e-12)
 
 
-def test_the_right_model_of_a_loop_leaves_noise_alone(loop: MeasuredLoop, paper_model: Model) -> None:
+def test_the_right_model_of_a_loop_leaves_noise_alone(loop, paper_model):
     residual, counted = loop.residual(paper_model), loop.prepared.weight > 0.0
     assert residual.size == loop.size == loop.test.time.size
     assert loop.residual_count == np.count_nonzero(counted) > 0.99 * loop.size
@@ -123,7 +120,7 @@ def test_the_right_model_of_a_loop_leaves_noise_alone(loop: MeasuredLoop, paper_
     assert np.max(np.abs(loop.noise_free(paper_model).residual(paper_model))) < 1e-9
 
 
-def test_a_gain_error_of_the_rig_pulls_no_fit(rig: Rig, paper_model: Model) -> None:
+def test_a_gain_error_of_the_rig_pulls_no_fit(rig, paper_model):
     """The gain that each of eight loops asks for, all of gain 1: noise in the gain's own column would make it small.
 
     With the force as it was measured in that column, the mean is 6 % below 1 (Peelle's puzzle).
@@ -138,7 +135,7 @@ def test_a_gain_error_of_the_rig_pulls_no_fit(rig: Rig, paper_model: Model) -> N
     assert np.linalg.norm(column) == pytest.approx(1.0 / 5e-3, rel=0.15)  # no loop tells a gain better than its rig
 
 
-def test_repeats_of_a_loop_share_the_error_of_its_gain(campaign: Campaign) -> None:
+def test_repeats_of_a_loop_share_the_error_of_its_gain(campaign):
     """So their mean is no surer of it than one of them: each counts as more unsure by the root of their number."""
     (loop,) = campaign.loops
     faster = replace(loop, name="faster", time=loop.time / 2.0)
@@ -149,7 +146,7 @@ def test_repeats_of_a_loop_share_the_error_of_its_gain(campaign: Campaign) -> No
     np.testing.assert_allclose([each.gain_error for each in found], [1e-2] * 4 + [5e-3])
 
 
-def test_dynamic_amplitudes_choose_the_levels(measured: PreparedCampaign) -> None:
+def test_dynamic_amplitudes_choose_the_levels(measured):
     assert set(measured.smallest_sweep.amplitude) == {1e-4}
     other = replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(2e-4, 5e-4)))
     assert set(PreparedCampaign.from_campaign(other).smallest_sweep.amplitude) == {2e-4, 5e-4}

@@ -66,7 +66,7 @@ CASES: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_the_motion_is_cleared_and_the_true_model_leaves_only_noise(paper_model: Model, case: str) -> None:
+def test_the_motion_is_cleared_and_the_true_model_leaves_only_noise(paper_model, case):
     """One peak and one trough a cycle, where the motion has them, although the sensor turns at every other row."""
     loop = measured(paper_model, **CASES[case])
     data_set = MeasuredLoop(prepare_loop(loop))
@@ -83,7 +83,7 @@ def test_the_motion_is_cleared_and_the_true_model_leaves_only_noise(paper_model:
     assert reduced < 1.0 + 6.0 * np.sqrt(2.0 / residual.size) + 0.1
 
 
-def test_from_rest_the_virgin_curve_is_followed(paper_model: Model) -> None:
+def test_from_rest_the_virgin_curve_is_followed(paper_model):
     whole = rig.record(paper_model, Direction.AXIAL, FREQUENCY, AMPLITUDE, cycles=3, steps_per_cycle=1000)
     loop = Loop("loop", Direction.AXIAL, whole.time, whole.displacement, whole.force)
     prepared = prepare_loop(loop)
@@ -97,7 +97,7 @@ def test_from_rest_the_virgin_curve_is_followed(paper_model: Model) -> None:
 
 
 @pytest.mark.parametrize(("cycles", "amplitude"), [(1, 1e-4), (1, 1e-3), (4, 1e-3), (3.5, 1e-4)])
-def test_rest_may_be_a_preload(paper_model: Model, cycles: float, amplitude: float) -> None:
+def test_rest_may_be_a_preload(paper_model, cycles, amplitude):
     whole = rig.record(paper_model, Direction.AXIAL, FREQUENCY, amplitude, cycles=4, steps_per_cycle=1000)
     rows = slice(round(1000 * cycles) + 1)
     noise = 3e-3 * np.ptp(whole.force) * np.random.default_rng(0).standard_normal(whole.force.size)
@@ -114,7 +114,7 @@ def test_rest_may_be_a_preload(paper_model: Model, cycles: float, amplitude: flo
     assert not prepare_loop(later).from_rest
 
 
-def test_many_rows_are_binned_without_loss(paper_model: Model) -> None:
+def test_many_rows_are_binned_without_loss(paper_model):
     loop = measured(paper_model, cycles=5.0, rows=40_000)
     prepared = prepare_loop(loop)
     assert prepared.force.size <= 5 * 1024 + 1
@@ -136,9 +136,7 @@ def with_hole(loop: Loop, begin: float, end: float) -> Loop:
 
 @pytest.mark.parametrize("waveform", ["sine", "triangle"])
 @pytest.mark.parametrize("hole", [(1.0, 2.0), (1.3, 2.3), (1.3, 1.8), (1.3, 1.55), (0.5, 1.5), (1.3, 2.9)])
-def test_rows_that_are_missing_do_not_change_the_frequency(
-    paper_model: Model, waveform: str, hole: tuple[float, float]
-) -> None:
+def test_rows_that_are_missing_do_not_change_the_frequency(paper_model, waveform, hole):
     prepared = prepare_loop(with_hole(measured(paper_model, waveform=waveform, cycles=3.0), *hole))
     assert prepared.frequency == pytest.approx(FREQUENCY, rel=1e-3)
     assert prepared.amplitude == pytest.approx(AMPLITUDE, rel=5e-3)
@@ -160,13 +158,13 @@ def frequency_found(waveform: str, phase: Array) -> float:
 
 @pytest.mark.parametrize("waveform", ["sine", "triangle"])
 @pytest.mark.parametrize("cycles", [1.005, 1.02, 1.03, 1.1, 1.2, 1.4, 1.7])
-def test_a_cycle_and_a_part_is_not_one_longer_cycle(waveform: str, cycles: float) -> None:
+def test_a_cycle_and_a_part_is_not_one_longer_cycle(waveform, cycles):
     starts = np.arange(0.0, 1.0, 0.05) if cycles > 1.1 else (0.0, 0.1, 0.4, 0.6)  # at an extreme a little is not seen
     found = [frequency_found(waveform, np.linspace(a, a + cycles, 2000)) for a in starts]
     assert found == pytest.approx([1.0] * len(starts), abs=2e-3)
 
 
-def test_less_than_a_cycle_is_refused() -> None:
+def test_less_than_a_cycle_is_refused():
     with pytest.raises(FitError, match=r"does not contain a whole cycle[\s\S]*at least one closed cycle"):
         frequency_found("sine", np.linspace(0.0, 0.9, 2000))
 
@@ -199,7 +197,7 @@ def recorded(model: Model, *motions: Array, noise: float = 3e-3) -> Loop:
 
 
 @pytest.mark.parametrize("case", RUN_INS)
-def test_the_true_model_leaves_only_noise_of_the_steady_cycles(paper_model: Model, case: str) -> None:
+def test_the_true_model_leaves_only_noise_of_the_steady_cycles(paper_model, case):
     prepared = prepare_loop(recorded(paper_model, *RUN_INS[case]))
     gap = float(np.sqrt(np.mean(np.square(MeasuredLoop(prepared).relative(paper_model)))))
     print(f"{case}: {prepared.notes}; true model within {100 * gap:.2f} % of half the force range, noise 0.3 %")

@@ -1,10 +1,7 @@
 """Priors of parameters, which weigh as one more measurement of the parameters, and ties between parameters."""
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,19 +13,17 @@ from bushfit.fitting.assess import FitStage, covariance
 from bushfit.fitting.coordinates import jacobian, residual
 from bushfit.fitting.model_error import log_likelihood
 from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.problem import FitProblem, FitResult
+from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.solve import solve, solve_with_lmfit
 from bushfit.model.constraints import Constraints, Prior
 from bushfit.model.file import from_document, to_document
-from bushfit.model.model import FIVE, Model
+from bushfit.model.model import FIVE
 from bushfit.model.result import Result
 
 
 @pytest.mark.parametrize("solver", [solve, solve_with_lmfit])
-def test_a_prior_weighs_as_one_more_measurement_of_the_parameter(
-    measured: PreparedCampaign, paper_model: Model, solver: Callable[[FitProblem], FitResult]
-) -> None:
+def test_a_prior_weighs_as_one_more_measurement_of_the_parameter(measured, paper_model, solver):
     """For one parameter of a nearly linear model, the estimate is the mean of tests and prior, by their variances."""
     tests = measured.select_tests(None)
     plain = solve(FitProblem(paper_model, tests, FIVE))
@@ -50,7 +45,7 @@ def _fitted(campaign: Campaign, **settings: ParameterSetting) -> Result:
     return fit_joint(PreparedCampaign.from_campaign(replace(campaign, fit=fit)))
 
 
-def test_a_tie_holds_in_values_errors_and_derivatives(rig: Callable[..., Campaign]) -> None:
+def test_a_tie_holds_in_values_errors_and_derivatives(rig):
     tied = _fitted(rig(3), m=ParameterSetting(expression="0.18 * mu + 1e3 * exp(alpha)"))
     mu, m, alpha = (tied.model.values[name] for name in ("mu", "m", "alpha"))
     assert m == pytest.approx(0.18 * mu + 1e3 * np.exp(alpha), rel=1e-12)
@@ -64,9 +59,7 @@ def test_a_tie_holds_in_values_errors_and_derivatives(rig: Callable[..., Campaig
     assert jacobian(tied.model, tests, ["mu"])[0] == pytest.approx((above - below) / 2e-5, rel=1e-3, abs=1e-2)
 
 
-def test_the_model_of_earlier_tests_is_a_prior_that_counts_as_these_tests(
-    rig: Callable[..., Campaign], tmp_path: Path
-) -> None:
+def test_the_model_of_earlier_tests_is_a_prior_that_counts_as_these_tests(rig, tmp_path):
     """The fit with the covariance of the first campaign is the fit to both campaigns, and its file says how it came."""
     stated = RigSettings(gain_error=5e-3, phase_error=2e-3)
     first, second = replace(rig(1), rig=stated), replace(rig(2), rig=stated, path=tmp_path / "campaign.toml")
@@ -84,14 +77,14 @@ def test_the_model_of_earlier_tests_is_a_prior_that_counts_as_these_tests(
     assert all(0.2 < use.share < 0.8 and abs(use.distance) < 4.0 for use in read.priors.values())
 
 
-def test_tests_contradict_a_wrong_prior_and_no_right_one(rig: Callable[..., Campaign], paper_model: Model) -> None:
+def test_tests_contradict_a_wrong_prior_and_no_right_one(rig, paper_model):
     truth = paper_model.values["alpha"]
     for shift, contradicts in ((0.5, False), (-6.0, True), (6.0, True)):
         found = _fitted(rig(4), alpha=ParameterSetting(prior=f"{truth + 0.004 * shift} +- 0.004"))
         assert any("the tests contradict the prior of alpha" in line for line in found.warnings) == contradicts
 
 
-def test_a_prior_of_a_parameter_that_the_model_lacks_is_reported(rig: Callable[..., Campaign]) -> None:
+def test_a_prior_of_a_parameter_that_the_model_lacks_is_reported(rig):
     found = _fitted(rig(0), **{"inertia.mass": ParameterSetting(prior="0.1 kg +- 0.01 kg")})
     assert "the prior 0.1 kg +- 0.01 kg is not used: the model lacks inertia.mass" in found.warnings
 
@@ -119,15 +112,13 @@ def test_a_prior_of_a_parameter_that_the_model_lacks_is_reported(rig: Callable[.
         ({"expression": "mu"}, "impossible value"),
     ],
 )
-def test_what_is_no_tie_or_prior_is_one_clear_error(
-    rig: Callable[..., Campaign], setting: dict[str, Any], message: str
-) -> None:
+def test_what_is_no_tie_or_prior_is_one_clear_error(rig, setting, message):
     with pytest.raises(BushfitError) as error:
         _fitted(rig(0), alpha=ParameterSetting(**setting))
     assert message in str(error.value)
 
 
-def test_the_likelihood_of_a_fit_has_the_density_of_its_prior(rig: Callable[..., Campaign], paper_model: Model) -> None:
+def test_the_likelihood_of_a_fit_has_the_density_of_its_prior(rig, paper_model):
     """A prior around the estimate multiplies it by its density there, averaged over the errors of the tests."""
     tests = PreparedCampaign.from_campaign(rig(5)).data_sets
     plain = solve(FitProblem(paper_model, tests, FIVE))

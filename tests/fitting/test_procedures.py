@@ -32,7 +32,7 @@ NAMES = ("paper", "soft and long", "stiff and thin", "strongly filled")
 
 
 @pytest.fixture(scope="module")
-def models(paper_model: Model, other_models: dict[str, Model]) -> dict[str, Model]:
+def models(paper_model, other_models) -> dict[str, Model]:
     return {"paper": paper_model, **other_models}
 
 
@@ -46,7 +46,7 @@ def shown(values: np.ndarray) -> str:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_an_ideal_rig_gives_the_truth_within_0_2_percent(rig: Rig, models: dict[str, Model], name: str) -> None:
+def test_an_ideal_rig_gives_the_truth_within_0_2_percent(rig, models, name):
     found = errors(
         fit_joint(PreparedCampaign.from_campaign(rig(model=models[name], settings=SimulateSettings()))),
         models[name].values,
@@ -58,7 +58,7 @@ def test_an_ideal_rig_gives_the_truth_within_0_2_percent(rig: Rig, models: dict[
 @pytest.mark.parametrize(
     ("name", "seeds"), [(NAMES[0], 8), *(pytest.param(name, 20, marks=pytest.mark.slow) for name in NAMES)]
 )
-def test_the_mean_over_seeds_is_the_truth(rig: Rig, models: dict[str, Model], name: str, seeds: int) -> None:
+def test_the_mean_over_seeds_is_the_truth(rig, models, name, seeds):
     truth, joint, two_step, spread = models[name], [], [], []
     for seed in range(seeds):
         data = PreparedCampaign.from_campaign(rig(seed, truth))
@@ -74,7 +74,7 @@ def test_the_mean_over_seeds_is_the_truth(rig: Rig, models: dict[str, Model], na
     assert np.all(np.abs(np.mean(two_step, axis=0)) < 3.0 * two_step_error + 2e-3)
 
 
-def test_radial_sweep_follows_from_axial_tests(measured: PreparedCampaign, result: Result) -> None:
+def test_radial_sweep_follows_from_axial_tests(measured, result):
     """The paper's claim: within 3 % in magnitude and 0.01 in loss factor of the means over the repeats."""
     (sweep,) = [data_set.sweep for data_set in measured.sweeps if data_set.direction is Direction.RADIAL]
     points = np.stack((sweep.frequency, sweep.amplitude))
@@ -89,7 +89,7 @@ def test_radial_sweep_follows_from_axial_tests(measured: PreparedCampaign, resul
     assert loss < 0.01
 
 
-def test_passes_agree_and_settle_where_plain_passes_would(measured: PreparedCampaign) -> None:
+def test_passes_agree_and_settle_where_plain_passes_would(measured):
     found = fit_two_step(measured)
     before, last = found.passes[-2], found.passes[-1]
     assert all(abs(last[name] / before[name] - 1.0) < 1e-4 for name in FIVE)
@@ -98,7 +98,7 @@ def test_passes_agree_and_settle_where_plain_passes_would(measured: PreparedCamp
     assert np.max(np.abs(errors(dynamic, found.result.model.values))) < 1e-3
 
 
-def test_errors_of_held_parameters_are_carried_over(measured: PreparedCampaign, result: Result) -> None:
+def test_errors_of_held_parameters_are_carried_over(measured, result):
     carried, sharp = fit_dynamic(measured, result), fit_dynamic(measured, Result(result.model))
     for name, most in (("m", 0.02), ("alpha", 0.01)):
         alone = sharp.covariance.stderr(name)
@@ -106,7 +106,7 @@ def test_errors_of_held_parameters_are_carried_over(measured: PreparedCampaign, 
         assert alone < most * sharp.model.values[name]  # type: ignore[operator]
 
 
-def test_magnitude_and_loss_factor_residuals_give_the_same_answer(measured: PreparedCampaign, result: Result) -> None:
+def test_magnitude_and_loss_factor_residuals_give_the_same_answer(measured, result):
     other = fit_joint(
         PreparedCampaign.from_campaign(replace(measured.campaign, fit=FitSettings(residuals="magnitude_loss_factor")))
     )
@@ -115,7 +115,7 @@ def test_magnitude_and_loss_factor_residuals_give_the_same_answer(measured: Prep
         assert other.model.values[name] == pytest.approx(result.model.values[name], abs=error)
 
 
-def test_missing_tests_are_said(measured: PreparedCampaign, result: Result) -> None:
+def test_missing_tests_are_said(measured, result):
     with pytest.raises(FitError, match="fit-static needs a loop"):
         fit_static(PreparedCampaign.from_campaign(replace(measured.campaign, loops=())))
     with pytest.raises(FitError, match="fit-dynamic needs a sweep"):
@@ -186,9 +186,7 @@ def told(shares: np.ndarray) -> str:
         ),
     ],
 )
-def test_95_percent_intervals_and_bands_cover(
-    rig: Rig, paper_model: Model, other_models: dict[str, Model], name: str, noise: dict[str, Any], seeds: int
-) -> None:
+def test_95_percent_intervals_and_bands_cover(rig, paper_model, other_models, name, noise, seeds):
     """Also where the noise of a loop is correlated from row to row."""
     inside, banded = coverage(rig, {"paper": paper_model, **other_models}[name], seeds, **noise)
     each, bands = np.mean(inside, axis=0), np.mean(banded, axis=0)
@@ -206,9 +204,7 @@ def test_95_percent_intervals_and_bands_cover(
 
 @pytest.mark.parametrize("seeds", [12, pytest.param(SEEDS, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("stated", [False, True])
-def test_95_percent_intervals_cover_where_the_gain_of_a_loop_is_off(
-    rig: Rig, paper_model: Model, seeds: int, stated: bool
-) -> None:
+def test_95_percent_intervals_cover_where_the_gain_of_a_loop_is_off(rig, paper_model, seeds, stated):
     """By 0.5 %, as each run and level of the sweeps, whether [rig] states it or nothing does; and all five at once."""
     inside, wide = [], []
     for seed in range(seeds):
@@ -244,7 +240,7 @@ def off_by_level(campaign: Campaign, error: float, seed: int) -> Campaign:
 
 
 @pytest.mark.parametrize("error", [0.0, 5e-3])
-def test_errors_of_levels_are_told(rig: Rig, paper_model: Model, error: float) -> None:
+def test_errors_of_levels_are_told(rig, paper_model, error):
     found, matters, freedom = [], [], []
     for seed in range(30):
         data = PreparedCampaign.from_campaign(off_by_level(rig(seed), error, seed))
@@ -260,7 +256,7 @@ def test_errors_of_levels_are_told(rig: Rig, paper_model: Model, error: float) -
     assert not error or 2 <= min(freedom) <= max(freedom) < 6  # six levels, less what the parameters take
 
 
-def test_held_and_bounded_parameters(measured: PreparedCampaign) -> None:
+def test_held_and_bounded_parameters(measured):
     settings = {"alpha": ParameterSetting(value=0.3, vary=False), "mu": ParameterSetting(max=1.05e6)}
     result = fit_joint(PreparedCampaign.from_campaign(replace(measured.campaign, fit=FitSettings(parameters=settings))))
     assert result.model.values["alpha"] == 0.3

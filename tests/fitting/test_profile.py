@@ -1,6 +1,5 @@
 """Profile likelihood, honest where the data leave a side open; and what they leave open is said, and what helps."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -18,11 +17,10 @@ from bushfit.fitting.profile import limit95
 from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
-from bushfit.model.model import FIVE, Model
+from bushfit.model.model import FIVE
 from bushfit.model.result import Result
 from bushfit.progress import report_progress_to
 
-Rig = Callable[..., Campaign]
 FREQUENCIES = (5.0, 15.0, 45.0, 100.0, 155.0)
 
 
@@ -37,7 +35,7 @@ def profiled(campaign: Campaign) -> Result:
     return fit_joint(PreparedCampaign.from_campaign(campaign), profile=True)
 
 
-def test_good_data_make_it_the_symmetric_interval(rig: Rig) -> None:
+def test_good_data_make_it_the_symmetric_interval(rig):
     told: list[tuple[str, int | None, int | None, str]] = []
     data = PreparedCampaign.from_campaign(replace(rig(1, **plan(1e-3)), rig=RigSettings(gain_error=0.0)))
     with report_progress_to(lambda *step: told.append(step)):
@@ -54,7 +52,7 @@ def test_good_data_make_it_the_symmetric_interval(rig: Rig) -> None:
         assert np.all(np.abs(off) < 0.05)
 
 
-def test_what_the_data_leave_open_stays_open(rig: Rig, paper_model: Model) -> None:
+def test_what_the_data_leave_open_stays_open(rig, paper_model):
     """Tests that end at a tenth of eps_half show mu + sigma_fmax/eps_half alone: without friction that ever gives way,
     all of the stiffness may be friction's."""
     result = profiled(rig(0, **plan(2e-5)))
@@ -70,7 +68,7 @@ def test_what_the_data_leave_open_stays_open(rig: Rig, paper_model: Model) -> No
 
 
 @pytest.mark.parametrize("largest", [1e-3, 1e-4], ids=["good", "weak"])
-def test_an_end_is_where_chi_square_has_risen_as_far_as_is_allowed(rig: Rig, largest: float) -> None:
+def test_an_end_is_where_chi_square_has_risen_as_far_as_is_allowed(rig, largest):
     data = PreparedCampaign.from_campaign(rig(3, **plan(largest, loops=())))
     data_sets = data.select_tests(None)
     result = profiled(data.campaign)
@@ -89,7 +87,7 @@ def test_an_end_is_where_chi_square_has_risen_as_far_as_is_allowed(rig: Rig, lar
     assert all(abs(rise - 1.0) < 0.02 for rise in rises.values())
 
 
-def test_what_rests_on_a_bound_is_told_by_how_far_from_it_the_tests_let_it_be(rig: Rig, paper_model: Model) -> None:
+def test_what_rests_on_a_bound_is_told_by_how_far_from_it_the_tests_let_it_be(rig, paper_model):
     """Of rubber that is all springpot and friction the tests show how much of a spring there is at most."""
     rubber = paper_model.with_values({"mu": 1e3, "m": 6e5, "alpha": 0.15})
     data = PreparedCampaign.from_campaign(replace(rig(0, rubber, **plan(1e-3)), rig=RigSettings(gain_error=0.0)))
@@ -105,7 +103,7 @@ def test_what_rests_on_a_bound_is_told_by_how_far_from_it_the_tests_let_it_be(ri
     assert "(95 %)" in told
 
 
-def test_one_loop_bounds_mu_from_above_alone(rig: Rig, paper_model: Model) -> None:
+def test_one_loop_bounds_mu_from_above_alone(rig, paper_model):
     """The storage of one loop is mu + m/2 omega^alpha cos(pi alpha/2): all may be mu's, and all the springpot's."""
     result = profiled(rig(3, **plan(1e-3, sweeps=())))
     values, omega = paper_model.values, 2.0 * np.pi * 0.1
@@ -125,7 +123,7 @@ def test_one_loop_bounds_mu_from_above_alone(rig: Rig, paper_model: Model) -> No
 
 @pytest.mark.slow
 @pytest.mark.parametrize("shared", [False, True], ids=["independent", "shared"])
-def test_profiles_hold_the_truth_as_often_as_they_say(rig: Rig, paper_model: Model, shared: bool) -> None:
+def test_profiles_hold_the_truth_as_often_as_they_say(rig, paper_model, shared):
     inside = []
     for seed in range(SEEDS // 2):
         campaign = rig(seed, shared=shared, **plan(1e-3))
@@ -173,7 +171,7 @@ LACKING = {
 
 
 @pytest.mark.parametrize("case", LACKING)
-def test_what_is_lacking_is_said_with_what_is_known_and_what_would_help(rig: Rig, case: str) -> None:
+def test_what_is_lacking_is_said_with_what_is_known_and_what_would_help(rig, case):
     loops, sweeps, reason, known, further = LACKING[case]
     for seed in (1, 2):
         lines = warnings(rig(seed, loops=loops, sweeps=sweeps))

@@ -1,6 +1,6 @@
 """Robust fits: outliers are found and listed, move no parameter, and clean tests have none."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -14,11 +14,10 @@ from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
-from bushfit.model.model import FIVE, Model
+from bushfit.model.model import FIVE
 from bushfit.model.result import Result
 from bushfit.reading.measurement import Sweep
 
-Rig = Callable[..., Campaign]
 SHARE = 0.03
 SOFT = FitSettings(loss="soft_l1")
 #: What becomes of a value, by kind of fault; "stuck" and "bursts" are done by hand.
@@ -74,9 +73,7 @@ def moved(one: Result, other: Result) -> np.ndarray:
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("shared", [False, True])
 @pytest.mark.parametrize("seeds", [1, pytest.param(8, marks=pytest.mark.slow)])
-def test_three_percent_outliers_move_no_parameter_by_a_standard_error(
-    rig: Rig, kind: str, shared: bool, seeds: int
-) -> None:
+def test_three_percent_outliers_move_no_parameter_by_a_standard_error(rig, kind, shared, seeds):
     shifts = []
     for seed in range(seeds):
         clean = rig(seed, shared=shared)
@@ -90,7 +87,7 @@ def test_three_percent_outliers_move_no_parameter_by_a_standard_error(
 
 
 @pytest.mark.parametrize("seeds", [1, pytest.param(6, marks=pytest.mark.slow)])
-def test_clean_tests_have_no_outliers_and_the_same_answer(rig: Rig, other_models: dict[str, Model], seeds: int) -> None:
+def test_clean_tests_have_no_outliers_and_the_same_answer(rig, other_models, seeds):
     shifts = []
     for model, shared, seed in product(other_models.values(), (False, True), range(seeds)):
         campaign = rig(seed, model, shared=shared)
@@ -101,7 +98,7 @@ def test_clean_tests_have_no_outliers_and_the_same_answer(rig: Rig, other_models
     assert np.max(np.abs(shifts)) < 0.5
 
 
-def test_the_noise_that_is_stated_does_not_move_a_robust_fit(rig: Rig) -> None:
+def test_the_noise_that_is_stated_does_not_move_a_robust_fit(rig):
     """soft_l1 turns at twice the scatter that the residuals show, whatever the file says of it."""
     sweep = rig().sweeps[0]
     tails = np.random.default_rng(3).standard_t(2, (2, sweep.stiffness.size)) * 5e-3
@@ -110,7 +107,7 @@ def test_the_noise_that_is_stated_does_not_move_a_robust_fit(rig: Rig) -> None:
     assert low.model.values == pytest.approx(high.model.values, rel=2e-3)
 
 
-def test_outliers_are_listed_by_file_and_row_and_told(rig: Rig) -> None:
+def test_outliers_are_listed_by_file_and_row_and_told(rig):
     campaign = rig()
     force = campaign.loops[0].force.copy()
     force[123] *= -1.0
@@ -127,9 +124,7 @@ def test_outliers_are_listed_by_file_and_row_and_told(rig: Rig) -> None:
 
 @pytest.mark.parametrize(("factor", "missed"), [(0.7, 0), (1.1, 2)])
 @pytest.mark.parametrize("stride", [9, pytest.param(1, marks=pytest.mark.slow)])
-def test_one_outlier_of_a_short_sweep_without_repeats_is_found_at_any_row(
-    rig: Rig, factor: float, missed: int, stride: int
-) -> None:
+def test_one_outlier_of_a_short_sweep_without_repeats_is_found_at_any_row(rig, factor, missed, stride):
     """Nine points a level leave four degrees of freedom beside the smooth curve, which the outlier bends, at an end
     so far that a small one may hide."""
     short = SimulatedSweep(Direction.AXIAL, (1e-4, 2e-4, 5e-4), tuple(np.linspace(5.0, 125.0, 9)))

@@ -1,7 +1,5 @@
 """Several bushings of one compound: one set of parameters, and a stiffness factor of each bushing."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.stats import binomtest
@@ -46,7 +44,7 @@ thick = 0.98
 {TESTS}"""
 
 
-def test_factors_of_three_shapes_are_recovered_and_read_back(tmp_path: Path) -> None:
+def test_factors_of_three_shapes_are_recovered_and_read_back(tmp_path):
     (tmp_path / "sim.toml").write_text(CAMPAIGN, encoding="utf-8")
     simulate(load_campaign(tmp_path / "sim.toml"), tmp_path / "tests")
     file = tmp_path / "tests/campaign.toml"
@@ -70,7 +68,7 @@ def test_factors_of_three_shapes_are_recovered_and_read_back(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(("factor", "band"), [("free", 0.059), ("one", 0.0)])
-def test_each_bushing_is_predicted_by_the_others(factor: str, band: float, tmp_path: Path) -> None:
+def test_each_bushing_is_predicted_by_the_others(factor, band, tmp_path):
     """The spread of free factors holds a bushing 4 % stiffer than its formula; equal factors do not."""
     (tmp_path / "sim.toml").write_text(CAMPAIGN, encoding="utf-8")
     simulate(load_campaign(tmp_path / "sim.toml"), tmp_path / "tests")
@@ -97,7 +95,7 @@ RIG = 'noise = "0.5 %"\nlevel_gain_error = "0.5 %"\nlevel_phase_error = "0.25 de
 
 @pytest.mark.slow
 @pytest.mark.parametrize("rig", ['noise = "0.5 %"', RIG], ids=["noise", "rig"])
-def test_intervals_hold_the_truth_in_95_of_100_campaigns_of_three_shapes(rig: str, tmp_path: Path) -> None:
+def test_intervals_hold_the_truth_in_95_of_100_campaigns_of_three_shapes(rig, tmp_path):
     """Factors drawn from their prior, tests from the rig in time, starts from the tests alone.
 
     With level errors of the rig, the intervals of eps_half and sigma_fmax hold the truth in 199 and 198 of 200
@@ -142,9 +140,7 @@ def _body(table: str, name: str) -> str:
         (('name = "long"', 'name = "radial"', 1), "another table has this name"),
     ],
 )
-def test_bodies_that_do_not_fit_the_tests_are_refused(
-    change: tuple[str, str, int], problem: str, tmp_path: Path
-) -> None:
+def test_bodies_that_do_not_fit_the_tests_are_refused(change, problem, tmp_path):
     old, new, count = change
     text = CAMPAIGN.replace(old, new, count) if count == 1 else new.join(CAMPAIGN.rsplit(old, count))
     if old == "long":

@@ -1,16 +1,13 @@
 """The least-squares problem: one minimum from anywhere, a fit that never climbs, bounds held, and effects added."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import lmfit
 import numpy as np
 import pytest
 
-from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.campaign.campaign import load_campaign
 from bushfit.effects import BASE, with_base
 from bushfit.errors import FitError
-from bushfit.fitting.coordinates import Bounds, Coordinates, residual
+from bushfit.fitting.coordinates import Coordinates, residual
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -18,7 +15,6 @@ from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
 from bushfit.model.model import FIVE, Model
-from bushfit.model.result import Result
 
 #: Campaigns, with the places of their tests.
 TESTS: dict[str, tuple[str, ...] | None] = {
@@ -41,18 +37,16 @@ STARTS = 5
 
 
 @pytest.fixture
-def axial(measured: PreparedCampaign) -> list[MeasuredTest]:
+def axial(measured) -> list[MeasuredTest]:
     return measured.select_tests(None)
 
 
 @pytest.fixture
-def data_sets(rig: Callable[..., Campaign]) -> list[MeasuredTest]:
+def data_sets(rig) -> list[MeasuredTest]:
     return PreparedCampaign.from_campaign(rig(1)).data_sets
 
 
-def test_a_parameter_pushed_against_a_bound_rests_on_it_and_is_named(
-    axial: list[MeasuredTest], paper_model: Model
-) -> None:
+def test_a_parameter_pushed_against_a_bound_rests_on_it_and_is_named(axial, paper_model):
     solution = solve(FitProblem(paper_model, axial, FIVE, {"mu": (None, 1.05e6)}))
     assert dict(solution.at_bound) == {"mu": "max"}
     assert solution.model.values["mu"] == pytest.approx(1.05e6, rel=1e-2)
@@ -63,9 +57,7 @@ def test_a_parameter_pushed_against_a_bound_rests_on_it_and_is_named(
 
 
 @pytest.mark.parametrize("many", [10, pytest.param(100, marks=pytest.mark.slow)])
-def test_random_starts_end_at_one_minimum(
-    measured: PreparedCampaign, axial: list[MeasuredTest], result: Result, many: int
-) -> None:
+def test_random_starts_end_at_one_minimum(measured, axial, result, many):
     """Two decades per parameter: a tenth to ten times the answer, alpha over its own range.
 
     From a start that is far too stiff a fit may lose a branch for good. It then says that the branch rests on a bound,
@@ -98,9 +90,7 @@ def started(paper_model: Model, data_sets: list[MeasuredTest], *effects: str) ->
 
 @pytest.mark.parametrize("effects", [(), ("delay",), ("viscous", "strain_stiffening")], ids="+".join)
 @pytest.mark.parametrize("bounds", [{}, {"alpha": (0.26, 0.5)}, {"mu": (None, 9e5)}], ids=str)
-def test_it_ends_where_lmfit_ends(
-    paper_model: Model, data_sets: list[MeasuredTest], effects: tuple[str, ...], bounds: Bounds
-) -> None:
+def test_it_ends_where_lmfit_ends(paper_model, data_sets, effects, bounds):
     model = started(paper_model, data_sets, *effects)
     names = tuple(model.parameters)
     problem = FitProblem(model, data_sets, names, bounds)
@@ -135,7 +125,7 @@ def elsewhere(model: Model, names: list[str], rng: np.random.Generator) -> Model
 @pytest.mark.parametrize(
     "campaigns", [("epdm_70",), pytest.param(tuple(TESTS), marks=pytest.mark.slow)], ids=["measured", "all"]
 )
-def test_no_random_start_ends_lower(root: Path, campaigns: tuple[str, ...]) -> None:
+def test_no_random_start_ends_lower(root, campaigns):
     rng, lowest, errors, others = np.random.default_rng(0), [], 0, []
     for campaign in campaigns:
         data = PreparedCampaign.from_campaign(load_campaign(root / f"configs/{campaign}.toml"))

@@ -6,7 +6,6 @@ formula, which tests/effects/test_limits.py holds against the constants of Willi
 follow another law are told apart from it, a test here says.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -56,7 +55,7 @@ def sweep(
 
 
 @pytest.fixture
-def coupons(paper_model: Model) -> Campaign:
+def coupons(paper_model) -> Campaign:
     """A coupon alone: the strain stepped at two frequencies, the frequency at two strains."""
     tests = (
         sweep(paper_model, DMA, [10.0, 100.0], STRAINS, "amplitude"),
@@ -66,13 +65,13 @@ def coupons(paper_model: Model) -> Campaign:
 
 
 @pytest.fixture
-def both(rig: Callable[..., Campaign], coupons: Campaign) -> Campaign:
+def both(rig, coupons) -> Campaign:
     """The paper's tests, and those of the coupon."""
     bushing = rig(2)
     return replace(bushing, sweeps=(*bushing.sweeps, *coupons.sweeps), specimens=(DMA,))
 
 
-def test_effects_of_the_campaign_are_in_every_fit(coupons: Campaign, paper_model: Model) -> None:
+def test_effects_of_the_campaign_are_in_every_fit(coupons, paper_model):
     mount = sweep(paper_model, MOUNT, FREQUENCIES, [1e-4, 5e-4], factor=1.1)
     effects = FitSettings(effects=("stiffness_factor.mount",))
     data = PreparedCampaign.from_campaign(
@@ -105,16 +104,16 @@ SEEDS = 12
 
 
 @pytest.fixture(scope="module")
-def truth(paper_model: Model) -> Model:
+def truth(paper_model) -> Model:
     return paper_model.with_effect("temperature", VALUES)
 
 
 @pytest.fixture(scope="module")
-def clean(truth: Model) -> Undisturbed:
+def clean(truth) -> Undisturbed:
     return undisturbed(truth, PLAN)
 
 
-def test_all_temperatures_are_fitted_at_once(clean: Undisturbed, truth: Model) -> None:
+def test_all_temperatures_are_fitted_at_once(clean, truth):
     """From what is read off the tests: the shift within its interval as often as it claims, and a stiffness between."""
     off, inside, bands, warm = [], 0, 0, CELSIUS + 30.0
     for seed in range(SEEDS):
@@ -133,7 +132,7 @@ def test_all_temperatures_are_fitted_at_once(clean: Undisturbed, truth: Model) -
     assert min(inside, bands) >= SEEDS - 2  # 11.4 are expected; 3 misses or more come once in 50
 
 
-def test_shift_factors_are_those_of_the_law_where_it_holds(clean: Undisturbed) -> None:
+def test_shift_factors_are_those_of_the_law_where_it_holds(clean):
     data = PreparedCampaign.from_campaign(measure(clean, PLAN).campaign())
     result = fit_joint(data, effects=(*BASE, "temperature"))
     found = master_curve(result, data.sweeps)
@@ -154,7 +153,7 @@ def test_shift_factors_are_those_of_the_law_where_it_holds(clean: Undisturbed) -
     assert own[2] - own[0] == pytest.approx(half, rel=1e-3)
 
 
-def test_a_sweep_off_the_law_says_so(truth: Model) -> None:
+def test_a_sweep_off_the_law_says_so(truth):
     """That at 8 degC as if its chamber had been 8 K warmer than it says."""
     tested = [replace(sweep, temperature=CELSIUS + 16.0) if sweep is SWEEPS[1] else sweep for sweep in SWEEPS]
     simulated = simulate(truth, replace(PLAN, sweeps=tuple(tested))).campaign()
@@ -167,7 +166,7 @@ def test_a_sweep_off_the_law_says_so(truth: Model) -> None:
     assert off[1] < -4.0
 
 
-def test_only_tests_of_its_temperature_stand_beside_a_prediction(clean: Undisturbed) -> None:
+def test_only_tests_of_its_temperature_stand_beside_a_prediction(clean):
     """At 38 degC one of five sweeps; all of them tell how well the model meets them."""
     campaign = measure(clean, PLAN).campaign()
     result = fit_joint(PreparedCampaign.from_campaign(campaign), effects=(*BASE, "temperature"))

@@ -56,7 +56,7 @@ def assert_clear(name: str, data: bytes, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", some(READ_BY, {"model"}))
-def test_the_corpus(name: str, tmp_path: Path) -> None:
+def test_the_corpus(name, tmp_path):
     """Inputs of which each once went wrong."""
     inputs = sorted((CORPUS / name).iterdir())
     assert len(inputs) >= 10
@@ -66,7 +66,7 @@ def test_the_corpus(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.hypothesis
 @pytest.mark.parametrize("name", ["readers", "campaign", "model"])
-def test_whatever_the_bytes(name: str, tmp_path: Path) -> None:
+def test_whatever_the_bytes(name, tmp_path):
     @given(st.binary(max_size=300) | st.text(max_size=300).map(lambda text: text.encode("utf-8", "surrogatepass")))
     def check(data: bytes) -> None:
         assert_clear(name, data, tmp_path)
@@ -75,7 +75,7 @@ def test_whatever_the_bytes(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", some(LINES, {"predict", "inspect", "simulate", "export", "reduce"}))
-def test_mutated_files_and_options(command: str, tmp_path: Path) -> None:
+def test_mutated_files_and_options(command, tmp_path):
     _, found = faults(command, range(40), tmp_path / "work")
     assert found == []
 
@@ -95,14 +95,14 @@ BOMBS = {
 
 
 @pytest.mark.parametrize("name", BOMBS)
-def test_a_bomb_is_refused(name: str, tmp_path: Path) -> None:
+def test_a_bomb_is_refused(name, tmp_path):
     (tmp_path / name).write_text(BOMBS[name])
     with pytest.raises(BushfitError):
         (load_result if name.endswith("json") else load_campaign)(tmp_path / name)
 
 
 @pytest.mark.parametrize(("name", "load"), [("x.toml", load_campaign), ("x.json", load_result)])
-def test_a_file_of_3_gib_is_not_even_read(name: str, load: object, tmp_path: Path) -> None:
+def test_a_file_of_3_gib_is_not_even_read(name, load, tmp_path):
     with (tmp_path / name).open("wb") as stream:
         stream.truncate(3 << 30)
     with pytest.raises(BushfitError, match="the file is too large"):

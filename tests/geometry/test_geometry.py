@@ -4,7 +4,6 @@ import itertools
 import math
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -47,7 +46,7 @@ def radial(bushing: Bushing) -> float:
 
 
 @pytest.mark.parametrize("stride", [4, pytest.param(1, marks=pytest.mark.slow)])
-def test_radial_against_many_digits(stride: int) -> None:
+def test_radial_against_many_digits(stride):
     for ratio, slenderness in itertools.product(RATIOS[::stride], LENGTHS[::stride]):
         bushing = tube(ratio, slenderness)
         exact = radial_exact(bushing.inner_radius, bushing.outer_radius, bushing.length)
@@ -55,7 +54,7 @@ def test_radial_against_many_digits(stride: int) -> None:
         assert abs(float(radial(bushing) / exact - 1)) < (1e-7 if long_and_thin else 1e-9), (ratio, slenderness)
 
 
-def test_within_the_finite_element_table(root: Path) -> None:
+def test_within_the_finite_element_table(root):
     rows = np.loadtxt(root / "data/reference/radial_fe.csv", delimiter=",", skiprows=1)
     gaps = []
     for a, b, length, element, formula in rows:
@@ -73,7 +72,7 @@ shapes = st.builds(
 
 
 @given(shapes, st.sampled_from([Direction.AXIAL, Direction.TORSION]))
-def test_strain_and_stiffness_share_one_energy(bushing: Bushing, direction: Direction) -> None:
+def test_strain_and_stiffness_share_one_energy(bushing, direction):
     """k d^2/2 = V mu (2 e)^2/2: the equivalent strain holds the energy that the stiffness stores."""
     volume = math.pi * (bushing.outer_radius**2 - bushing.inner_radius**2) * bushing.length
     stored = volume * (2.0 * bushing.unit_strain(direction)) ** 2
@@ -81,7 +80,7 @@ def test_strain_and_stiffness_share_one_energy(bushing: Bushing, direction: Dire
 
 
 @given(shapes)
-def test_radial_strain_is_eq_8(bushing: Bushing) -> None:
+def test_radial_strain_is_eq_8(bushing):
     with mpmath.workdps(50):
         a, b = mpmath.mpf(bushing.inner_radius), mpmath.mpf(bushing.outer_radius)
         exact = mpmath.sqrt((a**2 + b**2) / ((b**4 - a**4) * mpmath.log(b / a) - (a**2 - b**2) ** 2))
@@ -89,7 +88,7 @@ def test_radial_strain_is_eq_8(bushing: Bushing) -> None:
 
 
 @pytest.mark.parametrize("lengths", [(0.0010, 0.018, 0.034), (0.0178, 0.018, 0.034), (0.01, 0.018, 2.0)])
-def test_radial_is_refused_beyond_the_checked_shapes(lengths: tuple[float, float, float]) -> None:
+def test_radial_is_refused_beyond_the_checked_shapes(lengths):
     bushing = Bushing("extreme", *lengths)
     assert np.isfinite(bushing.stiffness_per_modulus(Direction.AXIAL))
     with pytest.raises(ModelError, match="not checked for this shape"):
@@ -109,7 +108,7 @@ def correction(radius_ratio: float, slenderness: float) -> Correction:
     return found
 
 
-def test_the_papers_bushing(bushing: Bushing) -> None:
+def test_the_papers_bushing(bushing):
     """274 per metre by Eq. 8, 168 of equal energy by the corrected stiffness; what friction sees lies between them."""
     calibrated = replace(bushing, shape="calibrated")
     stiffness, strain = calibrated.stiffness_per_modulus(Direction.RADIAL), calibrated.unit_strain(Direction.RADIAL)
@@ -122,7 +121,7 @@ def test_the_papers_bushing(bushing: Bushing) -> None:
 
 
 @given(radius_ratios, slendernesses, st.sampled_from([Direction.AXIAL, Direction.TORSION]))
-def test_only_the_radial_direction_is_corrected(radius_ratio: float, slenderness: float, direction: Direction) -> None:
+def test_only_the_radial_direction_is_corrected(radius_ratio, slenderness, direction):
     paper = Bushing("tube", radius_ratio, 1.0, slenderness)
     calibrated = replace(paper, shape="calibrated")
     assert calibrated.stiffness_per_modulus(direction) == paper.stiffness_per_modulus(direction)
@@ -138,7 +137,7 @@ def test_only_the_radial_direction_is_corrected(radius_ratio: float, slenderness
 
 
 @pytest.mark.parametrize(("inner", "length"), [(0.14, 1.0), (0.93, 1.0), (0.5, 0.09), (0.5, 61.0)])
-def test_beyond_the_shapes_that_were_solved(inner: float, length: float) -> None:
+def test_beyond_the_shapes_that_were_solved(inner, length):
     assert Bushing("tube", inner, 1.0, length).correction is None
     with pytest.raises(ModelError, match=re.escape("inner/outer 0.15 to 0.92 and length/outer 0.1 to 60")) as caught:
         Bushing("tube", inner, 1.0, length, "calibrated")

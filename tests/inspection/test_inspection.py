@@ -16,7 +16,6 @@ from bushfit.geometry import Direction, Specimen
 from bushfit.inspection.gathering import gather
 from bushfit.inspection.opening import inspect_file
 from bushfit.inspection.record import campaign_tables
-from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.simulation.files import raw_loop_table, raw_sweep_table
 from bushfit.simulation.measured import measure, simulate
@@ -24,24 +23,24 @@ from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
 
 @pytest.fixture(scope="module")
-def clean(paper_model: Model) -> Undisturbed:
+def clean(paper_model) -> Undisturbed:
     return undisturbed(paper_model, plan(), steps_per_cycle=256)
 
 
 @pytest.fixture
-def loop(clean: Undisturbed) -> Loop:
+def loop(clean) -> Loop:
     return measure(clean, plan(seed=1, force_noise=3e-3, displacement_noise=2e-4)).loops[0]
 
 
 @pytest.fixture
-def sweep(clean: Undisturbed) -> Sweep:
+def sweep(clean) -> Sweep:
     return measure(clean, plan(seed=1, noise=5e-3, gain_error=2e-3, phase_error=2e-3)).sweeps[0]
 
 
 CHANNELS = ("time", "displacement", "force")
 
 
-def test_loops_sines_and_triangles_are_described(loop: Loop, tmp_path: Path, paper_model: Model) -> None:
+def test_loops_sines_and_triangles_are_described(loop, tmp_path, paper_model):
     seen = look(tmp_path, replace(loop, force=loop.force + 20.0), "loop_axial_1mm_0.1Hz.csv")
     assert (seen.kind, seen.direction) == ("loop", Direction.AXIAL)
     assert [(column.role, column.unit) for column in seen.columns] == [
@@ -111,13 +110,13 @@ LOOP_FAULTS: dict[str, Callable[[Loop], Loop]] = {
 
 
 @pytest.mark.parametrize("said", LOOP_FAULTS)
-def test_each_fault_of_a_loop_is_told(loop: Loop, tmp_path: Path, said: str) -> None:
+def test_each_fault_of_a_loop_is_told(loop, tmp_path, said):
     odd = look(tmp_path, LOOP_FAULTS[said](loop)).odd
     assert any(said in sentence for sentence in odd), odd
     assert len(odd) <= 2
 
 
-def test_gaps_and_an_uneven_clock_are_described(loop: Loop, tmp_path: Path) -> None:
+def test_gaps_and_an_uneven_clock_are_described(loop, tmp_path):
     uneven = less(loop, slice(5, None, 10))
     assert look(tmp_path, uneven).facts["sampling"].startswith("uneven, every 0.01 to 0.02 s, mostly 0.01 s")
     seen = look(tmp_path, less(loop, slice(600, 1600)))
@@ -129,7 +128,7 @@ def test_gaps_and_an_uneven_clock_are_described(loop: Loop, tmp_path: Path) -> N
     assert any("rows are missing; of 30 s only 16 to 30 s are used" in sentence for sentence in odd)
 
 
-def test_a_loop_the_wrong_way_round_is_refused(loop: Loop, tmp_path: Path) -> None:
+def test_a_loop_the_wrong_way_round_is_refused(loop, tmp_path):
     with pytest.raises(FitError, match="releases energy"):
         look(tmp_path, replace(loop, force=np.roll(loop.force, 60)))
 
@@ -167,12 +166,12 @@ SWEEP_FAULTS: dict[str, Callable[[Sweep], Sweep]] = {
 
 
 @pytest.mark.parametrize("said", SWEEP_FAULTS)
-def test_each_fault_of_a_sweep_is_told(sweep: Sweep, tmp_path: Path, said: str) -> None:
+def test_each_fault_of_a_sweep_is_told(sweep, tmp_path, said):
     odd = look(tmp_path, SWEEP_FAULTS[said](sweep)).odd
     assert any(said in sentence for sentence in odd), odd
 
 
-def test_repeats_that_nothing_tells_are_asked_for(sweep: Sweep, tmp_path: Path) -> None:
+def test_repeats_that_nothing_tells_are_asked_for(sweep, tmp_path):
     """A repeat lost and levels missed by up to 12 %: no rule groups them."""
     table = raw_sweep_table(sweep).drop(columns="repeat").iloc[1:]
     table["amplitude [mm]"] *= 1.0 + 0.12 * np.random.default_rng(1).uniform(-1.0, 1.0, len(table))
@@ -193,7 +192,7 @@ def test_repeats_that_nothing_tells_are_asked_for(sweep: Sweep, tmp_path: Path) 
         ),
     ],
 )
-def test_labels_are_held_against_the_content(loop: Loop, tmp_path: Path, name: str, said: tuple[str, ...]) -> None:
+def test_labels_are_held_against_the_content(loop, tmp_path, name, said):
     odd = look(tmp_path, loop, name).odd
     assert len(odd) == len(said)
     assert all(sentence.startswith(start) for sentence, start in zip(odd, said, strict=True))
@@ -216,8 +215,8 @@ def held(sweep: Sweep, file: Path, level: float = 1e-4, drop: str = "amplitude [
     ],
 )
 def test_an_amplitude_without_a_column_is_read_from_the_name_unless_stated(
-    sweep: Sweep, tmp_path: Path, name: str, stated: dict[str, str], entry: dict[str, str], amplitude: float
-) -> None:
+    sweep, tmp_path, name, stated, entry, amplitude
+):
     seen = inspect_file(held(sweep, tmp_path / f"{name}.csv"), stated)
     assert seen.entry == entry
     assert seen.measured.amplitude[0] == pytest.approx(amplitude)
@@ -236,7 +235,7 @@ def test_an_amplitude_without_a_column_is_read_from_the_name_unless_stated(
         ("|G*| 0.1% [MPa],|G*| 1% [MPa],tan delta 0.1 %,tan delta 1 %", "{0},0.8,0.1,0.2", "x", "engineering"),
     ],
 )
-def test_moduli_are_those_of_a_specimen(header: str, cells: str, name: str, strain: str, tmp_path: Path) -> None:
+def test_moduli_are_those_of_a_specimen(header, cells, name, strain, tmp_path):
     rows = "\n".join(f"{f},{cells.format(1.2 + f / 1e3)}" for f in range(5, 60, 5))
     (tmp_path / f"{name}.csv").write_text(f"frequency [Hz],{header}\n{rows}\n", encoding="utf-8")
     seen = inspect_file(tmp_path / f"{name}.csv", {"specimen": "DMA"})
@@ -246,7 +245,7 @@ def test_moduli_are_those_of_a_specimen(header: str, cells: str, name: str, stra
     assert inspect_file(tmp_path / f"{name}.csv", {}).direction.name == ("bar" if strain == "tension" else "coupon")
 
 
-def test_a_temperature_is_stated_for_files_with_several(tmp_path: Path) -> None:
+def test_a_temperature_is_stated_for_files_with_several(tmp_path):
     """Of files with one temperature in a column, with several, and without such a column."""
     rows = pd.DataFrame(
         [(f, 0.1, 600 + f, 0.1, t) for t in (10, 25) for f in range(5, 60, 5)],
@@ -270,7 +269,7 @@ def test_a_temperature_is_stated_for_files_with_several(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("rig", NOISE)
 @pytest.mark.parametrize("seeds", SEEDS)
-def test_clean_tests_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str, seeds: int) -> None:
+def test_clean_tests_raise_nothing(clean, tmp_path, rig, seeds):
     """Nor do loops without time: rebuilt from a noisy motion it is uneven where the motion turns."""
     raised, file = [], tmp_path / "untimed_axial.csv"
     for seed in range(seeds):
@@ -283,9 +282,7 @@ def test_clean_tests_raise_nothing(clean: Undisturbed, tmp_path: Path, rig: str,
     assert raised == []
 
 
-def test_gaps_in_a_motion_are_told_and_slow_loops_are_no_stepped_sine(
-    loop: Loop, tmp_path: Path, paper_model: Model
-) -> None:
+def test_gaps_in_a_motion_are_told_and_slow_loops_are_no_stepped_sine(loop, tmp_path, paper_model):
     table = raw_loop_table(loop).iloc[:, 1:].drop(index=range(500, 530))
     table.to_csv(tmp_path / "axial.csv", index=False)
     odd = inspect_file(tmp_path / "axial.csv", {"frequency": "0.1 Hz", "waveform": "sine"}).odd
@@ -299,7 +296,7 @@ def test_gaps_in_a_motion_are_told_and_slow_loops_are_no_stepped_sine(
     assert seen.facts["programme"].startswith("2 loops in one record: 0.5 mm at 0.1, 0.3 Hz")
 
 
-def test_the_data_of_the_repository_raise_only_what_is_there(root: Path) -> None:
+def test_the_data_of_the_repository_raise_only_what_is_there(root):
     """Two practice campaigns lag so much that loss factors fall below zero; nothing else is odd in a single file."""
     sound = [*root.glob("data/cmp_15961*/*.csv"), *root.glob("data/arm_bushing/*.csv")]
     practice = [*root.glob("data/practice/*/*.csv"), *root.glob("data/mystery_mount/*.csv")]
@@ -314,9 +311,7 @@ def test_the_data_of_the_repository_raise_only_what_is_there(root: Path) -> None
     ("frequency", "amplitudes", "said"),
     [(1.0, (1.0,), None), (5.0, (1.0,), "a motion at 5 Hz is read as a loop"), (0.1, (0.2, 0.6, 1.0), None)],
 )
-def test_one_sine_is_a_loop_however_fast(
-    tmp_path: Path, frequency: float, amplitudes: tuple[float, ...], said: str | None
-) -> None:
+def test_one_sine_is_a_loop_however_fast(tmp_path, frequency, amplitudes, said):
     time = np.arange(0.0, 5.0 * len(amplitudes), 0.005) / frequency
     size = np.asarray(amplitudes)[np.minimum(time * frequency // 5, len(amplitudes) - 1).astype(int)]
     phase = 2.0 * np.pi * frequency * time
@@ -331,7 +326,7 @@ def test_one_sine_is_a_loop_however_fast(
 
 
 @pytest.mark.parametrize("timed", [True, False])
-def test_a_programme_of_loops_is_described(paper_model: Model, tmp_path: Path, *, timed: bool) -> None:
+def test_a_programme_of_loops_is_described(paper_model, tmp_path, *, timed):
     planned = SimulatedLoop(Direction.AXIAL, cycles=5, amplitudes=(2e-4, 5e-4, 1e-3), frequency=0.1, pause=12.0)
     (record,) = simulate(paper_model, SimulateSettings(seed=1, force_noise=3e-3, loops=(planned,))).loops
     table = raw_loop_table(record)

@@ -9,7 +9,6 @@ from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
 from bushfit.model.arms import Arms, fitted_arms, model_arms, part_modulus
-from bushfit.model.model import Model
 
 
 def springpot(alpha: float, band: tuple[float, float], accuracy: float) -> Arms:
@@ -31,7 +30,7 @@ def error_of(arms: Arms, alpha: float) -> float:
 @pytest.mark.parametrize(
     ("band", "count", "largest"), [((5.0, 155.0), 4, 0.01), ((5.0, 155.0), 6, 0.002), ((0.05, 300.0), 8, 0.007)]
 )
-def test_so_many_arms_leave_so_much(band: tuple[float, float], count: int, largest: float) -> None:
+def test_so_many_arms_leave_so_much(band, count, largest):
     """No more arms than others found for these errors, alpha 0.24."""
     arms = springpot(0.24, band, largest)
     assert arms.time.size <= count
@@ -41,7 +40,7 @@ def test_so_many_arms_leave_so_much(band: tuple[float, float], count: int, large
 
 @example(alpha=0.7721080689591432, decades=3.2421875, accuracy=0.002)  # a step of a fit went far beyond numbers
 @given(alpha=st.floats(0.05, 0.95), decades=st.floats(0.5, 4.0), accuracy=st.sampled_from([0.05, 0.01, 0.002]))
-def test_arms_keep_within_their_error_and_give_off_no_energy(alpha: float, decades: float, accuracy: float) -> None:
+def test_arms_keep_within_their_error_and_give_off_no_energy(alpha, decades, accuracy):
     arms = springpot(alpha, (1.0, 10.0**decades), accuracy)
     assert np.all(arms.modulus > 0.0)
     assert np.all(arms.time > 0.0)
@@ -49,7 +48,7 @@ def test_arms_keep_within_their_error_and_give_off_no_energy(alpha: float, decad
     assert error_of(arms, alpha) <= accuracy * 1.03
 
 
-def test_the_springpot_and_the_spring_in_series_are_one_part(paper_model: Model) -> None:
+def test_the_springpot_and_the_spring_in_series_are_one_part(paper_model):
     model = paper_model.with_effect("fractional_zener", {"fractional_zener.c": 0.3})
     (part,) = model_arms(model, (1.0, 1000.0), 0.005)
     assert part.stands_for == "springpot and fractional_zener"
@@ -61,7 +60,7 @@ def test_the_springpot_and_the_spring_in_series_are_one_part(paper_model: Model)
     assert np.abs(modulus_of(part, omega) / (whole - rest) - 1.0).max() <= 0.005
 
 
-def test_what_no_passive_arms_can_do_is_refused() -> None:
+def test_what_no_passive_arms_can_do_is_refused():
     with pytest.raises(ModelError, match="no set of springs and dashpots") as refused:
         fitted_arms(lambda omega: 1e4j + 0.0 * omega, (5.0, 155.0), 0.01)
     assert "an error of" in str(refused.value)

@@ -6,7 +6,6 @@ import pkgutil
 from dataclasses import replace
 from importlib import import_module
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,7 +19,7 @@ from bushfit.model.model import FIVE, Model
 from bushfit.model.sensitivity import differences, force_and_slopes, stiffness_and_slopes
 
 
-def test_the_whole_reference_table(paper_model: Model, root: Path) -> None:
+def test_the_whole_reference_table(paper_model, root):
     """192 points of an independent computation."""
     table = np.loadtxt(root / "data/reference/stiffness_table1.csv", delimiter=",", skiprows=1, dtype=str)
     assert len(table) == 192
@@ -38,7 +37,7 @@ def measured(model: Model, at: tuple[Direction, float, float], steps: int, run_i
     return rig.lock_in(record, at[1]) / complex(model.stiffness(*at)) - 1.0
 
 
-def test_extrapolated_to_no_step_and_no_transient_it_is_the_closed_form(paper_model: Model) -> None:
+def test_extrapolated_to_no_step_and_no_transient_it_is_the_closed_form(paper_model):
     errors = [measured(paper_model, (Direction.RADIAL, 5.0, 2e-4), steps, 200) for steps in (256, 512, 1024)]
     first = [2.0 * fine - coarse for coarse, fine in pairwise(errors)]
     gap = abs(4.0 * first[1] - first[0]) / 3.0
@@ -58,7 +57,7 @@ def spring(omega: Array, amplitude: Array) -> float:
 
 
 @pytest.mark.parametrize("name", MODULES)
-def test_the_examples_are_right(name: str, paper_model: Model) -> None:
+def test_the_examples_are_right(name, paper_model):
     """Each effect has one; contract.py says what the names in them stand for."""
     tests = {kind: Setting(paper_model.bushing, Direction.AXIAL, kind) for kind in ("sweep", "loop")}
     known = {"np": np, "paper": paper_model, "spring": spring, **tests}
@@ -71,9 +70,7 @@ FREQUENCY = np.array([0.1, 5.0, 55.0, 155.0])
 AMPLITUDE = np.array([1e-3, 1e-4, 2e-4, 5e-4])
 
 
-def test_analytic_derivatives_are_used_and_agree_with_the_differences(
-    paper_model: Model, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_analytic_derivatives_are_used_and_agree_with_the_differences(paper_model, monkeypatch):
     at = ("axial", FREQUENCY, AMPLITUDE)
     _, by_differences = differences(paper_model, FIVE, lambda values: paper_model.stiffness(*at, values=values))
     monkeypatch.setattr("bushfit.model.sensitivity.differences", None)
@@ -82,7 +79,7 @@ def test_analytic_derivatives_are_used_and_agree_with_the_differences(
     assert np.array_equal(stiffness_and_slopes(paper_model, *at, ("eps_half", "mu"))[1], analytic[[4, 0]])
 
 
-def test_one_sided_at_a_bound(paper_model: Model) -> None:
+def test_one_sided_at_a_bound(paper_model):
     """alpha = 1 may not be exceeded; the neutral mass 0 may be left both ways or one."""
     edge = paper_model.with_values({"alpha": 1.0})
     at = ("axial", FREQUENCY, AMPLITUDE)
@@ -100,9 +97,7 @@ def test_one_sided_at_a_bound(paper_model: Model) -> None:
 
 @pytest.mark.parametrize("cycles", [0, 2], ids=["steady", "from rest"])
 @pytest.mark.parametrize("moved", [0.0, 1e-9, 1e-5, 1e-4, 0.02])
-def test_slopes_under_a_compliant_rig_hold_however_near_the_last_model_was(
-    paper_model: Model, moved: float, cycles: int
-) -> None:
+def test_slopes_under_a_compliant_rig_hold_however_near_the_last_model_was(paper_model, moved, cycles):
     """The motion is solved no further than a fit needs: derivatives are right to a thousandth all the same."""
     last = paper_model.with_effect("sleeve_compliance", {"sleeve_compliance.compliance": 8e-8})
     last = last.with_values({"sigma_fmax": 5e4, "eps_half": 2e-3}).with_effect("maxwell", {"maxwell.mu1": 0.0})

@@ -9,10 +9,9 @@ from scipy.stats import t
 
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.file import from_document, to_document
-from bushfit.model.result import Result
 
 
-def test_covariance_root(result: Result) -> None:
+def test_covariance_root(result):
     root = result.covariance.root
     np.testing.assert_allclose(root @ root.T, result.covariance.matrix, rtol=1e-7)
     for matrix in ([[4.0, 6.0], [6.0, 9.0]], [[4.0, 0.0], [0.0, 0.0]]):
@@ -21,7 +20,7 @@ def test_covariance_root(result: Result) -> None:
     assert singular.correlations() == []
 
 
-def test_intervals_are_as_wide_as_an_estimated_variance_needs() -> None:
+def test_intervals_are_as_wide_as_an_estimated_variance_needs():
     """A variance of 3 and one of 5 degrees of freedom: alone Student's t, in a sum between the two and the normal."""
     one, other = np.diag([4.0, 0.0]), np.diag([0.0, 9.0])
     spread = (one * np.sqrt(2.0 / 3.0), other * np.sqrt(2.0 / 5.0))
@@ -35,7 +34,7 @@ def test_intervals_are_as_wide_as_an_estimated_variance_needs() -> None:
     np.testing.assert_allclose(known.half_width(np.eye(2)), [Z95 * 2.0, Z95 * 3.0], rtol=1e-4)
 
 
-def test_intervals(result: Result) -> None:
+def test_intervals(result):
     """Of a positive parameter symmetric in its logarithm; Student's t with hundreds of degrees of freedom."""
     low, high = result.interval("mu") or (0.0, 0.0)
     value = result.model.values["mu"]
@@ -46,11 +45,11 @@ def test_intervals(result: Result) -> None:
 
 
 @pytest.fixture
-def document(result: Result) -> dict[str, Any]:
+def document(result) -> dict[str, Any]:
     return json.loads(json.dumps(to_document(result), allow_nan=False))  # type: ignore[no-any-return]
 
 
-def test_there_and_back(result: Result, document: dict[str, Any]) -> None:
+def test_there_and_back(result, document):
     back = from_document(document)
     for key in ("model", "fitted", "quality", "measured", "warnings"):
         assert getattr(back, key) == getattr(result, key)

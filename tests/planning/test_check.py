@@ -1,13 +1,12 @@
 """A plan as a campaign for simulate, what simulations show of it, the guess that it starts from, and bounds."""
 
 from dataclasses import fields, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bushfit.campaign.campaign import load_campaign, model_of
-from bushfit.campaign.quantities import Compound, Polymer
+from bushfit.campaign.quantities import Compound
 from bushfit.campaign.schema import RigSettings
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -33,7 +32,7 @@ def small() -> Plan:
     return plan(known, PlanRequest("predictions", 0.7, RIG, (AXIAL,), (WANTED,), known.names))
 
 
-def test_simulated_campaigns_show_the_errors_promised(small: Plan) -> None:
+def test_simulated_campaigns_show_the_errors_promised(small):
     """Twenty campaigns tell a standard error within a third; the page quotes 300. Nothing is known before the tests."""
     truth, names = small.knowledge.model, small.knowledge.names
     vague = replace(small.knowledge, covariance=100.0 * small.knowledge.covariance)
@@ -49,7 +48,7 @@ def test_simulated_campaigns_show_the_errors_promised(small: Plan) -> None:
     assert np.all((ratio > 0.6) & (ratio < 1.45))
 
 
-def test_the_campaign_of_a_plan_is_what_simulate_reads(small: Plan, tmp_path: Path) -> None:
+def test_the_campaign_of_a_plan_is_what_simulate_reads(small, tmp_path):
     """All that the file states comes back as it was planned: tests, repeats, errors of the rig, and the model."""
     coupon = Specimen("coupon", "shear", area=4e-4, thickness=6e-3)
     tests: tuple[Test, ...] = (
@@ -91,12 +90,12 @@ def off(known: Knowledge, truth: dict[str, float]) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("shore", "megapascal"), [(30, 1.147), (40, 1.697), (50, 2.466), (60, 3.621), (70, 5.544)])
-def test_gents_relation(shore: float, megapascal: float) -> None:
+def test_gents_relation(shore, megapascal):
     """Young's modulus by the formula, worked out by hand: 0.0981 (56 + 7.66 S)/(0.137505 (254 - 2.54 S))."""
     assert 3e-6 * gent_modulus(shore) == pytest.approx(megapascal, rel=5e-4)
 
 
-def test_filler_amplifies_strain_and_makes_a_network() -> None:
+def test_filler_amplifies_strain_and_makes_a_network():
     """50 phr over the paper's 27, by hand: X_0/X of Guth 1.511/2.093, and phi^3.5 of the shares 0.204 and 0.121."""
     many, few = (guess_parameters(BUSHING, Compound(61, phr)).model.values for phr in (50, 27))
     ratio = {name: many[name] / few[name] for name in few}
@@ -104,7 +103,7 @@ def test_filler_amplifies_strain_and_makes_a_network() -> None:
     assert ratio["sigma_fmax"] / ratio["eps_half"] / ratio["mu"] == pytest.approx(4.41, rel=0.03)
 
 
-def test_the_guess_holds_the_papers_and_a_measured_rubber(root: Path) -> None:
+def test_the_guess_holds_the_papers_and_a_measured_rubber(root):
     found = off(guess_parameters(BUSHING, Compound(61, 27)), TABLE_1)
     assert np.abs(found).max() < Z95
     # An EPDM of 70 Shore A whose filler nobody states; its strain sweeps alone, which the five parameters can meet.
@@ -124,7 +123,7 @@ def by_the_laws(guessed: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("rubber", "errors"), [("natural", (0.45, 0.27, 0.5, 0.4)), ("EPDM", (0.7, 0.5, 0.7, 0.5))])
-def test_width_follows_from_the_laws(rubber: Polymer, errors: tuple[float, ...]) -> None:
+def test_width_follows_from_the_laws(rubber, errors):
     """What is guessed apart, moved by a little, moves the parameters together; hardness moves what is read."""
     known = guess_parameters(BUSHING, Compound(61, 27, rubber))
     by_hardness = 2.5 * np.log(gent_modulus(61.5) / gent_modulus(60.5))

@@ -1,7 +1,6 @@
 """A plan against what is worked out another way: full covariances, every choice there is, and fits."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -46,7 +45,7 @@ def known() -> Knowledge:
 
 
 @pytest.fixture(scope="module")
-def planned(known: Knowledge) -> Plan:
+def planned(known) -> Plan:
     return plan(known, wanted("predictions", 2.5))
 
 
@@ -89,7 +88,7 @@ def slopes_of(model: Model, test: SimulatedSweep) -> Array:
     return np.stack([np.real(rows), np.imag(rows)], axis=1)
 
 
-def test_the_information_is_that_of_the_full_covariance_of_all_points(known: Knowledge) -> None:
+def test_the_information_is_that_of_the_full_covariance_of_all_points(known):
     """Point by point: scatter, what a run shares and what all runs of a test share, in one matrix for each test."""
     counts, found = np.array([3, 2, 1, 0, 4, 0, 0]), np.linalg.inv(known.covariance)
     for test, count in zip(SWEEPS, counts[:5].tolist(), strict=True):
@@ -104,7 +103,7 @@ def test_the_information_is_that_of_the_full_covariance_of_all_points(known: Kno
     np.testing.assert_allclose(told, found, rtol=2e-4)
 
 
-def test_the_gain_of_a_loop_is_no_surer_than_the_class_of_the_rig(known: Knowledge) -> None:
+def test_the_gain_of_a_loop_is_no_surer_than_the_class_of_the_rig(known):
     """As a fit counts it where [rig] states the class: one whitened loop in place of a line with its error."""
     loop = TESTS[-2]
     assert isinstance(loop, SimulatedLoop)
@@ -115,7 +114,7 @@ def test_the_gain_of_a_loop_is_no_surer_than_the_class_of_the_rig(known: Knowled
     np.testing.assert_allclose(told, slopes @ slopes.T, rtol=0.02, atol=1e-3 * np.max(np.abs(told)))
 
 
-def test_an_effect_shows_as_a_fit_without_it_misses_it(known: Knowledge) -> None:
+def test_an_effect_shows_as_a_fit_without_it_misses_it(known):
     """Noncentrality against chi-square of the best fit of the model to noise-free tests with a little of the effect."""
     counts = np.array([2, 1, 1, 1, 2, 0, 0])
     view = view_of(replace(known, noise=replace(NOISE, level=(0.0, 0.0)), covariance=1e8 * np.eye(5)), TESTS)
@@ -138,7 +137,7 @@ def _noise_free(model: Model, truth: Model, test: SimulatedSweep) -> MeasuredSwe
     return sweep.noise_free(truth)
 
 
-def test_rivals_are_as_far_apart_as_the_best_refit_of_either_leaves_them(known: Knowledge) -> None:
+def test_rivals_are_as_far_apart_as_the_best_refit_of_either_leaves_them(known):
     """Linear distances against chi-square of full fits: inertia, and the delay that is nearest to it in few tests."""
     counts = np.array([1, 1, 1, 1, 2])
     one = known.model.with_effect("inertia", {"inertia.mass": 0.03})
@@ -160,9 +159,7 @@ def test_rivals_are_as_far_apart_as_the_best_refit_of_either_leaves_them(known: 
     assert linear == pytest.approx(min(fits), rel=0.1)
 
 
-def test_a_plan_is_better_than_the_standard_programme_and_errors_before_are_those_known(
-    planned: Plan, known: Knowledge
-) -> None:
+def test_a_plan_is_better_than_the_standard_programme_and_errors_before_are_those_known(planned, known):
     """At equal hours: errors of the stiffness at most 70 %, every effect found as small."""
     better, worst = mean_error(planned.planned) / mean_error(planned.standard), amounts_found(planned)
     assert planned.planned.hours <= 2.5
@@ -193,7 +190,7 @@ def test_a_plan_is_better_than_the_standard_programme_and_errors_before_are_thos
     ("limit", "most"),
     [("max_force", 300.0), ("max_displacement", 3e-4), ("max_frequency", 60.0), ("max_velocity", 0.05)],
 )
-def test_no_test_is_beyond_the_rig(known: Knowledge, limit: str, most: float) -> None:
+def test_no_test_is_beyond_the_rig(known, limit, most):
     found = candidates(known, wanted("predictions", 4.0, **{limit: most}))
     for test in found:
         amplitudes, frequencies = motions(test)
@@ -205,7 +202,7 @@ def test_no_test_is_beyond_the_rig(known: Knowledge, limit: str, most: float) ->
     assert {*found} != {*candidates(known, wanted("predictions", 4.0))}
 
 
-def test_a_rig_without_limits_and_an_error_of_the_model_are_told(root: Path) -> None:
+def test_a_rig_without_limits_and_an_error_of_the_model_are_told(root):
     """What no test lowers is part of the errors promised."""
     found = plan_tests(load_campaign(root / "data/practice/case_001/bushing.toml"), hours=1.0)
     limits, model, *_ = found.document["warnings"]

@@ -57,18 +57,18 @@ def rows(found: Comparison) -> dict[str, ParameterContrast]:
 
 
 @pytest.fixture(scope="module")
-def campaigns(paper_model: Model) -> tuple[Undisturbed, Undisturbed]:
+def campaigns(paper_model) -> tuple[Undisturbed, Undisturbed]:
     return undisturbed(paper_model, PLAN), undisturbed(scaled(paper_model, **OTHER), PLAN)
 
 
 @pytest.fixture(scope="module")
-def fits(campaigns: tuple[Undisturbed, Undisturbed]) -> list[tuple[Result, Result, Result]]:
+def fits(campaigns) -> list[tuple[Result, Result, Result]]:
     """The paper's bushing twice, of other noise, and the other one, for every seed."""
     one, other = campaigns
     return [(fitted(one, 3 * k), fitted(one, 3 * k + 1), fitted(other, 3 * k + 2)) for k in range(16)]
 
 
-def test_equal_bushings_differ_no_oftener_than_said(fits: list[tuple[Result, Result, Result]]) -> None:
+def test_equal_bushings_differ_no_oftener_than_said(fits):
     """By parameters (Holm), by all together, and by any word on stiffness or loss: 5 % of the pairs each."""
     found = [against(one, two) for one, two, _ in fits]
     alarms = {
@@ -79,7 +79,7 @@ def test_equal_bushings_differ_no_oftener_than_said(fits: list[tuple[Result, Res
     assert max(alarms.values()) <= binom.isf(3e-3, len(fits), 0.05)  # more in 3 of a thousand
 
 
-def test_known_differences_are_found_and_covered(fits: list[tuple[Result, Result, Result]], paper_model: Model) -> None:
+def test_known_differences_are_found_and_covered(fits, paper_model):
     truth = {name: factor - 1.0 for name, factor in OTHER.items()} | {"eps_half": 0.0}
     truth["alpha"] *= paper_model.values["alpha"]
     x, f = (axis.ravel() for axis in np.meshgrid(GRID[1], GRID[0], indexing="ij"))
@@ -105,7 +105,7 @@ def test_known_differences_are_found_and_covered(fits: list[tuple[Result, Result
 
 
 @pytest.mark.parametrize("freedom", [1e6, 12.0])
-def test_figures_are_those_of_independent_normal_errors(paper_model: Model, freedom: float) -> None:
+def test_figures_are_those_of_independent_normal_errors(paper_model, freedom):
     """Against scipy: t of each parameter with the degrees of freedom of Welch, and Hotelling's T^2 of all together."""
     random = np.random.default_rng(1)
     values = np.array([paper_model.values[name] for name in FIVE])
@@ -133,7 +133,7 @@ def test_figures_are_those_of_independent_normal_errors(paper_model: Model, free
             assert row.p == pytest.approx(2.0 * student.sf(abs(difference[i]) / error[i], welch[i]), rel=1e-3)
 
 
-def test_m_is_compared_at_a_frequency_where_alpha_is_free_and_alone_where_it_is_held(paper_model: Model) -> None:
+def test_m_is_compared_at_a_frequency_where_alpha_is_free_and_alone_where_it_is_held(paper_model):
     one = known(paper_model, np.diag([1e8, 1e6, 1e-6, 1e4, 1e-8]))
     other = replace(one, model=paper_model.with_values({"alpha": 0.25, "m": 1.9e5}))
     found = rows(against(one, other))
@@ -150,7 +150,7 @@ def test_m_is_compared_at_a_frequency_where_alpha_is_free_and_alone_where_it_is_
     assert found["alpha"].note == "fixed in both"
 
 
-def test_holm_is_holm() -> None:
+def test_holm_is_holm():
     """His example of four tests, by hand; more than Benjamini and Hochberg's."""
     p = [0.01, 0.04, 0.03, 0.005]
     assert holm(p) == pytest.approx([0.03, 0.06, 0.06, 0.02])
@@ -158,7 +158,7 @@ def test_holm_is_holm() -> None:
     assert holm([]) == []
 
 
-def test_uneven_bands_are_subtracted_end_from_opposite_end() -> None:
+def test_uneven_bands_are_subtracted_end_from_opposite_end():
     one, two = (Band(*map(np.array, ends)) for ends in ((2.0, 1.9, 2.3), (1.0, 0.7, 1.1)))
     difference = one.minus(two)
     ends = difference.value, difference.low, difference.high

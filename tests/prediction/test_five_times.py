@@ -118,7 +118,7 @@ def respond(truth: Truth, amplitude: float, random: np.random.Generator, times: 
 
 @pytest.mark.parametrize("seeds", [2, pytest.param(SEEDS, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", TRUTHS)
-def test_five_times_the_tested_amplitude_is_in_the_band_or_has_a_warning(name: str, seeds: int) -> None:
+def test_five_times_the_tested_amplitude_is_in_the_band_or_has_a_warning(name, seeds):
     inside, warned, errors = [], [], []
     for seed in range(seeds):
         random = np.random.default_rng([54, seed])

@@ -13,7 +13,6 @@ from bushfit.effects.contract import Array
 from bushfit.effects.history import History
 from bushfit.geometry import Direction
 from bushfit.model import rig
-from bushfit.model.model import Model
 from bushfit.model.result import Result
 
 _RANDOM = np.random.default_rng(9)
@@ -45,7 +44,7 @@ MOTIONS = (sweep, rounded_trapezoid, two_bands, decaying_sine)
 
 
 @pytest.mark.parametrize("law", some(LAWS, ["paper", "clearance"]))
-def test_channels_of_hidden_motions_are_those_of_the_rig(paper_model: Model, law: str) -> None:
+def test_channels_of_hidden_motions_are_those_of_the_rig(paper_model, law):
     """Two channels at once, axial and torsion."""
     model = paper_model if law == "paper" else paper_model.with_effect(law, LAWS[law])
     time, fine = np.arange(ROWS) * STEP, np.arange((ROWS - 1) * FINER + 1) * STEP / FINER

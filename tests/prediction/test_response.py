@@ -1,6 +1,5 @@
 """Force over time: against the virtual rig at a tenth of the step, its band, its ranges, and long histories."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +13,6 @@ from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.covariance import Covariance
-from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
 from bushfit.prediction.response import time_response
 from bushfit.reduction.displacement import noise_and_highest_frequency
@@ -66,9 +64,7 @@ FURTHER = {
 
 @pytest.mark.parametrize("motion", [random, dual_sine, ramp_and_hold, steps])
 @pytest.mark.parametrize("law", [*LAWS, *(pytest.param(name, marks=pytest.mark.slow) for name in FURTHER)])
-def test_the_force_is_that_of_the_rig_at_a_tenth_of_the_step(
-    paper_model: Model, law: str, motion: Callable[[Array], Array]
-) -> None:
+def test_the_force_is_that_of_the_rig_at_a_tenth_of_the_step(paper_model, law, motion):
     model = paper_model if law == "paper" else paper_model.with_effect(law, {**LAWS, **FURTHER}[law])
     history = History.sampled(motion(TIME), STEP)
     force = time_response(Result(model), Direction.AXIAL, history).force.value
@@ -78,7 +74,7 @@ def test_the_force_is_that_of_the_rig_at_a_tenth_of_the_step(
     assert np.sqrt(np.mean((force - expected) ** 2)) < 0.003 * np.sqrt(np.mean(expected**2))
 
 
-def test_a_steady_state_is_that_of_the_closed_form(paper_model: Model) -> None:
+def test_a_steady_state_is_that_of_the_closed_form(paper_model):
     amplitude, cycles = 2e-4, 4
     motion = amplitude * np.sin(2.0 * np.pi * 10.0 * np.arange(400 * cycles) / 4000.0)
     response = time_response(Result(paper_model), Direction.RADIAL, History.sampled(motion, 1 / 4000, periodic=True))
@@ -90,7 +86,7 @@ def test_a_steady_state_is_that_of_the_closed_form(paper_model: Model) -> None:
 
 
 @pytest.mark.parametrize("layer", [None, "sleeve_compliance"])
-def test_the_band_is_what_the_covariance_makes_of_the_force(paper_model: Model, layer: str | None) -> None:
+def test_the_band_is_what_the_covariance_makes_of_the_force(paper_model, layer):
     model = paper_model.with_effect(layer, {"sleeve_compliance.compliance": 3e-7}) if layer else paper_model
     covariance = Covariance(("mu", "alpha"), np.array([[4e8, 3.0], [3.0, 1e-6]]))
     history = History.sampled(dual_sine(TIME), STEP)
@@ -104,7 +100,7 @@ def test_the_band_is_what_the_covariance_makes_of_the_force(paper_model: Model, 
     np.testing.assert_allclose(force.value - force.low, half, atol=2e-3 * half.max())
 
 
-def test_ranges_beyond_the_tests_are_stated(paper_model: Model) -> None:
+def test_ranges_beyond_the_tests_are_stated(paper_model):
     unit_strain = paper_model.unit_strain(Direction.AXIAL)
     result = Result(paper_model, measured=Range((0.1, 20.0), (1e-4 * unit_strain, 5e-4 * unit_strain), ("axial",)))
     inside = time_response(result, Direction.AXIAL, History.sampled(4e-4 * np.sin(10.0 * TIME), STEP))
@@ -136,15 +132,13 @@ def test_ranges_beyond_the_tests_are_stated(paper_model: Model) -> None:
         ({"axial": random(TIME)}, np.inf, "seconds above zero"),
     ],
 )
-def test_arrays_that_are_no_history_are_one_error(
-    paper_model: Model, history: dict[str, Array], step: float, problem: str
-) -> None:
+def test_arrays_that_are_no_history_are_one_error(paper_model, history, step, problem):
     with pytest.raises(MeasurementError, match=problem):
         respond(Result(paper_model), history, step=step)
 
 
 @pytest.mark.parametrize("noise", [0.002, 0.01])
-def test_a_low_pass_removes_the_noise_that_friction_would_follow(paper_model: Model, noise: float) -> None:
+def test_a_low_pass_removes_the_noise_that_friction_would_follow(paper_model, noise):
     """A displacement of the rig with known noise; the force is that of the true motion at a tenth of the step."""
     fine = np.arange((ROWS - 1) * FINER + 1) * STEP / FINER
     expected = rig.imposed(paper_model, Direction.AXIAL, random(fine), STEP / FINER, 10.0).force[::FINER]
@@ -163,7 +157,7 @@ def test_a_low_pass_removes_the_noise_that_friction_would_follow(paper_model: Mo
 
 
 @pytest.mark.parametrize("compliance", [1e-7, 1e-6])
-def test_a_soft_sleeve_in_a_long_history_is_soon_in_equilibrium(paper_model: Model, compliance: float) -> None:
+def test_a_soft_sleeve_in_a_long_history_is_soon_in_equilibrium(paper_model, compliance):
     """Friction that a pulse leaves loaded once passed for a stiffness, and twice the forces were needed."""
     history, motions = History.sampled(np.tile(random(TIME), 30), STEP), list[Array]()
 
@@ -179,7 +173,7 @@ def test_a_soft_sleeve_in_a_long_history_is_soon_in_equilibrium(paper_model: Mod
     assert len(motions) < 9
 
 
-def test_what_has_no_law_for_the_motion_is_named(paper_model: Model) -> None:
+def test_what_has_no_law_for_the_motion_is_named(paper_model):
     model = paper_model.with_effect("mullins_softening", {"mullins_softening.share": 0.1})
     model = model.with_effect("rate_dependent_friction", {"rate_dependent_friction.n": 0.05})
     model = model.with_effect("inertia", {"inertia.mass": 5.0})
@@ -194,7 +188,7 @@ def test_what_has_no_law_for_the_motion_is_named(paper_model: Model) -> None:
     )
 
 
-def test_sliders_in_blocks_are_sliders_at_once(paper_model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sliders_in_blocks_are_sliders_at_once(paper_model, monkeypatch):
     model = paper_model.with_effect("distributed_sliders")
     history = History.sampled(random(TIME), STEP)
     expected = model.force("axial", history)

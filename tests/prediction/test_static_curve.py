@@ -9,7 +9,6 @@ from bushfit.errors import ModelError
 from bushfit.geometry import Direction
 from bushfit.model import rig
 from bushfit.model.covariance import Covariance
-from bushfit.model.model import Model
 from bushfit.model.result import Alternative, CampaignTable, Result, TestTable
 from bushfit.prediction.static_curve import static_curve, static_rate
 from bushfit.reading.preload import Preload
@@ -27,7 +26,7 @@ LAWS = {
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_the_curve_is_that_of_the_virtual_rig(paper_model: Model, law: str) -> None:
+def test_the_curve_is_that_of_the_virtual_rig(paper_model, law):
     """The last of 12 triangular cycles from rest, stepped through time, at equal displacements."""
     model = paper_model if law == "paper" else paper_model.with_effect(law, LAWS[law])
     reach = 2e-3
@@ -53,7 +52,7 @@ def test_the_curve_is_that_of_the_virtual_rig(paper_model: Model, law: str) -> N
     assert curve.secant.value[0] == pytest.approx(np.ptp(curve.mean.value[[0, -1]]) / (2.0 * reach), rel=1e-12)
 
 
-def test_the_band_is_what_the_covariance_makes_of_the_force(paper_model: Model) -> None:
+def test_the_band_is_what_the_covariance_makes_of_the_force(paper_model):
     covariance = Covariance(("mu", "sigma_fmax"), np.array([[4e8, 1e6], [1e6, 1e6]]))
     curve = static_curve(Result(paper_model, ("mu", "sigma_fmax"), covariance), Direction.RADIAL, 5e-4, RATE)
     rows = []
@@ -70,9 +69,7 @@ def test_the_band_is_what_the_covariance_makes_of_the_force(paper_model: Model) 
 
 @pytest.mark.parametrize(("c2", "c3"), [(0.0, 20.0), (2.0, 30.0), (3.0, 0.0)])
 @pytest.mark.parametrize(("offset", "reach"), [(1e-3, 5e-4), (-8e-4, 6e-4)])
-def test_about_a_preload_it_is_that_of_the_rig_with_the_whole_elastic_law(
-    paper_model: Model, c2: float, c3: float, offset: float, reach: float
-) -> None:
+def test_about_a_preload_it_is_that_of_the_rig_with_the_whole_elastic_law(paper_model, c2, c3, offset, reach):
     samples, frequency = 1000, RATE / (4.0 * reach)
     phase = np.arange(8 * samples + 1) / samples
     motion = offset * np.minimum(2.0 * phase, 1.0) + reach * rig.wave("triangle", phase - 0.5) * (phase >= 0.5)
@@ -92,7 +89,7 @@ def test_about_a_preload_it_is_that_of_the_rig_with_the_whole_elastic_law(
     np.testing.assert_allclose(mean - mean[45], expected - expected[45], atol=0.005 * np.ptp(expected) / 2.0)
 
 
-def test_the_rate_is_stated_or_that_of_the_slowest_loop(paper_model: Model) -> None:
+def test_the_rate_is_stated_or_that_of_the_slowest_loop(paper_model):
     loops = [
         TestTable("fast", "loop", "axial", (1.0, 1.0), (2e-3, 2e-3), "m", 100),
         TestTable("slow", "loop", "axial", (0.1, 0.1), (1e-3, 1e-3), "m", 100),
@@ -109,7 +106,7 @@ def test_the_rate_is_stated_or_that_of_the_slowest_loop(paper_model: Model) -> N
     assert static_rate(tested, Direction.AXIAL, {"rad": 1e-5}) == pytest.approx(4e-4)
 
 
-def test_a_law_of_the_harmonic_alone_has_no_curve_unless_it_is_the_rigs(paper_model: Model) -> None:
+def test_a_law_of_the_harmonic_alone_has_no_curve_unless_it_is_the_rigs(paper_model):
     with pytest.raises(ModelError, match="hysteretic_loss: this needs a law in time"):
         static_curve(Result(paper_model.with_effect("hysteretic_loss")), Direction.AXIAL, 1e-3, RATE)
     rigged = paper_model.with_effect("rig_compliance", {"rig_compliance.compliance": 1e-7})
@@ -117,7 +114,7 @@ def test_a_law_of_the_harmonic_alone_has_no_curve_unless_it_is_the_rigs(paper_mo
     np.testing.assert_array_equal(kept.mean.value, plain.mean.value)
 
 
-def test_an_alternative_without_a_law_in_time_is_left_out_with_a_sentence(paper_model: Model) -> None:
+def test_an_alternative_without_a_law_in_time_is_left_out_with_a_sentence(paper_model):
     other = paper_model.with_values({"mu": 1.05 * paper_model.values["mu"]})
     untimed = paper_model.without("friction").with_effect("kraus", {"kraus.delta": 1e6})
     alternatives = tuple(Alternative(model, 0.1) for model in (other, untimed))

@@ -9,9 +9,8 @@ import pytest
 from bushfit.campaign.simulated import SimulatedSweep, SimulateSettings
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
-from bushfit.geometry import Bushing, Direction, Shape
+from bushfit.geometry import Bushing, Direction
 from bushfit.model.covariance import Covariance
-from bushfit.model.model import Model
 from bushfit.model.result import Range, Result
 from bushfit.model.transfer import transfer_compound
 from bushfit.prediction.caveats import caveats
@@ -34,9 +33,7 @@ FOUR = ("stiffness [N/mm]", "loss factor [-]", "storage stiffness [N/mm]", "loss
     [((2e-4,), PAPER_FREQUENCIES), ((1e-4, 2e-4, 5e-4), (50.0,))],
     ids=["one amplitude", "one frequency"],
 )
-def test_bands_of_an_open_model_are_narrow_where_it_was_measured_and_only_there(
-    paper_model: Model, amplitudes: tuple[float, ...], frequencies: tuple[float, ...]
-) -> None:
+def test_bands_of_an_open_model_are_narrow_where_it_was_measured_and_only_there(paper_model, amplitudes, frequencies):
     """The direction that such sweeps leave wholly open cancels where the stiffness does not depend on it."""
     plan = SimulateSettings(repeats=3, noise=5e-3, sweeps=(SimulatedSweep(Direction.AXIAL, amplitudes, frequencies),))
     result = fit_joint(PreparedCampaign.from_campaign(measure(undisturbed(paper_model, plan), plan).campaign()))
@@ -52,7 +49,7 @@ def test_bands_of_an_open_model_are_narrow_where_it_was_measured_and_only_there(
 
 
 @pytest.fixture
-def either(paper_model: Model) -> Result:
+def either(paper_model) -> Result:
     """The paper's bushing with a sleeve that flexes, or a rig that gives way."""
     model = paper_model.with_effect("sleeve_compliance", {"sleeve_compliance.compliance": 2e-8})
     names, measured = ("mu", "sleeve_compliance.compliance"), Range((5.0, 155.0), (1e-3, 0.1))
@@ -60,7 +57,7 @@ def either(paper_model: Model) -> Result:
     return Result(model, names, covariance, measured=measured, unresolved=("sleeve_compliance",))
 
 
-def test_what_may_be_the_rigs_is_predicted_both_ways_and_the_bands_span_both(either: Result) -> None:
+def test_what_may_be_the_rigs_is_predicted_both_ways_and_the_bands_span_both(either):
     found = predict(either, Direction.RADIAL, FREQUENCIES, AMPLITUDES)
     settled = replace(either, model=either.model.with_twin("rig_compliance"), unresolved=())
     other = predict(settled, Direction.RADIAL, FREQUENCIES, AMPLITUDES)
@@ -96,7 +93,7 @@ def swept(frequency: object, amplitude: object, **more: Any) -> Sweep:
     return Sweep("s.csv", more.pop("direction", Direction.AXIAL), f, x, np.full(f.size, 1e6 + 1e5j), **more)
 
 
-def test_default_grid_is_that_of_the_sweeps_in_the_direction_where_there_are_any(result: Result) -> None:
+def test_default_grid_is_that_of_the_sweeps_in_the_direction_where_there_are_any(result):
     """Two that miss the same set point are one, in a file or in one file a frequency."""
     radial = swept([1.0, 80.0, 1.004, 20.0], [1e-3, 4e-4, 2e-4, 1e-3], direction=Direction.RADIAL)
     frequencies, amplitudes = default_grid(result, Direction.RADIAL, [radial])
@@ -110,7 +107,7 @@ def test_default_grid_is_that_of_the_sweeps_in_the_direction_where_there_are_any
     assert (frequencies.tolist(), amplitudes.tolist()) == ([1.0, 10.0, 50.0], levels.tolist())
 
 
-def test_the_compound_is_carried_to_another_bushing(result: Result) -> None:
+def test_the_compound_is_carried_to_another_bushing(result):
     """Same material, other shape: stiffness goes as the shape does; what belongs to the old bushing stays there."""
     model = result.model.with_effect("stiffness_factor.radial", {"stiffness_factor.radial": 1.1})
     model = model.with_effect("inertia").with_effect("clearance").with_effect("viscous")
@@ -127,7 +124,7 @@ def test_the_compound_is_carried_to_another_bushing(result: Result) -> None:
     assert any("extrapolated" in line for line in predict(other, Direction.RADIAL, [10.0], [5e-3]).warnings)
 
 
-def test_a_model_given_by_hand_has_no_bands_and_says_so(paper_model: Model) -> None:
+def test_a_model_given_by_hand_has_no_bands_and_says_so(paper_model):
     prediction = predict(Result(paper_model), Direction.RADIAL, [5.0, 55.0], [1e-4])
     assert np.array_equal(prediction.stiffness.low, prediction.stiffness.high)
     assert prediction.warnings == ()
@@ -169,9 +166,7 @@ OFF = "+4.9 % in stiffness and +36 % in strain compared with finite elements"
         ("radial", "axial", 0.017, "paper", ["radial formula, which was not compared with finite elements of this"]),
     ],
 )
-def test_a_band_that_lacks_the_error_of_a_formula_says_so(
-    result: Result, bushing: Bushing, direction: str, fitted: str, inner: float, shape: Shape, said: list[str]
-) -> None:
+def test_a_band_that_lacks_the_error_of_a_formula_says_so(result, bushing, direction, fitted, inner, shape, said):
     """Of the very shape; silent where another was fitted by its exact formula, or where an older file does not say."""
     reach = Range((0.1, 155.0), (1e-9, 1.0), tuple(Direction(name) for name in fitted.split()))
     model = replace(result.model, bushing=replace(bushing, inner_radius=inner, shape=shape))
@@ -180,7 +175,7 @@ def test_a_band_that_lacks_the_error_of_a_formula_says_so(
     assert all(part in line for part, line in zip(said, found, strict=True)), found
 
 
-def test_default_grid_is_the_papers_within_the_measured_range(result: Result) -> None:
+def test_default_grid_is_the_papers_within_the_measured_range(result):
     frequencies, amplitudes = default_grid(result, Direction.AXIAL)
     assert (tuple(frequencies), tuple(amplitudes)) == (PAPER_FREQUENCIES, PAPER_AMPLITUDES)
     narrow = replace(result, measured=Range((20.0, 80.0), result.measured.strain))  # type: ignore[union-attr]
@@ -190,7 +185,7 @@ def test_default_grid_is_the_papers_within_the_measured_range(result: Result) ->
     assert predict(tiny, Direction.AXIAL, *default_grid(tiny, Direction.AXIAL)).warnings == ()
 
 
-def test_a_resonance_says_what_its_peak_extrapolates(result: Result) -> None:
+def test_a_resonance_says_what_its_peak_extrapolates(result):
     """Frequencies and strains near the peak count, not those far from it; so does a place that was not fitted."""
     inside = predict_resonance(result, Direction.AXIAL, 3.0, 20.0, None)
     assert inside.frequency[-1] > 155.0, "beyond what was fitted, but far from the peak"

@@ -47,9 +47,7 @@ def on_the_rig(model: Model, motion: LargeMotion) -> complex:
     [(1e-3, 2.0), (2e-3, 2.0), (1e-3, 0.0), (-1e-3, 0.0)],
     ids=["1 mm", "2 mm", "at 1", "at -1"],
 )
-def test_it_is_that_of_the_virtual_rig_within_a_percent(
-    paper_model: Model, law: str, displacement: float, slow: float
-) -> None:
+def test_it_is_that_of_the_virtual_rig_within_a_percent(paper_model, law, displacement, slow):
     motion = LargeMotion(displacement, "m", slow)
     model = paper_model if law == "paper" else paper_model.with_effect(law, LAWS[law])
     found = predict(Result(model), Direction.AXIAL, [FREQUENCY], [AMPLITUDE], over=motion)
@@ -61,7 +59,7 @@ def test_it_is_that_of_the_virtual_rig_within_a_percent(
         assert abs(alone / expected - 1.0) > 0.02
 
 
-def test_a_vanishing_motion_changes_nothing_and_the_band_is_that_of_the_harmonic_alone(paper_model: Model) -> None:
+def test_a_vanishing_motion_changes_nothing_and_the_band_is_that_of_the_harmonic_alone(paper_model):
     covariance = Covariance(("mu", "sigma_fmax"), np.array([[4e8, 1e6], [1e6, 1e6]]))
     measured = Range((5.0, 155.0), (0.005, 0.05), ("axial",))
     result = Result(paper_model, ("mu", "sigma_fmax"), covariance, measured=measured)
@@ -84,7 +82,7 @@ def test_a_vanishing_motion_changes_nothing_and_the_band_is_that_of_the_harmonic
         (["kraus"], LargeMotion(1e-3, "m"), "a law in time"),
     ],
 )
-def test_what_it_cannot_answer(paper_model: Model, effects: list[str], motion: LargeMotion, words: str) -> None:
+def test_what_it_cannot_answer(paper_model, effects, motion, words):
     model = paper_model
     for effect in effects:
         model = model.with_effect(effect)

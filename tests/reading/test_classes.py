@@ -78,7 +78,7 @@ def fitted(folder: Path, *exports: Export) -> dict[str, float]:
 
 
 @pytest.fixture(scope="module")
-def plain(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, float]]:
+def plain(tmp_path_factory) -> dict[str, dict[str, float]]:
     """Parameters of a plain sweep, and of a plain sweep with a plain loop."""
     folder = tmp_path_factory.mktemp("plain")
     sweep = EXPORTS["phases negative"]
@@ -93,16 +93,14 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, float
         for name in names
     ],
 )
-def test_a_fit_of_an_export_equals_that_of_a_plain_file(
-    name: str, plain: dict[str, dict[str, float]], tmp_path: Path
-) -> None:
+def test_a_fit_of_an_export_equals_that_of_a_plain_file(name, plain, tmp_path):
     export = EXPORTS[name]
     kind = export.kind or "sweep"
     files = [export] if kind == "sweep" else [EXPORTS["phases negative"], export]
     assert fitted(tmp_path / "export", *files) == pytest.approx(plain[kind], rel=1e-3)
 
 
-def test_a_fit_of_a_loop_with_hum_is_that_of_the_loop(tmp_path: Path) -> None:
+def test_a_fit_of_a_loop_with_hum_is_that_of_the_loop(tmp_path):
     """A ripple of 0.5 % is no test of its own."""
     sweep = EXPORTS["phases negative"]
     clean, values = (fitted(tmp_path / f"hum{size}", sweep, with_hum(size)) for size in (0.0, 0.005))

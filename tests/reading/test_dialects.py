@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -49,7 +48,7 @@ def amplitudes(folder: Path, header: str, columns: Mapping[str, str] | None = No
 
 
 @pytest.mark.parametrize("header", [*PEAK_TO_PEAK, *ZERO_TO_PEAK])
-def test_a_header_says_how_amplitudes_count(header: str, tmp_path: Path) -> None:
+def test_a_header_says_how_amplitudes_count(header, tmp_path):
     doubled = header in PEAK_TO_PEAK
     assert set(amplitudes(tmp_path, header)) == {0.5 if doubled else 1.0}
     with pytest.raises(MeasurementError, match="header and campaign disagree on how amplitudes are counted"):
@@ -64,7 +63,7 @@ def test_a_header_says_how_amplitudes_count(header: str, tmp_path: Path) -> None
         ("f [Hz],A [mm],K,tan d", None), ("f [Hz],A [mm],K [degC],tan d", None),
     ],
 )  # fmt: skip
-def test_the_symbol_of_a_stiffness_is_one_by_its_unit(header: str, index: int | None, tmp_path: Path) -> None:
+def test_the_symbol_of_a_stiffness_is_one_by_its_unit(header, index, tmp_path):
     file = tmp_path / "sweep.csv"
     row = ",".join(["1.5"] * (header.partition("\n")[0].count(",") + 1))
     file.write_text("\n".join([header, *[row] * 3]))
@@ -81,9 +80,7 @@ def test_the_symbol_of_a_stiffness_is_one_by_its_unit(header: str, index: int | 
         ("x,y\n1,2\n2,3\n3,4\n", {}, 1, ("x", "y")),
     ],
 )
-def test_the_header_names_most_columns_unless_it_is_stated(
-    text: str, stated: dict[str, Any], line: int, headers: tuple[str, ...], tmp_path: Path
-) -> None:
+def test_the_header_names_most_columns_unless_it_is_stated(text, stated, line, headers, tmp_path):
     (tmp_path / "loop.csv").write_text(text)
     found = Table.open(tmp_path / "loop.csv", LOOP_COLUMNS, file_format=FileFormat(**stated)).layout
     assert (found.header_line, found.headers) == (line, headers)
@@ -106,7 +103,7 @@ UNCLEAR: dict[str, tuple[str, dict[str, str], float | None]] = {
 
 
 @pytest.mark.parametrize("case", UNCLEAR)
-def test_what_can_be_read_in_two_ways_is_refused(case: str, tmp_path: Path) -> None:
+def test_what_can_be_read_in_two_ways_is_refused(case, tmp_path):
     """Ten rows alike but for their first digit: only the row given can tell what its points and commas mean."""
     cells, stated, force = UNCLEAR[case]
     rows = [f"{n}.001;{n}.002;{n}.003" if "." in cells else f"{n},001;{n},002;{n},003" for n in range(2, 12)]
@@ -151,7 +148,7 @@ def in_si(dialect: Dialect) -> list[Floats]:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_every_dialect_reads_to_the_same_numbers(name: str, tmp_path: Path) -> None:
+def test_every_dialect_reads_to_the_same_numbers(name, tmp_path):
     dialect = ALL[name]
     read = by_bushfit(written(dialect, tmp_path))
     first, amplitude, third, *loss = in_si(dialect)
@@ -169,7 +166,7 @@ def test_every_dialect_reads_to_the_same_numbers(name: str, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_a_row_without_a_number_is_left_out_and_listed_in_every_dialect(name: str, tmp_path: Path) -> None:
+def test_a_row_without_a_number_is_left_out_and_listed_in_every_dialect(name, tmp_path):
     """One cell in the middle is no number; the note has its line as an editor counts, and the cell."""
     dialect = ALL[name]
     cells = dialect.row(NUMBERS[dialect.kind][12])

@@ -50,7 +50,7 @@ def check(measured: Loop | Sweep, reference: Mapping[str, np.ndarray], tolerance
 
 
 @pytest.mark.parametrize("name", EXPORTS)
-def test_an_export_is_read_right_or_raises_a_question(name: str, tmp_path: Path) -> None:
+def test_an_export_is_read_right_or_raises_a_question(name, tmp_path):
     export = EXPORTS[name]
     file = tmp_path / export.name
     file.write_bytes(export.content if isinstance(export.content, bytes) else export.content.encode())
@@ -71,7 +71,7 @@ def test_an_export_is_read_right_or_raises_a_question(name: str, tmp_path: Path)
 
 
 @pytest.mark.parametrize("channel", ["time", "force"])
-def test_complex_numbers_recorded_over_time_are_refused(channel: str, tmp_path: Path) -> None:
+def test_complex_numbers_recorded_over_time_are_refused(channel, tmp_path):
     channels = {"time": TIME, "displacement": DISPLACEMENT, "force": FORCE}
     scipy.io.savemat(tmp_path / "loop.mat", {**channels, channel: channels[channel] * (1.0 + 0.1j)})
     done = call(tmp_path, "inspect", "loop.mat", "--direction", "axial")
@@ -79,7 +79,7 @@ def test_complex_numbers_recorded_over_time_are_refused(channel: str, tmp_path: 
     assert f'loop.mat: the channel "{channel}" holds complex numbers' in done.stderr
 
 
-def test_parts_side_by_side_and_date_cells_of_a_workbook(tmp_path: Path) -> None:
+def test_parts_side_by_side_and_date_cells_of_a_workbook(tmp_path):
     book = openpyxl.Workbook()
     book.active.append(["P01", None, None, "P02"])
     book.active.merge_cells("A1:C1")
@@ -109,9 +109,7 @@ def test_parts_side_by_side_and_date_cells_of_a_workbook(tmp_path: Path) -> None
         ),
     ],
 )
-def test_blocks_with_other_units_or_another_order_are_refused(
-    first: str, second: str, words: list[str], title: str, tmp_path: Path
-) -> None:
+def test_blocks_with_other_units_or_another_order_are_refused(first, second, words, title, tmp_path):
     rows = "\n".join(f"{t:.6g},{x:.6g},{f:.6g}" for t, x, f in zip(TIME, DISPLACEMENT, FORCE, strict=True))
     (tmp_path / "blocks.csv").write_text(f"{title}{first}\n{rows}\n{title}{second}\n{rows}\n")
     done = call(tmp_path, "inspect", "blocks.csv", "--direction", "axial", "--json")

@@ -29,11 +29,11 @@ def amplitudes(said: Labels, expected: str = "m") -> list[tuple[str, str | None]
         ("loop 1,0 mm 10mm_min", "1 mm", None), ("5-155Hz_0.1mm", "0.1 mm", None),
     ],
 )  # fmt: skip
-def test_the_amplitude_in_a_name(name: str, text: str, convention: str | None) -> None:
+def test_the_amplitude_in_a_name(name, text, convention):
     assert amplitudes(labels_in_names(name)) == [(text, convention)]
 
 
-def test_what_no_single_number_says_frequencies_strains_and_sheets() -> None:
+def test_what_no_single_number_says_frequencies_strains_and_sheets():
     names = ["CMP15961", "2024-05-03", "20240503_12", "test 7", "axial_05mm", "0.1-1mm", "A0.05", "v2mm", "D 20 mm", ""]
     assert {name: amplitudes(labels_in_names(name)) for name in names} == {name: [] for name in names}
     assert amplitudes(labels_in_names("axial_18mm_bushing_1mm")) == [("18 mm", None), ("1 mm", None)]
@@ -63,7 +63,7 @@ def test_what_no_single_number_says_frequencies_strains_and_sheets() -> None:
         ("0.02rad", {}),
     ],
 )
-def test_what_else_a_name_says(name: str, keys: dict[str, object]) -> None:
+def test_what_else_a_name_says(name, keys):
     said = labels_in_names(name)
     assert {key: value for key, value in vars(said).items() if value and key != "quantities"} == keys
 
@@ -76,11 +76,11 @@ def test_what_else_a_name_says(name: str, keys: dict[str, object]) -> None:
         ("coaxial", None), ("loop", None),
     ],
 )  # fmt: skip
-def test_one_word_of_four_languages_settles_the_direction(name: str, direction: Direction | None) -> None:
+def test_one_word_of_four_languages_settles_the_direction(name, direction):
     assert named_direction([name]) is direction
 
 
-def test_lines_above_a_table_and_the_name_before_the_headers() -> None:
+def test_lines_above_a_table_and_the_name_before_the_headers():
     lines = [
         "# Prüftemperatur: 23,5 °C",
         "Datum;2024-05-03",
@@ -107,7 +107,7 @@ def test_lines_above_a_table_and_the_name_before_the_headers() -> None:
 
 
 @given(st.text())
-def test_any_name_and_any_line_say_something_that_can_be_read(text: str) -> None:
+def test_any_name_and_any_line_say_something_that_can_be_read(text):
     for said in (labels_in_names(text), labels_above([Line(1, text)]), labels_above([Line(1, [text, text])])):
         for expected in ("m", "rad", "1", "Hz"):
             for each in said.of_dimension(expected):

@@ -2,8 +2,7 @@
 
 import hashlib
 import os
-from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
 import pytest
@@ -32,7 +31,7 @@ from bushfit.reading.stated import LoopFile
         LOOP.replace("\n", ",Prüf\x81\n").replace("force [N],Prüf\x81", "force [N],remark").encode("latin-1"),
     ],
 )
-def test_loops_in_forms_that_the_dialects_lack(text: str | bytes, tmp_path: Path) -> None:
+def test_loops_in_forms_that_the_dialects_lack(text, tmp_path):
     loop = loop_from(text, tmp_path, noise=0.01)
     np.testing.assert_allclose(loop.time, TIME, rtol=1e-12)
     np.testing.assert_allclose(loop.displacement, 1e-3 * np.sin(3 * TIME), atol=1e-7)
@@ -43,7 +42,7 @@ def test_loops_in_forms_that_the_dialects_lack(text: str | bytes, tmp_path: Path
 
 
 @pytest.mark.parametrize(("first", "last"), [('"rerun', '"ok'), ('5" rig', '"x'), ('"rerun', "")])
-def test_a_quote_left_open_in_a_remark_takes_no_rows(first: str, last: str, tmp_path: Path) -> None:
+def test_a_quote_left_open_in_a_remark_takes_no_rows(first, last, tmp_path):
     """A library would read everything up to the next quote as one cell, lines and all."""
     remarks = {5: first, 30: last}
     lines = [f"{line},{remarks.get(number, '')}" for number, line in enumerate(LOOP.splitlines())]
@@ -53,7 +52,7 @@ def test_a_quote_left_open_in_a_remark_takes_no_rows(first: str, last: str, tmp_
 
 @pytest.mark.slow
 @pytest.mark.parametrize("lead", ["# rig 3\n\n", '\ufeffOperator "A"\nPrüfstand 3\n'])
-def test_a_large_file_reads_like_a_small_one(lead: str, tmp_path: Path) -> None:
+def test_a_large_file_reads_like_a_small_one(lead, tmp_path):
     """5 MB; a row that is left out late in the file still has its line."""
     count = 300_000
     numbers = np.column_stack((np.arange(count), np.arange(count) % 7 + 0.125, np.arange(count) % 7 - 0.25))
@@ -101,20 +100,20 @@ BAD_LOOPS: list[tuple[str | bytes, list[str]]] = [
 
 
 @pytest.mark.parametrize(("text", "words"), BAD_LOOPS, ids=[words[-1] for _, words in BAD_LOOPS])
-def test_spoiled_loops_have_one_clear_error(text: str | bytes, words: list[str], tmp_path: Path) -> None:
+def test_spoiled_loops_have_one_clear_error(text, words, tmp_path):
     with refused("loop.csv", *words):
         loop_from(text, tmp_path)
 
 
 @pytest.mark.parametrize("cell", ["nan", "-inf", "#N/A", "", "abc", "1" * 100_000])
-def test_rows_without_a_number_are_left_out_and_listed(cell: str, tmp_path: Path) -> None:
+def test_rows_without_a_number_are_left_out_and_listed(cell, tmp_path):
     loop = loop_from(with_line("\n# x\n\n" + LOOP, 8, f"0.3,{cell},3"), tmp_path)
     assert loop.force.size == len(LOOP_ROWS) - 1
     assert loop.source is not None
     assert loop.source.notes[0].startswith("1 row left out, without data: line 8 (0.3")
 
 
-def test_a_loop_of_a_coupon_has_strain_and_stress_and_one_in_torsion_radians(tmp_path: Path) -> None:
+def test_a_loop_of_a_coupon_has_strain_and_stress_and_one_in_torsion_radians(tmp_path):
     text = LOOP.replace("displacement [mm]", "shear strain [%]").replace("force [N]", "Schubspannung [kPa]")
     loop = loop_from(text, tmp_path, direction=Specimen("DMA", "modulus"))
     plain = loop_from(LOOP, tmp_path)
@@ -134,7 +133,7 @@ def test_a_loop_of_a_coupon_has_strain_and_stress_and_one_in_torsion_radians(tmp
 @pytest.mark.parametrize(
     ("then", "found"), [(8_000_000, "8000000 of 9600000"), (0, "0 of 9600000"), (10_000_000, "more than 9600000")]
 )
-def test_a_file_that_changes_while_it_is_read(then: int, found: str, tmp_path: Path) -> None:
+def test_a_file_that_changes_while_it_is_read(then, found, tmp_path):
     """As a test machine, or a copy over the network, may do: in a moment between its opening and its first byte."""
 
     class Changing(type(tmp_path)):  # type: ignore[misc]
@@ -150,7 +149,7 @@ def test_a_file_that_changes_while_it_is_read(then: int, found: str, tmp_path: P
 
 @pytest.mark.parametrize("waveform", ["sine", "triangle"])
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
-def test_time_rebuilt_from_frequency(waveform: Any, noise: float) -> None:
+def test_time_rebuilt_from_frequency(waveform, noise):
     time = np.sort(np.random.default_rng(1).uniform(0.0, 30.0, 3000))
     sine = np.sin(2 * np.pi * 0.1 * (time - time[0]))
     displacement = sine if waveform == "sine" else 2 / np.pi * np.arcsin(sine)
@@ -160,7 +159,7 @@ def test_time_rebuilt_from_frequency(waveform: Any, noise: float) -> None:
     np.testing.assert_allclose(rebuilt, time - time[0], atol=0.02 if noise == 0 else 0.2)
 
 
-def test_time_rebuilt_from_rate_and_columns_of_one_length(tmp_path: Path) -> None:
+def test_time_rebuilt_from_rate_and_columns_of_one_length(tmp_path):
     text = "\n".join(["displacement [mm],force [N]", *(f"{x},{x}" for x in [0, 1, 2, 2, 1, 0, -1, -2, -1, 0])])
     loop = loop_from(text, tmp_path, rate=1e-3)
     assert loop.time[-1] == pytest.approx(8.0)
@@ -170,6 +169,6 @@ def test_time_rebuilt_from_rate_and_columns_of_one_length(tmp_path: Path) -> Non
 
 
 @given(arrays(float, st.integers(2, 60), elements=st.integers(-5, 5).map(float)).filter(lambda x: np.ptp(x) > 0))
-def test_rebuilt_time_always_increases(displacement: Any) -> None:
+def test_rebuilt_time_always_increases(displacement):
     for waveform in ("sine", "triangle"):
         assert np.all(np.diff(rebuild_time(displacement, frequency=1.0, waveform=waveform)) > 0)

@@ -12,7 +12,7 @@ from bushfit.geometry import Specimen
 from bushfit.reading.measurement import Sweep
 
 
-def test_repeats_and_errors_of_the_points_are_read(tmp_path: Path) -> None:
+def test_repeats_and_errors_of_the_points_are_read(tmp_path):
     doubled = "\n".join([SWEEP_HEADER, *SWEEP_ROWS, *SWEEP_ROWS])
     assert sweep_from(doubled, tmp_path).repeat.tolist() == [1] * 8 + [2] * 8
     stated = "\n".join([SWEEP_HEADER + ",repeat", *(f"{row},3" for row in SWEEP_ROWS)])
@@ -35,7 +35,7 @@ ALL_PAIRS = "\n".join(
 )
 
 
-def test_columns_that_say_the_same_may_be_rounded_and_losses_be_negative(tmp_path: Path) -> None:
+def test_columns_that_say_the_same_may_be_rounded_and_losses_be_negative(tmp_path):
     stiffness = sweep_from(ALL_PAIRS, tmp_path).stiffness
     np.testing.assert_allclose(stiffness, 1e3 * np.array([600.0, 610.0, 620.0, 630.0]) * np.exp(0.11j), rtol=1e-3)
     assert np.array_equal(sweep_from(ALL_PAIRS.replace(",6.", ",-6."), tmp_path).stiffness, stiffness)
@@ -57,7 +57,7 @@ ONE_FREQUENCY = "\n".join(
 )
 
 
-def test_what_a_file_has_no_column_for_is_stated(tmp_path: Path) -> None:
+def test_what_a_file_has_no_column_for_is_stated(tmp_path):
     assert set(sweep_from(ONE_LEVEL, tmp_path, at_amplitude=2e-4).amplitude) == {2e-4}
     assert set(sweep_from(ONE_LEVEL, tmp_path, at_amplitude=2e-4, amplitude="peak-to-peak").amplitude) == {1e-4}
     assert set(sweep_from(ONE_FREQUENCY, tmp_path, at_frequency=10.0).frequency) == {10.0}
@@ -71,9 +71,7 @@ def test_what_a_file_has_no_column_for_is_stated(tmp_path: Path) -> None:
     ("level", "reached", "factor"),
     [("amplitude", "p-p", 0.5), ("amplitude p-p", "", 0.5), ("amplitude p-p", "p-p", 0.5), ("amplitude", "", 1.0)],
 )
-def test_amplitudes_reached_count_as_their_header_says_or_else_as_the_levels(
-    tmp_path: Path, level: str, reached: str, factor: float
-) -> None:
+def test_amplitudes_reached_count_as_their_header_says_or_else_as_the_levels(tmp_path, level, reached, factor):
     header = f"frequency [Hz],{level} [mm],amplitude reached {reached} [mm],stiffness [N/mm],loss factor [-]"
     sweep = sweep_of(header, ["5,0.1,0.099,600,0.1", "15,0.1,0.1,610,0.1", "25,0.1,0.101,620,0.1"], tmp_path)
     np.testing.assert_allclose(sweep.amplitude_reached, factor * np.array([9.9e-5, 1e-4, 1.01e-4]))
@@ -92,7 +90,7 @@ COUPON = "\n".join(
 )
 
 
-def test_a_coupon_gives_strain_and_modulus(tmp_path: Path) -> None:
+def test_a_coupon_gives_strain_and_modulus(tmp_path):
     sweep = sweep_from(COUPON, tmp_path, direction=DMA)
     np.testing.assert_allclose(sweep.amplitude, [1.1e-4, 1e-3, 1.1e-2])
     np.testing.assert_allclose(sweep.stiffness, [5.2e6 + 4e5j, 4.5e6 + 5e5j, 3.1e6 + 6e5j])
@@ -108,7 +106,7 @@ def at_temperatures(*temperatures: float, unit: str = "degC") -> str:
     return "\n".join([f"{SWEEP_HEADER},Temperature [{unit}]", *rows])
 
 
-def test_the_rows_at_a_stated_temperature_are_taken_with_their_repeats(tmp_path: Path) -> None:
+def test_the_rows_at_a_stated_temperature_are_taken_with_their_repeats(tmp_path):
     text = at_temperatures(-10.0, 18.4, 25.2)
     for stated, offset in ((291.55, 18.4), (300.0, 25.2)):
         sweep = sweep_from(text, tmp_path, temperature=stated)
@@ -124,9 +122,7 @@ def test_the_rows_at_a_stated_temperature_are_taken_with_their_repeats(tmp_path:
     [(" [degC]", 22.0, 22.0), (" [°C]", 22.0, 22.0), (" [K]", 295.15, 22.0), (" [degF]", 71.6, 22.0),
      (" [C]", 22.0, 22.0), ("", 22.0, None)],
 )  # fmt: skip
-def test_the_temperature_of_a_file_is_its_condition_if_it_has_a_unit(
-    unit: str, value: float, degrees: float | None, tmp_path: Path
-) -> None:
+def test_the_temperature_of_a_file_is_its_condition_if_it_has_a_unit(unit, value, degrees, tmp_path):
     source = sweep_from(at_temperatures(value, value).replace(" [degC]", unit), tmp_path).source
     assert source is not None
     assert source.conditions.get("temperature_degC") == (degrees and pytest.approx(degrees))
@@ -170,8 +166,6 @@ BAD_SWEEPS: list[tuple[str, dict[str, Any], list[str]]] = [
 
 
 @pytest.mark.parametrize(("text", "stated", "words"), BAD_SWEEPS, ids=[words[-1] for *_, words in BAD_SWEEPS])
-def test_spoiled_sweeps_have_one_clear_error(
-    text: str, stated: dict[str, Any], words: list[str], tmp_path: Path
-) -> None:
+def test_spoiled_sweeps_have_one_clear_error(text, stated, words, tmp_path):
     with refused("sweep.csv", *words):
         sweep_from(text, tmp_path, **stated)

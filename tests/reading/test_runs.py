@@ -21,9 +21,7 @@ def swept(amplitudes: np.ndarray, frequencies: np.ndarray, repeats: int, scatter
 
 
 @given(st.integers(1, 3), st.sampled_from([0.0, 1e-3, 0.01, 0.03, 0.08]), st.integers(0, 10_000), st.booleans())
-def test_amplitude_sweeps_as_reached_have_their_levels_back(
-    repeats: int, scatter: float, seed: int, numbered: bool
-) -> None:
+def test_amplitude_sweeps_as_reached_have_their_levels_back(repeats, scatter, seed, numbered):
     frequency, reached, meant, repeat = swept(AMPLITUDES, FREQUENCIES, repeats, scatter, seed)
     runs = runs_of(frequency, reached, repeat if numbered else None)
     assert runs.stepped == "amplitude"
@@ -33,7 +31,7 @@ def test_amplitude_sweeps_as_reached_have_their_levels_back(
 
 
 @pytest.mark.parametrize("order", ["by amplitude", "shuffled"])
-def test_repeats_in_any_order_have_their_levels_back(order: str) -> None:
+def test_repeats_in_any_order_have_their_levels_back(order):
     """Levels that miss by less than 4 % at each frequency, and by more over all of them."""
     frequency, reached, meant, _ = swept(AMPLITUDES, FREQUENCIES, 3, 0.035, 7)
     reached = reached * np.where(frequency == 80.0, 0.95, 1.0)
@@ -49,9 +47,7 @@ def test_repeats_in_any_order_have_their_levels_back(order: str) -> None:
 
 
 @given(st.permutations(["level", "repeat"]), st.booleans(), st.booleans(), st.floats(0.01, 1.0), st.integers(0, 10_000))
-def test_frequency_sweeps_as_reached_have_their_levels_and_repeats_back(
-    outer: list[str], falling: bool, numbered: bool, share: float, seed: int
-) -> None:
+def test_frequency_sweeps_as_reached_have_their_levels_and_repeats_back(outer, falling, numbered, share, seed):
     """Three levels in three repeats, in either order: what each run reached at one frequency it reached at no other.
 
     With numbered repeats they may miss by a tenth, without by 6 %: 1 in 100 is not told apart at 8 %.
@@ -70,7 +66,7 @@ def test_frequency_sweeps_as_reached_have_their_levels_and_repeats_back(
     assert np.allclose(runs.amplitude, level, rtol=scatter + 1e-12)
 
 
-def test_a_mass_on_a_mount_holds_neither_and_each_pass_is_a_run() -> None:
+def test_a_mass_on_a_mount_holds_neither_and_each_pass_is_a_run():
     frequency = np.tile(np.linspace(100.0, 300.0, 50), 2)
     amplitude = 1e-5 / (1.0 + ((frequency - 200.0) / 20.0) ** 2) * np.repeat([1.0, 3.0], 50)
     runs = runs_of(frequency, amplitude, None)
@@ -79,7 +75,7 @@ def test_a_mass_on_a_mount_holds_neither_and_each_pass_is_a_run() -> None:
     assert np.array_equal(runs.amplitude, amplitude)
 
 
-def test_amplitudes_that_nothing_groups_are_their_own_levels_and_one_that_falls_short_is_one_run() -> None:
+def test_amplitudes_that_nothing_groups_are_their_own_levels_and_one_that_falls_short_is_one_run():
     for amplitudes in (np.geomspace(1e-5, 1e-3, 40), [1e-4, 1.1e-4, 1.48e-4, 1.63e-4], [1e-4, 2e-4, 5e-4], [1e-4]):
         assert np.array_equal(nominal(np.array(amplitudes)), amplitudes)
     frequency = np.geomspace(0.01, 100.0, 28)
@@ -91,7 +87,7 @@ def test_amplitudes_that_nothing_groups_are_their_own_levels_and_one_that_falls_
 @pytest.mark.parametrize("stepped", ["frequency", "amplitude"])
 @pytest.mark.parametrize("counts", [(4, 8), (5, 5), (15, 8), (15, 15), (8, 40)], ids=str)
 @pytest.mark.parametrize("repeats", [1, 2])
-def test_the_order_of_the_rows_tells_what_is_stepped(stepped: str, counts: tuple[int, int], repeats: int) -> None:
+def test_the_order_of_the_rows_tells_what_is_stepped(stepped, counts, repeats):
     levels, steps = np.geomspace(1e-5, 1e-3, counts[0]), np.geomspace(5.0, 150.0, counts[1])
     axes = (levels, np.arange(repeats), steps) if stepped == "frequency" else (steps, np.arange(repeats), levels)
     held, _, step = (axis.ravel() for axis in np.meshgrid(*axes, indexing="ij"))
@@ -99,7 +95,7 @@ def test_the_order_of_the_rows_tells_what_is_stepped(stepped: str, counts: tuple
     assert runs_of(frequency, amplitude, None).stepped == stepped
 
 
-def test_a_table_of_three_amplitudes_that_was_sorted_by_frequency_steps_the_frequency() -> None:
+def test_a_table_of_three_amplitudes_that_was_sorted_by_frequency_steps_the_frequency():
     frequency, amplitude = (axis.ravel() for axis in np.meshgrid(np.arange(5.0, 156.0, 10.0), [1e-4, 2e-4, 5e-4]))
     order = np.lexsort((amplitude, frequency))
     assert runs_of(frequency[order], amplitude[order], None).stepped == "frequency"

@@ -113,13 +113,13 @@ def check(sweep: Sweep, scale: float = 1.0) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_every_form_reads_to_the_same_points(form: str, tmp_path: Path) -> None:
+def test_every_form_reads_to_the_same_points(form, tmp_path):
     check(sweep_from("\n".join(FORMS[form]) + "\n", tmp_path))
     check(sweep_from("\n".join(FORMS[form]).replace(";", "\t") + "\n", tmp_path))
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_every_form_reads_from_a_workbook(form: str, tmp_path: Path) -> None:
+def test_every_form_reads_from_a_workbook(form, tmp_path):
     book = openpyxl.Workbook()
     book.active.title = "Info"
     book.active.append(["Operator", "A. B."])
@@ -130,7 +130,7 @@ def test_every_form_reads_from_a_workbook(form: str, tmp_path: Path) -> None:
     check(read_sweep(tmp_path / "book.xlsx", Direction.AXIAL, SweepFile(file="book.xlsx")))
 
 
-def test_amplitudes_peak_to_peak_units_stated_and_repeats(tmp_path: Path) -> None:
+def test_amplitudes_peak_to_peak_units_stated_and_repeats(tmp_path):
     text = halves("f [Hz];" + each("K* {0} mm p-p [N/mm]") + ";" + each("tan delta {0} mm p-p"))
     check(sweep_from("\n".join(text), tmp_path), scale=0.5)
     text = halves("f [Hz];" + each("K* [N/mm] A={0}") + ";" + each("tan delta A={0}"))
@@ -164,7 +164,7 @@ SPOILED = [
 
 
 @pytest.mark.parametrize(("text", "words"), SPOILED, ids=[words[-1] for _, words in SPOILED])
-def test_spoiled_wide_tables_have_one_clear_error(text: list[str], words: list[str], tmp_path: Path) -> None:
+def test_spoiled_wide_tables_have_one_clear_error(text, words, tmp_path):
     with refused("sweep.csv", *words):
         sweep_from("\n".join(text), tmp_path)
 
@@ -216,14 +216,14 @@ FILES = {
 
 
 @pytest.mark.parametrize("header", FILES)
-def test_one_test_in_many_files(tmp_path: Path, header: str) -> None:
+def test_one_test_in_many_files(tmp_path, header):
     test = read(written(tmp_path, header, *FILES[header]))
     assert np.allclose(test.frequency, FREQUENCY)
     assert np.allclose(test.transmissibility, RATIO, rtol=1e-6)
     assert np.allclose(test.base_acceleration, BASE, rtol=1e-6)
 
 
-def test_rows_are_sorted_by_frequency(tmp_path: Path) -> None:
+def test_rows_are_sorted_by_frequency(tmp_path):
     file = written(tmp_path, "f [Hz],|T|,phase [rad]", np.abs(RATIO), ANGLE)
     lines = file.read_text().splitlines()
     file.write_text("\n".join([lines[0], *lines[:0:-1]]) + "\n")

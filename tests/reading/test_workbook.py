@@ -71,7 +71,7 @@ SHEETS: dict[str, Sheets] = {
 
 
 @pytest.mark.parametrize("case", SHEETS)
-def test_sheets_read_to_the_same_numbers(case: str, tmp_path: Path) -> None:
+def test_sheets_read_to_the_same_numbers(case, tmp_path):
     assert np.array_equal(forces(workbook(SHEETS[case], tmp_path)), FORCE)
 
 
@@ -103,9 +103,7 @@ def ods(rows: list[list[object]], file: Path) -> None:
 
 
 @pytest.mark.parametrize("write", [xls, ods])
-def test_workbooks_of_other_formats_read_to_the_same_numbers(
-    write: Callable[[list[list[object]], Path], None], tmp_path: Path
-) -> None:
+def test_workbooks_of_other_formats_read_to_the_same_numbers(write, tmp_path):
     write(table("loop"), tmp_path / f"test.{write.__name__}")
     assert np.array_equal(forces(tmp_path / f"test.{write.__name__}"), FORCE)
 
@@ -127,15 +125,13 @@ SPOILED: list[tuple[Sheets, str | None, list[str]]] = [
 
 
 @pytest.mark.parametrize(("sheets", "sheet", "words"), SPOILED, ids=[words[0] for *_, words in SPOILED])
-def test_spoiled_workbooks_have_one_clear_error(
-    sheets: Sheets, sheet: str | None, words: list[str], tmp_path: Path
-) -> None:
+def test_spoiled_workbooks_have_one_clear_error(sheets, sheet, words, tmp_path):
     with refused("test.xlsx", *words):
         forces(workbook(sheets, tmp_path), sheet=sheet)
 
 
 @pytest.mark.parametrize("row", [["a", 1.0, 2.0], [True, 1.0, 2.0], [1e6, None, 2.0], ["Mittelwert", 3.0, 4.0]])
-def test_rows_of_a_sheet_without_data_are_left_out_and_listed(row: list[object], tmp_path: Path) -> None:
+def test_rows_of_a_sheet_without_data_are_left_out_and_listed(row, tmp_path):
     file = workbook({"Loop": [*LOOP, row]}, tmp_path)
     loop = read_loop(file, Direction.AXIAL, LoopFile(file=file.name))
     assert np.array_equal(loop.force, FORCE)
@@ -144,7 +140,7 @@ def test_rows_of_a_sheet_without_data_are_left_out_and_listed(row: list[object],
 
 
 @pytest.mark.parametrize("cells", [lambda row: f"=1*{row}", lambda row: float(row)], ids=["all", "one column"])
-def test_formulas_whose_values_were_not_saved_are_said(cells: Callable[[str], object], tmp_path: Path) -> None:
+def test_formulas_whose_values_were_not_saved_are_said(cells, tmp_path):
     """As programs write them that do not compute, openpyxl among them."""
     rows = [table("loop")[0], *([f"=2*{t}", cells(x), cells(force)] for t, x, force in NUMBERS["loop"])]
     with pytest.raises(MeasurementError, match="formulas whose values were not saved") as caught:
@@ -161,7 +157,7 @@ TABLE = pd.DataFrame(
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("direction", list(Direction))
-def test_tests_are_read_back(form: Form, direction: Direction, tmp_path: Path) -> None:
+def test_tests_are_read_back(form, direction, tmp_path):
     loop = Loop("loop", direction, PHASE, 1e-3 * np.sin(PHASE), 50.0 * np.sin(PHASE + 0.2))
     frequency, repeat = np.tile([5.0, 15.0, 25.0], 2), np.repeat([2, 7], 3)
     sweep = Sweep("s", direction, frequency, np.full(6, 2e-4), 5e5 * np.exp(0.1j) * (1.0 + frequency / 100.0), repeat)
@@ -179,7 +175,7 @@ def test_tests_are_read_back(form: Form, direction: Direction, tmp_path: Path) -
     np.testing.assert_allclose(swept.stiffness, sweep.stiffness, rtol=1e-6)
 
 
-def test_cells_of_a_text_have_seven_digits_and_run_nothing() -> None:
+def test_cells_of_a_text_have_seven_digits_and_run_nothing():
     table = pd.DataFrame({"x [mm]": [1.0 / 3.0, np.nan], "n": [-3, 4], "=run": ["\r=1+1", 'a "b", c']})
     assert to_csv(table) == b'x [mm],n,\'=run\n0.3333333,-3,\' =1+1\n,4,"a ""b"", c"\n'
     commas = to_bytes("t", TABLE, "decimal-comma")
@@ -193,9 +189,7 @@ RUN = ["=1+1", "+cmd", "-2+3", "@SUM(A1)", "\t=1", "  =1", '=HYPERLINK("http://x
 STAY = ["loop_axial_1", "0.1 mm", "a=b", "A-4", "", "'quoted'", "Prüfling 3"]
 
 
-def test_what_a_sheet_does_not_hold_is_refused_and_cells_of_all_sheets_count(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_sheet_does_not_hold_is_refused_and_cells_of_all_sheets_count(tmp_path, monkeypatch):
     wide = pd.DataFrame(np.ones((1, 16_385)), columns=[f"c{n}" for n in range(16_385)])
     assert to_bytes("t", wide, "csv")
     with pytest.raises(OutputError, match="too large for a sheet"):

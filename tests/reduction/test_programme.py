@@ -79,7 +79,7 @@ PROGRAMMES: dict[str, tuple[Sequence[Array], Sequence[tuple[float, float]]]] = {
 
 
 @pytest.mark.parametrize("case", PROGRAMMES)
-def test_each_steady_part_is_a_loop_in_its_order(paper_model: Model, case: str) -> None:
+def test_each_steady_part_is_a_loop_in_its_order(paper_model, case):
     motions, expected = PROGRAMMES[case]
     record = recorded(paper_model, *motions)
     loops = programme(record)
@@ -103,7 +103,7 @@ def test_each_steady_part_is_a_loop_in_its_order(paper_model: Model, case: str) 
 
 
 @pytest.mark.parametrize("case", ["pauses", "one speed"])
-def test_without_time_parts_are_the_same(paper_model: Model, case: str) -> None:
+def test_without_time_parts_are_the_same(paper_model, case):
     motions, expected = PROGRAMMES[case]
     loops = programme(replace(recorded(paper_model, *motions), has_recorded_time=False), LoopFile(file="", rate=1e-4))
     sizes = [prepare_loop(loop).amplitude for loop in loops]
@@ -118,7 +118,7 @@ def virgin(loop: Loop, share: float) -> Loop:
     return replace(loop, force=loop.force * np.where(at < 1.0, 1.0 + share, 1.0))
 
 
-def test_a_softening_is_told_of_each_part(paper_model: Model) -> None:
+def test_a_softening_is_told_of_each_part(paper_model):
     loops = programme(virgin(recorded(paper_model, *[cycles(5, x) for x in (0.2, 0.5, 1)]), 0.12))
     found = [100.0 * (loop.softening or 0.0) for loop in loops]
     assert found == pytest.approx([12.0] * 3, abs=4.0)  # with what a springpot and friction make from rest

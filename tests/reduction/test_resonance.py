@@ -41,7 +41,7 @@ def misses(found: Resonance, model: Model) -> Array:
 
 
 @given(st.floats(1e4, 1e7), st.floats(0.01, 1.0), st.floats(0.0, 0.9), st.floats(1e-3, 1.0), st.floats(1e-7, 1e-3))
-def test_a_response_solves_its_equation(stiffness: float, loss: float, softer: float, half: float, base: float) -> None:
+def test_a_response_solves_its_equation(stiffness, loss, softer, half, base):
     """X = |T(K(X)) - 1| X_base, for a stiffness that falls with X from K to (1 - softer) K."""
     resonance = np.sqrt(stiffness / 0.5) / (2.0 * np.pi)
     frequency = resonance * np.array([0.1, 0.5, 0.9, 1.0, 1.1, 2.0, 10.0])
@@ -55,7 +55,7 @@ def test_a_response_solves_its_equation(stiffness: float, loss: float, softer: f
 
 
 @pytest.mark.parametrize("rows", [40, 2000])
-def test_a_clean_test_gives_the_stiffness_back(paper_model: Model, rows: int) -> None:
+def test_a_clean_test_gives_the_stiffness_back(paper_model, rows):
     found = reduce_resonance(shaken(paper_model, rows), MASS)
     off = np.abs(misses(found, paper_model))
     assert off.size == min(rows, MOST_POINTS)
@@ -85,9 +85,7 @@ def wandering(random: np.random.Generator, sigma: float) -> Callable[[int], Arra
         (2000, 0.01, True, 0.9, 0.98),
     ],
 )
-def test_standard_errors_cover_what_points_miss(
-    paper_model: Model, rows: int, sigma: float, shared: bool, least: float, most: float
-) -> None:
+def test_standard_errors_cover_what_points_miss(paper_model, rows, sigma, shared, least, most):
     """Also where neighbouring rows share their errors, as those of a slow sweep do."""
     off = []
     for seed in range(40):
@@ -100,7 +98,7 @@ def test_standard_errors_cover_what_points_miss(
     assert least < covered < most
 
 
-def test_the_measured_mount(root: Path) -> None:
+def test_the_measured_mount(root):
     """Eight tests of a mount of real rubber: it softens with amplitude, and the masses agree on its stiffness.
 
     Their resonances at 0.1 and 1 g: a hand calculation has -7.4 % for the largest mass. At 0.1 g and 450 Hz, three
@@ -128,7 +126,7 @@ def test_the_measured_mount(root: Path) -> None:
     assert np.ptp(np.angle(near[:3])) < 0.03
 
 
-def test_a_sweep_without_its_resonance_says_so(paper_model: Model) -> None:
+def test_a_sweep_without_its_resonance_says_so(paper_model):
     test = shaken(paper_model, 80)
     above = test.frequency > 250.0
     cut = {name: getattr(test, name)[above] for name in ("frequency", "transmissibility", "base_acceleration")}

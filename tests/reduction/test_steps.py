@@ -20,7 +20,7 @@ POINTS = [(f, a * (1.0 - 1e-4 * f)) for a in (1.02e-4, 1.99e-4, 4.9e-4) for f in
 
 
 @pytest.fixture(scope="module")
-def clean(paper_model: Model) -> Loop:
+def clean(paper_model) -> Loop:
     """Three levels at five frequencies, sampled at 5 kHz."""
     return stepped(paper_model, POINTS)
 
@@ -39,9 +39,7 @@ def off_truth(reduction: Reduction, model: Model) -> Array:
 @pytest.mark.parametrize(
     ("kind", "limit"), [("even", 5e-5), ("uneven", 5e-5), ("coarse", 5e-5), ("coarse, nearly 8 rows per cycle", 5e-4)]
 )
-def test_every_step_has_the_stiffness_of_the_closed_form(
-    clean: Loop, paper_model: Model, kind: str, limit: float
-) -> None:
+def test_every_step_has_the_stiffness_of_the_closed_form(clean, paper_model, kind, limit):
     count = clean.time.size
     rows = {
         "even": None,
@@ -63,7 +61,7 @@ def test_every_step_has_the_stiffness_of_the_closed_form(
 
 
 @pytest.mark.parametrize("seeds", [8, pytest.param(30, marks=pytest.mark.slow)])
-def test_stated_errors_are_those_made(clean: Loop, paper_model: Model, seeds: int) -> None:
+def test_stated_errors_are_those_made(clean, paper_model, seeds):
     """White noise and a wandering zero in both channels: 95 % of the points lie within 1.96 standard errors."""
     gain, phase = [], []
     for seed in range(seeds):
@@ -77,7 +75,7 @@ def test_stated_errors_are_those_made(clean: Loop, paper_model: Model, seeds: in
     assert max(held) < 0.98
 
 
-def test_noise_that_is_not_white_is_told_by_the_cycles() -> None:
+def test_noise_that_is_not_white_is_told_by_the_cycles():
     """A force whose amplitude wanders from cycle to cycle is less certain than its rows would say."""
     random, time = np.random.default_rng(3), np.arange(0.0, 4.0, 1e-3)
     errors, stated = [], []
@@ -108,7 +106,7 @@ LOGGERS = {
 
 @pytest.mark.parametrize("logger", LOGGERS)
 @pytest.mark.parametrize("controller", CONTROLLERS)
-def test_whatever_controller_and_logger_do(controller: str, logger: str) -> None:
+def test_whatever_controller_and_logger_do(controller, logger):
     """Eight steps of 20 cycles, of a bushing of constant stiffness, 0.05 % noise."""
     random, rate, stiffness = np.random.default_rng(4), 5000.0, 6e5 * np.exp(0.15j)
     points = [(f, a) for a in (2e-4, 1e-3) for f in (3.0, 20.0, 60.0, 155.0)]
@@ -129,7 +127,7 @@ def test_whatever_controller_and_logger_do(controller: str, logger: str) -> None
     assert np.abs(off).max() < 1e-3
 
 
-def test_overtones_of_both_channels_are_reported_and_do_no_harm() -> None:
+def test_overtones_of_both_channels_are_reported_and_do_no_harm():
     phase = 2.0 * np.pi * 23.7 * np.arange(0.0, 1.513, 1.0 / 4000.0)
     motion = 1e-3 * np.sin(phase) + 2e-5 * np.sin(2.0 * phase + 1.0)
     force = 400.0 * np.sin(phase + 0.3)
@@ -142,7 +140,7 @@ def test_overtones_of_both_channels_are_reported_and_do_no_harm() -> None:
     assert step.force_distortion == pytest.approx(np.sqrt(0.05**2 + 0.02**2 + 0.01**2), rel=1e-4)
 
 
-def test_repeats_and_levels(paper_model: Model) -> None:
+def test_repeats_and_levels(paper_model):
     """Two repeats in one record, a third in another; the rig misses its set point by up to 3 %."""
     first = stepped(paper_model, [(10.0, 0.97e-4), (30.0, 1.03e-4), (10.0, 1.0e-4), (30.0, 1.01e-4)])
     second = stepped(paper_model, [(10.0, 1.02e-4), (30.0, 0.98e-4)])
@@ -169,7 +167,7 @@ SLOW = 20.0 * np.exp(np.linspace(0.0, 0.6, TIME.size))
     ],
     ids=["swept", "slowly swept", "too few cycles", "still"],
 )
-def test_what_is_no_steady_sine_makes_no_points(motion: Array, said: str) -> None:
+def test_what_is_no_steady_sine_makes_no_points(motion, said):
     with pytest.raises(MeasurementError, match="no steady sine was found") as error:
         reduce([Loop("x", Direction.AXIAL, TIME, 1e-3 * motion, motion)])
     assert said in str(error.value)
@@ -185,9 +183,7 @@ def test_what_is_no_steady_sine_makes_no_points(motion: Array, said: str) -> Non
     cycles=st.floats(6.0, 40.0),
     rows=st.floats(7.0, 300.0),
 )
-def test_any_sine_gives_its_stiffness(
-    frequency: float, amplitude: float, phase: float, lead: float, mean: float, drift: float, cycles: float, rows: float
-) -> None:
+def test_any_sine_gives_its_stiffness(frequency, amplitude, phase, lead, mean, drift, cycles, rows):
     """Any frequency, phase, preload and slow drift, whole cycles or not, with a rig that rests before and after."""
     turns = np.arange(int(cycles * rows)) / rows
     zero = mean + drift * turns / cycles
@@ -199,7 +195,7 @@ def test_any_sine_gives_its_stiffness(
     assert step.stiffness == pytest.approx(3e5 * np.exp(1j * lead), rel=1e-6)
 
 
-def test_what_a_missed_set_point_does_to_the_stiffness_is_said(paper_model: Model) -> None:
+def test_what_a_missed_set_point_does_to_the_stiffness_is_said(paper_model):
     points = [(f, a) for f in (10.0, 30.0) for a in (1e-4, 5e-4 * (1.0 if f < 20.0 else 0.92))]
     (warning,) = reduce([stepped(paper_model, points)]).warnings
     assert "the rig reached 0.46 to 0.5 mm instead of 0.48 mm" in warning

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Sequence
-from pathlib import Path
 
 import pytest
 from agreement import Agree
@@ -12,7 +11,7 @@ _MODESTY, _ROUNDING = 0.5, 12.0
 
 
 @pytest.fixture(scope="session")
-def agree(root: Path) -> Agree:
+def agree(root) -> Agree:
     text = (root / "tests/reference/README.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| ([^|]+?) \| [^|]+ \| ([\d./ ]+) \|$", text, re.MULTILINE)
     said = {what: [float(part) for part in figures.split("/")] for what, figures in rows}

@@ -1,10 +1,8 @@
 """The finite elements against another's, against closed forms and finer meshes; the shipped correction against both."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from agreement import Agree, digits
+from agreement import digits
 from finite_tube import Solution, corrections, solve_tube
 
 from bushfit.geometry import Bushing, Direction
@@ -42,7 +40,7 @@ def long_tube(inner: float, n: int) -> Solution:
     return Solution(4.0 * even, np.pi * (1.0 - inner**2), np.sqrt(squared).ravel(), energy / energy.sum(), 0)
 
 
-def test_against_finite_elements_of_others(agree: Agree, root: Path) -> None:
+def test_against_finite_elements_of_others(agree, root):
     table = np.loadtxt(root / "data/reference/radial_fe.csv", delimiter=",", skiprows=1)[:, :4]
     rows = (table * (1e-3, 1e-3, 1e-3, 1.0)).tolist()
     solved = [b * solve_tube(a / b, length / b, fineness=0.5).stiffness for a, b, length, _ in rows]
@@ -58,7 +56,7 @@ def test_against_finite_elements_of_others(agree: Agree, root: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("inner", [0.15, 10 / 18, 0.9])
-def test_the_middle_of_a_long_tube(inner: float) -> None:
+def test_the_middle_of_a_long_tube(inner):
     """Between two lengths the stiffness grows by what the closed form says, Eqs. 8 and 7 being its strain."""
     tube = Bushing("tube", inner, 1.0, 1.0)
     for n, direction in ((1, Direction.RADIAL), (0, Direction.AXIAL)):
@@ -75,14 +73,14 @@ def test_the_middle_of_a_long_tube(inner: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", [(0.15, 0.1), (0.9, 0.1), (10 / 18, 34 / 18)])
-def test_finer_meshes_change_nothing(shape: tuple[float, float]) -> None:
+def test_finer_meshes_change_nothing(shape):
     coarse, fine, finer = (solve_tube(*shape, fineness=fineness) for fineness in (0.7, 1.0, 1.7))
     for quantity in ("stiffness", "energy_strain", "friction_strain"):
         assert getattr(fine, quantity) == pytest.approx(getattr(finer, quantity), rel=2e-4)
         assert getattr(coarse, quantity) == pytest.approx(getattr(finer, quantity), rel=1e-3)
 
 
-def test_the_papers_bushing() -> None:
+def test_the_papers_bushing():
     """What no correction ships: the axial formula supposes pure shear, and free ends are softer."""
     bushing = Bushing("CMP 15 961", 10.0 / 18.0, 1.0, 34.0 / 18.0)
     for n, direction in ((1, Direction.RADIAL), (0, Direction.AXIAL)):
@@ -97,7 +95,7 @@ def test_the_papers_bushing() -> None:
 @pytest.mark.parametrize(
     ("seed", "many", "fineness"), [(11, 1, 1.0), pytest.param(12, 12, 0.7, marks=pytest.mark.slow, id="many_kept")]
 )
-def test_the_correction_on_kept_shapes(seed: int, many: int, fineness: float) -> None:
+def test_the_correction_on_kept_shapes(seed, many, fineness):
     """Many on a coarser mesh, which moves no error by more than 0.02 % (see `test_finer_meshes_change_nothing`)."""
     kept = kept_shapes(seed, many)
     solved = corrections(kept, fineness=fineness)
@@ -108,7 +106,7 @@ def test_the_correction_on_kept_shapes(seed: int, many: int, fineness: float) ->
 
 
 @pytest.mark.slow
-def test_a_bulk_modulus_of_2_gpa() -> None:
+def test_a_bulk_modulus_of_2_gpa():
     """Thick and thin, flat and long tubes: how much less stiff they are than incompressible ones."""
     for inner, length in ((0.2, 0.5), (0.6, 4.0), (0.85, 2.0), (0.9, 0.4), (0.9, 9.0)):
         hard = solve_tube(inner, length, bulk=1.0 / INCOMPRESSIBLE, fineness=0.7).stiffness

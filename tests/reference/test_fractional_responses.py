@@ -10,7 +10,7 @@ from functools import cache
 import mpmath
 import numpy as np
 import pytest
-from agreement import Agree, digits
+from agreement import digits
 
 from bushfit.effects import History, friction
 from bushfit.effects.contract import Array
@@ -101,7 +101,7 @@ RESPONSES = {
 
 
 @pytest.mark.parametrize("name", RESPONSES)
-def test_from_rest(name: str, bushing: Bushing, agree: Agree) -> None:
+def test_from_rest(name, bushing, agree):
     """The sum of Eq. 3 is first order in the step, so twice as many steps tell its limit."""
     response = RESPONSES[name](bushing)
     plain, limit = [], []
@@ -122,7 +122,7 @@ def triangle(alpha: float, phase: float) -> float:
     return float(8 / mpmath.pi**2 * mpmath.im(odd / 1j * mpmath.expj(alpha * mpmath.pi / 2)))
 
 
-def test_on_the_steady_cycle(agree: Agree) -> None:
+def test_on_the_steady_cycle(agree):
     cycles = np.arange(STEPS) / STEPS
     at = [STEPS // 16 * k for k in (1, 2, 3, 5, 6, 7)]
     sine, bent = [], []
@@ -137,7 +137,7 @@ def test_on_the_steady_cycle(agree: Agree) -> None:
     agree("springpot, steady triangle", bent)
 
 
-def test_as_the_rig_measures_it(bushing: Bushing, agree: Agree) -> None:
+def test_as_the_rig_measures_it(bushing, agree):
     """Ten cycles from rest, then the lock-in over one."""
     found = []
     for alpha in ALPHAS:
@@ -163,7 +163,7 @@ def branches(strain: list[float]) -> list[mpmath.mpf]:
     return out
 
 
-def test_branches_from_rest(agree: Agree) -> None:
+def test_branches_from_rest(agree):
     random = np.random.default_rng(1)
     signs = np.where(np.arange(2000) % 2, -1.0, 1.0)
     strain = signs * VALUES["eps_half"] * 10.0 ** random.uniform(-2.0, 1.5, 2000)
@@ -192,7 +192,7 @@ def in_phase(x: float) -> mpmath.mpf:
     return VALUES["sigma_fmax"] * 2 / mpmath.pi * mpmath.quad(branch, mpmath.linspace(0, mpmath.pi, 9))
 
 
-def test_area_and_first_harmonic_of_the_steady_loop(agree: Agree) -> None:
+def test_area_and_first_harmonic_of_the_steady_loop(agree):
     """Friction knows no time, so that the samples may lie where Gauss integrates each branch exactly."""
     nodes, weights = np.polynomial.legendre.leggauss(400)
     phase, weight = np.pi / 2.0 * (1.0 + nodes), np.pi / 2.0 * weights

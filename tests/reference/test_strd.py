@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from agreement import Agree, digits
+from agreement import digits
 from strd import Problem, problems
 
 from bushfit.fitting.assess import FitStage, covariance
@@ -29,7 +29,7 @@ def fitted(problem: Problem, start: int, tolerance: float | None = None) -> FitR
         return solve(FitProblem(problem.curve(start), [problem.data_set()], names), evaluations=1000, **stop)
 
 
-def test_the_files_are_whole() -> None:
+def test_the_files_are_whole():
     """The formula read off each file gives the certified residuals at the certified values."""
     assert len(PROBLEMS) == 27
     assert sorted(problem.level for problem in PROBLEMS) == ["average"] * 11 + ["higher"] * 8 + ["lower"] * 8
@@ -41,7 +41,7 @@ def test_the_files_are_whole() -> None:
 
 
 @pytest.mark.slow
-def test_certified_values_from_both_starts(agree: Agree) -> None:
+def test_certified_values_from_both_starts(agree):
     values, errors, default, apart = {}, {}, {}, {}
     for problem, start in STARTS:
         at = (problem.name, start)
@@ -72,7 +72,7 @@ def test_certified_values_from_both_starts(agree: Agree) -> None:
 
 
 @pytest.mark.parametrize(("name", "start"), UNSOLVED)
-def test_what_is_not_solved_has_an_error_beyond_all_values(name: str, start: int) -> None:
+def test_what_is_not_solved_has_an_error_beyond_all_values(name, start):
     problem = next(problem for problem in PROBLEMS if problem.name == name)
     names = tuple(problem.certified)
     solution = fitted(problem, start)

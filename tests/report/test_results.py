@@ -22,7 +22,6 @@ from bushfit.commands.fit import fit
 from bushfit.commands.predict import predict
 from bushfit.errors import CONTROL, OutputError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.model.model import Model
 from bushfit.report.plots.style import to_image
 from bushfit.report.results import Formats, Picture, ResultFile, encode_all, write_results
 from bushfit.report.tables import loops_table, sweeps_table
@@ -44,7 +43,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {file.name: file.read_bytes() for file in folder.glob("[!.]*")}
 
 
-def test_a_killed_command_leaves_each_file_old_or_new_and_the_next_one_replaces_them(tmp_path: Path) -> None:
+def test_a_killed_command_leaves_each_file_old_or_new_and_the_next_one_replaces_them(tmp_path):
     """Killed at every system call in turn: no file is torn, and none of them is taken for the user's."""
     states = set()
     for count in range(200):
@@ -82,7 +81,7 @@ def _killed_at(count: int, folder: Path) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
-def test_a_folder_that_allows_no_writing() -> None:
+def test_a_folder_that_allows_no_writing():
     """Rights do not bind root, so that a child gives its own up first."""
     with tempfile.TemporaryDirectory() as home:
         folder = Path(home) / "x"
@@ -103,7 +102,7 @@ def test_a_folder_that_allows_no_writing() -> None:
         assert contents(folder) == {}
 
 
-def test_commands_that_write_into_one_folder_lose_no_file(tmp_path: Path) -> None:
+def test_commands_that_write_into_one_folder_lose_no_file(tmp_path):
     """Eight at once: the files of all of them are there, whole and known as results."""
     sets = [{f"{number}.csv": b"%d" % number * 2000, "shared.csv": b"%d" % number * 2000} for number in range(8)]
     write(tmp_path / "x", {"shared.csv": b"first"})
@@ -119,7 +118,7 @@ def test_commands_that_write_into_one_folder_lose_no_file(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("force", [True, False])
-def test_a_file_that_bushfit_did_not_write_is_never_replaced(tmp_path: Path, force: bool) -> None:
+def test_a_file_that_bushfit_did_not_write_is_never_replaced(tmp_path, force):
     """One of the user's, a result that the user changed, a link, an input of the run, a folder, a file as folder."""
     (tmp_path / "results").mkdir()
     write(tmp_path / "results", OLD)
@@ -147,7 +146,7 @@ NASTY = "<script>alert(1)</script> --> & $x_1$ 衬套"
 
 
 @pytest.fixture(scope="module")
-def data(root: Path) -> PreparedCampaign:
+def data(root) -> PreparedCampaign:
     return PreparedCampaign.from_campaign(load_campaign(root / "configs/cmp_15961.toml"))
 
 
@@ -159,7 +158,7 @@ def drawn() -> Figure:
 
 
 @pytest.mark.parametrize("form", get_args(Picture))
-def test_a_picture_is_the_same_bytes_each_time_without_date_or_version(form: Picture) -> None:
+def test_a_picture_is_the_same_bytes_each_time_without_date_or_version(form):
     first, second = (to_image(drawn(), form) for _ in range(2))
     assert first == second
     assert not [word for word in (b"Matplotlib v", b"CreationDate", b"dc:date", b"Software") if word in first]
@@ -169,9 +168,7 @@ def test_a_picture_is_the_same_bytes_each_time_without_date_or_version(form: Pic
         assert not {"script", "text", "image"} & names
 
 
-def test_loops_row_by_row_and_sweeps_by_amplitude_repeat_and_frequency(
-    data: PreparedCampaign, paper_model: Model
-) -> None:
+def test_loops_row_by_row_and_sweeps_by_amplitude_repeat_and_frequency(data, paper_model):
     table, loop = loops_table(paper_model, data.loops), data.loops[0].test
     assert len(table) == loop.time.size
     np.testing.assert_allclose(table["force [N]"], loop.force, rtol=1e-12)
@@ -196,7 +193,7 @@ FILE = "=1+1 $\\foo$ \x1b[2J\u202ecsv.exe"
 
 
 @pytest.fixture(scope="module")
-def outputs(root: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[ResultFile]]:
+def outputs(root, tmp_path_factory) -> dict[str, list[ResultFile]]:
     """Result files of commands on a campaign of such names."""
     folder = tmp_path_factory.mktemp("foreign")
     text = (root / "configs/cmp_15961.toml").read_text().replace('"CMP 15 961"', f"'''{NAME}'''", 1)
@@ -217,7 +214,7 @@ def outputs(root: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, l
 
 
 @pytest.mark.parametrize("command", ["fit", "predict", "compare"])
-def test_pictures_and_sheets(command: str, outputs: dict[str, list[ResultFile]]) -> None:
+def test_pictures_and_sheets(command, outputs):
     files, texts, cells = outputs[command], list[str](), list[Any]()
     for file in (file for file in files if file.kind == "figure"):
         figure = file.content

@@ -149,7 +149,7 @@ def strain_scale(bench: Bench) -> Sized:
 
 
 @kind("the bushing or its fixture has play", right=("clearance", "fixture_play"))
-def clearance(bench: Bench) -> Sized:
+def clearance(bench) -> Sized:
     smallest = bench.tests.amplitude[bench.sweeps].min()
 
     def change(amount: float) -> Change:
@@ -202,7 +202,7 @@ def compliance(bench: Bench) -> Sized:
 
 
 @kind("a sleeve or a fixture gives way under radial load", right=_COMPLIANCE, needs=("both",))
-def radial_compliance(bench: Bench) -> Sized:
+def radial_compliance(bench) -> Sized:
     give = _radial(bench)[:, None] / bench.size.max()
     return lambda amount: Change(gives=lambda force: amount * give * force)
 
@@ -217,7 +217,7 @@ def inertia(bench: Bench) -> Sized:
 
 
 @kind("the fixture has a resonance above the band", right=("fixture_resonance", "inertia"))
-def fixture_resonance(bench: Bench) -> Sized:
+def fixture_resonance(bench) -> Sized:
     frequency = of_harmonics(bench.tests.frequency)
     own, damping = bench.random.uniform(1.3, 2.2) * bench.steps[-1], 0.03
     added = frequency**2 * own**2 / (own**2 - frequency**2 + 2j * damping * own * frequency)

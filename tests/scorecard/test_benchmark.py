@@ -16,7 +16,7 @@ MUTE: ToolAnswer = {"sees": False, "claims": [], "where": []}
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     """A handful of campaigns, made as typed."""
     folder = tmp_path_factory.mktemp("benchmark")
     made = CliRunner().invoke(benchmark, ["make", str(folder), "--campaigns", str(COUNT)])
@@ -26,12 +26,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def answers(folder: Path) -> dict[str, Any]:
+def answers(folder) -> dict[str, Any]:
     document: dict[str, Any] = json.loads((folder / "answers.json").read_text())
     return document
 
 
-def test_300_campaigns_are_balanced_and_no_two_alike() -> None:
+def test_300_campaigns_are_balanced_and_no_two_alike():
     drawn = tasks(55, 300)
     groups = [task[0] for task in drawn]
     counts = {group: groups.count(group) for group in sorted(set(groups))}
@@ -39,7 +39,7 @@ def test_300_campaigns_are_balanced_and_no_two_alike() -> None:
     assert len({task[3] for task in drawn}) == 300
 
 
-def test_the_same_seed_makes_the_same_and_the_answers_are_apart(folder: Path, tmp_path: Path) -> None:
+def test_the_same_seed_makes_the_same_and_the_answers_are_apart(folder, tmp_path):
     campaigns, truth = make(tmp_path, 55, COUNT)
     assert (campaigns, truth) == (sha256(folder / "campaigns"), sha256(folder / "answers.json"))
     assert make(tmp_path / "other", 56, 1)[0] != make(tmp_path / "one", 55, 1)[0]
@@ -52,7 +52,7 @@ def rates(answers: dict[str, Any], told: dict[str, ToolAnswer]) -> dict[str, str
     return {measure: cell.partition(" (")[0] for measure, cell in score(answers, told).items()}
 
 
-def test_a_perfect_a_mute_and_a_prejudiced_tool(answers: dict[str, Any]) -> None:
+def test_a_perfect_a_mute_and_a_prejudiced_tool(answers):
     perfect, friction = {}, {}
     for name, truth in answers.items():
         right = [*truth["right"], *(f"fault.{place}" for place in truth["place"])]
@@ -108,14 +108,14 @@ TRUTH = {
         ([], False, False, False),
     ],
 )
-def test_what_a_claim_is_worth(claims: list[list[str]], hit: bool, in_the_set: bool, wrong: bool) -> None:
+def test_what_a_claim_is_worth(claims, hit, in_the_set, wrong):
     judged = judge(TRUTH, {"sees": True, "claims": claims, "where": []})
     assert (judged["hits"], judged["in the set"], judged["wrong names"]) == (hit, in_the_set, wrong)
     assert judge(TRUTH | {"visible": False}, MUTE)["hits"] is None
     assert judge(TRUTH | {"visible": False}, MUTE)["passed over"] is None
 
 
-def test_location_is_the_f1_of_points() -> None:
+def test_location_is_the_f1_of_points():
     points = [("axial", f, x, int(f > 50.0)) for f in (10.0, 60.0, 110.0) for x in (0.1, 0.5)]
     region = {"direction": "axial", "frequency_Hz": [60.0, 110.0], "amplitude_mm": [0.1, 0.1]}
     assert location_score(points, [region]) == pytest.approx(2 / 3)  # two of four, none beside
@@ -123,7 +123,7 @@ def test_location_is_the_f1_of_points() -> None:
     assert location_score(points, [region | {"direction": "radial"}]) == 0.0
 
 
-def test_tools_answer_and_a_stopped_run_continues(folder: Path, answers: dict[str, Any]) -> None:
+def test_tools_answer_and_a_stopped_run_continues(folder, answers):
     for tool in ("bushfit", "sparse"):
         done = CliRunner().invoke(benchmark, ["run", str(folder), "--tool", tool])
         assert done.exit_code == 0, done.output
@@ -136,7 +136,7 @@ def test_tools_answer_and_a_stopped_run_continues(folder: Path, answers: dict[st
     assert "| sparse, clean | " in table
 
 
-def test_baselines_name_what_is_plain(tmp_path: Path) -> None:
+def test_baselines_name_what_is_plain(tmp_path):
     campaign("inertia", 0.1, 5, tmp_path)
     plain = (["inertia"], ["fixture_resonance"])
     for answer in (sparse(tmp_path), single(tmp_path)):
@@ -145,5 +145,5 @@ def test_baselines_name_what_is_plain(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_planned_session_settles_what_was_left_open() -> None:
+def test_a_planned_session_settles_what_was_left_open():
     assert evaluate((1545993629, ("coupled_breakdown",)), 8.0) == "rightly"

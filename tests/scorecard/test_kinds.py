@@ -3,8 +3,6 @@
 Against tables from outside, closed forms, and bushfit's: three roads to one number.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -35,7 +33,7 @@ def a_session() -> Tests:
 
 
 @pytest.mark.parametrize("name", [name for name, kind in KINDS.items() if kind.in_sizes])
-def test_a_kind_comes_in_three_sizes(name: str) -> None:
+def test_a_kind_comes_in_three_sizes(name):
     """Those that go in steps, rows or cycles, come within a factor of two."""
     for size in SIZES:
         bench = Bench(a_session(), RUBBER, np.random.default_rng(5))
@@ -45,7 +43,7 @@ def test_a_kind_comes_in_three_sizes(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["", "row_shift"])
-def test_the_same_seed_writes_the_same_campaign(name: str, tmp_path: Path) -> None:
+def test_the_same_seed_writes_the_same_campaign(name, tmp_path):
     first, second = (campaign(name, 0.04, 3, tmp_path / each) for each in "ab")
     assert first == second
     for file in (tmp_path / "a").iterdir():
@@ -62,7 +60,7 @@ def points(bushing: Bushing, frequency: object, amplitude: object, direction: ob
     return Tests(bushing, f.astype(float), x.astype(float), d, nothing, nothing + 1, nothing > 0)
 
 
-def test_it_measures_the_table_of_the_paper_s_bushing(root: Path) -> None:
+def test_it_measures_the_table_of_the_paper_s_bushing(root):
     table = pd.read_csv(root / "data/reference/stiffness_table1.csv")
     direction, frequency, amplitude, stiffness, loss = (table[name].to_numpy() for name in table.columns)
     places = [DIRECTIONS.index(name) for name in direction]
@@ -71,13 +69,13 @@ def test_it_measures_the_table_of_the_paper_s_bushing(root: Path) -> None:
     assert np.max(np.abs(k.imag / k.real - loss)) < 2e-4
 
 
-def test_it_has_eq_11_of_every_shape(root: Path) -> None:
+def test_it_has_eq_11_of_every_shape(root):
     for inner, outer, length, _, equation in pd.read_csv(root / "data/reference/radial_fe.csv").to_numpy():
         assert Bushing(inner / 1e3, outer / 1e3, length / 1e3).stiffness("radial") == pytest.approx(equation, rel=1e-5)
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_bushfit_s_closed_form_meets_it(seed: int) -> None:
+def test_bushfit_s_closed_form_meets_it(seed):
     bushing, rubber = a_specimen(np.random.default_rng(seed))
     model = Model(geometry.Bushing("any", bushing.inner, bushing.outer, bushing.length), BASE, vars(rubber))
     frequency, amplitude = np.geomspace(0.1, 200.0, 12), np.geomspace(1e-5, 1e-3, 12)
@@ -87,7 +85,7 @@ def test_bushfit_s_closed_form_meets_it(seed: int) -> None:
         assert np.max(np.abs(measured / closed - 1.0)) < 2e-4
 
 
-def test_friction_with_further_turns_is_that_walked_from_rest() -> None:
+def test_friction_with_further_turns_is_that_walked_from_rest():
     phase = 2.0 * np.pi * np.arange(512) / 512
     wave = 0.01 * (np.cos(phase) + 0.5 * np.cos(3.0 * phase))
     largest, half = 2.0e4, 0.008
@@ -114,20 +112,20 @@ def steady(frequency: float, amplitude: float = 1.0) -> StrainHistory:
     return StrainHistory(amplitude * np.sin(PHASE)[None, :], np.array([[1.0 / (512 * frequency)]]), periodic=True)
 
 
-def test_relaxation_is_that_of_a_maxwell_element() -> None:
+def test_relaxation_is_that_of_a_maxwell_element():
     history = steady(2.0)
     stress = relax(history, history.rate, np.full_like(history.rate, 1.0 / 0.05))
     z = 2j * np.pi * 2.0 * 0.05
     assert first_harmonic(stress) / first_harmonic(history.strain) == pytest.approx(z / (1.0 + z), rel=1e-3)
 
 
-def test_fractional_derivative_from_rest_becomes_the_steady_one() -> None:
+def test_fractional_derivative_from_rest_becomes_the_steady_one():
     from_rest = StrainHistory(np.tile(np.sin(PHASE), 12)[None, :], np.array([[1.0 / 512]]), periodic=False)
     last = fractional_derivative(from_rest, 0.3)[:, -512:]
     assert first_harmonic(last) / -1j == pytest.approx((2j * np.pi) ** 0.3, rel=1e-2)
 
 
-def test_a_slider_loses_four_times_its_yield_force_times_its_slip() -> None:
+def test_a_slider_loses_four_times_its_yield_force_times_its_slip():
     history = steady(1.0, amplitude=0.05)
     stress = sliders(history, np.array([1e6]), np.array([0.01]))[0]
     loss = np.sum(0.5 * (stress + np.roll(stress, 1)) * np.diff(history.strain[0], prepend=history.strain[0, -1]))
@@ -135,7 +133,7 @@ def test_a_slider_loses_four_times_its_yield_force_times_its_slip() -> None:
 
 
 @pytest.mark.parametrize("rubber", RUBBERS)
-def test_every_rubber_is_stiffer_when_fast_and_softer_when_far(rubber: str) -> None:
+def test_every_rubber_is_stiffer_when_fast_and_softer_when_far(rubber):
     law = OtherRubber(RUBBERS[rubber](np.random.default_rng(3)), 1e6)
     frequency, amplitude = np.array([5.0, 100.0, 5.0]), np.array([1e-4, 1e-4, 5e-4])
     tests = points(CMP, frequency, amplitude, 0)
@@ -145,7 +143,7 @@ def test_every_rubber_is_stiffer_when_fast_and_softer_when_far(rubber: str) -> N
         assert 0.02 < value.imag / value.real < 0.3
 
 
-def test_a_campaign_is_evaluated_as_by_its_user() -> None:
+def test_a_campaign_is_evaluated_as_by_its_user():
     misfit, least, covered, half_width = evaluate(("two_springpots", 538641422))
     assert misfit >= 0.999 * least > 0.005
     assert covered > 0.9

@@ -24,16 +24,16 @@ SHAKEN = SimulatedResonance(MOUNT, 0.25, 9.81, tuple(np.linspace(60.0, 600.0, 40
 
 
 @pytest.fixture(scope="module")
-def clean(paper_model: Model) -> Undisturbed:
+def clean(paper_model) -> Undisturbed:
     return undisturbed(paper_model, PLAN)
 
 
 @pytest.fixture(scope="module")
-def coupon(paper_model: Model) -> Undisturbed:
+def coupon(paper_model) -> Undisturbed:
     return undisturbed(Model(None, BASE, paper_model.values), SimulateSettings(sweeps=(STRAIN_SWEEP,)))
 
 
-def test_an_ideal_rig_measures_the_closed_form_at_every_point(clean: Undisturbed, paper_model: Model) -> None:
+def test_an_ideal_rig_measures_the_closed_form_at_every_point(clean, paper_model):
     measured = measure(clean, replace(PLAN, repeats=3))
     (sweep,), (loop,) = measured.sweeps, measured.loops
     points = {*zip(sweep.amplitude, sweep.repeat, sweep.frequency, strict=True)}
@@ -48,7 +48,7 @@ def test_an_ideal_rig_measures_the_closed_form_at_every_point(clean: Undisturbed
     "name",
     [name for name, effect in LIBRARY.items() if not (effect.harmonic_only or effect.is_transient or name in BASE)],
 )
-def test_a_small_loop_is_that_of_the_closed_form_with_any_effect(paper_model: Model, name: str) -> None:
+def test_a_small_loop_is_that_of_the_closed_form_with_any_effect(paper_model, name):
     """What went before a loop is gone from it: the rig's first harmonic is the closed form's, within its own error."""
     model = paper_model.with_effect(name)
     effect = get_effect(name)
@@ -60,7 +60,7 @@ def test_a_small_loop_is_that_of_the_closed_form_with_any_effect(paper_model: Mo
     assert rig.lock_in(record, 1.0) == pytest.approx(closed, rel=5e-4)
 
 
-def test_noise_is_as_large_as_asked_for(clean: Undisturbed) -> None:
+def test_noise_is_as_large_as_asked_for(clean):
     ideal = measure(clean, PLAN)
     noisy = measure(clean, replace(PLAN, repeats=2000, noise=0.01, force_noise=0.02, displacement_noise=0.001))
     stiffness = noisy.sweeps[0].stiffness.reshape(2, 2000, 3)
@@ -73,7 +73,7 @@ def test_noise_is_as_large_as_asked_for(clean: Undisturbed) -> None:
 
 
 @pytest.mark.parametrize("correlation", [0.5, 0.98])
-def test_noise_of_a_loop_is_correlated_as_asked_for(clean: Undisturbed, correlation: float) -> None:
+def test_noise_of_a_loop_is_correlated_as_asked_for(clean, correlation):
     ideal = measure(clean, PLAN).loops[0].force
     plan = replace(PLAN, force_noise=0.02, force_correlation=correlation)
     unit = 0.02 * np.ptp(ideal) / 2.0
@@ -85,7 +85,7 @@ def test_noise_of_a_loop_is_correlated_as_asked_for(clean: Undisturbed, correlat
 
 
 @pytest.mark.parametrize("held", ["amplitude", "frequency"])
-def test_gain_and_phase_errors_are_shared_by_a_run(clean: Undisturbed, coupon: Undisturbed, held: str) -> None:
+def test_gain_and_phase_errors_are_shared_by_a_run(clean, coupon, held):
     """A run is one repeat at one of what is held: its points are off by one factor, those of other runs by others."""
     test, stiffness = (clean if held == "amplitude" else coupon).sweeps[0]
     own = replace(clean, sweeps=((replace(test, reached=0.0), stiffness),))
@@ -97,7 +97,7 @@ def test_gain_and_phase_errors_are_shared_by_a_run(clean: Undisturbed, coupon: U
     assert np.std(off.imag) == pytest.approx(0.02, rel=0.1)
 
 
-def test_an_amplitude_sweep_has_the_stiffness_at_the_amplitudes_reached(coupon: Undisturbed) -> None:
+def test_an_amplitude_sweep_has_the_stiffness_at_the_amplitudes_reached(coupon):
     """It is carried there from the nominal amplitudes, to 1e-5 of what the rig measures there itself."""
     (sweep,) = measure(coupon, SimulateSettings(repeats=2, seed=1)).sweeps
     assert sweep.stepped == "amplitude"
@@ -110,7 +110,7 @@ def test_an_amplitude_sweep_has_the_stiffness_at_the_amplitudes_reached(coupon: 
     np.testing.assert_allclose(sweep.stiffness, closed, rtol=2e-3)
 
 
-def test_a_resonance_test_reduces_to_the_stiffness_at_the_amplitude_reached(paper_model: Model) -> None:
+def test_a_resonance_test_reduces_to_the_stiffness_at_the_amplitude_reached(paper_model):
     plan = SimulateSettings(resonances=(SHAKEN, replace(SHAKEN, direction=Direction.RADIAL, mass=1.5)))
     simulated = simulate(paper_model.with_effect("force_gain", {"force_gain.loops": 0.1}), plan)
     assert [test.name for _, test in simulated.resonances] == ["resonance_mount", "resonance_radial"]
@@ -121,7 +121,7 @@ def test_a_resonance_test_reduces_to_the_stiffness_at_the_amplitude_reached(pape
         np.testing.assert_allclose(sweep.stiffness, closed, rtol=2e-3)
 
 
-def test_level_errors_are_shared_by_all_repeats_of_a_level(clean: Undisturbed) -> None:
+def test_level_errors_are_shared_by_all_repeats_of_a_level(clean):
     """All repeats of what a sweep holds are off by one factor, those at another amplitude by another."""
     (test, _), *_ = clean.sweeps
     own = replace(clean, sweeps=((replace(test, repeats=4), clean.sweeps[0][1]), *clean.sweeps[1:]))

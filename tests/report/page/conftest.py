@@ -11,7 +11,7 @@ CAMPAIGNS = {"cmp_15961": "configs/cmp_15961.toml", "mystery_mount": "configs/my
 
 
 @pytest.fixture(scope="session")
-def results(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+def results(root, tmp_path_factory) -> Callable[[str], Path]:
     """The folder of `bushfit run` of a campaign by its name, without pictures; each is made once."""
     home = tmp_path_factory.mktemp("results")
 
@@ -26,7 +26,7 @@ def results(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[s
 
 
 @pytest.fixture(scope="session")
-def measured(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def measured(root, tmp_path_factory) -> Path:
     """Measured rubber: the compound fitted to its coupons and predicted for the mount, as the README does it."""
     folder = tmp_path_factory.mktemp("measured") / "mount"
     fit = ("fit", "configs/epdm_70.toml", "--direction", "DMA", "--direction", "DMA 2", "-o", folder)
@@ -38,7 +38,7 @@ def measured(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def compared(root: Path, results: Callable[[str], Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def compared(root, results, tmp_path_factory) -> Path:
     """A folder with two comparisons: `two` bushings in both directions, and model `families` on one campaign."""
     home = tmp_path_factory.mktemp("compared")
     two = (results("cmp_15961"), results("mystery_mount"), "--direction", "axial", "--direction", "radial")
@@ -49,7 +49,7 @@ def compared(root: Path, results: Callable[[str], Path], tmp_path_factory: pytes
 
 
 @pytest.fixture(scope="session")
-def batch(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def batch(root, tmp_path_factory) -> Path:
     """A batch of four bushings, one of which misses a limit, another of which has no tests, diagnosed and reported."""
     home = tmp_path_factory.mktemp("batch")
     rows = [

@@ -4,7 +4,6 @@ import base64
 import json
 import re
 import shutil
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,18 +17,15 @@ from reading_html import HARMFUL, LARGEST, assert_harmless, drawn, loads, made_o
 from bushfit.effects.history import History
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document
-from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.rig import wave
 from bushfit.report.page.record import read_results
 from bushfit.report.page.report import comparable_sweeps, report_page
 from bushfit.report.results import ResultFile, contents
 
-Results = Callable[[str], Path]
-
 
 @pytest.mark.parametrize("name", ["cmp_15961", "mystery_mount"])
-def test_run_writes_a_whole_page_that_loads_nothing_and_its_folder_gives_the_same(results: Results, name: str) -> None:
+def test_run_writes_a_whole_page_that_loads_nothing_and_its_folder_gives_the_same(results, name):
     page = page_of(results(name))
     found = parsed(page)
     assert loads(page) == []
@@ -45,7 +41,7 @@ def test_run_writes_a_whole_page_that_loads_nothing_and_its_folder_gives_the_sam
         assert words not in found.text
 
 
-def test_the_first_block_is_what_a_customer_reads(results: Results) -> None:
+def test_the_first_block_is_what_a_customer_reads(results):
     """Stiffness at the stated point, static stiffness and their ratio, accuracy, verdict and its consequence."""
     folder = results("cmp_15961")
     first = parsed(page_of(folder)).text.partition("Figures")[0]
@@ -72,7 +68,7 @@ def test_the_first_block_is_what_a_customer_reads(results: Results) -> None:
 
 
 @pytest.mark.parametrize("form", ["xlsx", "decimal comma"])
-def test_other_forms_of_tables_are_read_back(results: Results, tmp_path: Path, form: str) -> None:
+def test_other_forms_of_tables_are_read_back(results, tmp_path, form):
     folder = tmp_path / "x"
     shutil.copytree(results("mystery_mount"), folder)
     for file in folder.glob("*.csv"):
@@ -85,7 +81,7 @@ def test_other_forms_of_tables_are_read_back(results: Results, tmp_path: Path, f
     assert parsed(made_of(folder)).text == parsed(page_of(folder)).text
 
 
-def test_what_it_says_is_what_the_documents_say(results: Results) -> None:
+def test_what_it_says_is_what_the_documents_say(results):
     folder = results("mystery_mount")
     text = parsed(page_of(folder)).text
     diagnosis = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
@@ -103,7 +99,7 @@ def test_what_it_says_is_what_the_documents_say(results: Results) -> None:
     assert len(model["campaign"]["sha256"]) == 64
 
 
-def test_conditions_of_the_tests_are_told(root: Path, tmp_path: Path) -> None:
+def test_conditions_of_the_tests_are_told(root, tmp_path):
     """Temperature, preload, date and the rest go from the campaign through the document onto the page."""
     text = (root / "configs/cmp_15961.toml").read_text(encoding="utf-8").replace("../data", str(root / "data"))
     stated = 'temperature = "22 degC"\npreload = "150 N axial"\ndate = "12 May 2025"\n'
@@ -141,7 +137,7 @@ def test_conditions_of_the_tests_are_told(root: Path, tmp_path: Path) -> None:
         (b"\x89PNG\r\n\x1a\n" + bytes(64_000), "at most 64000 bytes"),
     ],
 )
-def test_a_logo_that_cannot_be_shown_is_refused(root: Path, tmp_path: Path, content: bytes | None, words: str) -> None:
+def test_a_logo_that_cannot_be_shown_is_refused(root, tmp_path, content, words):
     text = (root / "configs/cmp_15961.toml").read_text(encoding="utf-8").replace("../data", str(root / "data"))
     (tmp_path / "c.toml").write_text(f'{text}\n[report]\nlogo = "logo.png"\n', encoding="utf-8")
     if content is not None:
@@ -153,7 +149,7 @@ def test_a_logo_that_cannot_be_shown_is_refused(root: Path, tmp_path: Path, cont
     assert not (tmp_path / "x").exists()
 
 
-def test_points_are_those_of_the_tables(results: Results) -> None:
+def test_points_are_those_of_the_tables(results):
     """Means of the repeats over frequency and over amplitude, within half a point."""
     folder = results("cmp_15961")
     sweeps = pd.read_csv(folder / "sweeps.csv").query("direction == 'radial'")
@@ -171,7 +167,7 @@ def test_points_are_those_of_the_tables(results: Results) -> None:
             assert panel.shape[1] >= 12
 
 
-def test_the_table_of_the_gap_is_measured_minus_model(results: Results) -> None:
+def test_the_table_of_the_gap_is_measured_minus_model(results):
     gap = pd.read_csv(results("mystery_mount") / "gap.csv")
     radial = gap[(gap["direction"] == "radial") & (gap["kind"] == "sweep")]
     assert radial["storage before [%]"].mean() < -2.0, "the plain model is stiffer than what was measured"
@@ -198,7 +194,7 @@ def page_from(documents: dict[str, Any], tables: dict[str, Any]) -> str:
 FOREIGN = {"name", "summary", "next_test", "command", "reading", "sentence", "evidence", "preload", "date", "warnings"}
 
 
-def test_names_do_no_harm(root: Path) -> None:
+def test_names_do_no_harm(root):
     """Whatever stands in a text, the page has the same elements and attributes, and says it to the letter."""
     documents, tables = read(root / "data/reports/mystery_mount")
     plain = parsed(page_from(documents, tables))
@@ -207,7 +203,7 @@ def test_names_do_no_harm(root: Path) -> None:
         assert_harmless(page_from(spoiled(documents, name, FOREIGN), named), plain, name)
 
 
-def test_beside_a_prediction_at_23_degrees_only_sweeps_of_that_temperature_are_drawn(paper_model: Model) -> None:
+def test_beside_a_prediction_at_23_degrees_only_sweeps_of_that_temperature_are_drawn(paper_model):
     table = pd.DataFrame({"sweep": ["cold", "room", "none"], "temperature [degC]": [-10.0, 24.0, np.nan]})
     warm = Result(paper_model.with_effect("temperature"))
     shown = [comparable_sweeps(table, result) for result in (warm, Result(paper_model))]

@@ -21,13 +21,13 @@ QUICK = [("mystery_mount", 1280), ("cmp_15961", 400)]
 
 
 @pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
+def tab(tmp_path_factory) -> Iterator[Tab]:
     with chromium.tab(tmp_path_factory.mktemp("profile")) as opened:
         yield opened
 
 
 @pytest.fixture
-def pages(results: Pages, request: pytest.FixtureRequest) -> Pages:
+def pages(results, request) -> Pages:
     def page(name: str) -> Path:
         if name in ("two", "families"):
             return Path(request.getfixturevalue("compared")) / name / "compare.html"
@@ -45,7 +45,7 @@ def pages(results: Pages, request: pytest.FixtureRequest) -> Pages:
     ("name", "width"),
     [pytest.param(name, width, marks=[] if (name, width) in QUICK else pytest.mark.slow) for name, width in BOTH],
 )
-def test_nothing_is_asked_for_and_all_can_read_it(tab: Tab, pages: Pages, name: str, width: int) -> None:
+def test_nothing_is_asked_for_and_all_can_read_it(tab, pages, name, width):
     """axe-core judges contrast, alternative texts, roles, tables and the rest."""
     page = pages(name)
     tab.open(page, width)
@@ -67,12 +67,12 @@ def test_nothing_is_asked_for_and_all_can_read_it(tab: Tab, pages: Pages, name: 
 @pytest.mark.parametrize(
     "name", [NAMES[1], *(pytest.param(name, marks=pytest.mark.slow) for name in NAMES[:-2] if name != NAMES[1])]
 )
-def test_a_report_is_four_sheets_of_paper_at_most(tab: Tab, pages: Pages, name: str) -> None:
+def test_a_report_is_four_sheets_of_paper_at_most(tab, pages, name):
     tab.open(pages(name), 1280)
     assert tab.sheets() <= (3 if name in ("two", "families") else 4)
 
 
-def test_values_are_shown_under_the_pointer(tab: Tab, pages: Pages) -> None:
+def test_values_are_shown_under_the_pointer(tab, pages):
     """At a measured point the values of this point, by the axes that the figure states."""
     tab.open(pages("cmp_15961"), 1280)
     hint = tab.run(
@@ -94,7 +94,7 @@ def test_values_are_shown_under_the_pointer(tab: Tab, pages: Pages) -> None:
 
 
 @pytest.mark.slow
-def test_a_batch_is_sorted_by_its_headings(tab: Tab, pages: Pages) -> None:
+def test_a_batch_is_sorted_by_its_headings(tab, pages):
     tab.open(pages("batch"), 1280)
     column = "[...document.querySelectorAll('.sorted tbody tr')].map(r => r.cells[0].textContent)"
     tab.run("document.querySelector('thead button').click()")
@@ -108,7 +108,7 @@ def test_a_batch_is_sorted_by_its_headings(tab: Tab, pages: Pages) -> None:
 
 
 @pytest.mark.slow
-def test_rows_of_a_batch_are_filtered_and_all_are_printed(tab: Tab, pages: Pages) -> None:
+def test_rows_of_a_batch_are_filtered_and_all_are_printed(tab, pages):
     tab.open(pages("production"), 1280)
     tab.run(
         "(() => { const typed = document.querySelector('input[type=search]'); typed.value = 'ALPHA differs';"
@@ -123,7 +123,7 @@ def test_rows_of_a_batch_are_filtered_and_all_are_printed(tab: Tab, pages: Pages
     tab.ask("Emulation.setEmulatedMedia", media="")
 
 
-def test_without_style_and_script_nothing_is_lost(tab: Tab, pages: Pages, tmp_path: Path) -> None:
+def test_without_style_and_script_nothing_is_lost(tab, pages, tmp_path):
     """As Jenkins shows it, whose content policy forbids both: https://www.jenkins.io/doc/book/security/configuring-content-security-policy"""
     policy = "sandbox; default-src 'none'; img-src 'self'; style-src 'self';"
     strict = re.sub(

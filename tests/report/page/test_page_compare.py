@@ -31,12 +31,12 @@ def document_of(compared: Path, name: str) -> Any:
 
 
 @pytest.fixture(scope="module")
-def documents(compared: Path) -> dict[str, Any]:
+def documents(compared) -> dict[str, Any]:
     return {name: document_of(compared, name) for name in NAMES}
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_compare_writes_a_whole_page_and_its_folder_gives_the_same(compared: Path, name: str) -> None:
+def test_compare_writes_a_whole_page_and_its_folder_gives_the_same(compared, name):
     page = (compared / name / "compare.html").read_text(encoding="utf-8")
     assert encode_all(folder_pages(compared / name), Formats())["compare.html"].decode() == page
     found = parsed(page)
@@ -48,7 +48,7 @@ def test_compare_writes_a_whole_page_and_its_folder_gives_the_same(compared: Pat
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_says_what_the_document_says(documents: dict[str, Any], compared: Path, name: str) -> None:
+def test_it_says_what_the_document_says(documents, compared, name):
     document, text = documents[name], parsed(page_of(documents[name])).text
     said = document["words"] if name == "two" else [family["words"] for family in document["families"]]
     for entry in document["compared"]:
@@ -69,7 +69,7 @@ def test_it_says_what_the_document_says(documents: dict[str, Any], compared: Pat
     assert 10.0 ** -len(shown[5].partition(".")[2]) < 0.1 * width, "the interval keeps two digits of its width"
 
 
-def test_names_do_no_harm(compared: Path) -> None:
+def test_names_do_no_harm(compared):
     for document in (document_of(compared, each) for each in NAMES):
         plain = parsed(page_of(spoiled(document, "plain", FOREIGN)))
         for name in HARMFUL:
@@ -81,7 +81,7 @@ SLOW = pytest.mark.slow
 
 
 @SLOW
-def test_a_batch_writes_its_page_and_the_folder_gives_the_same(batch: Path) -> None:
+def test_a_batch_writes_its_page_and_the_folder_gives_the_same(batch):
     written = (batch / "index.html").read_bytes()
     assert encode_all(folder_pages(batch), Formats())["index.html"] == written
     page = written.decode()
@@ -107,7 +107,7 @@ def test_a_batch_writes_its_page_and_the_folder_gives_the_same(batch: Path) -> N
 
 
 @SLOW
-def test_the_page_shows_each_curve_against_the_batch_and_who_differs(made: Path) -> None:
+def test_the_page_shows_each_curve_against_the_batch_and_who_differs(made):
     page = (made / "out/index.html").read_text(encoding="utf-8")
     assert encode_all(folder_pages(made / "out"), Formats())["index.html"].decode() == page
     found = parsed(page)

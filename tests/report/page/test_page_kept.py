@@ -10,7 +10,6 @@ import pytest
 from commandline import call
 from reading_html import change, loads, page_of, parsed
 
-Results = Callable[[str], Path]
 STYLED = re.compile(r"<(style|script)>(.*?)</\1>", re.DOTALL)
 
 
@@ -31,13 +30,11 @@ def assert_current(kept: Path, made: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["cmp_15961", "mystery_mount"])
-def test_the_reports_of_the_readme_are_current(root: Path, results: Results, name: str) -> None:
+def test_the_reports_of_the_readme_are_current(root, results, name):
     assert_current(root / f"data/reports/{name}.html", results(name) / "report.html")
 
 
-def test_the_report_of_measured_rubber_is_current_and_says_that_the_mount_was_not_fitted(
-    root: Path, measured: Path
-) -> None:
+def test_the_report_of_measured_rubber_is_current_and_says_that_the_mount_was_not_fitted(root, measured):
     assert_current(root / "data/measured/epdm_70/report.html", measured / "report.html")
     text = parsed(page_of(measured)).text
     assert loads(page_of(measured)) == []
@@ -52,7 +49,7 @@ def test_the_report_of_measured_rubber_is_current_and_says_that_the_mount_was_no
         assert words in text
 
 
-def test_the_results_to_try_it_on_are_current(root: Path, results: Results) -> None:
+def test_the_results_to_try_it_on_are_current(root, results):
     made = results("mystery_mount")
     kept = sorted((root / "data/reports/mystery_mount").iterdir())
     assert len(kept) == 5
@@ -152,9 +149,7 @@ OF_BATCH = [
         *(("batch", *case) for case in OF_BATCH),
     ],
 )
-def test_spoiled_folders_are_one_clear_error(
-    root: Path, request: pytest.FixtureRequest, tmp_path: Path, kind: str, spoil: Spoil, says: tuple[str, ...]
-) -> None:
+def test_spoiled_folders_are_one_clear_error(root, request, tmp_path, kind, spoil, says):
     folder = tmp_path / "x"
     if kind == "results":
         shutil.copytree(root / "data/reports/mystery_mount", folder)

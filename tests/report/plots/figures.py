@@ -1,6 +1,6 @@
 """Predictions to draw, and what a figure shows: its lines, points and texts, and whether these have room."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 from types import SimpleNamespace
 from typing import Any, cast
@@ -24,8 +24,6 @@ from bushfit.report.plots.prediction import prediction_figure
 from bushfit.report.plots.style import fixed_settings
 from bushfit.report.tables import loops_table, sweeps_table
 
-Swept = Callable[..., MeasuredSweep]
-Looped = Callable[..., MeasuredLoop]
 FREQUENCIES = np.arange(5.0, 156.0, 10.0)
 AMPLITUDES = np.array([1e-4, 2e-4, 5e-4])
 TORSION = np.radians([0.5, 1.0, 2.0])

@@ -10,8 +10,6 @@ import pytest
 from figures import (
     FREQUENCIES,
     TORSION,
-    Looped,
-    Swept,
     fitted,
     gap,
     inside,
@@ -30,13 +28,12 @@ from tries import some
 
 from bushfit.geometry import Direction
 from bushfit.inspection.record import Inspection
-from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.report.plots.inspection import inspection_figure
 from bushfit.report.plots.style import to_image
 
 
-def test_settings_of_the_user_do_not_matter(root: Path, tmp_path: Path) -> None:
+def test_settings_of_the_user_do_not_matter(root, tmp_path):
     """A backend of a notebook, LaTeX, an unknown font and a misspelt key in matplotlibrc."""
     (tmp_path / "matplotlibrc").write_text("text.usetex: True\nfont.family: No Such Font\nno.such.key: 1\n")
     folders = [tmp_path / "own", tmp_path / "plain"]
@@ -56,7 +53,7 @@ def test_settings_of_the_user_do_not_matter(root: Path, tmp_path: Path) -> None:
     assert (tmp_path / "saved/static.json").exists()
 
 
-def test_differences_are_measured_minus_model_everywhere(paper_model: Model, swept: Swept, looped: Looped) -> None:
+def test_differences_are_measured_minus_model_everywhere(paper_model, swept, looped):
     stiff = paper_model.with_values({name: 1.2 * paper_model.values[name] for name in ("mu", "m", "sigma_fmax")})
     residuals = sweeps(stiff, swept(paper_model)).axes[2]
     assert all(np.mean(line.get_ydata()) < -5.0 for line in points(residuals))
@@ -65,7 +62,7 @@ def test_differences_are_measured_minus_model_everywhere(paper_model: Model, swe
     assert means.get_ydata()[0] < 0.0 < means.get_ydata()[len(means.get_ydata()) // 2], "at the upper turn, the lower"
 
 
-def test_loops_show_model_and_residuals(paper_model: Model, looped: Looped) -> None:
+def test_loops_show_model_and_residuals(paper_model, looped):
     data_sets = [looped(paper_model, 1e-3), looped(paper_model, 5e-4, run_in=3)]
     figure = whole(loops(paper_model, *data_sets))
     over_phase = ["phase after the upper turn [deg]", "force residual / noise"]
@@ -80,7 +77,7 @@ def test_loops_show_model_and_residuals(paper_model: Model, looped: Looped) -> N
     assert np.nanmax(step) < 0.2, "a stroke across the cycles that are left out"
 
 
-def test_prediction_over_frequency_and_amplitude_and_means_of_repeats(paper_model: Model, swept: Swept) -> None:
+def test_prediction_over_frequency_and_amplitude_and_means_of_repeats(paper_model, swept):
     result = fitted(paper_model)
     figure = prediction(result, Direction.AXIAL, swept(paper_model), note="A further sentence.")
     shown = ("axial stiffness |K| [N/mm]", "axial loss factor [-]")
@@ -118,7 +115,7 @@ def checked(figure: Figure) -> Figure:
 
 
 @pytest.mark.parametrize("count", some([8, 40], {40}))
-def test_sweeps_of_many_amplitudes(paper_model: Model, swept: Swept, count: int) -> None:
+def test_sweeps_of_many_amplitudes(paper_model, swept, count):
     """A line an amplitude, named by a legend as long as that can, else by a colour bar."""
     amplitudes = np.geomspace(2e-5, 1e-3, count)
     data_set = swept(paper_model, amplitudes=amplitudes, repeats=1)

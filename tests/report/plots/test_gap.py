@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from figures import Looped, Swept, gap, legend, points, titles, whole
+from figures import gap, legend, points, titles, whole
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
@@ -20,7 +20,7 @@ Heavier = Callable[[float], Model]
 
 
 @pytest.fixture
-def heavier(paper_model: Model) -> Heavier:
+def heavier(paper_model) -> Heavier:
     """The paper's model with a mass [kg] moving along."""
 
     def model(mass: float) -> Model:
@@ -30,7 +30,7 @@ def heavier(paper_model: Model) -> Heavier:
 
 
 @pytest.fixture
-def campaign(heavier: Heavier, swept: Swept, looped: Looped) -> list[MeasuredTest]:
+def campaign(heavier, swept, looped) -> list[MeasuredTest]:
     """Two directions and two loops of a bushing with a mass that the paper's model lacks."""
     truth = heavier(0.1)
     return [swept(truth), swept(truth, Direction.RADIAL), looped(truth, 1e-3), looped(truth, 2e-3)]
@@ -54,9 +54,7 @@ def headings(figure: Figure) -> list[str]:
     return [axes.get_title() for axes in figure.axes if axes.get_title()]
 
 
-def test_one_symmetric_scale_and_cells_that_are_measured_minus_model_in_percent(
-    paper_model: Model, heavier: Heavier, campaign: list[MeasuredTest], swept: Swept
-) -> None:
+def test_one_symmetric_scale_and_cells_that_are_measured_minus_model_in_percent(paper_model, heavier, campaign, swept):
     figure = gap(paper_model, heavier(0.1), campaign)
     coloured = [found for axes in maps(figure) for found in cells(axes)]
     norm, cmap = coloured[0].norm, coloured[0].cmap
@@ -82,7 +80,7 @@ def values(axes: Axes) -> Any:
     return np.concatenate([np.asarray(found.get_array()) for found in cells(axes)])
 
 
-def test_loops_are_means_in_percent_of_half_the_force_range(paper_model: Model, looped: Looped) -> None:
+def test_loops_are_means_in_percent_of_half_the_force_range(paper_model, looped):
     data_set = looped(paper_model, 1e-3)
     figure = whole(gap(paper_model, paper_model, [data_set]))
     (axes,) = figure.axes
@@ -104,7 +102,7 @@ def panel(count: int) -> Panel:
 
 
 @pytest.mark.parametrize("count", [10, 20_000])
-def test_medians_limits_and_names(count: int) -> None:
+def test_medians_limits_and_names(count):
     one = panel(count)
     names = [f"$name {n}" for n in range(count)]
     panels = [one, Panel("alpha [-]", np.full(count, 0.24))]

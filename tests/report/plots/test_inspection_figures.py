@@ -6,12 +6,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from figures import Swept, labels, legend, points, whole
+from figures import labels, legend, points, whole
 
 from bushfit.geometry import Direction
 from bushfit.inspection.opening import read_history
 from bushfit.inspection.record import Inspection
-from bushfit.model.model import Model
 from bushfit.reduction.steps import reduce
 from bushfit.report.plots.inspection import inspection_figure, reduction_figure
 
@@ -20,9 +19,7 @@ from bushfit.report.plots.inspection import inspection_figure, reduction_figure
     ("stepped", "held", "levels", "scale"),
     [("amplitude", "frequency", ["35 Hz", "5 Hz"], 1e3), ("frequency", "amplitude", ["0.1 mm", "0.2 mm", "0.5 mm"], 1)],
 )
-def test_a_sweep_is_drawn_over_its_steps(
-    paper_model: Model, swept: Swept, stepped: str, held: str, levels: list[str], scale: float
-) -> None:
+def test_a_sweep_is_drawn_over_its_steps(paper_model, swept, stepped, held, levels, scale):
     sweep = replace(swept(paper_model, frequencies=np.array([5.0, 35.0])).sweep, stepped=stepped)
     seen = Inspection(Path("x.csv"), "sweep", Direction.AXIAL, {}, (), {}, (), {}, sweep)
     figure = whole(inspection_figure([seen]))
@@ -35,7 +32,7 @@ def test_a_sweep_is_drawn_over_its_steps(
         np.testing.assert_allclose(drawn.get_ydata(), 1e-3 * np.abs(sweep.stiffness[rows]))
 
 
-def test_a_reduction_shows_the_cycles_used_and_twice_the_standard_error(root: Path) -> None:
+def test_a_reduction_shows_the_cycles_used_and_twice_the_standard_error(root):
     history, _ = read_history(root / "data/cmp_15961_raw/stepped_sine_axial.csv", {"direction": "axial"})
     reduction = reduce([history])
     figure = whole(reduction_figure(reduction, [history], "x"))
