@@ -33,11 +33,12 @@ _OF_TESTS = {
     "preload": ("LOAD", 'Static preload of the test, such as "500 N axial" or "none"; shown in the report.'),
     "rate": ("SPEED", None),
     "frequency": ("FREQUENCY", None),
-    "waveform": (
-        "WAVE",
+    "waveform": ("WAVE", None),
+    "sampling_rate": (
+        "FREQUENCY",
         (
             'For a loop without a time column: its speed, such as "10 mm/min", or its frequency, such as "0.1 '
-            'Hz", and its waveform, sine or triangle.'
+            'Hz", and its waveform, sine or triangle, or its sampling rate [from lines above the table].'
         ),
     ),
     "specimen": (

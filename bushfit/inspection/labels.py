@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from bushfit.geometry import Place
-from bushfit.reading.names import Labels, StatedQuantity, labels_above, labels_in_names
+from bushfit.reading.names import Labels, StatedQuantity, labels_in_names
 from bushfit.reading.sweeps import ONE_TEST
 from bushfit.reading.table import Table
 from bushfit.units import parse_quantity
@@ -75,9 +75,8 @@ def keys_from_labels(
     Raises:
         MeasurementError: a sweep without an amplitude or a frequency.
     """
-    above = labels_above(line for line in table.source.head() if line.number < table.layout.header_line)
     written = "from the lines above the table" if table.layout.header_line else "from the properties in the file"
-    sources = {"from the name": by_name, written: above, "from the other sheets": of_book}
+    sources = {"from the name": by_name, written: table.labels_above, "from the other sheets": of_book}
     keys: dict[str, Any] = {}
     facts: dict[str, list[str]] = {}
     is_counted = True

@@ -112,9 +112,14 @@ def read_displacements(
             )
         roles = dict.fromkeys(named_places, "displacement")
     wanted = {role: table.column(role, place) for place, role in roles.items()}
-    wanted["time"] = time_column(table, next(iter(roles)))
+    rate = table.sampling_rate
+    wanted |= {} if rate else {"time": time_column(table, next(iter(roles)))}
     values, notes = table.read(wanted, fewest_rows=FEWEST_ROWS)
-    time, more = increasing_time(table.needing(wanted), wanted["time"], values["time"])
+    if rate:
+        time = np.arange(next(iter(values.values())).size) / rate
+        more: tuple[str, ...] = (table.note_sampling,)
+    else:
+        time, more = increasing_time(table.needing(wanted), wanted["time"], values["time"])
     with error_location(table.file, "time"):
         even, correction = even_time(time)
     notes = (*(note for note in notes if "displacement" in wanted or note not in table.notes), *more, *correction)

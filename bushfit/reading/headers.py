@@ -70,8 +70,11 @@ _ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsation", "
 _CHANNEL = re.compile(r"\([^()]*[:|][^()]*\)")
 #: Loss factor written as a function, with brackets that do not contain a unit.
 _TAN = re.compile(r"(?i)\btan\s*\(\s*(delta|d|δ)\s*\)")
-#: Logarithm of a quantity: "log10 f [Hz]", "lg(G') [Pa]", "log f". The base of a plain log is not known.
-_LOGARITHM = re.compile(r"\s*(?P<kind>log[\s_]?10|lg|ln|log)(?=[\s_(])[\s_]*(?:\((?P<inner>[^()]*)\))?", re.IGNORECASE)
+#: Logarithm of a quantity: "log10 f [Hz]", "lg(G') [Pa]", "log10(K*/(N/m))". The base of a plain log is not known.
+_LOGARITHM = re.compile(
+    r"\s*(?P<kind>log[\s_]?10|lg|ln|log)(?=[\s_(])[\s_]*(?:\((?P<inner>(?:[^()]|\([^()]*\))*)\))?",
+    re.IGNORECASE,
+)
 #: Logarithm in a unit: "log10(Pa)", "ln(Pa)", "dB re 1 N/mm", "dB (N/mm)".
 _LOGARITHM_OF_UNIT = re.compile(
     r"(?:(?:log_?10|lg|(?P<ln>ln))\s*\(|(?P<dB>dB)\s*\(?(?:\s*rel?f?\.?(?![^\W_]))?(?:\s*1(?=\s))?)\s*(?P<unit>[^()]*)\)?"
@@ -278,7 +281,7 @@ class Vocabulary:
         if match := _LOGARITHM.match(text):
             kind = match["kind"].lower()
             logarithm = {"ln": 2.718281828459045, "log": float("nan")}.get(kind, 10.0)
-            text = f"{(match['inner'] or '').replace('/', ' in ')} {text[match.end() :]}".strip()
+            text = f"{(match['inner'] or '').replace('/', ' ', 1)} {text[match.end() :]}".strip()
         if plain(header) in self._stated:  # a campaign may name a header together with its unit
             without, convention = split_convention(text)
             name, unit = units.split_header(without)

@@ -42,6 +42,8 @@ def read_loop(
     """
     rows = test.rows_of_test(shared=shared)
     table = Table.open(file, LOOP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
+    stated_rate = None if test.states_time else table.sampling_rate
+    test = replace(test, sampling_rate=stated_rate) if stated_rate else test
     wanted = loop_columns(table, direction, test)
     values, notes = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
     table = table.needing(wanted)
@@ -63,6 +65,7 @@ def read_loop(
         notes = (*notes, *more)
     else:
         time = test.clock(displacement)
+        notes += (table.note_sampling,) if stated_rate else ()
     return Loop(
         name or table.file.stem,
         direction,
@@ -71,7 +74,7 @@ def read_loop(
         force,
         test.noise,
         test.source(table.sha256, test.temperature, (*notes, *note_not_understood(table, table.row_labels, None))),
-        "time" in values,
+        "time" in values or test.sampling_rate is not None,
         test.weight,
         temperature=test.temperature,
         preload=parse_preload(test.preload, direction),
@@ -84,7 +87,7 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
     Args:
         table: table of the loop.
         direction: direction of the bushing, or the specimen.
-        test: table [[loops]] of the campaign; if it has a rate or a frequency, the file needs no time column.
+        test: table [[loops]] of the campaign; if it states the time, the file needs no time column.
 
     Returns:
         Columns of displacement, force and, if present, time, by role.
@@ -107,8 +110,9 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
     wanted["force"] = replace(wanted["force"], scale=test.force_sign * wanted["force"].scale)
     if "time" in table.roles:
         wanted["time"] = time_column(table, direction)
-    elif test.rate is None and test.frequency is None:
-        hint = 'or state rate = "10 mm/min", or frequency = "0.1 Hz" and waveform = "sine", in the campaign'
+    elif not test.states_time:
+        hint = 'or state rate = "10 mm/min", or frequency = "0.1 Hz" and waveform = "sine", or '
+        hint += 'sampling_rate = "100 Hz", in the campaign'
         table.column("time", direction, hint)
     return wanted
 

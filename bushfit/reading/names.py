@@ -50,12 +50,20 @@ _SPECIMEN_NUMBER = re.compile(
 _TEMPERATURES = (-100.0, 300.0)
 #: Key of a campaign by each of its usual names above a table.
 _KEY_OF = {plain(name): key for key, names in WORDS["above"].items() for name in names}
+#: SI unit of the two keys for the time between rows.
+_SAMPLING = {"sampling_rate": "Hz", "sampling_interval": "s"}
 #: Usual names of amplitude and frequency above a table.
 _VOCABULARY = Vocabulary({role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}, {})
 #: Separator between a name and its value above a table.
 _AFTER_KEY = re.compile(r"\t|;|:\s|:$|\s=\s|=|,(?!\d)|(?<=[^\W\d]),")
+#: Blank between a name and its value at the end of a line: "Sample rate 512 Hz".
+_BEFORE_VALUE = re.compile(r"\s+(?=\d[\d.,]*(?:\s*[^\W\d]\S*)?$)")
 #: Decimal comma of a number at the start of a value.
 _COMMA = re.compile(r"^([+-]?\d+),(?=\d+(?!\d|[.,]\d))")
+#: Unit of a sampling rate in samples: "kS/s", "samples/s", "SPS".
+_SAMPLES = re.compile(r"^(k|M)?(?:sps|(?:s|sa|samples?|pts|points|scans?)\s?/\s?s(?:ec)?)$", re.IGNORECASE)
+#: Number with a decimal mark or exponent, and its unit, if any.
+_NUMBER_AND_UNIT = re.compile(r"(?P<number>\d[\d.,']*(?:[eE][+-]?\d+)?)\s*(?P<unit>\D.*?)\s*")
 #: Characters of the longest value above a table; chosen: a longer one is a text.
 _LONGEST_VALUE = 60
 
@@ -91,6 +99,7 @@ class Labels:
         quantities: quantities that may be the amplitude or frequency of the test.
         direction: direction of the bushing; None if it is not named.
         temperature, preload, date, operator, specimen_number: values for these keys of a campaign, as texts.
+        sampling: sampling rate or interval of a record as its number and unit, separated by a blank.
     """
 
     quantities: tuple[StatedQuantity, ...] = ()
@@ -100,6 +109,7 @@ class Labels:
     date: str | None = None
     operator: str | None = None
     specimen_number: str | None = None
+    sampling: str | None = None
 
     def of_dimension(self, unit: str) -> list[StatedQuantity]:
         """Return the distinct quantities with the dimension of an SI unit; only the marked ones if there are any."""
@@ -181,6 +191,8 @@ def _label_in_line(line: Line) -> Labels:
         cells = [cell if isinstance(cell, str) else f"{cell:.12g}" for cell in line.content]
         cells = [*_AFTER_KEY.split(cells[0], maxsplit=1), *cells[1:]]
     cells = [cell.strip(' "') for cell in cells if cell.strip(' "')]
+    if len(cells) == 1 and (end := _BEFORE_VALUE.search(cells[0])):
+        cells = [cells[0][: end.start()], cells[0][end.end() :]]
     if len(cells) < 2 or len(cells[0]) > _LONGEST_VALUE:
         return NO_LABELS
     name, unit = units.split_header(cells[0])
@@ -189,6 +201,11 @@ def _label_in_line(line: Line) -> Labels:
         is_value = len(cells[1]) <= _LONGEST_VALUE and plain(cells[1]) not in _KEY_OF  # else a row of headers
         values: dict[str, Any] = {key: cells[1]} if is_value else {}
         return Labels(**values)
+    if key in _SAMPLING:
+        for form in (" ".join(cells[1:3]), f"{cells[1]} {unit or ('Hz' if key == 'sampling_rate' else '')}"):
+            match = _NUMBER_AND_UNIT.fullmatch(form)
+            if match and units.is_compatible(rate_unit := _SAMPLES.sub(r"\1Hz", match["unit"]), _SAMPLING[key]):
+                return Labels(sampling=f"{match['number']} {rate_unit}")
     heading = _VOCABULARY.heading(cells[0])
     for form in (cells[1], " ".join(cells[1:3]), f"{cells[1]} {unit or ''}"):
         text = _COMMA.sub(r"\1.", form)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo
 
 from bushfit.errors import CampaignError, error_location
@@ -201,6 +202,7 @@ class LoopFile(TestFile):
         columns: header or number of each column with an unusual name, by role.
         units: units that the file does not state, by role.
         force_sign: -1 if the load cell has the opposite sign.
+        sampling_rate: sampling rate [Hz], for a file without time that does not state it.
         rate: speed [m/s or rad/s, or 1/s], for a file without time.
         frequency: frequency of the waveform [Hz], for a file without time.
         waveform: shape of the displacement over time, for a file without time.
@@ -209,23 +211,34 @@ class LoopFile(TestFile):
     columns: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS, "header")] = field(default_factory=dict)
     units: Annotated[Mapping[str, Text], _roles(LOOP_COLUMNS, "unit")] = field(default_factory=dict)
     force_sign: Literal[1, -1] = 1
+    sampling_rate: Frequency | None = None
     rate: Annotated[float, motion_quantity("/s"), Field(gt=0)] | None = None
     frequency: Frequency | None = None
     waveform: Waveform | None = None
 
     def __post_init__(self) -> None:
-        if (self.frequency is None) != (self.waveform is None) or (self.rate and self.frequency):
+        is_incomplete = (self.frequency is None) != (self.waveform is None)
+        if is_incomplete or sum(map(bool, (self.sampling_rate, self.rate, self.frequency))) > 1:
             raise ValueError(
                 CampaignError(
                     "these keys do not settle the time of a loop",
-                    found=", ".join(key for key in ("rate", "frequency", "waveform") if getattr(self, key)),
-                    expected='rate, or frequency and waveform ("sine" or "triangle") together',
-                    hint='state waveform = "sine" beside it' if self.frequency and not self.rate else None,
+                    found=", ".join(
+                        key for key in ("sampling_rate", "rate", "frequency", "waveform") if getattr(self, key)
+                    ),
+                    expected='sampling_rate, or rate, or frequency and waveform ("sine" or "triangle") together',
+                    hint='state waveform = "sine" beside it' if self.frequency and is_incomplete else None,
                 )
             )
 
+    @property
+    def states_time(self) -> bool:
+        """True if a key states how the rows follow each other in time."""
+        return bool(self.sampling_rate or self.rate or self.frequency)
+
     def clock(self, displacement: Floats) -> Floats:
-        """Rebuild the time [s], (n,), of a file without time from its displacement [m or rad], (n,), and waveform."""
+        """Rebuild the time [s], (n,), of a file without time from its displacement [m or rad], (n,)."""
+        if self.sampling_rate:
+            return np.arange(displacement.size) / self.sampling_rate
         return rebuild_time(
             displacement, rate=self.rate, frequency=self.frequency, waveform=self.waveform or "triangle"
         )

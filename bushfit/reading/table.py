@@ -32,6 +32,8 @@ from bushfit.reading.headers import (
 from bushfit.reading.labelled import Rows, find_labels, select_rows
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.measurement import Floats
+from bushfit.reading.names import Labels, labels_above
+from bushfit.reading.numerals import ALL_NUMERALS
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, RowSource, Sheet
 from bushfit.reading.times import clock
@@ -128,6 +130,31 @@ class Table(Cells):
         needed = frozenset(roles[role].index for role in present)
         table = replace(table, roles=roles, notes=notes, clocks=clocks, needed=needed)
         return replace(table, selected=select_rows(table, table.row_labels, rows)) if rows else table
+
+    @cached_property
+    def labels_above(self) -> Labels:
+        """Labels in the lines above the table, such as a temperature."""
+        return labels_above(line for line in self.source.head() if line.number < self.layout.header_line)
+
+    @cached_property
+    def sampling_rate(self) -> float | None:
+        """Sampling rate [Hz] above a table without time, in its notation of numbers; None without a clear one."""
+        text, _, unit = (self.labels_above.sampling or "").partition(" ")
+        if not text or "time" in self.roles:
+            return None
+        values = {way.value(text) for way in ALL_NUMERALS} - {None}
+        value = values.pop() if len(values) == 1 else self.numerals.value(text)
+        if not value:
+            return None
+        is_rate = units.is_compatible(unit, "Hz")
+        return value * units.si_factor(unit, "Hz") if is_rate else 1.0 / (value * units.si_factor(unit, "s"))
+
+    @property
+    def note_sampling(self) -> str:
+        """Sentence on a time that comes from the sampling rate above the table."""
+        return (
+            f"the file has no time: its rows are {self.sampling_rate:.6g} a second, as the lines above the table state"
+        )
 
     @property
     def sha256(self) -> str:

@@ -143,6 +143,7 @@ EXPORTS: dict[str, Export] = {
         sweep("omega|Amplitude [mm]|K* [N/mm]|tan delta", 2 * np.pi * F, A, K, ETA), stated={"units": {"frequency": "rad/s"}}
     ),
     "log10 f": Export(sweep("log10 f [Hz]|Amplitude [mm]|K* [N/mm]|tan delta", np.log10(F), A, K, ETA)),
+    "log10(K*/(N/m))": Export(sweep("log10(f/Hz)|x0 [mm]|log10(K*/(N/m))|delta [°]", np.log10(F), A, np.log10(1e3 * K), PHASE)),
     "log f": Export(sweep("log f [Hz]|Amplitude [mm]|K* [N/mm]|tan delta", np.log10(F), A, K, ETA), None, ["log10(Hz)", "ln(Hz)"]),
     "log f, as the hint says": Export(
         sweep("log f [Hz]|Amplitude [mm]|K* [N/mm]|tan delta", np.log10(F), A, K, ETA), stated={"units": {"frequency": "log10(Hz)"}}
@@ -395,6 +396,19 @@ EXPORTS: dict[str, Export] = {
     "means of levels": Export(
         sweep("f [Hz]|A0 [mm]|K* [N/mm]|delta [°]|Status", [*F[:5], "MW", *F[5:], "MW"], [*A[:5], "", *A[5:], ""], [*K[:5], 2.5, *K[5:], 2.5], [*PHASE[:5], 2.5, *PHASE[5:], 2.5], ["OK"] * 12),
         words=["2 rows left out"],
+    ),
+    **{
+        f"no time below {line}": Export(f"{line}\n" + loop("displacement [mm]|force [N]", DISPLACEMENT, FORCE), kind, words)
+        for line, kind, words in (
+            *((line, "loop", ["20 a second"]) for line in (
+                "Sampling rate: 20 Hz", "Abtastrate\t0,02\tkHz", "# fs = 20", "Sample interval [ms] 50", "dt = 0.05 s",
+                "Sample rate: 20.000 samples/s", "Data rate\t1200\t1/min",
+            )),
+            *((line, None, ['sampling_rate = "100 Hz"']) for line in ("Sampling rate: 1,000 Hz", "dt = 0.05", "Rate: 20 Hz")),
+        )
+    },
+    "no time, but its sampling rate stated": Export(
+        loop("displacement [mm]|force [N]", DISPLACEMENT, FORCE), "loop", (), {"sampling_rate": "20 Hz"}
     ),
     "times too coarse": Export(loop("Time [s]|Displacement [mm]|Force [N]", ["0"] * 300 + ["1"] * 300, DISPLACEMENT, FORCE), None, ["more digits"]),
 }  # fmt: skip

@@ -43,7 +43,15 @@ CLASSES: dict[str, tuple[str, ...]] = {
         *("MTS793, nine acquisitions", "end of a loop"),
     ),
     "signs and ranges of phases": ("phases negative", "phases near 174", "phases near 366", "loss stiffness negative"),
-    "times": ("clock", "ISO", "date and time", "AM and PM", "day numbers", "day numbers as days"),
+    "times": (
+        "clock",
+        "ISO",
+        "date and time",
+        "AM and PM",
+        "day numbers",
+        "day numbers as days",
+        "no time below dt = 0.05 s",
+    ),
     "delimiters": ("columns of one width with a units row", "carets"),
     "columns": (
         *(
