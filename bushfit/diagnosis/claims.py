@@ -93,7 +93,7 @@ class Claim:
         campaign = data.campaign
         if not self.tests:
             bushing = campaign.bushing and self.mistake.corrected_bushing(campaign.bushing)
-            return replace(data, campaign=replace(campaign, bushing=bushing)).in_session()
+            return replace(data, campaign=replace(campaign, bushing=bushing)).with_rubber_conditions()
         loops, sweeps, count = list(data.loops), [sweep.test for sweep in data.sweeps], len(data.loops)
         for place in self.tests:
             test = self.mistake.corrected_test([*data.loops, *data.sweeps][place].test)
@@ -104,7 +104,7 @@ class Claim:
         data = replace(data, loops=tuple(with_gain_errors(loops, data.campaign.rig)))
         if any(place >= count for place in self.tests):
             data = data.with_sweeps(sweeps)
-        return data.in_session()
+        return data.with_rubber_conditions()
 
 
 def adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[PreparedCampaign, list[str]]:

@@ -84,13 +84,13 @@ def describe(
         return None
     harmonic = tuple(test.fundamental() for test in evidence.data_sets)
     try:
-        base = fit_from(evidence.model, harmonic, fixed, bounds).finished(_EVALUATIONS).solution
-        base = fit_from(base.model, harmonic, (*fixed, *base.at_bound), bounds).finished(_EVALUATIONS).solution
+        base = fit_from(evidence.model, harmonic, fixed, bounds).run(_EVALUATIONS).solution
+        base = fit_from(base.model, harmonic, (*fixed, *base.at_bound), bounds).run(_EVALUATIONS).solution
     except FitError:  # too few points are left for the parameters
         return None
     model = replace(fitted.model, effects=(*evidence.model.effects, NAME), unnamed=correction)
-    after = Evidence(fitted.moved_to(model, harmonic), harmonic)
-    whole = Evidence(fitted.moved_to(model, evidence.data_sets), evidence.data_sets)
+    after = Evidence(fitted.reevaluate(model, harmonic), harmonic)
+    whole = Evidence(fitted.reevaluate(model, evidence.data_sets), evidence.data_sets)
     law = nearest_power_law(Evidence(base, harmonic), rig, start, bounds)
     sentences = _form(correction, law), _validity(correction, whole)
     return GapDescription(after, fitted, _hold_out_inside(evidence, fitted), law, *sentences)

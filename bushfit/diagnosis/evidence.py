@@ -114,7 +114,7 @@ def fit(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], b
         FitError: fewer data than parameters, or no finite response.
         ModelError: no response.
     """
-    descent = fit_from(model, data_sets, fixed, bounds).finished(EVALUATIONS)
+    descent = fit_from(model, data_sets, fixed, bounds).run(EVALUATIONS)
     return Evidence(descent.solution, tuple(data_sets))
 
 

@@ -225,7 +225,7 @@ def _predict(
             rest = fit(evidence.model, part.rest(data_sets), fixed, bounds).solution
         except (FitError, ModelError):
             return failed
-        leave_out = _leave_out(rest.moved_to(rest.model, data_sets))
+        leave_out = _leave_out(rest.reevaluate(rest.model, data_sets))
         if rest.stopped or leave_out.undetermined(rows).any():
             return failed
     residuals = np.array(leave_out.predicted(rows, _clusters(data_sets, rows.size), stepped=is_step))

@@ -8,7 +8,7 @@ from scipy.special import logsumexp
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import LARGEST, SIZES
 from bushfit.effects import get_effect, qualified_name
-from bushfit.fitting.design import probes
+from bushfit.fitting.design import shape_start_values
 
 #: Number of sizes over which the prior of an amount is averaged, and the smallest relative error that they resolve.
 _FINE, _SHARPEST = 1000, 0.01
@@ -57,7 +57,7 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
             density += _of_amount(size, float(error)) - (0.0 if parameter.log else log(amount))
             density -= 0.0 if parameter.neutral == parameter.bounds[0] else log(2.0)
             continue
-        tried = probes(data_sets, model, parameter)
+        tried = shape_start_values(data_sets, model, parameter)
         if parameter.log:
             wide = max(log(tried.max() / max(tried.min(), 1e-30)), 1.0)
         else:

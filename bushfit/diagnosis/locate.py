@@ -94,14 +94,14 @@ def _read_sweep(
     if len(means) > 1 and np.ptp(means) >= _CHANGES * max(abs(mean) for mean in means):
         level += f", {_trend_word(means[0], means[-1])} with {fixed_axis}"
     if len(touched) < len(lines):
-        level = "at " + ", ".join(lines[i].words for i in touched)
+        level = "at " + ", ".join(lines[i].label for i in touched)
     unit, factor = ("Hz", 1.0) if line.stepped != "amplitude" else line.direction.display.displacement
     low, high = (factor * end for end in spans[line.stepped == "amplitude"])
     trend = _trend(line.stepped or "frequency", line.step, pieces[worst])
     if len(touched) > 1 and line.stepped:
-        trend = f"most at {line.words}, {trend} there"
+        trend = f"most at {line.label}, {trend} there"
     across = [
-        line.words
+        line.label
         for line, piece in zip(lines, pieces, strict=True)
         if np.max(-np.sign(largest) * piece) > _STRONG * abs(largest)
     ]

@@ -18,7 +18,7 @@ from bushfit.diagnosis.groups import Group
 from bushfit.effects import Branch, Effect, effects_for_places, qualified_name, twins_of
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.design import fit_from, probes
+from bushfit.fitting.design import fit_from, shape_start_values
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.geometry import shared_labels
 from bushfit.model.model import Model
@@ -183,7 +183,7 @@ def sensitivity(
     """
     bare, model = model, model.with_effect(effect.name)
     axes = {
-        qualified_name(effect, parameter): probes(data_sets, model, parameter)
+        qualified_name(effect, parameter): shape_start_values(data_sets, model, parameter)
         for parameter in effect.parameters
         if parameter.neutral is None
     }

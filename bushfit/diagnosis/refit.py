@@ -14,7 +14,7 @@ from bushfit.errors import FitError, ModelError
 from bushfit.fitting.common_error import CommonError, CorrelatedTests
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.descent import Descent
-from bushfit.fitting.design import fit_from, probes
+from bushfit.fitting.design import fit_from, shape_start_values
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.solve import solve
@@ -62,7 +62,7 @@ def refitted(
     running, best = list(fits), 0.0
     for _ in track("evaluations of effects", range(1, EVALUATIONS)):
         for name in running:
-            fits[name] = fits[name].finished(fits[name].evaluations + 1)
+            fits[name] = fits[name].run(fits[name].evaluations + 1)
         best = min((fit.chi_square for fit in fits.values()), default=0.0)
         for name in list(running):
             fit = fits[name]
@@ -79,7 +79,7 @@ def refitted(
     if columns is None:
         return {name: Evidence(solution, evidence.data_sets) for name, solution in near.items()}
     return {
-        name: Evidence(solution.moved_to(solution.model, evidence.data_sets), evidence.data_sets, solution)
+        name: Evidence(solution.reevaluate(solution.model, evidence.data_sets), evidence.data_sets, solution)
         for name, solution in near.items()
     }
 
@@ -102,7 +102,7 @@ def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:
         for parameter in effect.parameters
         if parameter.scale
     ]
-    tried = {name: probes(data_sets, model, parameter) for name, parameter in shapes}
+    tried = {name: shape_start_values(data_sets, model, parameter) for name, parameter in shapes}
     return {name: (float(values.min()), float(values.max())) for name, values in tried.items() if np.ptp(values) > 0.0}
 
 
@@ -127,4 +127,4 @@ def refit_with_free_columns(
     starts = [evidence.model, *([evidence.model.with_values(start_values)] if start_values else [])]
     fits = [solve(FitProblem(model, tests, names, bounds), strict=False) for model in starts]
     model = min(fits, key=lambda each: each.chi_square).model
-    return replace(evidence, solution=evidence.solution.moved_to(model, evidence.data_sets))
+    return replace(evidence, solution=evidence.solution.reevaluate(model, evidence.data_sets))

@@ -132,7 +132,7 @@ def in_scatter_units(evidence: Evidence) -> Evidence:
         else data_set
         for data_set in with_gain_weighting(evidence.data_sets, weigh=False)
     )
-    return Evidence(evidence.solution.moved_to(evidence.model, data_sets), data_sets)
+    return Evidence(evidence.solution.reevaluate(evidence.model, data_sets), data_sets)
 
 
 def rig_errors(evidence: Evidence, rig: RigSettings) -> RigErrors:

@@ -22,7 +22,7 @@ from bushfit.fitting.design import fit_from
 from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
-from bushfit.fitting.robust import estimate, outlier_warnings, outliers_at
+from bushfit.fitting.robust import estimate, list_outliers, outlier_warnings
 from bushfit.geometry import get_places
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
@@ -67,7 +67,7 @@ def diagnose(
                 error.hint = f"these tests agree if {claim.words(data)}: {options} corrects it"
             raise
         known_rows = {(outlier.test, outlier.row) for outlier in excluded}  # a robust fit finds them anew
-        candidates = (*outliers, *outliers_at(base.model, split_by_kind(base.data_sets)[1]))
+        candidates = (*outliers, *list_outliers(base.model, split_by_kind(base.data_sets)[1]))
         wild = tuple(outlier for outlier in candidates if (outlier.test, outlier.row) not in known_rows)
         if not wild:
             break
@@ -99,7 +99,7 @@ def diagnose(
         f"{name}: {count} of these points are left out, because they deviate by more than noise"
         for name, count in counts.items()
     )
-    of_loops = outliers_at(diagnosis.result.model, data.loops)
+    of_loops = list_outliers(diagnosis.result.model, data.loops)
     warnings = (*outlier_warnings(of_loops, robust=data.robust), *outlier_warnings(excluded, robust=True))
     notes = (*messages, *reductions, *left_out, *diagnosis.notes, *data.assumed, *warnings)
     result = replace(
@@ -141,5 +141,5 @@ def _initial_fit(
         robust = estimate(FitProblem.with_fixed(model, data_sets, fixed, data.bounds), robust=True)
         outliers, data_sets = robust.outliers, robust.data_sets
     data_sets = [data_set.with_weight() for data_set in with_gain_weighting(data_sets, weigh=True)]
-    descent = fit_from(model, data_sets, fixed, data.bounds).finished(EVALUATIONS)
+    descent = fit_from(model, data_sets, fixed, data.bounds).run(EVALUATIONS)
     return Evidence(descent.solution, tuple(data_sets)), start, outliers

@@ -11,7 +11,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Coordinates, coordinate_changes, prior_covariance
-from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, log_slopes, rows_of
+from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, log_slopes, residual_slices
 from bushfit.fitting.problem import FitResult
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
@@ -72,7 +72,7 @@ class LeaveOut:
 
     def undetermined(self, rows: Array) -> Array:
         """Mask of the parameters, (k,), that a fit without some rows (indices or mask) would not determine."""
-        size, vectors = np.linalg.eigh(self._rest(rows))
+        size, vectors = np.linalg.eigh(self._information(rows))
         without = np.square(self.coordinate_steps @ vectors) @ (1.0 / np.maximum(size, _LEAST_SEEN**2))
         return without > _MOST_GROWTH * np.sum(np.square(self.coordinate_steps), axis=1)
 
@@ -109,7 +109,7 @@ class LeaveOut:
         remainder[rows] = 0.0
         pulls = np.zeros((int(clusters.max()) + 1, step.size))
         np.add.at(pulls, clusters, self.basis * remainder[:, None])
-        root = np.linalg.inv(np.linalg.cholesky(self._rest(rows)))
+        root = np.linalg.inv(np.linalg.cholesky(self._information(rows)))
         size, vectors = np.linalg.eigh(root @ pulls.T @ pulls @ root.T)
         error = out @ root.T @ vectors * np.sqrt(np.maximum(size, 1.0))
         directions, scale, _ = np.linalg.svd(error, full_matrices=False)
@@ -127,18 +127,18 @@ class LeaveOut:
         Returns:
             Derivatives, (n,).
         """
-        through = self.basis @ np.linalg.solve(self._rest(rows), self.basis[rows].T @ predicted)
+        through = self.basis @ np.linalg.solve(self._information(rows), self.basis[rows].T @ predicted)
         pull = -through
         pull[rows] = predicted
         return pull
 
-    def _rest(self, rows: Array) -> Array:
+    def _information(self, rows: Array) -> Array:
         """Fisher information of a fit without the given rows (indices or mask), along the m basis vectors, (m, m)."""
         return np.eye(self.components.size) - self.basis[rows].T @ self.basis[rows]
 
     def _basis_step(self, rows: Array) -> Array:
         """Gauss-Newton step of a fit without the given rows (indices or mask), along the m basis vectors, (m,)."""
-        return -np.linalg.solve(self._rest(rows), self.components - self.basis[rows].T @ self.residual[rows])
+        return -np.linalg.solve(self._information(rows), self.components - self.basis[rows].T @ self.residual[rows])
 
 
 def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest] = ()) -> tuple[Misfit, ...]:
@@ -195,7 +195,7 @@ def expected_errors(solution: FitResult, unfitted: Sequence[MeasuredTest] = ()) 
     model, free, parts = solution.model, solution.moving, list[tuple[str, Array, bool]]()
     whole = LeaveOut.from_fit(solution.jacobian[free], solution.residual)
     per_coordinate = solution.coordinates.slopes(model.values)[:, None]
-    for test, rows in zip(solution.minimised, rows_of(solution.minimised), strict=True):
+    for test, rows in zip(solution.minimised, residual_slices(solution.minimised), strict=True):
         modelled = test.noise_free(model).measured
         slopes = (log_slopes(model, test, solution.names) * per_coordinate)[free]
         for run in _runs(test):
@@ -208,7 +208,7 @@ def expected_errors(solution: FitResult, unfitted: Sequence[MeasuredTest] = ()) 
     for test in unfitted:
         difference = _absolute_difference(test.noise_free(model).measured, test.measured)
         parts.append((str(test.direction), difference, True))
-    return _by_place(parts)
+    return _errors_by_direction(parts)
 
 
 def expected_errors_without_refits(
@@ -229,7 +229,7 @@ def expected_errors_without_refits(
     for index, test in enumerate([*fitted, *unfitted]):
         difference = _absolute_difference(test.noise_free(model).measured, test.measured)
         parts.append((str(test.direction), difference, index >= len(fitted)))
-    return _by_place(parts)
+    return _errors_by_direction(parts)
 
 
 def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUse]:
@@ -283,7 +283,7 @@ def prior_warnings(uses: Mapping[str, PriorUse]) -> list[str]:
     ]
 
 
-def _by_place(parts: Sequence[tuple[str, Array, bool]]) -> tuple[ExpectedError, ...]:
+def _errors_by_direction(parts: Sequence[tuple[str, Array, bool]]) -> tuple[ExpectedError, ...]:
     """Expected error of each direction, from its predicted points if these are at least half, else from all its points.
 
     Args:

@@ -18,7 +18,7 @@ from bushfit.fitting.preparation import (
     MeasuredTest,
     operating_conditions,
     repeats_of,
-    rows_of,
+    residual_slices,
     split_by_kind,
 )
 from bushfit.fitting.problem import SmoothError
@@ -111,7 +111,7 @@ def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | Non
     by_noise = dict[Hashable, tuple[Array, Array]]()
     for stage, (equations, basis) in zip(stages, bases, strict=True):
         influence = reaction[:, equations] @ basis
-        blocks = list(zip(stage.data_sets, rows_of(stage.data_sets), strict=True))
+        blocks = list(zip(stage.data_sets, residual_slices(stage.data_sets), strict=True))
         if stage.smooth_error:  # beside it the error of the noise is the least part
             added = stage.smooth_error.covariance(model, stage.data_sets, influence)
             spread.append(added * np.sqrt(2.0 / stage.smooth_error.freedom))
@@ -150,7 +150,7 @@ def _changes_by_noise(
         that the wrong weights of the fit add, (k, k) each.
     """
     unit, sums = basis / np.linalg.norm(basis[0]), dict[Hashable, list[Array]]()
-    for test, rows in zip(data_sets, rows_of(data_sets), strict=True):
+    for test, rows in zip(data_sets, residual_slices(data_sets), strict=True):
         of_test = influence[:, rows]
         for variance, move in test.noise_sensitivity(of_test).items():
             products = [move @ of_test.T, move @ move.T, move @ unit[:, rows].T]
@@ -306,7 +306,7 @@ def implausible_modulus(bushing: Bushing | None, data_sets: Sequence[MeasuredTes
     return [] if _SOFTEST < moduli[hardest] < _HARDEST else [sentence]
 
 
-def refuse_strain(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> None:
+def check_strain(bushing: Bushing | None, data_sets: Sequence[MeasuredTest]) -> None:
     """Raise a FitError if the strain of a test is beyond any rubber, usually because of a wrong unit or dimension."""
     for data_set in data_sets:
         largest = float(np.max(data_set.amplitude))

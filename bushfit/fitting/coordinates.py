@@ -39,6 +39,7 @@ class Coordinates:
 
     @classmethod
     def of_parameters(cls, model: Model, names: Sequence[str]) -> "Coordinates":
+        """Build the map for some parameters of a model, given by name."""
         return cls(tuple(names), tuple(model.parameters[name] for name in names))
 
     def forward(self, name: str, value: float) -> float:
@@ -143,7 +144,9 @@ def prior_covariance(prior: Prior, coordinates: Coordinates) -> Array:
 
 
 def coordinate_changes(model: Model, names: Sequence[str], changed: Sequence[str]) -> Array:
-    """Derivatives of coordinates by the coordinates of free parameters, 1 or 0 but for tied parameters.
+    """Derivatives of parameter coordinates by the coordinates of the free parameters, for the chain rule with ties.
+
+    A free parameter has derivative 1 by itself and 0 by the others; a tied parameter follows those in its formula.
 
     Args:
         model: model with its ties.

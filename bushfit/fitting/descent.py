@@ -63,7 +63,7 @@ class Descent:
         converged: True after the last step.
         damping: damping of the next step, relative to the curvature.
         growth: factor on the damping if the next step fails.
-        last: last successful step, (k,), and the second derivative of the residuals along it, (n,); None at first.
+        last: last successful step, (k,), and the second derivative of the residuals along it, (n,); None before one.
     """
 
     problem: FitProblem
@@ -122,7 +122,7 @@ class Descent:
         state = self.model, self.residual, self.jacobian, self.evaluations, at_bound, not self.converged
         return FitResult(self.problem, *state)
 
-    def finished(self, evaluations: int) -> "Descent":
+    def run(self, evaluations: int) -> "Descent":
         """Take steps until the fit has converged or has used up its evaluations of the model.
 
         A step that lowers chi-square is taken and reduces the damping; any other step is undone and increases it.
@@ -226,7 +226,9 @@ class Descent:
         return step, float(-(2.0 * slope + curvature @ step) @ step)
 
     def _bend(self, step: Array, damping: float) -> Array:
-        """Second-order correction of a damped step, along a curved valley; 0 if the last step went elsewhere.
+        """Second-order correction of a damped step, which bends along a curved valley of chi-square.
+
+        The curvature is known from the last successful step; if that had another direction, the correction is 0.
 
         Args:
             step: damped step of the k parameter coordinates, (k,).
@@ -254,7 +256,7 @@ class Descent:
 
 
 def _solved(curvature: Array, pull: Array, free: Array) -> Array:
-    """Solve curvature @ step = pull for some parameters; directions that are rounding errors get a step of 0.
+    """Solve curvature @ step = pull for some parameters; along eigenvectors below rounding errors the step is 0.
 
     Args:
         curvature: Gauss-Newton Hessian by coordinate, (k, k).

@@ -37,10 +37,10 @@ _LOWER = 0.1
 _MOST = 200
 
 
-def designed(
+def start_with_effects(
     model: Model, plain: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds
 ) -> Model:
-    """Choose start values for a fit with added effects: each effect is added in turn to the best fit without it.
+    """Find start values for a fit with added effects by fits that add one effect after another.
 
     Args:
         model: model with all effects, at the start values.
@@ -50,11 +50,11 @@ def designed(
         bounds: limits of parameters [SI], inside their default limits.
 
     Returns:
-        The given model, or that model with the values built up effect by effect if these give a lower chi-square.
+        The model with the values of these fits if they give a lower chi-square than its start values; else unchanged.
     """
     added = [get_effect(name) for name in model.effects if name not in plain.effects]
     with suppress(FitError, ModelError):  # no response, or too few points; the fit then says what is wrong
-        direct = fit_from(model, data_sets, fixed, bounds).finished(_MOST)
+        direct = fit_from(model, data_sets, fixed, bounds).run(_MOST)
         problem = FitProblem.with_fixed(plain, data_sets, fixed, bounds)
         solution = solve(problem, evaluations=_MOST, strict=False)
         for effect in added:
@@ -92,16 +92,18 @@ def with_effect(
     for parameter in effect.parameters:
         if parameter.neutral is None:
             name = qualified_name(effect, parameter)
-            values = probes(data_sets, first, parameter) if parameter.scale else first.values[name] * np.array(_FACTORS)
+            values = first.values[name] * np.array(_FACTORS)
+            if parameter.scale:
+                values = shape_start_values(data_sets, first, parameter)
             starts += [first.with_values({name: value}) for value in np.clip(values, *parameter.bounds).tolist()]
     fits = []
     for start in starts:
         with suppress(FitError, ModelError):  # no response from this start
-            fits.append(fit_from(start, data_sets, fixed, bounds).finished(_FIRST))
+            fits.append(fit_from(start, data_sets, fixed, bounds).run(_FIRST))
     if not fits:
         raise FitError("the model has no finite response to these tests", found=effect.name)
     best = sorted(fits, key=lambda descent: descent.chi_square)[:_BEST]
-    return min((descent.finished(_MOST) for descent in best), key=lambda descent: descent.chi_square).solution
+    return min((descent.run(_MOST) for descent in best), key=lambda descent: descent.chi_square).solution
 
 
 def fit_from(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds) -> Descent:
@@ -116,7 +118,7 @@ def fit_from(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[st
     return Descent.start(FitProblem.with_fixed(model, data_sets, fixed, bounds))
 
 
-def probes(data_sets: Sequence[MeasuredTest], model: Model, parameter: Parameter) -> Array:
+def shape_start_values(data_sets: Sequence[MeasuredTest], model: Model, parameter: Parameter) -> Array:
     """Start values of a shape parameter (time, gap, order, frequency) over the range that the tests can determine.
 
     Args:

@@ -19,7 +19,7 @@ from bushfit.effects.contract import Array
 from bushfit.effects.temperature import REFERENCE
 from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.fitting.coordinates import ROUNDING
-from bushfit.fitting.preparation import MeasuredTest, log_slopes, operating_conditions, rows_of
+from bushfit.fitting.preparation import MeasuredTest, log_slopes, operating_conditions, residual_slices
 from bushfit.fitting.problem import FitResult
 from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood, coordinates, in_lengths, patterns
 from bushfit.model.covariance import Z95
@@ -101,7 +101,7 @@ class FittedTests:
         the residuals' changes by stiffness changes of 1 and of i [N/m or N m/rad] along these directions.
         """
         units, blocks = np.array([[1.0], [1.0j]]), list[tuple[MeasuredTest, slice, Array | None, Array]]()
-        for test, rows in zip(self.data_sets, rows_of(self.data_sets), strict=True):
+        for test, rows in zip(self.data_sets, residual_slices(self.data_sets), strict=True):
             if test.kind == "loop":
                 directions, components = np.linalg.qr(test.residual_change(units, self.solution.model).T)
                 blocks.append((test, rows, directions, components.T))
@@ -142,10 +142,11 @@ class FittedTests:
 
     @cached_property
     def remainder(self) -> tuple[Array, Array]:
-        """Project out what k parameters and rig errors explain of the d components of the residuals.
+        """Part of the residuals that neither the parameters nor errors of the rig explain.
 
         Returns:
-            Orthonormal basis of the explained changes, (k, d), and residual without its components in them, (d,).
+            Orthonormal basis of the changes of the d components that parameters and rig errors can produce, (e, d), and
+            components of the residuals orthogonal to this basis, (d,).
         """
         rows, residual = self.solution.jacobian, self.solution.residual
         pairs = list(zip(self._blocks, self.rig_errors, strict=True))

@@ -12,7 +12,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.fitting.assess import measured_range
 from bushfit.fitting.coordinates import jacobian
-from bushfit.fitting.preparation import MeasuredTest, new_loop, new_sweep, split_by_kind
+from bushfit.fitting.preparation import MeasuredTest, planned_loop, planned_sweep, split_by_kind
 from bushfit.fitting.rig_class import ASSUMED
 from bushfit.model.model import Model
 
@@ -62,7 +62,7 @@ class FisherInformation:
         return cls(tuple(names), slope @ slope.T)
 
     def directions(self) -> tuple[Array, Array]:
-        """Relative standard errors along the eigenvectors of the information, (k,), and these as columns, (k, k)."""
+        """Relative standard errors along the eigenvectors of the information, (k,), and the eigenvectors as columns."""
         values, vectors = np.linalg.eigh(self.matrix)
         return 1.0 / np.sqrt(np.maximum(values, np.finfo(float).eps * values.max())), vectors
 
@@ -79,7 +79,7 @@ class FisherInformation:
 
 
 def relative_sizes(model: Model, names: Sequence[str]) -> Array:
-    """Change of the fit coordinate of each parameter per relative change of its value, (k,): 1 for logarithms."""
+    """Derivative of each parameter's fit coordinate by its relative change dp/p, (k,): 1 if the coordinate is ln p."""
     pairs = [(model.parameters[name], abs(model.values[name])) for name in names]
     return np.array(
         [1.0 if parameter.log else max(value / parameter.typical, _LEAST_SIZE) for parameter, value in pairs]
@@ -147,7 +147,7 @@ def _candidates(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[tup
         )
         for times, words in ((1.0, ""), (3.0, "three times "), (10.0, "ten times ")):
             motion = model, direction, _NEW_RATE, times * largest_amplitude, _FORCE_NOISE
-            loop = new_loop(*motion, cycles=2.0, rows=400, from_rest=True)
+            loop = planned_loop(*motion, cycles=2.0, rows=400, from_rest=True)
             yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", [replace(loop, gain_error=ASSUMED[0])]
     reach = measured_range(model, data_sets)
     small, large = (strain / model.unit_strain(data_sets[0].direction) for strain in reach.strain)
@@ -164,4 +164,4 @@ def _candidates(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[tup
     scatter, shared = (sweeps[0].relative_noise, sweeps[0].noise.shared) if sweeps else (ASSUMED[0], ASSUMED)
     for words, band, amplitudes in planned if sweeps else planned[2:]:
         frequencies, levels = (x.ravel() for x in np.meshgrid(np.geomspace(*band, 9), amplitudes))
-        yield words, [new_sweep(model, direction, frequencies, levels, (scatter, scatter), shared)]
+        yield words, [planned_sweep(model, direction, frequencies, levels, (scatter, scatter), shared)]

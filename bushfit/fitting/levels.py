@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, rows_of, split_by_kind
+from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, residual_slices, split_by_kind
 
 #: Relative change of the variances at which the scoring ends: far below their standard error.
 _SETTLED = 1e-3
@@ -25,14 +25,12 @@ class LevelErrors(NamedTuple):
     Args:
         error: standard deviation of the relative gain error, and of the phase error [rad].
         freedom: degrees of freedom behind the error; 0 if the error is fixed at the largest that a rig may have.
-        gain: fall of -2 ln(likelihood) by these errors, compared with the noise that the tests had before.
-        matters: True if the fall is larger than chance explains.
+        significant: True if these errors lower -2 ln(likelihood) by more than chance explains.
     """
 
     error: tuple[float, float]
     freedom: int
-    gain: float
-    matters: bool
+    significant: bool
 
 
 def level_errors(
@@ -47,7 +45,7 @@ def level_errors(
         maximum: largest standard deviation of gain and of phase [rad] that the rig may have.
 
     Returns:
-        Errors, with the fall of -2 ln(likelihood) that they bring.
+        Errors, with their degrees of freedom and significance.
 
     Notes:
         An error of a level adds v u u^T to the covariance of the whitened residuals, where u is the whitened unit error
@@ -55,13 +53,13 @@ def level_errors(
         The restricted likelihood is maximised by Fisher scoring, in the space of the levels.
     """
     rows, kinds, before, size = list[Array](), np.empty(0), (0.0, 0.0), residual.size
-    for sweep, block in zip(data_sets, rows_of(data_sets), strict=True):
+    for sweep, block in zip(data_sets, residual_slices(data_sets), strict=True):
         if isinstance(sweep, MeasuredSweep):
-            units = level_errors_of(sweep)
+            units = level_error_columns(sweep)
             before, kinds = sweep.noise.level, np.append(kinds, np.arange(len(units)) % 2)  # gain, phase, in turn
             rows.append(np.zeros((len(units), size)))
             rows[-1][:, block] = units
-    nothing = LevelErrors(before, 0, 0.0, matters=False)
+    nothing = LevelErrors(before, 0, significant=False)
     if not rows:
         return nothing
     columns = np.concatenate(rows)
@@ -106,12 +104,12 @@ def level_errors(
         return nothing
     measured = any(sweep.noise.freedom for sweep in split_by_kind(data_sets)[1])
     fall = likelihood(np.zeros(2))[2] - minimum
-    matters = fall > (_MATTERS if measured else _MATTERS_UNREPEATED)
+    significant = fall > (_MATTERS if measured else _MATTERS_UNREPEATED)
     gain, phase = np.sqrt(counted + added).tolist()
-    return LevelErrors((gain, phase), int(freedoms.min()) if freedoms.size else 0, fall, matters)
+    return LevelErrors((gain, phase), int(freedoms.min()) if freedoms.size else 0, significant)
 
 
-def level_errors_of(sweep: MeasuredSweep) -> Array:
+def level_error_columns(sweep: MeasuredSweep) -> Array:
     """Derivatives of a sweep's whitened residuals by the gain and phase error of each of its levels.
 
     Returns:

@@ -46,7 +46,7 @@ class LineMisfit:
         return self.amplitude if self.stepped == "amplitude" else self.frequency
 
     @property
-    def words(self) -> str:
+    def label(self) -> str:
         """Text of the constant amplitude or frequency of the line, "0.1 mm" or "10 Hz"; else the name of the test."""
         if self.stepped == "frequency":
             return shown_amplitude(self.direction, float(self.amplitude[0]))

@@ -11,8 +11,8 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.loop_harmonics import residual_limit
-from bushfit.fitting.outliers import gross_rows
+from bushfit.fitting.loop_harmonics import outlier_distance
+from bushfit.fitting.outliers import gross_outliers
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.cycles import HOLE, shifted_difference
 from bushfit.reduction.harmonics import basis, least_squares, resolved_order, spread_rows
@@ -92,7 +92,7 @@ def _thinned(loop: Loop) -> tuple[Array, Array]:
     """Time [s] and displacement [m or rad] of every k-th row, enough to find the cycles, without gross outliers."""
     selection = slice(None, None, -(-loop.time.size // ENOUGH_ROWS))
     time, motion = loop.time[selection], loop.displacement[selection]
-    rows = gross_rows(motion)
+    rows = gross_outliers(motion)
     return np.delete(time, rows), np.delete(motion, rows)
 
 
@@ -271,7 +271,7 @@ def _refined(clock: Array, x: Array, frequency: float, rows_per_cycle: float) ->
     solution = least_squares(columns, motion)
     for _ in range(10):  # of Gauss-Newton; chosen: nearly all frequencies take three to six
         residual = motion - columns @ solution
-        inliers = np.abs(residual) <= residual_limit(solution, residual, residual.size)
+        inliers = np.abs(residual) <= outlier_distance(solution, residual, residual.size)
         by_phase = np.concatenate(([0.0], -number * solution[order + 1 :], number * solution[1 : order + 1]))
         by_frequency = 2.0 * np.pi * time * (columns @ by_phase)
         found = least_squares(np.column_stack((columns, by_frequency)), motion, inliers)

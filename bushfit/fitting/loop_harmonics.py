@@ -36,10 +36,10 @@ _CORNER = 0.5
 
 
 class OutlierRows(NamedTuple):
-    """Outliers of displacement or force: row indices and distances from the harmonics [noise], (k,) each."""
+    """Outliers of displacement or force: row indices, and distances from the harmonics in units of noise, (k,) each."""
 
     rows: Array
-    off: Array
+    distances: Array
 
 
 _NO_OUTLIERS = OutlierRows(np.empty(0, dtype=np.intp), np.empty(0))
@@ -154,7 +154,7 @@ def remove_slow_changes(phase: Array, residual: Array) -> tuple[Array, int]:
     return remainder, unknowns
 
 
-def residual_limit(solution: Array, residual: Array, rows: int) -> float:
+def outlier_distance(solution: Array, residual: Array, rows: int) -> float:
     """Distance from the harmonics, in units of the column, beyond which a row is an outlier.
 
     The limit allows for the noise and for corners of a triangle, which the harmonics round off.
@@ -210,7 +210,7 @@ def _column_outliers(loop: Loop, frequency: float, column: Array, solution: Arra
     grid = np.arange(GRID + 1) / GRID
     cycle = basis(grid, solution.size // 2) @ solution
     distance = column - np.interp((loop.time - loop.time[0]) * frequency % 1.0, grid, cycle)
-    limit = residual_limit(solution, residual, column.size)
+    limit = outlier_distance(solution, residual, column.size)
     rows = np.flatnonzero(are_outliers(distance, column, limit) | are_stuck(column))
     return OutlierRows(rows, np.abs(distance[rows]) / _noise(solution, residual))
 
@@ -225,7 +225,7 @@ def _inliers(columns: Array, values: Array, solution: Array, stuck: Array) -> Ar
         stuck: mask of the rows that repeat the value of the row before, (n,).
     """
     residual = values - columns @ solution
-    return ~(stuck | are_outliers(residual, values, residual_limit(solution, residual, values.size)))
+    return ~(stuck | are_outliers(residual, values, outlier_distance(solution, residual, values.size)))
 
 
 def _noise(solution: Array, residual: Array) -> float:

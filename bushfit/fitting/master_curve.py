@@ -60,7 +60,7 @@ def master_curve(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[Shift
             at_reference = model.stiffness(sweep.direction, sweep.frequency * pace, sweep.amplitude)
             reduced = sweep.measured * at_reference / sweep.stiffness(model)
             temperature = float(np.mean(sweep.temperature))
-            shift, error = (float(value.item()) for value in law(result, np.array([temperature])))
+            shift, error = (float(value.item()) for value in shift_factors(result, np.array([temperature])))
             further, unsure = _further_shift(model, sweep)
             laws = (shift, error), (shift + further, unsure)
             curves.append(ShiftedSweep(sweep, temperature, *laws, sweep.frequency * pace, reduced))
@@ -72,7 +72,7 @@ def can_shift(sweep: Sweep) -> bool:
     return sweep.temperature is not None and np.unique(sweep.frequency).size >= _FREQUENCIES
 
 
-def law(result: Result, temperature: Array) -> tuple[Array, Array]:
+def shift_factors(result: Result, temperature: Array) -> tuple[Array, Array]:
     """Fitted shift factors ln a_T at temperatures [K], (n,), with standard errors; nan if these are unknown.
 
     Returns:

@@ -97,7 +97,9 @@ class MeasuredLoop(MeasuredBase):
     @cached_property
     def residual_count(self) -> int:
         """Number of residuals with weight; if the noise of rows is correlated, the effective number."""
-        return 2 if self.fundamental_only else round(self.prepared.row_noise.share * np.count_nonzero(self._counting))
+        if self.fundamental_only:
+            return 2
+        return round(self.prepared.row_noise.observed_share * np.count_nonzero(self._usable_rows))
 
     @property
     def independent_count(self) -> float:
@@ -149,7 +151,7 @@ class MeasuredLoop(MeasuredBase):
         force = self.prepared.interpolate_at_rows(force) + (self.prepared.datum or 0.0)
         return force if values is not None else self._keep("force", model, (), force)
 
-    def residual_with(self, added: Array, model: Model) -> Array:
+    def residual_with_added(self, added: Array, model: Model) -> Array:
         """Whitened residuals, model minus measured in units of noise, of a model with an additional stiffness.
 
         Args:
@@ -173,8 +175,8 @@ class MeasuredLoop(MeasuredBase):
         self._keep("force", model, (), self.prepared.interpolate_at_rows(force) + (self.prepared.datum or 0.0))
         return self.prepared.interpolate_at_rows(slopes)
 
-    def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
-        """Derivatives by k parameters of the whitened residuals with an added stiffness (`residual_with`), (k, size).
+    def jacobian_with_added(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
+        """Derivatives by k parameters of the whitened residuals of a model with an additional stiffness, (k, size).
 
         Args:
             added: stiffness added to the model's at each operating point (one in a loop), complex [N/m or N m/rad].
@@ -245,7 +247,7 @@ class MeasuredLoop(MeasuredBase):
     def gain_and_offset(self) -> Array:
         """Change of the whitened residuals by a gain error of 100 %, and by an offset of half the range, (2, size)."""
         offset = np.full(self.prepared.force.size, self.prepared.half_range)
-        return np.array([self._less_shared(self.unit_gain), self.whiten(offset * self._per_noise)])
+        return np.array([self._whiten_shared(self.unit_gain), self.whiten(offset * self._per_noise)])
 
     def columns(self) -> dict[str, Any]:
         """Table columns by header that identify the point of each residual, such as time [s] and amplitude."""
@@ -257,27 +259,30 @@ class MeasuredLoop(MeasuredBase):
         }
 
     @cached_property
-    def _counting(self) -> Array:
-        return self.prepared.row_noise.counting(self.prepared.weight)
+    def _usable_rows(self) -> Array:
+        """Mask of the whitened rows that have weight, together with all rows that their noise depends on, (n,)."""
+        return self.prepared.row_noise.usable_rows(self.prepared.weight)
 
     @cached_property
     def _per_noise(self) -> Array:
-        return np.sqrt(self.prepared.weight) / (self.prepared.noise * self.prepared.row_noise.size)
+        """Reciprocal of the standard deviation of each row's force [1/N or 1/(N m)], (n,); 0 for unused rows."""
+        return np.sqrt(self.prepared.weight) / (self.prepared.noise * self.prepared.row_noise.row_scale)
 
     @cached_property
     def _waves(self) -> Array:
+        """Constant, cosines and sines of five harmonics at the phases of the rows, (11, n)."""
         return smooth_waves(self.prepared.phase)
 
-    def _in_noise(self, rows: Array) -> Array:
-        """Remove the correlation of the noise from rows of force in units of noise, (..., n); rows left out become 0.
+    def _whiten_rows(self, rows: Array) -> Array:
+        """Remove the autocorrelation of the noise from rows of force in units of noise, (..., n); unused rows become 0.
 
         If only the first harmonic is used, the result has the two components along it, (..., 2).
         """
         white = self.prepared.row_noise.whiten(rows)
-        white *= self._counting
+        white *= self._usable_rows
         return white @ self._fundamental if self.fundamental_only else white
 
-    def _less_shared(self, white: Array) -> Array:
+    def _whiten_shared(self, white: Array) -> Array:
         """Whiten rows of uncorrelated noise, (..., n), by the error that all rows share: model error or gain error."""
         return self._shared.whiten(white) if self._shared else white
 
@@ -286,7 +291,7 @@ class MeasuredLoop(MeasuredBase):
         return self.whiten(waves * (self._per_noise * self.prepared.half_range))
 
     def whiten(self, difference: Array) -> Array:
-        return self._less_shared(self._in_noise(difference))
+        return self._whiten_shared(self._whiten_rows(difference))
 
     @property
     def log_det_covariance(self) -> float:
@@ -296,12 +301,12 @@ class MeasuredLoop(MeasuredBase):
     @cached_property
     def _fundamental(self) -> Array:
         """Orthonormal basis of the whitened rows of a first harmonic, (n, 2)."""
-        waves = self.prepared.row_noise.whiten(self._waves[1:3] * self._per_noise) * self._counting
+        waves = self.prepared.row_noise.whiten(self._waves[1:3] * self._per_noise) * self._usable_rows
         return np.linalg.qr(waves.T)[0]
 
     @cached_property
     def _unit_changes(self) -> Array:
-        """Change of the whitened residuals by a change of the stiffness by 1 and by i [N/m or N m/rad], (2, size)."""
+        """Change of the whitened residuals per real and per imaginary unit of stiffness [N/m or N m/rad], (2, size)."""
         wave = self.prepared.coefficients[1] * np.exp(2j * np.pi * self.prepared.phase)
         return self.whiten(np.array([wave.real, -wave.imag]) * self._per_noise)
 
@@ -315,7 +320,7 @@ class MeasuredLoop(MeasuredBase):
         """
         waves, weighed = self._waves.T, self.weights > 0.0
         smooth = waves @ np.linalg.lstsq(waves[weighed], self.prepared.force[weighed], rcond=None)[0]
-        return self._in_noise(smooth * self._per_noise)
+        return self._whiten_rows(smooth * self._per_noise)
 
     @cached_property
     def _shared(self) -> CommonError | None:
@@ -342,7 +347,7 @@ class MeasuredLoop(MeasuredBase):
             order = np.arange(2.0 * np.ceil(self.prepared.cycles))[:, None]
             drift = np.cos(np.pi * order * self.prepared.phase / self.prepared.cycles) / (1.0 + order)
             waves = np.concatenate((waves, waves * (self.prepared.phase < 1.0), drift))
-        return self._in_noise(waves * (self._per_noise * self.prepared.half_range))
+        return self._whiten_rows(waves * (self._per_noise * self.prepared.half_range))
 
     @cached_property
     def _unit_error(self) -> CommonError:
@@ -358,7 +363,7 @@ class MeasuredLoop(MeasuredBase):
         """
         slopes = self._slopes(model, names)
         misfit = (self.force(model) - self.prepared.force)[None]
-        white = self._in_noise(np.concatenate((misfit, slopes)) * self._per_noise)
+        white = self._whiten_rows(np.concatenate((misfit, slopes)) * self._per_noise)
         directions, size = self._unit_error.principal_errors
         return ErrorProducts(white @ white.T, white @ directions * size, np.square(size))
 
@@ -372,15 +377,15 @@ class MeasuredLoop(MeasuredBase):
             By identifier of the variance, (k, size): the influence times the whitened derivative of the residuals'
             covariance by the variance, times the standard error of the variance.
         """
-        reaction = self._less_shared(influence)
+        reaction = self._whiten_shared(influence)
         whole = reaction @ self._fundamental.T if self.fundamental_only else reaction
         parts = list(self.prepared.row_noise.noise_sensitivity(whole))
         if self.fundamental_only:
             parts = [part @ self._fundamental for part in parts]
         if not parts and self.test.noise is None:
-            rows = round(self.prepared.row_noise.share * np.count_nonzero(self._counting))
+            rows = round(self.prepared.row_noise.observed_share * np.count_nonzero(self._usable_rows))
             parts = [np.sqrt(2.0 / rows) * reaction]
-        return {(self.name, index): self._less_shared(part) for index, part in enumerate(parts)}
+        return {(self.name, index): self._whiten_shared(part) for index, part in enumerate(parts)}
 
     def extra_covariance(self, influence: Array) -> Array:
         """Covariance of parameter estimates by errors that the weights of the residuals do not include.
@@ -394,6 +399,6 @@ class MeasuredLoop(MeasuredBase):
         Returns:
             Covariance to be added, (k, k).
         """
-        first = influence @ self._less_shared(self.model_error * self._error_waves[:2]).T
-        gain = influence @ self._less_shared(self.gain_error * self.unit_gain)
+        first = influence @ self._whiten_shared(self.model_error * self._error_waves[:2]).T
+        gain = influence @ self._whiten_shared(self.gain_error * self.unit_gain)
         return np.asarray(np.outer(gain, gain) - first @ first.T)

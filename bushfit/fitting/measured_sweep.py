@@ -192,8 +192,8 @@ class MeasuredSweep(MeasuredBase):
             points of the sweep, the index of its distinct point, (n,).
         """
         points = self.frequency + 1j * self.sweep.amplitude_reached[self.order]
-        distinct, place = np.unique(points, return_inverse=True)
-        return distinct.real, distinct.imag, place
+        distinct, distinct_index = np.unique(points, return_inverse=True)
+        return distinct.real, distinct.imag, distinct_index
 
     def _operating_points(self, model: Model) -> tuple[Array, Array, RubberConditions, Array | slice]:
         """Frequency, amplitude and conditions at which to evaluate a model, and for each point the index of its own.
@@ -203,24 +203,24 @@ class MeasuredSweep(MeasuredBase):
         if model.depends_on_conditions:
             reached = self.sweep.amplitude_reached[self.order]
             return self.frequency, reached, self.conditions, slice(None)
-        frequency, amplitude, place = self._distinct
-        return frequency, amplitude, UNKNOWN, place
+        frequency, amplitude, distinct_index = self._distinct
+        return frequency, amplitude, UNKNOWN, distinct_index
 
     def stiffness(self, model: Model, values: Values | None = None) -> Array:
         """Stiffness of a model at the points of the sweep; repeats are computed once.
 
         Args:
             model: model to evaluate.
-            values: parameter values in place of the model's own; leading axes are added to the result.
+            values: parameter values in distinct_index of the model's own; leading axes are added to the result.
 
         Returns:
             Complex stiffness, (..., n) [N/m or N m/rad].
         """
         if values is None and (stiffness := self._recall("stiffness", model)) is not None:
             return stiffness
-        frequency, amplitude, conditions, place = self._operating_points(model)
+        frequency, amplitude, conditions, distinct_index = self._operating_points(model)
         stiffness = model.stiffness(self.direction, frequency, amplitude, values=values, conditions=conditions)[
-            ..., place
+            ..., distinct_index
         ]
         return stiffness if values is not None else self._keep("stiffness", model, (), stiffness)
 
@@ -228,13 +228,13 @@ class MeasuredSweep(MeasuredBase):
         with np.errstate(divide="ignore", invalid="ignore"):  # not finite where there is no stiffness: within free play
             return self.deviation(self.stiffness(model, values))
 
-    def residual_with(self, added: Array, model: Model) -> Array:
+    def residual_with_added(self, added: Array, model: Model) -> Array:
         return self.whiten(self.deviation(self.stiffness(model) + added))
 
     def slopes(self, model: Model, names: Sequence[str]) -> Array:
         return self.residual_change(self._slopes(model, names), model)
 
-    def jacobian_with(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
+    def jacobian_with_added(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
         """Derivatives by k parameters of the whitened residuals, gains then phases, of a model with an added stiffness.
 
         Args:
@@ -251,12 +251,12 @@ class MeasuredSweep(MeasuredBase):
 
     def _slopes(self, model: Model, names: Sequence[str]) -> Array:
         """Derivatives of the stiffness at the points by parameter value, (len(names), n); caches the stiffness too."""
-        frequency, amplitude, conditions, place = self._operating_points(model)
+        frequency, amplitude, conditions, distinct_index = self._operating_points(model)
         stiffness, slopes = stiffness_and_slopes(
             model, self.direction, frequency, amplitude, names, conditions=conditions
         )
-        self._keep("stiffness", model, (), stiffness[place])
-        return slopes[:, place]
+        self._keep("stiffness", model, (), stiffness[distinct_index])
+        return slopes[:, distinct_index]
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
         """Change of the whitened residuals by a small change of the model's stiffness.

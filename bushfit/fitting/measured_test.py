@@ -142,7 +142,7 @@ class MeasuredBase(ABC):
 
     @cached_property
     def _last(self) -> dict[str, tuple[Model, Any, Array]]:
-        """Cache of the last force or stiffness and its derivatives by key, each with its model and parameter names."""
+        """Cache for `_recall` and `_keep`: by name of the quantity, its model, parameter names and last array."""
         return {}
 
     def _recall(self, key: str, model: Model, names: Any = ()) -> Array | None:

@@ -40,8 +40,8 @@ from bushfit.fitting.discrepancy import (
     averaged,
     discrepancies,
 )
-from bushfit.fitting.levels import level_errors_of
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, rows_of
+from bushfit.fitting.levels import level_error_columns
+from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, residual_slices
 from bushfit.fitting.problem import FitProblem, FitResult, SmoothError
 from bushfit.fitting.rig_class import class_errors
 from bushfit.fitting.solve import solve
@@ -92,7 +92,7 @@ def with_model_error(
         replace(test, model_error=size, first_error=2) if isinstance(test, MeasuredLoop) else test
         for test in _thinned(plain_fit.minimised)
     ]
-    tests = _in_noise(closest, thinned)
+    tests = _fitted_tests(closest, thinned)
     sizes = np.geomspace(_SMOOTH_RATIO[0] * size, _SMOOTH_RATIO[1] * size, 9)
     processes = [replace(process, sizes=sizes) for process in discrepancies(tests)]
     likeliest = max(processes, key=lambda process: process.best[0])
@@ -100,7 +100,7 @@ def with_model_error(
     if error.rms >= SIZES[-1]:
         return plain_fit, None
     weighed = [test.with_model_error(size) for test in plain_fit.covariance_tests or plain_fit.minimised]
-    whole = Discrepancy.over_tests(_in_noise(closest, weighed), likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
+    whole = Discrepancy.over_tests(_fitted_tests(closest, weighed), likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
     process = SmoothError(likeliest.best[1] * whole.complex_shapes, likeliest.likelihood.freedom(likeliest.best[1]))
     closest = replace(closest, noise_weighted=plain_fit.data_sets, outliers=plain_fit.outliers)
     return replace(closest, covariance_tests=weighed, smooth_error=process), error
@@ -126,7 +126,7 @@ def closest_fit(plain_fit: FitResult, bounds: Bounds) -> tuple[FitResult, float]
         of_effects = [paper.start_values_for(effect)[0] for effect in plain_fit.model.records]
         values = {**paper.values, **{name: value for start in of_effects for name, value in start.items()}}
         starts.append(plain_fit.model.with_values({name: values[name] for name in names if name in values}))
-    sizes = [likeliest_size(start, tests, names) for start in starts]
+    sizes = [likeliest_model_error(start, tests, names) for start in starts]
     size = min(size for size in sizes if np.isfinite(size))
     for _ in range(_MAXIMUM_ROUNDS):
         weighted, ends = [test.with_model_error(size) for test in tests], list[FitResult]()
@@ -135,13 +135,13 @@ def closest_fit(plain_fit: FitResult, bounds: Bounds) -> tuple[FitResult, float]
                 ends.append(solve(FitProblem(start, weighted, names, bounds), strict=False))
         solution = min(ends, key=lambda end: end.chi_square)
         starts, before = [solution.model], size
-        size = likeliest_size(solution.model, tests, [names[i] for i in solution.moving])
+        size = likeliest_model_error(solution.model, tests, [names[i] for i in solution.moving])
         if abs(np.log(size / before)) < _SETTLED or size >= SIZES[-1]:
             break
     return solution, size
 
 
-def likeliest_size(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> float:
+def likeliest_model_error(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> float:
     """Size of the independent model error, relative to the stiffness, that maximises the restricted likelihood.
 
     Args:
@@ -203,7 +203,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
     bare = [replace(test, model_error=0.0) for test in _thinned(solution.minimised)]
     if size:
         bare = [replace(t, model_error=size, first_error=2) if isinstance(t, MeasuredLoop) else t for t in bare]
-    tests = _in_noise(solution, bare)
+    tests = _fitted_tests(solution, bare)
     rows, residual = tests.moving, tests.solution.residual
     information, gain = rows @ rows.T, 0.0
     if size:
@@ -241,7 +241,7 @@ def model_error_warning(error: Unnamed) -> str:
 def _exceeds_noise(solution: FitResult, rig: RigSettings) -> bool:
     """True if chi-square of all tests, or of one, exceeds that of noise and errors of a rig of the given class."""
     squares, counts = [], [test.residual_count for test in solution.minimised]
-    for test, rows in zip(solution.minimised, rows_of(solution.minimised), strict=True):
+    for test, rows in zip(solution.minimised, residual_slices(solution.minimised), strict=True):
         whitened = CommonError(_errors_of_class(test, rig)).whiten(solution.residual[rows])
         squares.append(float(np.sum(np.square(whitened))))
     freedom = max(sum(counts) - len(solution.names), 1)
@@ -252,7 +252,7 @@ def _exceeds_noise(solution: FitResult, rig: RigSettings) -> bool:
 def _is_smooth(solution: FitResult, rig: RigSettings) -> bool:
     """True if a smooth discrepancy is more probable than noise and errors of a rig of the given class alone."""
     thinned = _thinned(solution.minimised)
-    solution = solution.moved_to(solution.model, thinned)
+    solution = solution.reevaluate(solution.model, thinned)
     tests = FittedTests(solution, [_errors_of_class(test, rig) for test in thinned])
     names = tuple(dict.fromkeys(tests.directions.tolist()))
     quick = [Discrepancy.over_tests(tests, (names,), _MIDDLING, _FEW)]
@@ -273,21 +273,21 @@ def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
         gain = test.gain_error * test.unit_gain[None]
         return gain[:0] if test.gain_weighs else gain
     uncounted = np.sqrt(np.maximum(np.square(class_errors(rig)) - np.square(test.noise.level), 0.0))
-    columns = level_errors_of(test)
+    columns = level_error_columns(test)
     return columns * np.tile(uncounted, len(columns) // 2)[:, None]
 
 
-def _in_noise(solution: FitResult, tests: Sequence[MeasuredTest]) -> FittedTests:
-    """Collect a fit and its tests, with other weights or fewer points, for the estimate of a smooth model error.
+def _fitted_tests(solution: FitResult, tests: Sequence[MeasuredTest]) -> FittedTests:
+    """Evaluate a fit for reweighted or thinned tests, for the estimate of a smooth model error without rig errors.
 
     Args:
         solution: result of the fit.
         tests: reweighted or thinned tests.
 
     Returns:
-        Fitted model and tests, without errors of the rig.
+        Fitted model and tests.
     """
-    return FittedTests(solution.moved_to(solution.model, tests), [np.empty((0, test.size)) for test in tests])
+    return FittedTests(solution.reevaluate(solution.model, tests), [np.empty((0, test.size)) for test in tests])
 
 
 def _thinned(tests: Sequence[MeasuredTest]) -> list[MeasuredTest]:

@@ -17,10 +17,10 @@ from bushfit.fitting.repeats import (
     FEWEST_SOUGHT,
     FLOOR,
     LineNoise,
-    at_nominal,
     difference_freedom,
-    disturbed,
+    disturbed_steps,
     line_noise,
+    stiffness_at_nominal,
 )
 from bushfit.fitting.rig_class import class_errors, describe_class, format_class_errors, largest_error
 from bushfit.reading.measurement import Sweep
@@ -114,7 +114,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
         within a line and over lines; lines keep separate variances if Bartlett's test finds them unequal. If the
         squares of D grow along the stepped quantity, so does the scatter.
     """
-    at_levels = [(sweep, at_nominal(sweep)) for sweep in sweeps]
+    at_levels = [(sweep, stiffness_at_nominal(sweep)) for sweep in sweeps]
 
     def of_lines(without: Collection[float]) -> dict[LineKey, LineNoise]:
         return {
@@ -124,8 +124,8 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
         }
 
     lines = of_lines(())
-    if disturbed_steps := disturbed(lines.values()):
-        lines = of_lines(disturbed_steps)
+    if disturbed := disturbed_steps(lines.values()):
+        lines = of_lines(disturbed)
     slopes, by_name = dict[str, tuple[float, float]](), {sweep.name: sweep for sweep in sweeps}
     for stepped in {sweep.stepped for sweep in sweeps}:  # one law for all sweeps that step the same
         names = [name for name, sweep in by_name.items() if sweep.stepped == stepped]

@@ -99,7 +99,7 @@ def are_stuck(recorded: Array) -> Array:
     return np.append(False, unlikely)
 
 
-def gross_rows(values: Array) -> Array:
+def gross_outliers(values: Array) -> Array:
     """Find rows of a periodic motion, of unknown period, that are far from the median of their neighbours.
 
     Many such rows mean that the motion turns within the width of the median; then no row is returned.
@@ -148,36 +148,36 @@ def outlying_points(
     limit = by_noise * misfit_scale(distance, 2)
     far = distance > limit
     local = _from_neighbours(deviation, starts, _FEW_NEIGHBOURS)
-    _, place = np.unique(points, axis=1, return_inverse=True)
-    repeats, from_repeats = _from_repeats(local, place)
+    _, point_index = np.unique(points, axis=1, return_inverse=True)
+    repeats, from_repeats = _from_repeats(local, point_index)
     alone = np.minimum(
         distance_of(local, shared=False), np.where(repeats > 0, distance_of(from_repeats, shared=False), np.inf)
     )
-    against = _from_neighbours(_from_repeats(deviation, place)[1], starts, NEIGHBOURS)
+    against = _from_neighbours(_from_repeats(deviation, point_index)[1], starts, NEIGHBOURS)
     # the median of n repeats has pi/(2 n) of the variance of one
     agreed = distance_of(against, shared=False) / np.sqrt(1.0 + np.pi / 2.0 / np.maximum(repeats, 1))
-    farthest = np.zeros(place.max() + 1)
-    np.maximum.at(farthest, place, agreed)
+    farthest = np.zeros(point_index.max() + 1)
+    np.maximum.at(farthest, point_index, agreed)
     apart_from_repeats = agreed > by_noise * misfit_scale(agreed[repeats > 1], 2)
     return np.flatnonzero(
-        np.where(repeats > 1, apart_from_repeats & (far | (agreed == farthest[place])), far & (alone > limit))
+        np.where(repeats > 1, apart_from_repeats & (far | (agreed == farthest[point_index])), far & (alone > limit))
     )
 
 
-def contradictions(stiffness: Array, place: Array) -> list[tuple[float, int, int]]:
+def contradictions(stiffness: Array, point_index: Array) -> list[tuple[float, int, int]]:
     """Find operating points whose repeats contradict each other: complex stiffnesses that differ by 10 % or more.
 
     Args:
         stiffness: stiffness of the points, complex (n,).
-        place: index of the operating point of each point, (n,).
+        point_index: index of the operating point of each point, (n,).
 
     Returns:
         For each such operating point, the largest first: magnitude of the complex difference relative to |K|, and
         indices of the two points that differ most.
     """
-    value, ends, worst = np.log(stiffness), np.cumsum(np.bincount(place)), dict[int, tuple[float, int, int]]()
+    value, ends, worst = np.log(stiffness), np.cumsum(np.bincount(point_index)), dict[int, tuple[float, int, int]]()
     for part in (value.real, value.imag):
-        order = np.lexsort((part, place))
+        order = np.lexsort((part, point_index))
         first, last = order[np.append(0, ends[:-1])], order[ends - 1]
         separation = np.abs(stiffness[last] - stiffness[first]) / np.minimum(*np.abs(stiffness[[first, last]]))
         for location in np.flatnonzero(separation >= _UNLIKE).tolist():
@@ -216,18 +216,18 @@ def _from_neighbours(values: Array, starts: Array, window: int) -> Array:
     return local
 
 
-def _from_repeats(values: Array, place: Array) -> tuple[Array, Array]:
+def _from_repeats(values: Array, point_index: Array) -> tuple[Array, Array]:
     """Number of other repeats of each point, (n,), and its difference from their median, complex (n,); 0 without any.
 
     Args:
         values: deviations, complex (n,).
-        place: index of the operating point of each point, (n,); points with equal indices are repeats.
+        point_index: index of the operating point of each point, (n,); points with equal indices are repeats.
     """
-    counts = np.bincount(place)
-    repeats, distances = counts[place] - 1, []
+    counts = np.bincount(point_index)
+    repeats, distances = counts[point_index] - 1, []
     for part in (values.real, values.imag):
-        order = np.lexsort((part, place))
-        size, start = counts[place[order]], (np.cumsum(counts) - counts)[place[order]]
+        order = np.lexsort((part, point_index))
+        size, start = counts[point_index[order]], (np.cumsum(counts) - counts)[point_index[order]]
         rank = np.arange(order.size) - start
         # the two in the middle of the others, which step over the point itself
         low, high = (np.minimum(half + (half >= rank), size - 1) for half in ((size - 2) // 2, (size - 1) // 2))

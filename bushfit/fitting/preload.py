@@ -86,7 +86,7 @@ def _probability_of_chance(data: PreparedCampaign, tests: Sequence[MeasuredTest]
     names = [name for name in data.free(tuple(model.parameters)) if name not in model.tied]
     plain, full = _fits(data, FitProblem(model, tests, names, data.bounds), fixed)
     errors = level_errors(full.minimised, full.residual, full.jacobian, largest_error(data.campaign.rig))
-    if errors.matters:
+    if errors.significant:
         loops, sweeps = split_by_kind(tests)
         tests = [*loops, *with_level_errors(sweeps, errors.error, errors.freedom)]
         plain, full = _fits(data, replace(plain.problem, model=plain.model, tests=tests), fixed)

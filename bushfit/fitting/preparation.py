@@ -162,7 +162,7 @@ def split_by_kind(data_sets: Iterable[MeasuredTest]) -> tuple[list[MeasuredLoop]
     return loops, [test for test in tests if isinstance(test, MeasuredSweep)]
 
 
-def rows_of(data_sets: Iterable[MeasuredTest]) -> list[slice]:
+def residual_slices(data_sets: Iterable[MeasuredTest]) -> list[slice]:
     """Slice of each test's residuals in the array of the residuals of all tests."""
     ends = accumulate((test.size for test in data_sets), initial=0)
     return [slice(*pair) for pair in pairwise(ends)]
@@ -197,7 +197,7 @@ def sources(data_sets: Iterable[MeasuredTest]) -> tuple[Source, ...]:
     return tuple(found)
 
 
-def new_loop(
+def planned_loop(
     model: Model,
     place: Place,
     frequency: float,
@@ -240,7 +240,7 @@ def new_loop(
     return MeasuredLoop(silent).noise_free(model).with_noise(noise)
 
 
-def new_sweep(
+def planned_sweep(
     model: Model,
     place: Place,
     frequency: Array,

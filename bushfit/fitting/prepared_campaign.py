@@ -13,9 +13,9 @@ from bushfit.campaign.constraints import constraints_of
 from bushfit.campaign.session import measured_session
 from bushfit.effects import BASE, effect_name_of, get_effect, with_base
 from bushfit.errors import FitError, ModelError, error_location
-from bushfit.fitting.assess import mixed_conditions, refuse_strain
+from bushfit.fitting.assess import check_strain, mixed_conditions
 from bushfit.fitting.coordinates import Bounds, residual
-from bushfit.fitting.design import designed
+from bushfit.fitting.design import start_with_effects
 from bushfit.fitting.preload import with_preload
 from bushfit.fitting.preparation import (
     MeasuredLoop,
@@ -79,9 +79,9 @@ class PreparedCampaign:
             {name: (setting.min, setting.max) for name, setting in campaign.fit.parameters.items()},
             constraints=constraints_of(campaign),
         )
-        return with_preload(data.in_session())
+        return with_preload(data.with_rubber_conditions())
 
-    def in_session(self) -> "PreparedCampaign":
+    def with_rubber_conditions(self) -> "PreparedCampaign":
         """Return the campaign with the temperature of the rubber and its earlier strains at each point of each test."""
         conditions = iter(measured_session(self.campaign.bushing, [data_set.test for data_set in self.data_sets]))
         loops = tuple(replace(loop, test_conditions=next(conditions).select(0)) for loop in self.loops)
@@ -102,7 +102,7 @@ class PreparedCampaign:
 
     @property
     def assumed(self) -> list[str]:
-        """Warnings about preloads, and if the class of the rig is assumed: nothing was repeated, no class stated."""
+        """Warnings about the influence of preload, and about a rig whose accuracy is neither stated nor measured."""
         if None not in self.campaign.rig.stiffness_errors or all(
             sweep.noise.origin != "assumed" for sweep in self.sweeps
         ):
@@ -136,7 +136,7 @@ class PreparedCampaign:
         if not tests:
             raise FitError(message, file=self.campaign.path, found=found, hint=hint)
         with error_location(self.campaign.path):
-            refuse_strain(self.campaign.bushing, tests)
+            check_strain(self.campaign.bushing, tests)
         return tests
 
     def without(self, outliers: Sequence[Outlier]) -> "PreparedCampaign":
@@ -198,10 +198,10 @@ class PreparedCampaign:
         plain = Model.with_defaults(bushing, [*dict.fromkeys(before)], starts[best], constraints=self.constraints)
         names = [*models[best].parameters, *plain.parameters]
         still = [name for name in names if name in stage_fixed or not self.free((name,))]
-        return designed(models[best], plain, data_sets, still, self.bounds)
+        return start_with_effects(models[best], plain, data_sets, still, self.bounds)
 
     def free(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Names of the parameters that the campaign does not fix."""
+        """Select the parameter names that the campaign does not fix."""
         settings = self.campaign.fit.parameters
         return tuple(name for name in names if name not in settings or settings[name].vary)
 

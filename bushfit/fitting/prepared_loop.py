@@ -193,7 +193,7 @@ def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> PreparedLoop:
     half_motion = float(np.ptp(series(found.motion, np.arange(GRID) / GRID))) / 2.0
     half_force = float(np.ptp(np.delete(loop.force, outliers))) / 2.0
     noise = loop.noise * half_force if loop.noise is not None else found.force_noise
-    rests = _rests(loop, found, frequency, half_motion, half_force, noise)
+    rests = _starts_at_rest(loop, found, frequency, half_motion, half_force, noise)
     from_rest = first_row == 0 and any(rests)
     unweighted = outliers if without_outliers else outliers[:0]
     clock = loop.time - loop.time[0] if loop.time[0] else loop.time
@@ -285,7 +285,7 @@ def _with_row_noise(prepared: PreparedLoop, loop_harmonics: LoopHarmonics) -> Pr
         model, size = row_noise(misfit * scale, remove_slow_changes(phase, misfit)[0] * scale, cycles)
     if binned:
         breaks = () if prepared.from_rest else tuple((np.flatnonzero(np.diff(turn)) + 1).tolist())
-        model = replace(model, size=max(size / loop_harmonics.force_noise, 1.0), breaks=breaks)
+        model = replace(model, row_scale=max(size / loop_harmonics.force_noise, 1.0), breaks=breaks)
         return replace(prepared, row_noise=model)
     if not model.order:
         return prepared
@@ -306,7 +306,7 @@ def _at_reversal(prepared: PreparedLoop) -> Array:
     return np.minimum(position - turns[after - 1], turns[after] - position) < 1.5
 
 
-def _rests(
+def _starts_at_rest(
     loop: Loop, harmonics: LoopHarmonics, frequency: float, half_motion: float, half_force: float, noise: float
 ) -> tuple[bool, bool]:
     """Return two flags: the record begins at rest at zero, and it begins at rest about a preload.

@@ -19,7 +19,7 @@ from bushfit.fitting.coordinates import (
     prior_rows,
     residual,
 )
-from bushfit.fitting.preparation import MeasuredTest, rows_of
+from bushfit.fitting.preparation import MeasuredTest, residual_slices
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.model.result import End, Outlier
@@ -134,7 +134,7 @@ class SmoothError:
             Covariance of the parameters, in the units of the influence, (k, k).
         """
         first, changes = 0, np.zeros((len(influence), len(self.shapes)))
-        for test, rows in zip(tests, rows_of(tests), strict=True):
+        for test, rows in zip(tests, residual_slices(tests), strict=True):
             last = first + test.frequency.size
             change = self.shapes[:, first:last] * test.noise_free(model).measured
             changes += influence[:, rows] @ test.residual_change(change, model).T
@@ -209,14 +209,14 @@ class FitResult:
         return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
 
     def gain(self, fixed: Collection[str]) -> float:
-        """Fall of chi-square expected from one Gauss-Newton step of the other parameters, with the named ones fixed."""
+        """Fall of chi-square expected from one Gauss-Newton step of all parameters except the `fixed` ones, by name."""
         free = [i for i, name in enumerate(self.names) if name not in fixed]
         left_vectors, values, _ = np.linalg.svd(self.jacobian[free].T, full_matrices=False)
         significant = values > ROUNDING * values.max(initial=0.0)
         return float(np.sum(np.square(left_vectors[:, significant].T @ self.residual)))
 
-    def moved_to(self, model: Model, tests: Sequence[MeasuredTest]) -> FitResult:
-        """Evaluate residuals and Jacobian again for other parameter values or other tests, without a fit.
+    def reevaluate(self, model: Model, tests: Sequence[MeasuredTest]) -> FitResult:
+        """Compute residuals and Jacobian for other parameter values or other tests, without a fit.
 
         Args:
             model: model with the same parameters.

@@ -110,7 +110,7 @@ def fit_joint(
         tests = [*loops, *with_level_errors(sweeps, errors.error, errors.freedom)]
         found = estimate(replace(problem, model=found.model, tests=tests), robust=data.robust)
     notes = [model_error_warning(error) + NEXT] if error else []
-    if errors.matters and not at_limit and not error:
+    if errors.significant and not at_limit and not error:
         size = format_class_errors(errors.error)
         notes.append(
             f"levels disagree by more than their repeats: an error of {size} for each level is included in the noise"

@@ -75,7 +75,7 @@ def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed:
         sweep: measured sweep.
         log_stiffness: ln K of the sweep's points, complex (n,).
         held_value: value held constant along the line: amplitude [m or rad], frequency [Hz] or number of the run.
-        disturbed: frequencies or amplitudes to leave out, see `disturbed`.
+        disturbed: frequencies or amplitudes to leave out, see `disturbed_steps`.
 
     Returns:
         Noise of the line.
@@ -86,7 +86,7 @@ def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed:
     table = np.full((numbers.size, steps.size), np.nan + 0j)
     table[row, column] = log_stiffness[chosen]
     differences = (one - second for one, second in combinations(table, 2))
-    usual_steps = [(difference, _usual(difference, np.log(steps))) for difference in differences]
+    usual_steps = [(difference, _is_typical(difference, np.log(steps))) for difference in differences]
     pairs = [(difference[usual], steps[usual]) for difference, usual in usual_steps if usual.sum() >= FEWEST_STEPS]
     if not pairs:
         return _about_smooth_curve(steps, np.nanmean(table, axis=0))
@@ -112,7 +112,7 @@ def difference_freedom(steps: int) -> float:
     return 2.0 * steps**2 / (3.0 * steps - 1.0)
 
 
-def _usual(difference: Array, log_step: Array) -> Array:
+def _is_typical(difference: Array, log_step: Array) -> Array:
     """Mask of the steps at which the difference of two repeats is no outlier, (n,).
 
     The limit is constant, or grows along the run if the differences grow, by Theil's (1950) median slope.
@@ -145,12 +145,12 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
     usual = np.median(np.sort(residual, axis=0)[degree + 1 :], axis=0)  # the curve goes through degree + 1 points
     inliers = np.all(residual <= np.maximum(_OUTLIER * MEDIAN_TO_SIGMA * usual, FLOOR), axis=1)
     inliers |= np.count_nonzero(inliers) < degree + 2  # too few would leave nothing free
-    scatter = _freed(basis[inliers], values[inliers])
+    scatter = _project_out(basis[inliers], values[inliers])
     curve = np.linalg.qr(basis)[0]
     misfit, free = values - curve @ (curve.T @ values), 1.0 - np.square(curve).sum(axis=1)
     falls = np.square(misfit).sum(axis=1) / np.maximum(free, FLOOR**2)
     worst = int(np.argmax(falls))  # the point without which the sum of squares about the curve falls most
-    calmer = _freed(np.delete(basis, worst, axis=0), np.delete(values, worst, axis=0))
+    calmer = _project_out(np.delete(basis, worst, axis=0), np.delete(values, worst, axis=0))
     squares = np.square(residual / np.maximum(MEDIAN_TO_SIGMA * usual, FLOOR)).sum(axis=1)
     squared_distance = dict(zip(steps.tolist(), squares.tolist(), strict=True))
     return LineNoise(
@@ -158,7 +158,7 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
     )
 
 
-def disturbed(lines: Iterable[LineNoise]) -> list[float]:
+def disturbed_steps(lines: Iterable[LineNoise]) -> list[float]:
     """Find steps at which lines without repeats scatter far more than at others, such as near the mains frequency.
 
     Returns:
@@ -180,7 +180,7 @@ def unit(values: Array) -> Array:
     return 2.0 * (values - values.min()) / max(float(np.ptp(values)), np.finfo(float).tiny) - 1.0
 
 
-def _freed(basis: Array, values: Array) -> Array:
+def _project_out(basis: Array, values: Array) -> Array:
     """Project values, (n, m), orthogonally to the k functions of a curve, (n, k): independent residuals, (n - k, m)."""
     (reflections, factors), _ = qr(basis, mode="raw")
     turned, *_ = lapack.dormqr("L", "T", reflections, factors, values, lwork=values.shape[1])
@@ -192,7 +192,7 @@ def _parts(values: Array) -> Array:
     return np.stack([np.real(values), np.imag(values)], axis=-1)
 
 
-def at_nominal(sweep: Sweep) -> Array:
+def stiffness_at_nominal(sweep: Sweep) -> Array:
     """Logarithm of the stiffness of each point, corrected to the nominal amplitude of its level, complex (n,).
 
     The correction from the reached to the nominal amplitude follows a smooth surface fitted to ln K over ln f and ln X.

@@ -32,7 +32,7 @@ _MOST_ROUNDS = 30
 _MOST_NAMED = 8
 
 
-def outliers_at(
+def list_outliers(
     model: Model, data_sets: Sequence[MeasuredTest], outlying: Sequence[Array] | None = None
 ) -> tuple[Outlier, ...]:
     """List the outliers of tests by file and row.
@@ -69,7 +69,7 @@ def estimate(
     """
     if not robust:
         found = solver(problem)
-        return replace(found, outliers=outliers_at(found.model, problem.tests))
+        return replace(found, outliers=list_outliers(found.model, problem.tests))
     model, tests = problem.model, problem.tests
     for _ in range(_MOST_ROUNDS):
         outlying = [test.outlier_indices(model) for test in tests]
@@ -86,7 +86,7 @@ def estimate(
         change, model = (after - before) @ found.jacobian, found.model
         if float(change @ change) < _SETTLED**2:
             weighed = [test.weighted(np.array(_efficiency(test.residuals_per_point))) for test in retained]
-            outliers = outliers_at(model, retained, outlying)
+            outliers = list_outliers(model, retained, outlying)
             return replace(found, covariance_tests=weighed, noise_weighted=retained, outliers=outliers)
     raise FitError(
         "the robust fit does not converge",

@@ -49,8 +49,9 @@ class RowNoise:
         starts: matrix that whitens the first p rows, which have no p rows before them, (p, p).
         error: standard errors of the log of the variance, and of b_k/b_0, as independent columns, (p + 1, p + 1); None
             if not estimated.
-        share: share of the variance of the whitened rows that is observed; the rest is the floor under the spectrum.
-        size: standard deviation of a row of unit weight over the noise of a recorded row; above 1 for bins of
+        observed_share: fraction of the variance of the whitened rows that is observed; the rest is the floor under the
+            spectrum.
+        row_scale: standard deviation of a row of unit weight over the noise of a recorded row; above 1 for bins of
             correlated rows.
         breaks: indices of rows that do not depend on the row before: starts of bins averaged over other cycles.
     """
@@ -58,8 +59,8 @@ class RowNoise:
     filter: Array = field(default_factory=lambda: np.ones(1))
     starts: Array = field(default_factory=lambda: np.ones((0, 0)))
     error: Array | None = None
-    share: float = 1.0
-    size: float = 1.0
+    observed_share: float = 1.0
+    row_scale: float = 1.0
     breaks: tuple[int, ...] = ()
 
     @property
@@ -72,20 +73,16 @@ class RowNoise:
         """Number of correlated rows with as much information on slow changes as one independent row, at least 1."""
         return max(1.0 / float(np.sum(self.filter)) ** 2, 1.0)
 
-    def counting(self, weight: Array) -> Array:
-        """Mask of the whitened rows to use: the row and all preceding rows in its filter have weight, (n,).
-
-        Returns:
-            Mask, (n,).
-        """
+    def usable_rows(self, weight: Array) -> Array:
+        """Mask of the whitened rows to use: the row and all preceding rows in its filter have weight, (n,)."""
         counts = weight > 0.0
-        counting = counts.copy()
+        usable = counts.copy()
         for k in range(1, self.order + 1):
-            counting[k:] &= counts[:-k]
+            usable[k:] &= counts[:-k]
         for first in (0, *self.breaks):
             begun = slice(first, first + self.order)
-            counting[begun] = counts[begun].all()
-        return counting
+            usable[begun] = counts[begun].all()
+        return usable
 
     def whiten(self, rows: Array) -> Array:
         """Whiten rows in units of noise, (..., n): their noise becomes uncorrelated with unit variance.
@@ -123,7 +120,7 @@ class RowNoise:
         return list(np.tensordot(self.error.T, np.array(moves), axes=1))
 
     def _coloured(self, rows: Array, delay: int) -> Array:
-        """Give white rows, (..., n), delayed by `delay` rows, the correlation of the noise, times b_0."""
+        """Delay white rows, (..., n), by `delay` rows and filter them by b_0/b, the inverse of the whitening filter."""
         late = np.zeros((rows.shape[-1], rows[..., 0].size))  # a banded system: no module of filters is loaded
         late[delay:] = rows.reshape(late.shape[::-1])[:, : len(late) - delay].T
         band = np.repeat((self.filter / self.filter[0])[:, None], len(late), axis=1)
@@ -179,7 +176,7 @@ def row_noise(residual: Array, settled: Array, cycles: int) -> tuple[RowNoise, f
 
 
 def noise_harmonics_of_single_cycle(number: Array) -> Array:
-    """Mask of the harmonics, given by number, (n,), of a lone cycle that are taken for noise, (n,)."""
+    """Mask of the harmonics, by number, (n,), from which the noise of a loop of one cycle is estimated, (n,)."""
     return (number % 2 == 0) & (number >= _FIRST_EVEN)
 
 

@@ -41,7 +41,7 @@ def solve(
     if not problem.names:
         misfit = problem.residual(problem.model)
         return FitResult(problem, problem.model, misfit, np.empty((0, misfit.size)))
-    found = Descent.start(problem, tolerance).finished(evaluations).solution
+    found = Descent.start(problem, tolerance).run(evaluations).solution
     if found.stopped and strict and not found.flat:
         raise FitError(
             "the fit did not converge",

@@ -45,7 +45,7 @@ def start_values(
     Args:
         bushing: geometry of the bushing; None if all tests are of specimens.
         data_sets: tests.
-        fixed: known values by parameter name, returned unchanged [SI].
+        fixed: known values by parameter name, included unchanged [SI].
 
     Returns:
         Values by parameter name [SI].

@@ -52,7 +52,7 @@ class SharedError:
 
     @cached_property
     def share(self) -> Array:
-        """Share, 0 to 1, of each group's shared component that whitening subtracts, (g,)."""
+        """Fraction, 0 to 1, of each group's shared component that whitening subtracts, (g,)."""
         return 1.0 - 1.0 / np.sqrt(1.0 + self.variance * self.weight)
 
     def components(self, rows: Array) -> Array:
@@ -201,7 +201,7 @@ class Whitening:
 
     @cached_property
     def _by_point(self) -> tuple[Array, Array]:
-        """Indices that sort deviations by operating point, gains first, (2 n,), and the start of each point."""
+        """Indices that sort the 2 n deviations by operating point, gains first, and the first index of each group."""
         labels = np.concatenate((self.points, self.points + self.points.max() + 1))
         order = np.argsort(labels, kind="stable")
         return order, np.concatenate(([0], 1 + np.flatnonzero(np.diff(labels[order]))))

@@ -21,7 +21,7 @@ from bushfit.effects import Effect
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
 from bushfit.fitting.coordinates import Coordinates, jacobian
 from bushfit.fitting.information import relative_sizes
-from bushfit.fitting.preparation import MeasuredTest, new_loop, new_sweep, split_by_kind
+from bushfit.fitting.preparation import MeasuredTest, planned_loop, planned_sweep, split_by_kind
 from bushfit.geometry import Place, shared_labels
 from bushfit.planning.contract import Knowledge, Test, operating_points
 
@@ -184,14 +184,14 @@ class CandidateGrid:
                 continue
             motion = test.direction, test.frequency, test.amplitude
             if motion not in loops:
-                data_sets.append(new_loop(model, *motion, per_row, rows=_ROWS))
+                data_sets.append(planned_loop(model, *motion, per_row, rows=_ROWS))
                 loops[motion] = start + np.arange(_ROWS)
                 start += _ROWS
             rows[test] = loops[motion]
         for place, place_sweeps in sweeps.items():
             parts = [np.stack(operating_points(sweep)[::-1], axis=-1) for sweep in place_sweeps]
             points, index = np.unique(np.concatenate(parts), axis=0, return_inverse=True)
-            data_sets.append(new_sweep(model, place, points[:, 1], points[:, 0], (1.0, 1.0), (0.0, 0.0)))
+            data_sets.append(planned_sweep(model, place, points[:, 1], points[:, 0], (1.0, 1.0), (0.0, 0.0)))
             ends = np.cumsum([len(part) for part in parts])[:-1]
             for sweep, numbers in zip(place_sweeps, np.split(index.ravel(), ends), strict=True):
                 rows[sweep] = start + np.stack((numbers, len(points) + numbers))

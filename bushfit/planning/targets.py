@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.preparation import new_sweep
+from bushfit.fitting.preparation import planned_sweep
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.result import Result
 from bushfit.planning.contract import Knowledge, Points, Target
@@ -54,7 +54,7 @@ class WantedPoints:
             Sensitivities and errors, in the order of the points.
         """
         place, frequency, amplitude = points.place, points.frequency, points.amplitude
-        sweep = new_sweep(knowledge.model, place, frequency, amplitude, (1.0, 1.0), (0.0, 0.0))
+        sweep = planned_sweep(knowledge.model, place, frequency, amplitude, (1.0, 1.0), (0.0, 0.0))
         slopes = np.stack(np.split(relative_slopes(knowledge, [sweep]).T, 2))
         exact = replace(knowledge.result or Result(knowledge.model), covariance=Covariance())
         prediction = predict(exact, place, frequency, amplitude)  # over the grid of all pairs

@@ -12,7 +12,7 @@ from rigged import SHARED, asked, no_repeats, said
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.next_test import BUSHING_TESTS, FIXTURE_TESTS, deciding_test, remaining_entropy
 from bushfit.effects import BASE
-from bushfit.fitting.preparation import MeasuredTest, new_sweep
+from bushfit.fitting.preparation import MeasuredTest, planned_sweep
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
@@ -135,6 +135,6 @@ def test_coupons_with_a_bushing_are_followed_by_a_sweep_of_it(bushing, paper_mod
     """A bushing that was not tested is proposed, and no test of a bushing if the campaign has none."""
     model = paper_model if bushing else replace(paper_model, bushing=None)
     coupon = Specimen("DMA", "modulus")
-    sweep = new_sweep(model, coupon, np.array([5.0, 25.0, 105.0]), np.full(3, 0.01), (2e-3, 2e-3), (2e-3, 2e-3))
+    sweep = planned_sweep(model, coupon, np.array([5.0, 25.0, 105.0]), np.full(3, 0.01), (2e-3, 2e-3), (2e-3, 2e-3))
     rivals = [model, model.with_effect("stiffness_factor.radial", {"stiffness_factor.radial": 1.2})]
     assert ("radial direction" in deciding_test(rivals, EVEN, [sweep])) == bushing

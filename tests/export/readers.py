@@ -168,7 +168,7 @@ def teimorbit(text: str) -> dict[str, tuple[dict[str, str], list[str], np.ndarra
     return {block: (pairs, columns, np.array(table)) for block, (pairs, columns, table) in found.items()}
 
 
-def rows_of(known: pd.DataFrame, direction: Direction, level: int) -> tuple[np.ndarray, np.ndarray]:
+def residual_slices(known: pd.DataFrame, direction: Direction, level: int) -> tuple[np.ndarray, np.ndarray]:
     """Frequency and complex stiffness of the kept computation at a level of amplitude from 1, or else the last."""
     rows = known[known["direction"] == direction]
     amplitudes = np.sort(rows["amplitude"].unique())

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from readers import HASH, Curves, abaqus_options, by_abaqus, by_optistruct, by_pynastran, rows_of, teimorbit
+from readers import HASH, Curves, abaqus_options, by_abaqus, by_optistruct, by_pynastran, residual_slices, teimorbit
 from scipy.interpolate import Akima1DInterpolator
 
 from bushfit.effects.contract import Array
@@ -61,7 +61,7 @@ def test_every_value_of_the_grid_is_read_back(name, units, export_request, known
         scale = newton * metre if direction is Direction.TORSION else newton / metre
         for dof in dofs:
             for rank in ranks:
-                frequency, stiffness = rows_of(known, direction, rank)
+                frequency, stiffness = residual_slices(known, direction, rank)
                 f, k = found[dof, rank]
                 np.testing.assert_allclose(f * second, frequency, rtol=ALONG)
                 worst = max(worst, np.abs(k / scale / stiffness - 1.0).max())
@@ -205,7 +205,7 @@ def test_adams_holds_curve_and_damping(export_request, known):
                 assert moved[-1] == pytest.approx(amplitudes[-1] * length, rel=ALONG)
                 at_end = resting(export_request.result.model, Direction(direction), amplitudes[-1])
                 np.testing.assert_allclose(resisting[[0, -1]], np.array([-1.0, 1.0]) * at_end * force, rtol=MODEL)
-                frequency, stiffness = rows_of(known, Direction(direction), (amplitudes.size + 1) // 2)
+                frequency, stiffness = residual_slices(known, Direction(direction), (amplitudes.size + 1) // 2)
                 f, k = frequency[7], stiffness[7]  # of 16 from 5 Hz in steps of 10
                 wanted = k.imag / (2.0 * np.pi * f) * force / length if kind == "car" else np.degrees(np.angle(k))
                 assert float(blocks["DAMPING"][0][f"{end}_DAMPING"]) == pytest.approx(wanted, rel=5 * MODEL)
@@ -225,7 +225,7 @@ def test_adams_says_how_far_its_element_is_off(export_request, known, kind):
     wave = np.cos(2.0 * np.pi * np.arange(64) / 64)
     ratio, apart = [], []
     for rank in range(1, 6):
-        frequency, stiffness = rows_of(known, Direction.AXIAL, rank)
+        frequency, stiffness = residual_slices(known, Direction.AXIAL, rank)
         amplitude = 1e3 * amplitude_of(known, Direction.AXIAL, rank)
         storage = 2.0 * np.mean(np.interp(amplitude * wave, moved, force) * wave) / amplitude
         turn = 2j * np.pi * frequency * damping if kind == "car" else 1j * storage * np.tan(np.radians(damping))

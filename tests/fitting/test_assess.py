@@ -13,7 +13,7 @@ from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.assess import FitStage, covariance
 from bushfit.fitting.coordinates import jacobian
-from bushfit.fitting.preparation import MeasuredLoop, new_loop
+from bushfit.fitting.preparation import MeasuredLoop, planned_loop
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import fit_joint
@@ -88,7 +88,7 @@ def test_what_wrong_weights_cost_is_that_of_a_mean_of_two_groups(paper_model):
     """One parameter from two loops of unsure noise, as P. Meier (Biometrics 9 (1953) 59) has a mean of two groups: its
     variance grows by 4 sum p (1 - p)/f, p the weights and f the degrees of freedom; and has those of Satterthwaite."""
     new = {400: (1e-3, 0.01), 1000: (4e-4, 0.006)}  # rows, amplitude and noise
-    loops = [new_loop(paper_model, Direction.AXIAL, 0.1, *of, cycles=2.0, rows=rows) for rows, of in new.items()]
+    loops = [planned_loop(paper_model, Direction.AXIAL, 0.1, *of, cycles=2.0, rows=rows) for rows, of in new.items()]
 
     def stated(noise: float | None) -> list[MeasuredLoop]:
         tests = [replace(loop.test, name=f"{number}", noise=noise) for number, loop in enumerate(loops)]

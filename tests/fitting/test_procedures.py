@@ -247,7 +247,7 @@ def test_errors_of_levels_are_told(rig, paper_model, error):
         solution = solve(FitProblem(paper_model, data.select_tests(BOTH), FIVE))
         told = level_errors(data.select_tests(BOTH), solution.residual, solution.jacobian, (1.0, 1.0))
         found.append(np.square(told.error))
-        matters.append(told.matters)
+        matters.append(told.significant)
         freedom.append(told.freedom)
     size = np.sqrt(np.mean(found, axis=0))
     np.testing.assert_allclose(size, error, rtol=0.25, atol=1e-3)

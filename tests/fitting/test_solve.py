@@ -94,7 +94,7 @@ def test_it_ends_where_lmfit_ends(paper_model, data_sets, effects, bounds):
     model = started(paper_model, data_sets, *effects)
     names = tuple(model.parameters)
     problem = FitProblem(model, data_sets, names, bounds)
-    found = Descent.start(problem).finished(100)
+    found = Descent.start(problem).run(100)
     coordinates, start, (low, high) = problem.coordinates, problem.start, problem.limits
     parameters = lmfit.Parameters()
     for name, value, least, most in zip("abcdefgh", start, low, high, strict=False):

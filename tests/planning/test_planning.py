@@ -13,7 +13,7 @@ from bushfit.commands.plan import plan as plan_tests
 from bushfit.effects import get_effect
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import residual
-from bushfit.fitting.preparation import MeasuredSweep, new_loop, new_sweep
+from bushfit.fitting.preparation import MeasuredSweep, planned_loop, planned_sweep
 from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.solve import solve
 from bushfit.geometry import Bushing, Direction, Place
@@ -108,7 +108,7 @@ def test_the_gain_of_a_loop_is_no_surer_than_the_class_of_the_rig(known):
     loop = TESTS[-2]
     assert isinstance(loop, SimulatedLoop)
     rows = 1000 * loop.cycles
-    whole = new_loop(known.model, AXIAL, 0.1, 1e-3, NOISE.force, cycles=3.0, rows=rows)
+    whole = planned_loop(known.model, AXIAL, 0.1, 1e-3, NOISE.force, cycles=3.0, rows=rows)
     slopes = relative_slopes(known, [replace(whole, gain_error=NOISE.level[0], gain_weighs=True)])
     told = view_of(known, (loop,)).total(np.array([1])).parameters[0] - np.linalg.inv(known.covariance)
     np.testing.assert_allclose(told, slopes @ slopes.T, rtol=0.02, atol=1e-3 * np.max(np.abs(told)))
@@ -129,7 +129,7 @@ def test_an_effect_shows_as_a_fit_without_it_misses_it(known):
 def _noise_free(model: Model, truth: Model, test: SimulatedSweep) -> MeasuredSweep:
     """One run of a sweep, as the truth has it."""
     place, frequency, amplitude = points_of(test)
-    sweep = new_sweep(model, place, frequency, amplitude, NOISE.scatter, NOISE.shared)
+    sweep = planned_sweep(model, place, frequency, amplitude, NOISE.scatter, NOISE.shared)
     if test.stepped == "amplitude":
         held = replace(sweep.sweep, stepped="amplitude")
         noise = replace(sweep.noise, random={("new", test.frequencies[0]): NOISE.scatter})
