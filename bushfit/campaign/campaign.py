@@ -27,7 +27,7 @@ from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.stated import LoopFile, SweepFile, place_tested
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reduction.displacement import prepare_record
-from bushfit.reduction.programme import programme
+from bushfit.reduction.programme import split_record
 from bushfit.units import CELSIUS, parse_quantity
 from bushfit.validation import validate_tables
 
@@ -114,7 +114,7 @@ def load_campaign(path: str | Path) -> Campaign:
         "specimens": specimens,
         "loops": tuple(
             without_copied_tests(
-                [loop for keywords in loops for loop in programme(read_loop(**keywords), keywords["test"])]
+                [loop for keywords in loops for loop in split_record(read_loop(**keywords), keywords["test"])]
             )
         ),
         "sweeps": tuple(

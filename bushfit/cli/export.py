@@ -107,8 +107,8 @@ def command(
     names, file = tuple(dict.fromkeys(formats)), model_file(model)
     exported = export(file, names, loaded, dialect=dialect or "nastran", decimal_comma=comma, **settings)
     for name, written in exported.exported.items():
-        for loss in written.losses:
-            output.print(f"limit of {name}: {loss}")
+        for omission in written.omissions:
+            output.print(f"limit of {name}: {omission}")
     output.warn(exported.predicted.warnings)
     inputs = [file, *(input_files(loaded) if loaded else [])]
     output.write(output.folder((loaded or result).name), exported.files, exported.document, inputs)

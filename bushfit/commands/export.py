@@ -102,7 +102,7 @@ def export(
             `predict`; all directions share one list of frequencies.
 
     Returns:
-        Predictions, the content for each format with its losses, and the result files.
+        Predictions, the content for each format with its omissions, and the result files.
 
     Raises:
         ModelError: a model that a format cannot represent, or an invalid grid.
@@ -121,7 +121,8 @@ def export(
         exported[name] = getattr(importlib.import_module(f"bushfit.{module}"), function)(request)
     document: ExportDocument = {
         "formats": {
-            name: {"files": list(written.files), "left_out": list(written.losses)} for name, written in exported.items()
+            name: {"files": list(written.files), "left_out": list(written.omissions)}
+            for name, written in exported.items()
         },
         "warnings": predicted.warnings,
     }

@@ -20,7 +20,7 @@ from bushfit.effects import Level as EffectLevel
 from bushfit.export.contract import MM_T_S_N, Exported, ExportRequest, UnitSystem
 from bushfit.export.deck import (
     AmplitudeLevel,
-    Form,
+    StiffnessForm,
     by_dof,
     comment_lines,
     deck_lines,
@@ -29,15 +29,15 @@ from bushfit.export.deck import (
     exported_directions,
     format_real,
     stiffness_tables,
-    table_losses,
+    table_omissions,
 )
-from bushfit.export.prony import COMPOUND, LONG_TERM, PronySeries, prony_losses, prony_series, shear_strain
+from bushfit.export.prony import COMPOUND, LONG_TERM, PronySeries, prony_omissions, prony_series, shear_strain
 from bushfit.units import number
 
 #: Number of constants of a symmetric 6 x 6 matrix, and of values per data line.
 _CONSTANTS, _A_LINE = 21, 8
 
-_FORM = Form(lambda f, k: (k.real, k.imag / (2.0 * np.pi * f)), lambda f, a, b: a + 2j * np.pi * f * b)
+_FORM = StiffnessForm(lambda f, k: (k.real, k.imag / (2.0 * np.pi * f)), lambda f, a, b: a + 2j * np.pi * f * b)
 
 
 def export(request: ExportRequest) -> Exported:
@@ -50,17 +50,19 @@ def export(request: ExportRequest) -> Exported:
         File bushing.inp, and sentences on properties that the format cannot represent.
     """
     units = request.units or MM_T_S_N
-    losses = tuple(table_losses(request, _FORM))
+    omissions = tuple(table_omissions(request, _FORM))
     series = prony_series(request) if request.time_domain else []
     if has_material := LONG_TERM in request.result.model.values:
-        losses += ("compound: strain is uniform in a material, so the amplitude of each element is that of the table",)
+        omissions += (
+            "compound: strain is uniform in a material, so the amplitude of each element is that of the table",
+        )
     else:
-        losses += ("compound: no elastic branch, so no long-term modulus, and no material",)
+        omissions += ("compound: no elastic branch, so no long-term modulus, and no material",)
     usage = "behaviors are for CONN3D2 of type BUSHING; they act in *STEADY STATE DYNAMICS, DIRECT"
-    losses += tuple(prony_losses(series)) if series else ()
-    lines = deck_lines(request, "**", units, losses, usage, "BUSHING_", partial(_behavior, units))
+    omissions += tuple(prony_omissions(series)) if series else ()
+    lines = deck_lines(request, "**", units, omissions, usage, "BUSHING_", partial(_behavior, units))
     return Exported(
-        {"bushing.inp": encode_deck([*lines, *(_materials(request, units, series) if has_material else ())])}, losses
+        {"bushing.inp": encode_deck([*lines, *(_materials(request, units, series) if has_material else ())])}, omissions
     )
 
 

@@ -20,9 +20,9 @@ from bushfit.export.deck import (
     CARDANIC,
     DOFS,
     StiffnessTable,
-    band_losses,
+    band_omissions,
     comment_lines,
-    common_losses,
+    common_omissions,
     describe_amplitudes,
     encode_deck,
     exported_directions,
@@ -70,7 +70,7 @@ class _Element(NamedTuple):
     frequency: float
     damping: Mapping[Kind, float]
 
-    def loss(self, kind: Kind) -> str:
+    def describe_error(self, kind: Kind) -> str:
         """Sentence on the errors of |K| and loss factor over the grid, due to a single static curve and damping.
 
         Args:
@@ -114,32 +114,34 @@ def export(request: ExportRequest) -> Exported:
         frequency, exact = float(frequencies[row]), complex(reference.stiffness[row])
         damping: dict[Kind, float] = {"car": exact.imag / (2.0 * np.pi * frequency), "ride": float(np.angle(exact))}
         elements.append(_Element(tables, curve, reference, frequency, damping))
-    shared = [line for prediction in predictions for line in band_losses(prediction)] + list(common_losses(request))
+    shared = [line for prediction in predictions for line in band_omissions(prediction)] + list(
+        common_omissions(request)
+    )
     if request.units:
         shared.append(f"the requested units, {request.units}: the file states its own units, which Adams converts")
-    losses = {kind: [element.loss(kind) for element in elements] for kind in _KINDS}
+    omissions = {kind: [element.describe_error(kind) for element in elements] for kind in _KINDS}
     files = {
-        f"bushing_{kind}.bus": encode_deck(_property_file(request, elements, kind, [*losses[kind], *shared]))
+        f"bushing_{kind}.bus": encode_deck(_property_file(request, elements, kind, [*omissions[kind], *shared]))
         for kind in _KINDS
     }
-    return Exported(files, (*losses["car"], *losses["ride"], *shared))
+    return Exported(files, (*omissions["car"], *omissions["ride"], *shared))
 
 
 def _property_file(
-    request: ExportRequest, elements: Sequence[_Element], kind: Kind, losses: Sequence[str]
+    request: ExportRequest, elements: Sequence[_Element], kind: Kind, omissions: Sequence[str]
 ) -> Iterator[str]:
     """Yield the lines of a property file for Adams Car or Adams Car Ride.
 
     Args:
         request: model, predictions and settings.
         elements: element of each direction.
-        kind: which of the two files.
-        losses: sentences on properties that the format cannot represent.
+        kind: "car" for Adams Car, "ride" for Adams Car Ride.
+        omissions: sentences on properties that the format cannot represent.
     """
     amplitudes = describe_amplitudes([element.reference for element in elements])
     rates = ", ".join(f"{element.curve.direction} {element.curve.rate_text}" for element in elements)
     about = [f"damping at {number(elements[0].frequency, 4)} Hz, {amplitudes}", f"static curves at {rates}"]
-    yield from comment_lines("$", [*heading(request, ", ".join(_UNITS.values()), losses), _KINDS[kind], *about])
+    yield from comment_lines("$", [*heading(request, ", ".join(_UNITS.values()), omissions), _KINDS[kind], *about])
     yield from _block("MDI_HEADER", {"FILE_TYPE": "'bus'", "FILE_VERSION": "4.0", "FILE_FORMAT": "'ASCII'"})
     yield from _block("UNITS", {name: f"'{unit}'" for name, unit in _UNITS.items()})
     damping, curves = [0.0] * len(_AXES), [(np.arange(-2.0, 3.0), np.zeros(5))] * len(_AXES)

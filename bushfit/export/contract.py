@@ -131,14 +131,14 @@ class ExportRequest:
     cardanic: complex | None = None
     day: str | None = None
 
-    def remarks(self, losses: Iterable[str]) -> Iterator[tuple[str, str]]:
+    def remarks(self, omissions: Iterable[str]) -> Iterator[tuple[str, str]]:
         """Generate the notes for the head of an exported file.
 
         Args:
-            losses: properties of the model that the format cannot represent.
+            omissions: properties of the model that the format cannot represent.
 
         Yields:
-            Kind and text of each note: campaign, tests, temperature, range of validity, losses and warnings.
+            Kind and text of each note: campaign, tests, temperature, range of validity, omissions and warnings.
         """
         campaign, measured, model = self.result.campaign, self.result.measured, self.result.model
         if campaign:
@@ -157,7 +157,7 @@ class ExportRequest:
                 parts.append(format_range("degC", *temperatures) if temperatures else "temperature not stated")
                 parts.append("fitted there" if str(place) in measured.directions else "not fitted there")
                 yield "valid", ", ".join(parts)
-        yield from (("limit", loss) for loss in losses)
+        yield from (("limit", omission) for omission in omissions)
         warnings = warnings_of(self.result, [prediction.warnings for prediction in self.predictions])
         yield from (("warning", line) for line in warnings)
 
@@ -178,10 +178,10 @@ class Exported:
 
     Args:
         files: content by file name.
-        losses: sentences on properties that the format cannot represent, with the error that this causes.
+        omissions: sentences on properties that the format cannot represent, with the error that this causes.
         arms: groups of Maxwell arms in the files; empty if the format has none.
     """
 
     files: Mapping[str, bytes]
-    losses: tuple[str, ...] = ()
+    omissions: tuple[str, ...] = ()
     arms: tuple[Arms, ...] = ()

@@ -1,4 +1,4 @@
-"""Common parts of solver decks: tables over frequency, comments, the heading, and the losses of a deck."""
+"""Common parts of solver decks: tables over frequency, comments, the heading, and the omissions of a deck."""
 
 import re
 import textwrap
@@ -46,7 +46,7 @@ class StiffnessTable(NamedTuple):
 
     @property
     def dofs(self) -> tuple[int, ...]:
-        """Numbers of the degrees of freedom, 1 to 6."""
+        """Degrees of freedom with this stiffness, as solvers number them: 1 to 3 translations, 4 to 6 rotations."""
         return DOFS[self.direction] if self.amplitude else CARDANIC
 
 
@@ -96,10 +96,11 @@ def stiffness_tables(prediction: Prediction) -> list[StiffnessTable]:
 
 
 def amplitude_levels(request: ExportRequest) -> list[AmplitudeLevel]:
-    """Group the stiffness tables of all directions by the rank of their amplitude, one level for each solver property.
+    """Group the stiffness tables of all directions by the rank of their amplitude, for one solver property per rank.
 
-    The first level has the smallest amplitude of each direction. A direction with fewer amplitudes than others repeats
-    its largest.
+    Returns:
+        Levels, each with a stiffness table per direction: the smallest amplitudes first. A direction with fewer
+        amplitudes than others repeats its largest.
     """
     by_direction = [stiffness_tables(prediction) for prediction in exported_directions(request)]
     count = max(map(len, by_direction))
@@ -114,7 +115,7 @@ def by_dof(level: AmplitudeLevel) -> Iterator[tuple[int, StiffnessTable]]:
     yield from sorted(((dof, table) for table in level for dof in table.dofs), key=lambda pair: pair[0])
 
 
-class Form(NamedTuple):
+class StiffnessForm(NamedTuple):
     """Conversion between a complex stiffness and the two real tables of a solver, such as stiffness and damping.
 
     Args:
@@ -149,13 +150,13 @@ def comment_lines(mark: str, lines: Iterable[str]) -> list[str]:
     return wrapped
 
 
-def heading(request: ExportRequest, units: str, losses: Iterable[str]) -> list[str]:
-    """List the comments at the head of a deck: bushing, model and its hash, units, axes, losses and warnings.
+def heading(request: ExportRequest, units: str, omissions: Iterable[str]) -> list[str]:
+    """List the comments at the head of a deck: bushing, model and its hash, units, axes, omissions and warnings.
 
     Args:
         request: model and settings.
         units: description of the units.
-        losses: properties that the deck cannot represent.
+        omissions: properties that the deck cannot represent.
 
     Returns:
         Lines without comment signs.
@@ -171,7 +172,7 @@ def heading(request: ExportRequest, units: str, losses: Iterable[str]) -> list[s
         f"sha256: {source.sha256}",
         f"units: {units}",
         "axes: z along the bushing (axial 3, torsion 6), x and y across (radial 1, 2)",
-        *map(": ".join, request.remarks(losses)),
+        *map(": ".join, request.remarks(omissions)),
     ]
 
 
@@ -179,7 +180,7 @@ def deck_lines(
     request: ExportRequest,
     mark: str,
     units: UnitSystem,
-    losses: Iterable[str],
+    omissions: Iterable[str],
     usage: str,
     name: str,
     level_lines: Callable[[int, AmplitudeLevel], Iterable[str]],
@@ -190,13 +191,13 @@ def deck_lines(
         request: model and settings.
         mark: comment sign at the start of a comment line.
         units: unit system of the deck.
-        losses: sentences on properties that the deck cannot represent.
+        omissions: sentences on properties that the deck cannot represent.
         usage: comment on the use of the deck in the solver.
         name: prefix of the names of the levels, before their rank.
         level_lines: function of the rank of a level, from 1, and the level that returns its lines.
     """
     about = f"{units}; frequency in {units.frequency.name}, rotation in rad"
-    lines = comment_lines(mark, [*heading(request, about, losses), usage])
+    lines = comment_lines(mark, [*heading(request, about, omissions), usage])
     for rank, level in enumerate(amplitude_levels(request), start=1):
         lines += [*comment_lines(mark, [f"{name}{rank}: {describe_amplitudes(level)}"]), *level_lines(rank, level)]
     return lines
@@ -219,8 +220,8 @@ def encode_deck(lines: Iterable[str]) -> bytes:
     return ("\n".join(lines) + "\n").encode("ascii")
 
 
-def table_losses(request: ExportRequest, form: Form) -> Iterator[str]:
-    """Generate sentences on the losses of a deck with linear tables over frequency, one set for each amplitude.
+def table_omissions(request: ExportRequest, form: StiffnessForm) -> Iterator[str]:
+    """Generate sentences on the omissions of a deck with linear tables over frequency, one set for each amplitude.
 
     Args:
         request: model, predictions and settings.
@@ -251,12 +252,12 @@ def table_losses(request: ExportRequest, form: Form) -> Iterator[str]:
             yield f"{place}: between the frequencies |K| has errors up to {number(100.0 * worst, 2)} %"
         else:
             yield f"{place}: one frequency, {number(tables[0].frequency[0], 4)} Hz: K and loss are constants"
-        yield from band_losses(prediction)
-    yield from common_losses(request)
+        yield from band_omissions(prediction)
+    yield from common_omissions(request)
 
 
-def common_losses(request: ExportRequest) -> Iterator[str]:
-    """Generate sentences on the losses of every deck: time domain, coupling, and motions that the model lacks.
+def common_omissions(request: ExportRequest) -> Iterator[str]:
+    """Generate sentences on the omissions of every deck: time domain, coupling, and motions that the model lacks.
 
     Returns:
         Iterator over sentences.
@@ -277,8 +278,8 @@ def common_losses(request: ExportRequest) -> Iterator[str]:
         yield f"specimens: {', '.join(specimens)}"
 
 
-def band_losses(prediction: Prediction) -> Iterator[str]:
-    """Generate sentences on the omitted 95 % band, and on the prediction if an unresolved effect belongs to the rig."""
+def band_omissions(prediction: Prediction) -> Iterator[str]:
+    """Generate sentences on the omitted 95 % band, and on |K| if an effect of unknown origin is that of the rig."""
     place, band = prediction.direction, prediction.stiffness
     if (width := float(np.max((band.high - band.low) / (2.0 * band.value)))) > 0.0:
         yield f"{place}: no 95 % band, which is up to +/-{number(100.0 * width, 2)} % of |K|"

@@ -84,7 +84,7 @@ def export(request: ExportRequest) -> Exported:
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for file, data in content.items():  # without dates, so that equal contents give equal bytes
             archive.writestr(zipfile.ZipInfo(file), data, zipfile.ZIP_DEFLATED)
-    return Exported({f"{name}.fmu": buffer.getvalue()}, model.losses, model.arms)
+    return Exported({f"{name}.fmu": buffer.getvalue()}, model.omissions, model.arms)
 
 
 def compile_library(sources: Mapping[str, bytes], name: str) -> tuple[str, bytes]:
@@ -193,7 +193,7 @@ def model_description(request: ExportRequest, model: TimeModel, name: str, guid:
         Content of the XML file in UTF-8.
     """
     about = f"Rubber bushing, displacement in and force out, of {request.source.file} (SHA-256 {request.source.sha256})"
-    about = "; ".join([about, *map(": ".join, request.remarks(model.losses))])
+    about = "; ".join([about, *map(": ".join, request.remarks(model.omissions))])
     root = ET.Element("fmiModelDescription", {
         "fmiVersion": "2.0", "modelName": _xml_text(request.result.name), "guid": guid, "description": _xml_text(about),
         "generationTool": f"bushfit {__version__}", "variableNamingConvention": "flat", "numberOfEventIndicators": "0",

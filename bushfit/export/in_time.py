@@ -12,7 +12,7 @@ from bushfit.effects.contract import RubberConditions
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.errors import ModelError
 from bushfit.export.contract import ExportRequest
-from bushfit.export.deck import band_losses
+from bushfit.export.deck import band_omissions
 from bushfit.geometry import Place, bushing_at
 from bushfit.model.arms import Arms, model_arms, qualified_size, values_under
 from bushfit.model.model import Model
@@ -61,7 +61,7 @@ class TimeModel:
         levers: lever arm of the slip force at each place: outer radius [m] for torsion, otherwise 1.
         parts: name of the parameter to which the moduli of each group of arms are proportional.
         arm_rows: for each arm, index of its group in `parts`, modulus over that parameter, and relaxation time [s].
-        losses: sentences on effects that are omitted or constant, with the error that this causes.
+        omissions: sentences on effects that are omitted or constant, with the error that this causes.
         arms: groups of arms with the effects that they replace, and their error.
     """
 
@@ -71,7 +71,7 @@ class TimeModel:
     levers: tuple[float, ...]
     parts: tuple[str, ...]
     arm_rows: tuple[tuple[int, float, float], ...]
-    losses: tuple[str, ...]
+    omissions: tuple[str, ...]
     arms: tuple[Arms, ...]
 
 
@@ -79,7 +79,7 @@ def time_model(request: ExportRequest) -> TimeModel:
     """Convert the fitted model of an export to a time-domain model for an FMU, without effects of the rig.
 
     Returns:
-        Values, fields and lever arm of each direction, Maxwell arms, and the losses.
+        Values, fields and lever arm of each direction, Maxwell arms, and the omissions.
 
     Raises:
         ModelError: an effect has no law in the time domain or none in the C sources, or no arms reach the accuracy.
@@ -103,9 +103,9 @@ def time_model(request: ExportRequest) -> TimeModel:
     band = float(frequencies.min()) / 100.0, float(frequencies.max()) * 10.0
     arms = model_arms(model, band, request.accuracy, conditions)
     values, names = _values(request, model, arms)
-    losses = [f"{part.sentence}; slower relaxation is left out" for part in arms]
+    omissions = [f"{part.sentence}; slower relaxation is left out" for part in arms]
     for prediction in request.predictions:
-        losses += [*_steady_losses(model, omitted, prediction, conditions), *band_losses(prediction)]
+        omissions += [*_steady_omissions(model, omitted, prediction, conditions), *band_omissions(prediction)]
     sizes = values_under(model, conditions)
     tubes = [(bushing_at(model.bushing, place), place) for place in request.places]
     return TimeModel(
@@ -121,7 +121,7 @@ def time_model(request: ExportRequest) -> TimeModel:
             for index, part in enumerate(arms)
             for modulus, time in zip(part.modulus, part.time, strict=True)
         ),
-        tuple(losses),
+        tuple(omissions),
         arms,
     )
 
@@ -203,7 +203,9 @@ def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Ar
     return fields
 
 
-def _steady_losses(model: Model, omitted: list[str], prediction: Prediction, conditions: RubberConditions) -> list[str]:
+def _steady_omissions(
+    model: Model, omitted: list[str], prediction: Prediction, conditions: RubberConditions
+) -> list[str]:
     """Write a sentence on the relative error of |K| due to constant modifiers and omitted effects; or none.
 
     Args:

@@ -13,7 +13,15 @@ from functools import partial
 import numpy as np
 
 from bushfit.export.contract import MM_T_S_N, Exported, ExportRequest, UnitSystem
-from bushfit.export.deck import AmplitudeLevel, Form, by_dof, deck_lines, encode_deck, format_real, table_losses
+from bushfit.export.deck import (
+    AmplitudeLevel,
+    StiffnessForm,
+    by_dof,
+    deck_lines,
+    encode_deck,
+    format_real,
+    table_omissions,
+)
 
 #: Difference between the table numbers of two properties. The last two digits are the degree of freedom n for K, and
 #: 10 + n for the loss.
@@ -24,12 +32,12 @@ _TABLES = 100
 _DIALECTS = {
     "nastran": (
         ("K", "GE"),
-        Form(lambda _, k: (k.real, k.imag / k.real), lambda _, a, b: a * (1.0 + 1j * b)),
+        StiffnessForm(lambda _, k: (k.real, k.imag / k.real), lambda _, a, b: a * (1.0 + 1j * b)),
         "bushing.bdf",
     ),
     "optistruct": (
         ("KMAG", "ANGLE"),
-        Form(lambda _, k: (np.abs(k), np.angle(k, deg=True)), lambda _, a, b: a * np.exp(1j * np.radians(b))),
+        StiffnessForm(lambda _, k: (np.abs(k), np.angle(k, deg=True)), lambda _, a, b: a * np.exp(1j * np.radians(b))),
         "bushing.fem",
     ),
 }
@@ -45,16 +53,18 @@ def export(request: ExportRequest) -> Exported:
         File with the deck, and sentences on properties that the format cannot represent.
     """
     (names, form, file), units = _DIALECTS[request.dialect], request.units or MM_T_S_N
-    losses = tuple(table_losses(request, form))
+    omissions = tuple(table_omissions(request, form))
     usage = (
         "the tables act in frequency response; PBUSH alone, at the lowest frequency, acts elsewhere; PARAM,G is added "
         "to the loss"
     )
-    lines = deck_lines(request, "$", units, losses, usage, "property ", partial(_property, names, form, units))
-    return Exported({file: encode_deck(lines)}, losses)
+    lines = deck_lines(request, "$", units, omissions, usage, "property ", partial(_property, names, form, units))
+    return Exported({file: encode_deck(lines)}, omissions)
 
 
-def _property(names: Sequence[str], form: Form, units: UnitSystem, pid: int, level: AmplitudeLevel) -> Iterator[str]:
+def _property(
+    names: Sequence[str], form: StiffnessForm, units: UnitSystem, pid: int, level: AmplitudeLevel
+) -> Iterator[str]:
     """Yield the lines of PBUSH, PBUSHT and the tables of one amplitude.
 
     Args:

@@ -95,7 +95,7 @@ def prony_series(request: ExportRequest) -> list[PronySeries]:
     return series
 
 
-def prony_losses(series: Sequence[PronySeries]) -> list[str]:
+def prony_omissions(series: Sequence[PronySeries]) -> list[str]:
     """Write sentences on the limits of Prony series: error, frequency band, and strain amplitude of each.
 
     Returns:
@@ -146,4 +146,4 @@ def export(request: ExportRequest) -> Exported:
         for term, (relative, time) in enumerate(zip(one.relative_moduli, one.arms.time, strict=True), start=1)
     ]
     table = to_csv(pd.DataFrame(rows), decimal_comma=request.decimal_comma)
-    return Exported({"prony.csv": table}, tuple(prony_losses(series)))
+    return Exported({"prony.csv": table}, tuple(prony_omissions(series)))

@@ -16,7 +16,7 @@ from bushfit.fitting.outliers import gross_outliers
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.cycles import HOLE, shifted_difference
 from bushfit.reduction.harmonics import basis, least_squares, resolved_order, spread_rows
-from bushfit.reduction.programme import ENOUGH_ROWS, SAME_MOTION, THREE_CYCLES, left_out
+from bushfit.reduction.programme import ENOUGH_ROWS, SAME_MOTION, THREE_CYCLES, omitted_rows_sentence
 
 #: Share of a period up to which a break in the steady motion, or a part left out, is ignored.
 _BRIEF = 0.02
@@ -145,7 +145,7 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
     if before and last - first > THREE_CYCLES * period:
         first += period  # after a run-in the first cycle still remembers it
     gaps = (f"{gap:.3g} s" if gap > _BRIEF * period else "" for gap in (first - time[0], time[-1] - last))
-    note = left_out(gaps, (last - first) / period)
+    note = omitted_rows_sentence(gaps, (last - first) / period)
     return _cut(loop, first, last if after else np.inf), note
 
 

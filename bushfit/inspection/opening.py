@@ -26,7 +26,7 @@ from bushfit.reading.source import Channels, Sheet
 from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reading.table import Table
-from bushfit.reduction.programme import programme
+from bushfit.reduction.programme import split_record
 from bushfit.reduction.steps import steady_sines
 from bushfit.validation import validate_tables
 
@@ -199,7 +199,7 @@ def classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tuple
     if len(points) > 1 and is_fast:
         with suppress(MeasurementError):  # no steady sine after all
             return "history", describe_history(measured, by_name)
-    loops = programme(measured, test)
+    loops = split_record(measured, test)
     if len(loops) > 1:
         return "loop", describe_programme(measured, loops, by_name)
     facts, odd = describe_loop(loops[0], by_name)

@@ -52,7 +52,7 @@ class Cycles:
     range: Floats
 
     @classmethod
-    def count(cls, time: Floats, motion: Floats) -> "Cycles":
+    def find(cls, time: Floats, motion: Floats) -> "Cycles":
         """Find the cycles of a motion, of any frequency and of any amplitude above the noise.
 
         Args:

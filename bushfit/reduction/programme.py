@@ -62,16 +62,16 @@ class SteadySpan:
 
     @property
     def cycles(self) -> float:
-        """Number of cycles in the part, not necessarily whole."""
+        """Number of cycles in this part of the record, not necessarily whole."""
         return (self.end - self.begin) / self.period
 
     def is_like(self, span: "SteadySpan") -> bool:
-        """Return True if two parts have the same amplitude and rate, both within 8 %."""
+        """Return True if another part of the record has the same amplitude and rate, both within 8 %."""
         ranges, periods = np.log(self.range / span.range), np.log(self.period / span.period)
         return bool(abs(ranges) < _SAME_AMPLITUDE and abs(periods) < _SAME_RATE)
 
 
-def programme(loop: Loop, test: LoopFile = _TIMED) -> tuple[Loop, ...]:
+def split_record(loop: Loop, test: LoopFile = _TIMED) -> tuple[Loop, ...]:
     """Split a record into loops, one for each part of constant amplitude and rate.
 
     Args:
@@ -227,7 +227,7 @@ def cut_loops(loop: Loop, time: Floats, spans: Sequence[SteadySpan], test: LoopF
             "" if gap <= _AT_END * span.period else f"{gap:.3g} s" if loop.has_recorded_time else f"{gap:.0f} rows"
             for gap in gaps
         ]
-        sentence = left_out(gap_texts, (span.end - begin) / span.period) if any(gap_texts) else None
+        sentence = omitted_rows_sentence(gap_texts, (span.end - begin) / span.period) if any(gap_texts) else None
         part = replace(
             loop.select(rows),
             name=f"{loop.name}_part_{number}",
@@ -238,7 +238,7 @@ def cut_loops(loop: Loop, time: Floats, spans: Sequence[SteadySpan], test: LoopF
         last_end = span.end
 
 
-def left_out(gaps: Iterable[str], cycles: float) -> str:
+def omitted_rows_sentence(gaps: Iterable[str], cycles: float) -> str:
     """Write a sentence on the omitted durations before and after the steady cycles, and on the number of cycles used.
 
     Args:
@@ -250,12 +250,12 @@ def left_out(gaps: Iterable[str], cycles: float) -> str:
 
 
 def measure_softening(loop: Loop, span: SteadySpan, *, from_rest: bool) -> float | None:
-    """Measure the softening of the rubber in a part: relative excess of |K| of the first over the last cycle.
+    """Measure the softening of rubber during a loop test: relative excess of |K| of the first over the last cycle.
 
     Args:
         loop: the whole record.
         span: part of the record with constant amplitude and rate.
-        from_rest: True if the part begins from rest.
+        from_rest: True if the part begins from rest, as the first part of a record does.
 
     Returns:
         |K_first|/|K_last| - 1; None if it is within noise and the memory of the rubber (springpot and friction).

@@ -84,7 +84,7 @@ def steady_sines(history: Loop) -> list[tuple[float, float, int]]:
     Returns:
         Frequency [Hz], approximate zero-to-peak amplitude [m or rad] and number of cycles of each stretch.
     """
-    cycles = Cycles.count(history.time, history.displacement)
+    cycles = Cycles.find(history.time, history.displacement)
     found = []
     for run in cycles.runs():
         edges = cycles.edges[run.start : run.stop + 1]
@@ -109,7 +109,7 @@ def find_steps(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStre
     """
     found: list[tuple[float, float, Step]] = []
     skipped: list[SkippedStretch] = []
-    cycles = Cycles.count(history.time, history.displacement)
+    cycles = Cycles.find(history.time, history.displacement)
     for run in cycles.runs():
         motion, force = cycles.fundamentals(run, history.displacement, history.force)
         edges = cycles.edges[run.start : run.stop + 1]
@@ -213,7 +213,7 @@ def _creeps(values: Floats, smallest: float) -> bool:
 
     Args:
         values: values in order, (n,).
-        smallest: smallest total change that counts, in the unit of the values.
+        smallest: smallest total change that is reported, in the unit of the values.
     """
     if values.size < 3:
         return False

@@ -20,7 +20,7 @@ from bushfit.reading.measurement import Loop, Source, Sweep
 from bushfit.reading.resonance import ResonanceTest
 from bushfit.reading.runs import runs_of
 from bushfit.reading.tablefile import folder_name
-from bushfit.reduction.programme import programme
+from bushfit.reduction.programme import split_record
 from bushfit.reduction.resonance import reduce_resonance
 from bushfit.simulation.undisturbed import Undisturbed, near, undisturbed
 
@@ -59,7 +59,7 @@ class Simulated:
         """Convert the simulated tests to a campaign that can be fitted; resonance tests are reduced to sweeps."""
         reduced = tuple(reduce_resonance(test, mass).sweep for mass, test in self.resonances)
         bushing, name = self.truth.bushing, self.result.name
-        loops = tuple(part for loop in self.loops for part in programme(loop))
+        loops = tuple(part for loop in self.loops for part in split_record(loop))
         tests = loops, self.sweeps + reduced, self.validation
         return Campaign(name, Path(name), bushing, *tests, specimens=self.specimens)
 

@@ -14,7 +14,7 @@ from bushfit.model import rig
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop
 from bushfit.reading.stated import LoopFile
-from bushfit.reduction.programme import programme
+from bushfit.reduction.programme import split_record
 
 STEP = 0.01
 NOISE = SimulateSettings(seed=2, force_noise=3e-3, displacement_noise=2e-4)
@@ -82,7 +82,7 @@ PROGRAMMES: dict[str, tuple[Sequence[Array], Sequence[tuple[float, float]]]] = {
 def test_each_steady_part_is_a_loop_in_its_order(paper_model, case):
     motions, expected = PROGRAMMES[case]
     record = recorded(paper_model, *motions)
-    loops = programme(record)
+    loops = split_record(record)
     prepared_loops = [prepare_loop(loop) for loop in loops]
     assert [loop.name for loop in loops] == [f"loop_part_{number}" for number in range(1, len(expected) + 1)]
     assert [1e3 * prepared.amplitude for prepared in prepared_loops] == pytest.approx(
@@ -105,7 +105,9 @@ def test_each_steady_part_is_a_loop_in_its_order(paper_model, case):
 @pytest.mark.parametrize("case", ["pauses", "one speed"])
 def test_without_time_parts_are_the_same(paper_model, case):
     motions, expected = PROGRAMMES[case]
-    loops = programme(replace(recorded(paper_model, *motions), has_recorded_time=False), LoopFile(file="", rate=1e-4))
+    loops = split_record(
+        replace(recorded(paper_model, *motions), has_recorded_time=False), LoopFile(file="", rate=1e-4)
+    )
     sizes = [prepare_loop(loop).amplitude for loop in loops]
     assert [1e3 * size for size in sizes] == pytest.approx([x for x, _ in expected], rel=1e-2)
     for loop, size in zip(loops, sizes, strict=True):
@@ -119,9 +121,9 @@ def virgin(loop: Loop, share: float) -> Loop:
 
 
 def test_a_softening_is_told_of_each_part(paper_model):
-    loops = programme(virgin(recorded(paper_model, *[cycles(5, x) for x in (0.2, 0.5, 1)]), 0.12))
+    loops = split_record(virgin(recorded(paper_model, *[cycles(5, x) for x in (0.2, 0.5, 1)]), 0.12))
     found = [100.0 * (loop.softening or 0.0) for loop in loops]
     assert found == pytest.approx([12.0] * 3, abs=4.0)  # with what a springpot and friction make from rest
     assert any("stiffer than the last (Mullins)" in note for note in prepare_loop(loops[1]).notes)
-    (one,) = programme(virgin(recorded(paper_model, cycles(5, 1)), 0.12))
+    (one,) = split_record(virgin(recorded(paper_model, cycles(5, 1)), 0.12))
     assert one.softening == pytest.approx(0.12, abs=0.03)
