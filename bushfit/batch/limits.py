@@ -80,7 +80,7 @@ class Bounds:
 
     @property
     def fixed(self) -> tuple[float, float]:
-        """Lowest and highest allowed value from min, max, nominal and tolerance; infinite without a limit."""
+        """Lowest and highest allowed value by min, max, nominal and tolerance; infinite on a side without a limit."""
         low, high = -math.inf if self.min is None else self.min, math.inf if self.max is None else self.max
         if self.nominal is not None and self.tolerance is not None:
             half = abs(self.nominal) * self.tolerance

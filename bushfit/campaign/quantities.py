@@ -186,7 +186,7 @@ class ReportSettings:
 
     @property
     def lines(self) -> dict[str, str]:
-        """Stated texts for the head of the report by key, in order, without the logo."""
+        """Texts for the head of the report by key, such as "customer", in order; without the logo and missing texts."""
         return {key: value for key, value in vars(self).items() if value is not None and key != "logo"}
 
 

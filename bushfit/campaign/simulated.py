@@ -91,7 +91,7 @@ class SimulatedLoop(SimulatedTest):
 
     @property
     def parts(self) -> list[tuple[float, float]]:
-        """Frequency [Hz] and amplitude [m or rad, or strain] of each loop of the record."""
+        """Frequency [Hz] and amplitude [m or rad, or strain] of each loop in the simulated record."""
         amplitudes = self.amplitudes or (self.amplitude,)
         return [(frequency, size) for frequency in self.frequencies or (self.frequency,) for size in amplitudes]
 
@@ -116,17 +116,17 @@ class SimulatedSweep(SimulatedTest):
 
     @property
     def levels(self) -> tuple[float, ...]:
-        """Constant quantity of each run: amplitudes [m or rad, or strain] or frequencies [Hz]."""
+        """Constant quantity of each run of the sweep: amplitudes [m or rad, or strain] or frequencies [Hz]."""
         return self.amplitudes if self.stepped == "frequency" else self.frequencies
 
     @property
     def steps(self) -> tuple[float, ...]:
-        """Stepped quantity of a run: frequencies [Hz] or amplitudes [m or rad, or strain]."""
+        """Stepped quantity of every run of the sweep: frequencies [Hz] or amplitudes [m or rad, or strain]."""
         return self.frequencies if self.stepped == "frequency" else self.amplitudes
 
     @property
     def points(self) -> tuple[Array, Array]:
-        """Frequency [Hz] and amplitude [m or rad, or strain] of each point, (levels, steps) each."""
+        """Frequency [Hz] and amplitude [m or rad, or strain] of each point of the sweep, (levels, steps) each."""
         level, step = np.meshgrid(self.levels, self.steps, indexing="ij")
         return (step, level) if self.stepped == "frequency" else (level, step)
 

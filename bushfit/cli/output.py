@@ -107,7 +107,7 @@ class Output:
 
     @property
     def formats(self) -> Formats:
-        """Formats of result files, and the kinds that are written."""
+        """File formats of tables and figures, and the kinds of result file to write, as the options state them."""
         pictures = tuple(dict.fromkeys(self.plot_format))
         return Formats(True, not self.no_plots, not self.no_report, self.table_format, pictures)
 

@@ -53,12 +53,12 @@ class DiagnosisOutput:
 
     @property
     def headline(self) -> str:
-        """Sentence with the verdict, and the parameters whose 95 % half width is at least their value."""
+        """Verdict of the diagnosis as a sentence, with the parameters whose 95 % half width is at least their value."""
         return "; ".join(filter(None, (self.diagnosis.verdict, self.result.unknown_parameters)))
 
     @property
     def result(self) -> Result:
-        """Model to use: the joint fit, or the model with the effects that were added."""
+        """Fitted model to use: the joint fit, or the model with the effects that the diagnosis added."""
         return self.diagnosis.result
 
 

@@ -41,7 +41,7 @@ class FitOutput:
 
     @property
     def result(self) -> Result:
-        """Fitted result: that of the last step."""
+        """Fitted model: the result of the last step."""
         return self.steps[-1][1]
 
 

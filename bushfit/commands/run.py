@@ -73,7 +73,7 @@ class RunOutput:
 
     @property
     def result(self) -> Result:
-        """Model to use: the joint fit, or the model with the effects that were added."""
+        """Fitted model to use: the joint fit, or the model with the effects that the diagnosis added."""
         return self.predicted.result
 
     @property

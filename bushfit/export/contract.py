@@ -72,12 +72,12 @@ class UnitSystem:
 
     @property
     def frequency(self) -> Unit:
-        """Unit of frequency, the inverse of the unit of time, with its factor from Hz."""
+        """Unit of frequency in this unit system, the inverse of the unit of time, with its factor from Hz."""
         return Unit("Hz" if self.time.name == "s" else f"1/{self.time.name}", 1.0 / self.time.factor)
 
     @property
     def stress(self) -> Unit:
-        """Unit of stresses and moduli, with its factor from Pa."""
+        """Unit of stresses and moduli in this unit system, with its factor from Pa."""
         return Unit(f"{self.force.name}/{self.length.name}^2", self.force.factor / self.length.factor**2)
 
     def display(self, motion: Motion) -> Display:
@@ -163,7 +163,7 @@ class ExportRequest:
 
     @property
     def conditions(self) -> RubberConditions:
-        """Temperature of the rubber for which the response is exported."""
+        """Temperature of the rubber at which the model is exported."""
         return RubberConditions(self.temperature)
 
     @property

@@ -127,7 +127,7 @@ class StiffnessForm(NamedTuple):
     joined: Callable[[Array, Array, Array], Array]
 
     def in_units(self, table: StiffnessTable, units: UnitSystem) -> tuple[Array, Array, Array]:
-        """Frequency and the two real tables in the units of the deck, (n,) each."""
+        """Convert a stiffness table to frequency and two real columns, such as K and damping, in units of the deck."""
         frequency = table.frequency * units.frequency.factor
         factor = units.display(table.direction.motion).stiffness.factor
         return frequency, *self.parts(frequency, table.stiffness * factor)

@@ -52,7 +52,7 @@ class TestSource:
         return f"{self.file}, {word_for_part(self.file)} {self.sheet}" if self.sheet else str(self.file)
 
     def without(self, *keys: str) -> "TestSource":
-        """Copy of the source without the options of the given keys."""
+        """Copy of the test source without the options of the given keys."""
         return replace(self, test_options={key: value for key, value in self.test_options.items() if key not in keys})
 
     def inspect(self) -> Inspection:

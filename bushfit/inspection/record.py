@@ -125,7 +125,7 @@ class Inspection:
 
     @property
     def assumed(self) -> str | None:
-        """Assumptions, each with the option or key that changes it; None if nothing was assumed."""
+        """Assumptions about the file, each with the option or key that changes it; None if nothing was assumed."""
         assumptions = []
         if isinstance(self.direction, Specimen) and self.direction.kind == "modulus":
             meaning, alternative = "the engineering shear strain", "tension"

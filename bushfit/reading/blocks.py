@@ -214,7 +214,7 @@ def _with_complex_parts(source: RowSource, layout: Layout) -> tuple[RowSource, L
 
 
 def refuse_other_columns(table: Cells, left_out: Iterable[FaultyRow], vocabulary: Vocabulary) -> None:
-    """Refuse a header or row of units that states another order or other units for the rows below it.
+    """Refuse a table in which a later header or row of units changes the order or the units of the columns.
 
     Args:
         table: table with its columns by role.

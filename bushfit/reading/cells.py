@@ -68,7 +68,7 @@ class Cells:
         return self.layout.headers
 
     def blocks(self) -> Iterator[RowSource]:
-        """Yield the source of the rows in blocks that can be read one by one; one block if rows are selected."""
+        """Yield the rows of the table in blocks to be read one by one; a single block for selected rows."""
         if isinstance(self.source, Text) and self.selected is None:
             return self.source.blocks(self.layout.lines_before_data)
         return iter([self.source])

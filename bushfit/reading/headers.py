@@ -258,7 +258,7 @@ class Vocabulary:
 
     @classmethod
     def shared(cls, names: Mapping[str, Sequence[str]], columns: Mapping[str, str]) -> "Vocabulary":
-        """Return the vocabulary of some names; it is built once for all files with these names."""
+        """Return a vocabulary, built once, of usual names and the user's `columns`, both by role."""
         return _shared(tuple((role, tuple(usual)) for role, usual in names.items()), tuple(columns.items()))
 
     def heading(self, header: str) -> Heading | None:

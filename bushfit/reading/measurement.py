@@ -154,7 +154,7 @@ class Sweep:
 
     @property
     def held_value(self) -> Floats:
-        """Value that is constant in each point's run, (n,): amplitude [m or rad], frequency [Hz] or repeat number."""
+        """Constant quantity in the run of each point, (n,): amplitude [m or rad], frequency [Hz] or repeat number."""
         if self.stepped is None:
             return self.repeat.astype(float)
         return self.amplitude if self.stepped == "frequency" else self.frequency

@@ -112,7 +112,7 @@ class Labels:
     sampling: str | None = None
 
     def of_dimension(self, unit: str) -> list[StatedQuantity]:
-        """Return the distinct quantities with the dimension of an SI unit; only the marked ones if there are any."""
+        """Return the distinct quantities with the dimension of an SI unit; only marked ones if any `is_marked`."""
         fitting = [quantity for quantity in dict.fromkeys(self.quantities) if units.is_compatible(quantity.unit, unit)]
         return [quantity for quantity in fitting if quantity.is_marked] or fitting
 

@@ -80,7 +80,7 @@ class Text:
         return any(self.data.find(mark.encode(), start) >= 0 for mark in marks)
 
     def first_words(self, delimiter: str) -> set[str]:
-        """Return the distinct texts without digits that are the first cell of a row."""
+        """Return the distinct texts without digits in the first column, such as "Mean" of a summary row."""
         mark = re.escape(delimiter).encode()
         first = re.compile(rb'\n[ \t"%b]*([^\d\r\n"%b]+)(?=["\r\n%b])' % (mark, mark, mark))
         return {word.decode("utf-8", "replace").strip() for word in set(first.findall(b"\n" + self.data))}

@@ -33,7 +33,7 @@ _DAMPING = Vocabulary({"damping": ["damping", "damp", "Dämpfung", "amortissemen
 
 
 def stiffness_pair(table: Table) -> tuple[str, str]:
-    """Return the roles of the first pair of columns in PAIRS that a table has; they give the complex stiffness.
+    """Return the roles of two columns of a table that give the complex stiffness, such as stiffness and loss_factor.
 
     Raises:
         MeasurementError: the table has no such pair, or its damping can be read in two ways.

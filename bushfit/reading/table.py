@@ -232,7 +232,7 @@ class Table(Cells):
             return replace(column, scale=strain_factor * units.si_factor(unit, expected))
 
     def agrees(self, role: str, expected: str) -> bool:
-        """Return True if the table has a column for a role, and its unit, or 1, has the dimension of `expected`."""
+        """Return True if the table has a column for a role in a unit of the dimension of `expected`, or in 1."""
         column = self.roles.get(role)
         return column is not None and units.is_compatible(column.unit or "1", expected)
 

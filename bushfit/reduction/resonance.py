@@ -66,7 +66,7 @@ class Resonance:
 
     @property
     def sweep(self) -> Sweep:
-        """Points as a sweep for the fit, in which neither frequency nor amplitude is constant."""
+        """Points of the resonance test as a sweep for the fit, in which neither frequency nor amplitude is constant."""
         test, error = self.test, self.relative_error
         points = self.frequency, self.amplitude, self.stiffness
         return Sweep(test.name, test.direction, *points, source=test.source, stepped=None, relative_error=error)

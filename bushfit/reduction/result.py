@@ -114,7 +114,7 @@ class Reduction:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on outliers, means, missed levels, sampling, distortion, and stretches without a point."""
+        """Warnings on outliers, mean values, missed levels, sampling, distortion, and stretches without a point."""
         steps, sentences = self.steps, list[str]()
         unit, factor = self.direction.display.displacement
         if self.outliers:

@@ -63,7 +63,7 @@ class SweepGroup(NamedTuple):
         return self.palette in ("amplitude", "frequency")
 
     def thinned(self) -> SweepGroup:
-        """Copy of the group with at most 24 of its curves, evenly from the first to the last."""
+        """Copy of the group of sweeps with at most 24 of its curves, evenly from the first to the last."""
         return self._replace(curves=[self.curves[index] for index in spread(len(self.curves), MOST_CURVES)])
 
 
