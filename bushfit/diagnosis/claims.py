@@ -58,7 +58,7 @@ class Claim:
     @property
     def single_tests(self) -> list[Claim]:
         """Claims of the same mistake, one for each affected test; the claim itself for a mistake in [bushing]."""
-        return [Claim(self.mistake, (place,)) for place in self.tests] or [self]
+        return [Claim(self.mistake, (index,)) for index in self.tests] or [self]
 
     def test(self, data: PreparedCampaign) -> str | None:
         """Name of the first affected test; None for a mistake in [bushing]."""
@@ -71,13 +71,13 @@ class Claim:
     def words(self, data: PreparedCampaign) -> str:
         """Sentence that states the mistake, with the files of the affected tests."""
         data_sets = [*data.loops, *data.sweeps]
-        files = [file_or_name(data_sets[place].test) for place in self.tests]
+        files = [file_or_name(data_sets[index].test) for index in self.tests]
         return self.mistake.sentence.format(files=" and ".join(filter(None, (", ".join(files[:-1]), *files[-1:]))))
 
     def corrections(self, data: PreparedCampaign) -> tuple[str, ...]:
         """Lines to write into the campaign file to correct the mistake, one for each affected test."""
         data_sets = [*data.loops, *data.sweeps]
-        return tuple(self.mistake.correction_line(data_sets[place].test) for place in self.tests) or (
+        return tuple(self.mistake.correction_line(data_sets[index].test) for index in self.tests) or (
             self.mistake.correction_line(None),
         )
 
@@ -95,14 +95,14 @@ class Claim:
             bushing = campaign.bushing and self.mistake.corrected_bushing(campaign.bushing)
             return replace(data, campaign=replace(campaign, bushing=bushing)).with_rubber_conditions()
         loops, sweeps, count = list(data.loops), [sweep.test for sweep in data.sweeps], len(data.loops)
-        for place in self.tests:
-            test = self.mistake.corrected_test([*data.loops, *data.sweeps][place].test)
+        for index in self.tests:
+            test = self.mistake.corrected_test([*data.loops, *data.sweeps][index].test)
             if isinstance(test, Loop):
-                loops[place] = prepare_loops([test], data.campaign.rig, without_outliers=data.robust)[0]
+                loops[index] = prepare_loops([test], data.campaign.rig, without_outliers=data.robust)[0]
             elif isinstance(test, Sweep):
-                sweeps[place - count] = test
+                sweeps[index - count] = test
         data = replace(data, loops=tuple(with_gain_errors(loops, data.campaign.rig)))
-        if any(place >= count for place in self.tests):
+        if any(index >= count for index in self.tests):
             data = data.with_sweeps(sweeps)
         return data.with_rubber_conditions()
 
@@ -140,10 +140,10 @@ def _parse_claim(data: PreparedCampaign, name: str) -> Claim:
     """
     mistake, test = get_mistake(name), name.partition(SEPARATOR)[2]
     data_sets: list[MeasuredTest] = [*data.loops, *data.sweeps]
-    possible = [place for place, one in enumerate(data_sets) if mistake and _is_possible(mistake, one, data)]
-    tests = tuple(place for place in possible if data_sets[place].name == test)
+    possible = [index for index, one in enumerate(data_sets) if mistake and _is_possible(mistake, one, data)]
+    tests = tuple(index for index in possible if data_sets[index].name == test)
     if mistake is None or bool(tests) != bool(mistake.kinds) or (test and not tests):
-        expected = [labelled(name.partition(SEPARATOR)[0], data_sets[place].name) for place in possible]
+        expected = [labelled(name.partition(SEPARATOR)[0], data_sets[index].name) for index in possible]
         raise ModelError(
             "this mistake is not possible in this test",
             found=name,
@@ -186,16 +186,16 @@ def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
         if not mistake.kinds:
             found += [Claim(mistake, ())] if data.campaign.bushing else []
             continue
-        places = [
-            place
-            for place, data_set in enumerate(data_sets)
+        indices = [
+            index
+            for index, data_set in enumerate(data_sets)
             if _is_possible(mistake, data_set, data) and labelled(mistake.name, data_set.name) not in without
         ]
-        groups: list[tuple[int, ...]] = [(place,) for place in places]
-        groups += [tuple(p for p in places if data_sets[p].kind == kind) for kind in ("loop", "sweep")]
+        groups: list[tuple[int, ...]] = [(index,) for index in indices]
+        groups += [tuple(p for p in indices if data_sets[p].kind == kind) for kind in ("loop", "sweep")]
         directions = dict.fromkeys(data_set.direction for data_set in data_sets)
-        groups += [tuple(p for p in places if data_sets[p].direction == direction) for direction in directions]
-        found += [Claim(mistake, group) for group in dict.fromkeys([*groups, tuple(places)]) if group]
+        groups += [tuple(p for p in indices if data_sets[p].direction == direction) for direction in directions]
+        found += [Claim(mistake, group) for group in dict.fromkeys([*groups, tuple(indices)]) if group]
     return found
 
 
@@ -228,8 +228,8 @@ class Screen:
         before, misfits = self.misfit(None), np.array([self.misfit(claim) for claim in candidates])
         changed = np.abs(misfits - before) > _LEAST_CHANGE * before
         order = np.argsort(misfits, kind="stable")
-        better = (place for place in order if changed[place] and misfits[place] < _WORTH_A_FIT * before)
-        return [candidates[place] for place in better][:limit]
+        better = (index for index in order if changed[index] and misfits[index] < _WORTH_A_FIT * before)
+        return [candidates[index] for index in better][:limit]
 
     def misfit(self, claim: Claim | None) -> float:
         """Compute the misfit of the paper's model to the tests: least sum of squared residuals over its parameters.
@@ -244,9 +244,9 @@ class Screen:
         if claim and not claim.tests and bushing:
             bushing = claim.mistake.corrected_bushing(bushing)
         data_sets: list[MeasuredTest] = [*self.data.loops, *self.data.sweeps]
-        mistakes = [claim.mistake if claim and place in claim.tests else None for place in range(len(data_sets))]
+        mistakes = [claim.mistake if claim and index in claim.tests else None for index in range(len(data_sets))]
         try:
-            parts = [self._part(place, test, mistakes[place], bushing) for place, test in enumerate(data_sets)]
+            parts = [self._part(index, test, mistakes[index], bushing) for index, test in enumerate(data_sets)]
         except ModelError:  # a shape for which a formula was not checked
             return np.inf
         whole = np.sum(parts, axis=0)
@@ -256,11 +256,11 @@ class Screen:
         explained = np.einsum("gi,gi->g", right, np.linalg.solve(unit, right[..., None])[..., 0])
         return max(_paraboloid_minimum((total - explained).reshape(_EPS_HALF.size, _ALPHA.size)), 0.0)
 
-    def _part(self, place: int, data_set: MeasuredTest, mistake: Mistake | None, bushing: Bushing | None) -> Array:
+    def _part(self, index: int, data_set: MeasuredTest, mistake: Mistake | None, bushing: Bushing | None) -> Array:
         """Inner products of the three model columns and the measured stiffness of one test, at each of g grid points.
 
         Args:
-            place: index of the test, loops before sweeps.
+            index: index of the test, loops before sweeps.
             data_set: the test.
             mistake: mistake that is corrected in the test; None for the test as recorded.
             bushing: bushing with its dimensions, corrected if the mistake is in them; None without a bushing.
@@ -268,7 +268,7 @@ class Screen:
         Returns:
             Matrix of products at each value of alpha and eps_half, (g, 4, 4).
         """
-        key = (place, mistake.name if mistake else "", bushing)
+        key = (index, mistake.name if mistake else "", bushing)
         if key not in self._known:
             direction, frequency, amplitude, stiffness, error = _points(data_set, mistake)
             columns = self._columns(bushing, direction, frequency, amplitude) / (stiffness * error)

@@ -52,7 +52,7 @@ def condensed(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, ...]
     Returns:
         The reduced campaign, and one sentence for each sweep that is changed and one for the loops.
     """
-    rig, loops, messages = data.campaign.rig, _some(data.loops), tuple[str, ...]()
+    rig, loops, messages = data.campaign.rig, _select_loops(data.loops), tuple[str, ...]()
     if len(loops) < len(data.loops):
         data, total = replace(data, loops=tuple(with_gain_errors(loops, rig))), len(data.loops)
         messages = (
@@ -80,7 +80,7 @@ def condensed(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, ...]
     return replace(data, sweeps=tuple(sweeps)), messages
 
 
-def _some(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
+def _select_loops(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
     """Select loops with at most `_MOST_ROWS` rows in total, and at least one loop of each direction.
 
     Different loops are selected before repeats. If they are too many, the selection is evenly spread over direction,
@@ -112,7 +112,7 @@ def _noise(before: SweepNoise, condensations: Sequence[_Means], rig: RigSettings
     Args:
         before: noise of the sweeps as measured.
         condensations: sweeps that were reduced.
-        rig: stated class of the rig.
+        rig: stated accuracy class of the rig (gain and phase errors).
     """
     if not condensations:
         return before
@@ -170,43 +170,43 @@ class _Groups:
 
     Args:
         rows: indices of the n grouped rows in the sweep, (n,).
-        place: index of the group that each of these rows belongs to, (n,).
-        lead: index in the sweep of one row of each group, (g,).
+        group: index of the group that each of these rows belongs to, (n,).
+        first: index in the sweep of the first row of each group, (g,).
         counts: number of rows in each group, (g,).
     """
 
     rows: Array
-    place: Array
-    lead: Array
+    group: Array
+    first: Array
     counts: Array
 
     @classmethod
     def from_keys(cls, rows: Array, keys: Array) -> "_Groups":
         """Build the groups of sweep rows, (n,), whose columns of `keys`, (k, n), are equal."""
-        _, first, place, counts = np.unique(keys, axis=1, return_index=True, return_inverse=True, return_counts=True)
-        turn = np.argsort(np.bincount(place, rows) / counts, kind="stable")
-        return cls(rows, np.argsort(turn)[place], rows[first[turn]], counts[turn])
+        _, first, group, counts = np.unique(keys, axis=1, return_index=True, return_inverse=True, return_counts=True)
+        turn = np.argsort(np.bincount(group, rows) / counts, kind="stable")
+        return cls(rows, np.argsort(turn)[group], rows[first[turn]], counts[turn])
 
     def mean(self, values: Any) -> Any:
         """Mean of values by sweep row over each group, (g,); a value that is no array is returned unchanged."""
         return self._mean(values) if isinstance(values, np.ndarray) else values
 
     def _mean(self, values: Array) -> Array:
-        return np.bincount(self.place, values[self.rows]) / self.counts
+        return np.bincount(self.group, values[self.rows]) / self.counts
 
     def _middle(self, values: Array) -> Array:
         """Geometric mean of values by sweep row over each group, (g,); the value itself for groups of one row."""
-        return np.where(self.counts > 1, np.exp(self._mean(np.log(values))), values[self.lead])
+        return np.where(self.counts > 1, np.exp(self._mean(np.log(values))), values[self.first])
 
     def sweep(self, sweep: Sweep) -> Sweep:
         """Sweep with one mean point per group; the stepped axis and |K| are averaged geometrically."""
         phase, error = np.angle(sweep.stiffness), sweep.relative_error
         return replace(
             sweep,
-            frequency=sweep.frequency[self.lead] if sweep.stepped == "amplitude" else self._middle(sweep.frequency),
-            amplitude=sweep.amplitude[self.lead] if sweep.stepped == "frequency" else self._middle(sweep.amplitude),
+            frequency=sweep.frequency[self.first] if sweep.stepped == "amplitude" else self._middle(sweep.frequency),
+            amplitude=sweep.amplitude[self.first] if sweep.stepped == "frequency" else self._middle(sweep.amplitude),
             stiffness=self._middle(np.abs(sweep.stiffness)) * np.exp(1j * self._mean(phase)),
-            repeat=sweep.repeat[self.lead],
+            repeat=sweep.repeat[self.first],
             reached=None if sweep.reached is None else self._middle(sweep.reached),
             relative_error=None if error is None else np.sqrt(self._mean(np.square(error)) / self.counts),
             temperature=self.mean(sweep.temperature),

@@ -68,7 +68,7 @@ def describe(
 
     Args:
         evidence: the fitted model and the tests.
-        rig: stated class of the rig.
+        rig: stated accuracy class of the rig (gain and phase errors).
         start: starting values read from the data, for a model whose parameters the gap has distorted.
         fixed: names of parameters that are not fitted.
         bounds: limits of parameters inside their general limits.

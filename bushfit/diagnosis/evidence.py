@@ -136,7 +136,7 @@ def result_of(
             twin in the rig are reported as unresolved.
         lacking: True if the model lacks something, so that a smooth error of the model is estimated.
         corrected: fit together with a smooth correction of the model; None if the model has no correction.
-        rig: stated class of the rig.
+        rig: stated accuracy class of the rig (gain and phase errors).
 
     Returns:
         The model with covariance, quality, range, warnings and expected error.

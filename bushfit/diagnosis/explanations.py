@@ -188,16 +188,16 @@ def outlier_clusters(
 
 
 def compound(evidence: Evidence) -> Group | None:
-    """Build the smooth deviation of the compound's modulus from the model's laws, as a group of residual columns.
+    """Explanation of a gap by a compound whose modulus deviates smoothly from the model's laws.
 
-    The relative deviation is the same function of frequency and strain in all directions and specimens.
+    The relative deviation is a random function of frequency and strain, the same in all directions and specimens.
 
     Args:
         evidence: fitted model and tests.
 
     Returns:
-        Group with columns (c, n) and relative changes of stiffness (c, points), of unit variance at each operating
-        point, and the deviations of the shape of each loop. None without tests.
+        Changes of the residuals, (c, n), and of the stiffness, (c, points), by independent patterns of the deviation,
+        of unit variance at each operating point, and by deviations of the shape of each loop. None without tests.
     """
     if not evidence.data_sets:
         return None

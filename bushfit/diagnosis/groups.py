@@ -72,7 +72,10 @@ class GroupEvidence:
 
     @property
     def total(self) -> float:
-        """Natural log of the marginal likelihood with the group, summed over compound with and without deviation."""
+        """Natural log of the marginal likelihood with the group, summed over both hypotheses on the compound.
+
+        The compound follows the model's laws, or deviates from them smoothly.
+        """
         if self.with_compound is None:
             return self.log_evidence
         return float(np.logaddexp(self.log_evidence, self.with_compound.log_evidence))

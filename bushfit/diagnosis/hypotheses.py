@@ -66,7 +66,7 @@ class Hypothesis:
         claim: mistake in the record; None without a mistake.
         faulty_parts: faulty parts of the tests: frequencies, levels, repeats or loops.
         unnamed: name of the smooth curve or compound deviation that stands for an unknown effect; "" without one.
-        levels: True if errors of amplitude levels are larger than the class of the rig allows.
+        levels: True if errors of amplitude levels are larger than the accuracy class of the rig allows.
         log_posterior: natural log of prior times evidence, not normalised.
         change: largest relative change of |K| by any of the explanations.
         last_change: relative change of |K| by the last explanation if its evidence is linear; 0 if it was refitted.
@@ -108,7 +108,7 @@ class Tests:
 
     Args:
         base: fit of the starting model; its residuals are whitened by scatter and by errors that points share.
-        rig: stated class of the rig.
+        rig: stated accuracy class of the rig (gain and phase errors).
         log_prior: natural log of the prior probability that these are the right records and nothing is missing.
         claim: mistake that is corrected; None for the tests as recorded.
         change: relative change of the recorded quantities by the correction; 0 for the tests as recorded.

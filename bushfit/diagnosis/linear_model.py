@@ -72,7 +72,7 @@ class LinearModel:
 
     @cached_property
     def _plain(self) -> Array:
-        """Mask of the nodes (error sizes) with rig errors within the class and no compound deviation, (nodes,)."""
+        """Mask of the nodes (error sizes) with rig errors within the stated accuracy and no compound deviation."""
         return np.array([not self.rig.nodes[n].wide for n in self.nodes]) & (self._deviation == 0.0)
 
     @cached_property
@@ -134,7 +134,7 @@ class LinearModel:
     def _projected(
         self, chosen: Array, index: Array, gram: Array, grams: Sequence[Array], log_det: Array, by_noise: Array
     ) -> list[Array]:
-        """Project parameters and the compound's deviation out of the inner products, at some of the nodes.
+        """Project parameters and the compound's deviation out of the inner products, for some error sizes (nodes).
 
         Args:
             chosen: positions of the m nodes in `nodes`, (m,).
@@ -206,7 +206,7 @@ class LinearModel:
     def _over_nodes(
         self, gains: tuple[Array, Array], chosen: Array, with_compound: GroupEvidence | None = None
     ) -> GroupEvidence:
-        """Average the evidence for a group of columns over some of the nodes.
+        """Average the evidence for one explanation over some combinations of error sizes (nodes).
 
         Args:
             gains: gain in log evidence, and squared relative change of |K|, by node and size of the amounts, (nodes,
@@ -238,7 +238,7 @@ class LinearModel:
         ]
 
     def _log_evidence_over(self, chosen: Array) -> float:
-        """Natural log of the evidence without a further explanation, summed over the nodes in a mask, (nodes,)."""
+        """Natural log of the evidence without a further explanation, over the error sizes in a mask, (nodes,)."""
         return _log_sum(self._at_nodes.base[chosen]) if chosen.any() else -np.inf
 
     @property
@@ -270,7 +270,7 @@ class LinearModel:
         return float(np.sqrt(share @ self._at_nodes.changes[bent])), float(likeliest)
 
     def likely(self, far: float) -> Array:
-        """Select the nodes that matter to the evidence for further groups of columns, to save time.
+        """Select the combinations of error sizes (nodes) that matter to the evidence for further explanations.
 
         Args:
             far: difference in log evidence from the best node, beyond which a node is left out.
@@ -294,7 +294,8 @@ class LinearModel:
         Args:
             compound_deviates: True to average over nodes with a deviation of the compound; False for nodes without one.
 
-        Notes: a posterior predictive check, averaged over nodes by probability (Gelman, Meng and Stern, 1996).
+        Notes: a posterior predictive check (Gelman, Meng and Stern, 1996), averaged over error sizes by probability. r
+        are the whitened residuals, and P projects out the parameters.
         """
         base = np.where(self._deviation > 0.0 if compound_deviates else self._plain, self._at_nodes.base, -np.inf)
         freedom = max(self.residual.size - int(np.count_nonzero(self.precision == 0.0)), 1)
@@ -307,7 +308,7 @@ class LinearModel:
             number: index of the group in `groups`.
 
         Returns:
-            Mean, (g,), and covariance, (g, g), averaged over all sizes and the nodes within the class of the rig.
+            Mean, (g,), and covariance, (g, g), averaged over all sizes of the amounts and of the rig's errors.
         """
         kind, place = next(
             (kind, int(np.flatnonzero(numbers == number)[0]))

@@ -62,11 +62,17 @@ def _sweep_regions(evidence: Evidence) -> Iterator[MisfitRegion]:
             band = float(frequencies.min()), float(frequencies.max())
             span = float(amplitudes.min()), float(amplitudes.max())
             yield MisfitRegion(
-                direction, "sweep", band, span, name, excess, _read_sweep(name, mine, pieces, touched, (band, span))
+                direction,
+                "sweep",
+                band,
+                span,
+                name,
+                excess,
+                _describe_sweep_misfit(name, mine, pieces, touched, (band, span)),
             )
 
 
-def _read_sweep(
+def _describe_sweep_misfit(
     part: str,
     lines: Sequence[LineMisfit],
     pieces: Sequence[Array],

@@ -245,7 +245,7 @@ def nearest_power_law(
 
     Args:
         fitted: the fitted model and the tests.
-        rig: stated class of the rig.
+        rig: stated accuracy class of the rig (gain and phase errors).
         start: starting values read from the data; the gap may have distorted those of the fit.
         bounds: limits of parameters inside their general limits.
 

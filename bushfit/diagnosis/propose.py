@@ -112,7 +112,7 @@ def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
     return inverse * np.square(products), -inverse * products / lengths, visible
 
 
-def has_what_it_uses(effect: Effect, model: Model) -> bool:
+def has_used_parameters(effect: Effect, model: Model) -> bool:
     """True if a model has all parameters of other effects that an effect uses."""
     return not (isinstance(effect, Branch) and {*effect.uses} - {*model.values})
 
@@ -131,7 +131,7 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
     present = (None, *model.effects)
     excluded_names = {name for member in (*model.effects, *excluded) for name in twins_of(member)}
     unavailable = {*excluded_names, *(effect.replaces for effect in model.records)}
-    possible = [effect for effect in effects_for_places(places).values() if has_what_it_uses(effect, model)]
+    possible = [effect for effect in effects_for_places(places).values() if has_used_parameters(effect, model)]
     missing = [effect for effect in possible if effect.name not in unavailable]
     series = {name for effect in model.records for name in effect.never_with}
     series |= {effect.name for effect in missing if {*effect.never_with} & {*present}}

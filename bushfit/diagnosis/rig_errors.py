@@ -31,7 +31,7 @@ class Node:
         errors: standard deviations of errors of a run, a level, drift along a run, and a loop, relative to those of
             the rig's stated class.
         log_weight: natural log of the prior weight.
-        wide: True if errors of levels are larger than the class of the rig allows.
+        wide: True if errors of levels are larger than the accuracy class of the rig allows.
         compound: standard deviation of the compound's deviation from the model's laws, relative to |K|.
     """
 
@@ -48,7 +48,8 @@ class Block:
 
     Args:
         rows: indices of the rows in the residual vector, (n,).
-        columns: change of the whitened residuals by each of w errors at the size of the rig's class, (w, n).
+        columns: change of the whitened residuals by each of w errors at the size that the accuracy class of the rig
+            states, (w, n).
         kinds: kind of each error (run, level, drift or loop), (w,).
         scatters: True for points of sweeps, whose scatter differs between nodes; False for loops.
     """
@@ -170,7 +171,7 @@ def blocks(evidence: Evidence, rig: RigSettings) -> Iterator[Block]:
 
     Args:
         evidence: the fitted model and the tests.
-        rig: stated class of the rig.
+        rig: stated accuracy class of the rig (gain and phase errors).
 
     Yields:
         Blocks that together contain every row once.

@@ -20,7 +20,7 @@ from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart, Ou
 from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, SearchState, Tests
 from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS
-from bushfit.diagnosis.propose import has_what_it_uses
+from bushfit.diagnosis.propose import has_used_parameters
 from bushfit.diagnosis.refit import refit_with_free_columns, refitted, within_reach
 from bushfit.diagnosis.verdict import decide_verdict
 from bushfit.errors import FitError, ModelError
@@ -263,7 +263,7 @@ class Search:
                 continue
             with suppress(FitError, ModelError):  # no response without it
                 model = state.evidence.model.without(name)
-                if not all(has_what_it_uses(effect, model) for effect in model.records):
+                if not all(has_used_parameters(effect, model) for effect in model.records):
                     continue
                 evidence = fit(model, data_sets, request.fixed, {**within_reach(model, data_sets), **request.bounds})
                 shorter = SearchState.of_tests(state.tests, request)

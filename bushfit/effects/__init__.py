@@ -259,7 +259,7 @@ def effects_for_places(places: Iterable[str]) -> dict[str, Effect]:
     """Effects that a search considers for tests of the given directions and specimens.
 
     Args:
-        places: names of the tested directions and specimens. The axial direction, or else the first place, is the
+        places: names of the tested directions and specimens. The axial direction, or else the first name, is the
             reference for the factors of the others.
 
     Returns:

@@ -310,12 +310,12 @@ class Layer(Effect):
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Effects with the same equation, one for each direction or specimen ("place").
+    """Effects with the same equation, one for each direction or specimen.
 
     Args:
-        record: effect with the placeholder {place} in its texts. The effect for a place acts only in tests of this
-            place; the effect and its one parameter are named `<name>.<place>`.
-        places: function from the tested places to the places that a search considers.
+        record: effect with the placeholder {place} in its texts. The effect acts only in tests of one direction or
+            specimen; the effect and its one parameter are named `<name>.<place>`.
+        places: function from the tested directions and specimens to those for which a search considers the effect.
         radial: texts for the radial direction that differ from those of the record.
     """
 

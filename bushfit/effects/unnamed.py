@@ -115,7 +115,7 @@ class Unnamed:
 
     @property
     def rms(self) -> float:
-        """Root mean square of the relative correction at the nodes, whose standard deviation s adds: of c^2 + s^2."""
+        """Root mean square of the relative correction c at the nodes, with its error s: root of mean(c^2 + s^2)."""
         return float(np.sqrt(np.mean(self._at_nodes[0] + self._at_nodes[1])))
 
     @property

@@ -110,7 +110,7 @@ class FittedTests:
         return blocks
 
     def project(self, rows: Array) -> Array:
-        """Reduce whitened residuals of all tests, (..., n), to their components, (..., d)."""
+        """Reduce whitened residuals of all tests, (..., n), to the d combinations that the stiffness can change."""
         parts = [
             rows[..., block] if directions is None else rows[..., block] @ directions
             for _, block, directions, _ in self._blocks
@@ -118,13 +118,13 @@ class FittedTests:
         return np.concatenate(parts, axis=-1)
 
     def columns(self, shapes: Array) -> Array:
-        """Convert relative changes of the stiffness into changes of the residuals' components.
+        """Convert relative changes of the stiffness into changes of the d combinations of residuals of `project`.
 
         Args:
             shapes: c relative changes of the stiffness at the operating points, complex (c, p).
 
         Returns:
-            Components of the whitened residuals for each change, (c, d).
+            Changes of these combinations, (c, d).
         """
         columns, first, changes = [], 0, shapes * self._stiffness
         for test, _, directions, components in self._blocks:

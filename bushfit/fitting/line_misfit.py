@@ -9,7 +9,7 @@ import numpy as np
 from bushfit.effects.contract import Array
 from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.fitting.measured_test import shown_amplitude
-from bushfit.fitting.repeats import unit
+from bushfit.fitting.repeats import to_unit_interval
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.reading.measurement import Stepped
@@ -56,7 +56,7 @@ class LineMisfit:
     def smooth(self) -> Array:
         """Smooth part of `misfit` (K_measured/K_model - 1): a polynomial in the log of `step`, complex (n,)."""
         x = np.log(self.step)
-        basis = np.polynomial.legendre.legvander(unit(x), min(_SMOOTH_DEGREE, np.unique(x).size - 1))
+        basis = np.polynomial.legendre.legvander(to_unit_interval(x), min(_SMOOTH_DEGREE, np.unique(x).size - 1))
         return basis @ np.linalg.lstsq(basis.astype(complex), self.misfit, rcond=None)[0]
 
 

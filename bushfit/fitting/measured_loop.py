@@ -35,7 +35,7 @@ class MeasuredLoop(MeasuredBase):
         test_conditions: temperature of the rubber in the loop, and its strains before.
         fundamental_only: True to use only the first harmonic of the residuals, so that the loop is one operating point
             with two residuals: for an added stiffness that is known at the loop's frequency only.
-        gain_error: standard deviation of the relative gain error of the whole record, by the class of its rig.
+        gain_error: standard deviation of the relative gain error of the whole record, by the accuracy class of its rig.
         gain_weighs: True if the gain error is part of the noise that weights the residuals, as for a class stated in
             [rig]. An assumed gain error only widens the errors of fitted parameters.
         model_error: standard deviation of the model's error of the force, relative to half the force range, added to

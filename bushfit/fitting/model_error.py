@@ -75,7 +75,7 @@ def with_model_error(
     Args:
         plain_fit: least-squares fit with the noise alone.
         bounds: limits of parameters [SI], inside their default limits.
-        rig: class of the rig, whose errors may explain a misfit.
+        rig: accuracy class of the rig, whose errors may explain a misfit.
         smooth: True to test for smooth discrepancies only.
 
     Returns:

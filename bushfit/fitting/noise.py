@@ -20,7 +20,7 @@ from bushfit.fitting.repeats import (
     difference_freedom,
     disturbed_steps,
     line_noise,
-    stiffness_at_nominal,
+    log_stiffness_at_nominal,
 )
 from bushfit.fitting.rig_class import class_errors, describe_class, format_class_errors, largest_error
 from bushfit.reading.measurement import Sweep
@@ -63,7 +63,8 @@ class SweepNoise:
             the scatter is that of `random`.
         level: standard deviation of the errors shared by all runs of a line, (ln|K|, phase [rad]).
         level_freedom: degrees of freedom behind `level`; 0 if it is exact.
-        excess_warnings: warning on each sweep whose runs differ by more than a rig of its class explains, by name.
+        excess_warnings: warning on each sweep whose runs differ by more than the accuracy class of its rig explains, by
+            name.
     """
 
     random: dict[LineKey, tuple[float, float]]
@@ -114,7 +115,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
         within a line and over lines; lines keep separate variances if Bartlett's test finds them unequal. If the
         squares of D grow along the stepped quantity, so does the scatter.
     """
-    at_levels = [(sweep, stiffness_at_nominal(sweep)) for sweep in sweeps]
+    at_levels = [(sweep, log_stiffness_at_nominal(sweep)) for sweep in sweeps]
 
     def of_lines(without: Collection[float]) -> dict[LineKey, LineNoise]:
         return {
@@ -245,11 +246,11 @@ def _shared(lines: Sequence[LineNoise], rig: RigSettings) -> Array:
     """Standard deviation of the errors of relative gain and phase [rad] shared by a run, (2,), from pairs of repeats.
 
     Outlying pairs are left out. Few repeats often agree by chance: below `_ENOUGH` degrees of freedom the variance is
-    averaged with that of the rig's class.
+    averaged with that of the rig's accuracy class.
 
     Args:
         lines: noise of the lines with repeats.
-        rig: class of the rig.
+        rig: accuracy class of the rig (gain and phase errors).
     """
     pairs, freedom = np.concatenate([line.shared for line in lines]), sum(line.shared_freedom for line in lines)
     usual = np.abs(pairs) <= _OUTLYING_PAIR * np.median(np.abs(pairs), axis=0) if len(pairs) else np.empty((0, 2), bool)

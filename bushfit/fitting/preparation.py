@@ -50,7 +50,7 @@ def prepare_loops(
 
     Args:
         loops: measured loops.
-        rig: class of the rig.
+        rig: accuracy class of the rig (gain and phase errors).
         without_outliers: True to give rows whose force is an outlier no weight.
     """
     prepared_loops = [prepare_loop(loop, without_outliers=without_outliers) for loop in loops]
@@ -74,7 +74,7 @@ def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[Me
 
 
 def with_gain_weighting(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> list[MeasuredTest]:
-    """Set for all loops among tests if the noise that weights the residuals includes the rig's gain error (`weigh`)."""
+    """Return tests whose loops weight their residuals by noise with (`weigh`) or without the gain error of the rig."""
     return [replace(test, gain_weighs=weigh) if isinstance(test, MeasuredLoop) else test for test in data_sets]
 
 
@@ -103,7 +103,7 @@ def prepare_sweeps(
     Args:
         sweeps: measured sweeps.
         residuals: definition of the residuals: complex, or magnitude and loss factor.
-        rig: class of the rig.
+        rig: accuracy class of the rig (gain and phase errors).
 
     Returns:
         Measured sweeps with their noise, in the order given.

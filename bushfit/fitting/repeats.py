@@ -140,7 +140,7 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
     if degree < 1:
         return LineNoise(np.full((1, 2), ASSUMED[0]), 1, np.empty((0, 2)))
     values = _parts(log_stiffness)
-    basis = np.polynomial.legendre.legvander(unit(np.log(steps)), degree)
+    basis = np.polynomial.legendre.legvander(to_unit_interval(np.log(steps)), degree)
     residual = np.abs(values - basis @ least_absolute(basis, values, FLOOR**2))
     usual = np.median(np.sort(residual, axis=0)[degree + 1 :], axis=0)  # the curve goes through degree + 1 points
     inliers = np.all(residual <= np.maximum(_OUTLIER * MEDIAN_TO_SIGMA * usual, FLOOR), axis=1)
@@ -175,8 +175,8 @@ def disturbed_steps(lines: Iterable[LineNoise]) -> list[float]:
     ]
 
 
-def unit(values: Array) -> Array:
-    """Scale values linearly to the interval from -1 to 1, (n,); all -1 if they are equal."""
+def to_unit_interval(values: Array) -> Array:
+    """Scale values, (n,), linearly to the interval from -1 to 1, for Legendre polynomials; all -1 if they are equal."""
     return 2.0 * (values - values.min()) / max(float(np.ptp(values)), np.finfo(float).tiny) - 1.0
 
 
@@ -192,7 +192,7 @@ def _parts(values: Array) -> Array:
     return np.stack([np.real(values), np.imag(values)], axis=-1)
 
 
-def stiffness_at_nominal(sweep: Sweep) -> Array:
+def log_stiffness_at_nominal(sweep: Sweep) -> Array:
     """Logarithm of the stiffness of each point, corrected to the nominal amplitude of its level, complex (n,).
 
     The correction from the reached to the nominal amplitude follows a smooth surface fitted to ln K over ln f and ln X.
@@ -211,7 +211,7 @@ def stiffness_at_nominal(sweep: Sweep) -> Array:
 
     def surface(amplitude: Array) -> Array:
         over_range = 2.0 * (np.log(amplitude) - low) / span - 1.0
-        return np.polynomial.legendre.legvander2d(unit(np.log(sweep.frequency)), over_range, degrees)
+        return np.polynomial.legendre.legvander2d(to_unit_interval(np.log(sweep.frequency)), over_range, degrees)
 
     reached = surface(sweep.amplitude_reached)
     solution = np.linalg.lstsq(reached.astype(complex), value, rcond=None)[0]

@@ -93,7 +93,7 @@ class _TestObject:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Names that include this place in the name of an effect: of the place, its body, and its direction."""
+        """Names by which an effect can be restricted to this test object: its own, and of its body and direction."""
         return (str(self),)
 
     @property
@@ -278,7 +278,7 @@ class Specimen(_TestObject):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """Names that include this place in the name of an effect: of the place, its body, and its direction."""
+        """Names by which an effect can be restricted to this test object: its own, and of its body and direction."""
         return (self.name, self.body, str(self.axis)) if self.axis else (self.name,)
 
 
@@ -323,13 +323,16 @@ def default_places(bushing: Bushing | None, specimens: Sequence[Specimen]) -> li
 
 
 def shared_labels(places: Iterable[Place]) -> list[str]:
-    """List the names of tested places for a search: of each place, then of bodies and directions of several bushings.
+    """List the names to which a search for missing effects may restrict an effect.
 
-    A body tested in one direction has the name of its only place, and the first of two bodies has no name, because its
-    error is that of the second with the opposite sign.
+    A body that is tested in one direction is not listed in addition to this direction, nor is the first of two bodies,
+    because its error is that of the second with the opposite sign.
+
+    Args:
+        places: tested directions and specimens.
 
     Returns:
-        Names of places, then of bodies, then of directions.
+        Names of directions and specimens; then, of several bushings, of the bodies and of the common directions.
     """
     tested = [*dict.fromkeys(places)]
     mounted = [place for place in tested if isinstance(place, Specimen) and place.bushing]
@@ -341,12 +344,12 @@ def shared_labels(places: Iterable[Place]) -> list[str]:
 
 
 def unit_strain(bushing: Bushing | None, place: Place) -> float:
-    """Equivalent strain of the rubber per displacement [1/m], rotation [1/rad] or stated strain [1] at a place.
+    """Equivalent strain of the rubber per displacement [1/m], rotation [1/rad] or stated strain [1] of a test.
 
-    A place is a direction of the bushing, which is then required, or a specimen.
+    The test is in a direction of the bushing, or of a specimen (`place`).
 
     Raises:
-        ModelError: the place is a direction, but there is no bushing.
+        ModelError: `place` is a direction, but there is no bushing.
 
     >>> unit_strain(None, Specimen("coupon", "modulus"))
     0.5
@@ -359,12 +362,12 @@ def unit_strain(bushing: Bushing | None, place: Place) -> float:
 
 
 def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
-    """Stiffness at a place per equivalent shear modulus: [m], [m^3/rad] in torsion, [1] for a modulus test.
+    """Stiffness per equivalent shear modulus: [m], [m^3/rad] in torsion, [1] for a modulus test.
 
-    A place is a direction of the bushing, which is then required, or a specimen.
+    The stiffness is that of a direction of the bushing, or of a specimen (`place`).
 
     Raises:
-        ModelError: the place is a direction, but there is no bushing.
+        ModelError: `place` is a direction, but there is no bushing.
 
     >>> stiffness_per_modulus(None, Specimen("mount", "shear", area=1e-3, thickness=0.01, elements=2))
     0.2
@@ -386,7 +389,7 @@ def strain_factor_of_files(place: Place) -> float:
 
 
 def bushing_at(bushing: Bushing | None, place: Place) -> Bushing | None:
-    """Return the bushing that is tested at a place: its own, or the one bushing of the campaign; None for a coupon."""
+    """Bushing whose tests `place` denotes: of several bushings its own, else the given one; None for a coupon."""
     return place.bushing if isinstance(place, Specimen) else bushing
 
 

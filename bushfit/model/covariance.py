@@ -75,7 +75,7 @@ class Covariance:
     def describe_unknown(self, values: Mapping[str, float]) -> str:
         """Sentence that names the parameters whose 95 % half-width is at least their value; "" if there are none.
 
-        The parameters of `preload` are coefficients of one curve, whose band tells more than one error.
+        Parameters of the effect `preload` are not named: they are coefficients of one curve, and have no meaning alone.
         """
         names = [name for name in self.names if not name.startswith("preload.")]
         unknown = ", ".join(name for name in names if self.half_width_of(name) >= abs(values[name]))

@@ -128,7 +128,10 @@ class Model:
 
     @property
     def constant_modifiers(self) -> list[str]:
-        """Names of the modifiers, other than temperature shifts, which a motion through time uses at one amplitude."""
+        """Names of the modifiers that a simulation in time evaluates only once, at the amplitude of the whole motion.
+
+        Modifiers are effects that change parameters with frequency or amplitude; temperature shifts are not listed.
+        """
         return [effect.name for effect in self.structure.modifiers if not effect.shift_factor]
 
     @property
@@ -162,11 +165,11 @@ class Model:
         return self.bushing.name if self.bushing else "compound"
 
     def unit_strain(self, place: Place) -> float:
-        """Equivalent strain of the rubber at a place, per displacement [1/m], rotation [1/rad] or strain [1]."""
+        """Equivalent strain of the rubber per displacement [1/m], rotation [1/rad] or stated strain [1] of a test."""
         return geometry.unit_strain(self.bushing, place)
 
     def stiffness_per_modulus(self, place: Place) -> float:
-        """Stiffness at a place per shear modulus: [m], [m^3/rad] for rotation, [1] if tests give a modulus."""
+        """Stiffness of a direction or specimen per shear modulus: [m], [m^3/rad] in torsion, [1] for modulus tests."""
         return geometry.stiffness_per_modulus(self.bushing, place)
 
     def with_values(self, values: Mapping[str, float]) -> "Model":

@@ -37,8 +37,8 @@ class Quality:
         reduced_chi_square: sum of squared residuals in units of noise per degree of freedom; 1 if only noise remains.
         points: number of residuals.
         noise: relative standard deviation of the noise of one point, root mean square over all points.
-        loop_gain_error: relative standard deviation of the force gain of a loop, by the class of the rig; None without
-            loops, or if an older file does not state it.
+        loop_gain_error: relative standard deviation of the force gain of a loop, by the accuracy class of the rig; None
+            without loops, or if an older file does not state it.
     """
 
     nrmse: Number

@@ -31,7 +31,7 @@ def factor_spread(result: Result) -> float | None:
 
 
 def with_factor(result: Result, places: Sequence[str], spread: float) -> Result:
-    """Add a stiffness factor of 1, with the spread between bushings, at places without a test.
+    """Add a stiffness factor of 1, with the spread between bushings, to directions or bushings without a test.
 
     Args:
         result: fitted model.

@@ -52,8 +52,8 @@ class Noise:
     Args:
         scatter: independent error of each point of a sweep, (gain, phase).
         shared: error shared by all points of one run, (gain, phase).
-        level: error shared by all runs of one test, (gain, phase): the class of the rig. A loop has its gain only. A
-            fit takes this error from [rig] and treats it as noise of loops and repeated sweeps.
+        level: error shared by all runs of one test, (gain, phase): the accuracy class of the rig. A loop has its gain
+            only. A fit takes this error from [rig] and treats it as noise of loops and repeated sweeps.
         force: error of one recorded row of a loop over half the force range, at 1000 rows per cycle as in `simulate`.
             The default is chosen: that of most force sensors.
         rows_as_one: number of correlated rows of a loop with the information of one independent row. The default is

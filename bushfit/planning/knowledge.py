@@ -62,9 +62,9 @@ def from_result(result: Result, noise: Noise | None = None, source: str = "") ->
 def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -> Knowledge:
     """Fit the tests of a campaign to obtain the knowledge for a plan; with rivals, one fit for each rival effect.
 
-    The fits treat the errors of the class of the rig as noise, whether [rig] states them or not, as in the planned
-    tests. With rivals, the model also has the effects that a diagnosis found for certain, and the first effect of each
-    other set that the diagnosis cannot separate.
+    The fits treat the errors of the accuracy class of the rig as noise, whether [rig] states them or not, as in the
+    planned tests. With rivals, the model also has the effects that a diagnosis found for certain, and the first effect
+    of each other set that the diagnosis cannot separate.
 
     Args:
         data: tests of the campaign.
@@ -228,7 +228,7 @@ def noise_of(data: PreparedCampaign) -> Noise:
 
 
 def rig_of(rig: RigSettings, noise: Noise) -> RigSettings:
-    """Return the settings [rig] with the class of the rig (gain and phase errors) that a plan assumes."""
+    """Return the settings [rig] with the accuracy class (gain and phase errors) that a plan assumes."""
     return replace(rig, gain_error=noise.level[0], phase_error=noise.level[1], displacement_error=None)
 
 
