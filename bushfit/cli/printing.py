@@ -17,7 +17,7 @@ _MOST_TESTS = 8
 
 
 def print_validations(output: Output, validations: Sequence[Validation], before: Sequence[Validation] = ()) -> None:
-    """Print NRMSE, peak and energy error, and share of points in the 95 % band for each validation record.
+    """Print NRMSE, gap of peak and energy, and share of points in the 95 % band for each validation record.
 
     Args:
         output: output of the command.
@@ -74,7 +74,7 @@ def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Expe
 
     Args:
         output: output of the command.
-        misfits: NRMSE, reduced chi-square and mean error of |K| of each test and run.
+        misfits: NRMSE, reduced chi-square and mean gap of |K| of each test and run.
         usable: expected error of |K| and loss factor of each direction or specimen.
     """
     from bushfit.report.tables import DISPLAYS
@@ -82,11 +82,8 @@ def print_tests(output: Output, misfits: Sequence[Misfit], usable: Sequence[Expe
     tests = [test for test in misfits if output.verbose or test.held is None]
     worst = sorted(tests, key=lambda test: -test.reduced_chi_square)[: len(tests) if output.verbose else _MOST_TESTS]
     if len(tests) > 1:
-        title = (
-            "test by test: NRMSE [%], reduced chi-square (chi2), mean error of the model in |K| [%] (+: model stiffer "
-            "than measured)"
-        )
-        columns, rows = ("test", "direction", "points", "NRMSE", "chi2", "mean", ""), []
+        title = "test by test: NRMSE [%], reduced chi-square (chi2), mean gap in |K| [%] (measured minus model)"
+        columns, rows = ("test", "direction", "points", "NRMSE", "chi2", "gap", ""), []
         for test in (test for test in tests if test in worst):
             name, (unit, factor) = test.test, DISPLAYS.get(test.unit or "", (test.unit or "", 1.0))
             if test.held is not None:  # a run, by its amplitude or frequency

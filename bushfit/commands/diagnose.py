@@ -113,8 +113,8 @@ def diagnose(
                 "direction": str(validation.record.direction),
                 "nrmse": validation.nrmse,
                 "nrmse_before": plain_validation.nrmse if plain_validation else None,
-                "peak_error": validation.peak_error,
-                "energy_error": validation.energy_error,
+                "peak_gap": validation.peak_gap,
+                "energy_gap": validation.energy_gap,
                 "share_inside": validation.share_inside,
             }
             for validation, plain_validation in zip_longest(validations, before)

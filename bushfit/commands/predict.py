@@ -117,7 +117,7 @@ class PredictionOutput:
 
     @cached_property
     def tests(self) -> tuple[Misfit, ...]:
-        """Misfit of the model with each measured sweep and run: NRMSE, reduced chi-square, mean error of |K|."""
+        """Misfit of the model with each measured sweep and run: NRMSE, reduced chi-square, mean gap of |K|."""
         return misfits(self.result.model, *split_by_fit(self.result, self.measured))
 
     @cached_property

@@ -143,8 +143,8 @@ class ValidationEntry(TypedDict):
     direction: Annotated[str, Doc("direction of the bushing, or name of a specimen.")]
     nrmse: Annotated[float, Doc("rms error of the force with model.json, relative to half the range of the force.")]
     nrmse_before: Annotated[float | None, Doc("the same without the added effects; null if none were added.")]
-    peak_error: Annotated[float, Doc("relative error of the largest force.")]
-    energy_error: Annotated[float, Doc("relative error of the work.")]
+    peak_gap: Annotated[float, Doc("relative gap of the largest force, measured minus predicted.")]
+    energy_gap: Annotated[float, Doc("relative gap of the work, measured minus predicted.")]
     share_inside: Annotated[float, Doc("share of the measured points inside the 95 % band, 0 to 1.")]
 
 

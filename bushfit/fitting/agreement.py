@@ -155,7 +155,7 @@ def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[Mea
     found = []
     for index, whole in enumerate([*fitted, *unfitted]):
         test = whole.with_weight()
-        relative, gain = test.relative(model), np.abs(test.noise_free(model).measured / test.measured) - 1.0
+        relative, gain = test.relative(model), 1.0 - np.abs(test.noise_free(model).measured / test.measured)
         squares = np.square(test.residual(model)).reshape(test.residuals_per_point, -1).sum(axis=0)
         runs = list(_runs(test))
         for run in (_Run(None, None, None, slice(None)), *(runs if len(runs) > 1 else ())):

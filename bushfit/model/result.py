@@ -110,7 +110,7 @@ class Misfit:
         nrmse: root mean square difference of the complex stiffness relative to |K|, or of a loop's force relative to
             half its range.
         reduced_chi_square: mean square residual in units of noise.
-        gain: mean relative error of the model's |K|: positive if the model is stiffer than measured.
+        gain: mean relative gap of |K|, measured minus model: positive if the test is stiffer than the model.
     """
 
     test: str

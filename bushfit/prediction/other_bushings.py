@@ -26,7 +26,7 @@ class OtherBushings:
         points: number of operating points of its tests.
         nrmse: root mean square error of the prediction, relative to |K|, or of a loop to half its range of force.
         reduced_chi_square: mean square error in units of noise.
-        gain: mean relative error of |K|: positive if the prediction is stiffer than measured.
+        gain: mean relative gap of |K|, measured minus predicted.
         share_inside: share of the points whose |K| is in the 95 % band of prediction and noise, 0 to 1.
     """
 

@@ -28,20 +28,20 @@ class Validation:
 
     @property
     def nrmse(self) -> float:
-        """Root mean square of predicted minus measured force, relative to half the range of the measured force."""
+        """Root mean square of measured minus predicted force, relative to half the range of the measured force."""
         error = self.response.force.value - self.measured
         return float(2.0 * np.sqrt(np.mean(np.square(error))) / np.ptp(self.measured))
 
     @property
-    def peak_error(self) -> float:
-        """Relative error of the largest magnitude of the force: predicted over measured, minus 1."""
-        return float(self.response.peak / np.abs(self.measured).max() - 1.0)
+    def peak_gap(self) -> float:
+        """Relative gap of the largest magnitude of the force: measured minus predicted, over measured."""
+        return float(1.0 - self.response.peak / np.abs(self.measured).max())
 
     @property
-    def energy_error(self) -> float:
-        """Relative error of the work of the motion on the bushing: predicted over measured, minus 1."""
+    def energy_gap(self) -> float:
+        """Relative gap of the work of the motion on the bushing: measured minus predicted, over measured."""
         history = self.response.history
-        return work(history, self.response.force.value) / work(history, self.measured) - 1.0
+        return 1.0 - work(history, self.response.force.value) / work(history, self.measured)
 
     @property
     def share_inside(self) -> float:

@@ -40,14 +40,14 @@ def validation_table(validations: Sequence[Validation], before: Sequence[Validat
         before: comparisons with the model without the effects that a diagnosis added; empty if none were added.
 
     Returns:
-        Name, direction, NRMSE, peak and energy error, and share of the points inside the band, in percent.
+        Name, direction, NRMSE, gap of peak and energy, and share of the points inside the band, in percent.
     """
     columns = {
         "test": [validation.record.name for validation in validations],
         "direction": [str(validation.record.direction) for validation in validations],
         "NRMSE [%]": [100.0 * validation.nrmse for validation in validations],
-        "peak error [%]": [100.0 * validation.peak_error for validation in validations],
-        "energy error [%]": [100.0 * validation.energy_error for validation in validations],
+        "peak gap [%]": [100.0 * validation.peak_gap for validation in validations],
+        "energy gap [%]": [100.0 * validation.energy_gap for validation in validations],
         "points in band [%]": [100.0 * validation.share_inside for validation in validations],
     }
     if before:

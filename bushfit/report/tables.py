@@ -274,7 +274,7 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
                     **response_columns(place, modelled, "model "),
                     "stiffness residual [noise]": gain,
                     "loss residual [noise]": phase,
-                    "model over measured [-]": np.abs(modelled / data_set.measured),
+                    "measured over model [-]": np.abs(data_set.measured / modelled),
                     "loss factor difference [-]": loss_factor(data_set.measured) - loss_factor(modelled),
                     "outlier": np.where(data_set.weights > 0.0, "no", "yes"),
                 }
@@ -321,7 +321,7 @@ def master_curve_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:
 
 def bushings_table(bushings: Sequence[OtherBushings]) -> pd.DataFrame:
     """Table of the errors with which a fit to the other bushings predicts each bushing; a row per bushing."""
-    columns = ["bushing", "points", "NRMSE [%]", "chi2 [-]", "mean error [%]", "in band [%]"]
+    columns = ["bushing", "points", "NRMSE [%]", "chi2 [-]", "mean gap [%]", "in band [%]"]
     table = pd.DataFrame([astuple(row) for row in bushings], columns=columns)
     percent = [name for name in columns if "%" in name]
     return table.assign(**{name: 100.0 * table[name] for name in percent})

@@ -70,7 +70,7 @@ def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_ampl
     measured = pd.read_csv(tmp_path / "x" / "measured.csv")
     assert set(measured["sweep"]) == {"sweep_axial", "sweep_radial"}
     assert dict(zip(measured["direction"], measured["fitted"], strict=True)) == {"axial": "yes", "radial": "no"}
-    assert measured["model over measured [-]"].between(0.95, 1.05).all()
+    assert measured["measured over model [-]"].between(0.95, 1.05).all()
     axial, radial = (line for line in done.stderr.splitlines() if ": expected error " in line)
     assert (axial.endswith("all fitted)"), radial.endswith("each predicted without its own run)")) == (True, True)
     table = pd.read_csv(tmp_path / "x" / "axial.csv")
