@@ -22,14 +22,15 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
         quantities: values and standard errors of the n parts by name of the quantity, (n,) each; NaN where not known.
 
     Returns:
-        Two mappings by name of the quantity, (n,) each: deviation from the mean of the parts that are no outliers, in
-        their standard deviations, NaN where not known; and True for the outliers.
+        Two mappings by name of the quantity, (n,) each: deviation from the mean of the parts that are outliers in no
+        quantity, in their standard deviations, NaN where not known; and True for the outliers.
 
     Notes:
         Generalised extreme studentised deviate procedure (Rosner, Technometrics 25 (1983) 165) for up to a fifth of
         the parts, with Bonferroni's correction for the number of quantities. Each value is held against the others
         without it, so that their deviation has n - 2 degrees of freedom and the limit is that of `smallest_deviation`.
-        A standard error above the usual one widens the deviation that a value may have.
+        A standard error above the usual one widens the deviation that a value may have. Outliers of one quantity are
+        then compared in all quantities with the parts that are outliers in none, so that they do not hide each other.
     """
     deviations, outliers = dict[str, Array](), dict[str, Array]()
     for name, (values, errors) in quantities.items():
@@ -45,10 +46,16 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
             usual[worst] = False
             removed.append(worst)
             count = step + 1 if chance < _LEVEL else count
-        differs = np.zeros(values.size, dtype=bool)
-        differs[removed[:count]] = True
-        deviations[name] = _studentised(values, errors, finite & ~differs)
-        outliers[name] = differs
+        outliers[name] = np.zeros(values.size, dtype=bool)
+        outliers[name][removed[:count]] = True
+    named = np.any([*outliers.values()], axis=0)
+    for name, (values, errors) in quantities.items():
+        usual = np.isfinite(values) & ~named
+        if usual.sum() < FEWEST - 1:
+            usual = np.isfinite(values) & ~outliers[name]
+        deviations[name] = _studentised(values, errors, usual)
+        limit = smallest_deviation(int(usual.sum()) + 1, len(quantities)) or math.inf
+        outliers[name] |= named & (np.abs(deviations[name]) > limit)
     return deviations, outliers
 
 

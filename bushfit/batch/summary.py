@@ -214,7 +214,9 @@ class BatchResult:
         if name in self.compared:
             is_compared = np.isfinite(self.compared[name][0])
             limit = smallest_deviation(int(is_compared.sum()), len(self.compared))
-            detectable = limit and limit * float(values[is_compared & ~self.outliers[1][name]].std(ddof=1))
+            usual = is_compared & ~np.any([*self.outliers[1].values()], axis=0)
+            usual = usual if usual.sum() >= FEWEST - 1 else is_compared & ~self.outliers[1][name]
+            detectable = limit and limit * float(values[usual].std(ddof=1))
         low, high = self.allowed[0].get(name, (-np.inf, np.inf))
         fixed = (-np.inf, np.inf)
         if self.plan.limits and name in self.allowed[0] and name not in FIT_NAMES:
@@ -262,7 +264,7 @@ class BatchResult:
             doubtful=doubtful,
             poor_fit=describe_poor_fit(record, limits),
             deviations={name: round(z, 2) for name, z in outlying.items()},
-            differs="; ".join(f"{name} {number(100.0 * relative[name], 3, '+')} %" for name in outlying),
+            differs="; ".join(f"{name} {number(round(100.0 * relative[name], 2), 3, '+')} %" for name in outlying),
             warnings=record.warnings,
             labels=labels,
             values=[float(value) if np.isfinite(value) else None for value in values],

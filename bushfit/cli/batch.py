@@ -155,7 +155,7 @@ def _print_result(output: Output, result: BatchResult, folder: Path) -> None:
         scatter = format_aligned([quantity.sigma], 2)[0] if quantity.parts > 1 and quantity.sigma else ""
         indices = ["" if index is None else number(index[0], 3) for index in (quantity.cp, quantity.cpk)]
         rows.append((name, format_aligned([quantity.median], 4)[0], scatter, unit or "-", *indices))
-    columns = ("quantity", "median", "robust std dev", "unit", "Cp", "Cpk")
+    columns = ("quantity", "median", "robust std dev", "unit", "Cp, all parts", "Cpk, all parts")
     column_count = len(columns) if any(row[-1] for row in rows) else 4
     if rows:
         counted = f"{document.title}: {document.done} bushing{'s' * (document.done > 1)}"
@@ -167,6 +167,8 @@ def _print_result(output: Output, result: BatchResult, folder: Path) -> None:
         f"{rate:.1f} per second"
     )
     if document.limits:
-        output.print("limits: " + ", ".join(f"{count} {word}" for word, count in document.limits.items()))
+        counts = ", ".join(f"{count} {word}" for word, count in document.limits.items())
+        explanation = " (conditional: the 95 % interval crosses the limit)" if "conditional" in counts else ""
+        output.print(f"limits: {counts}{explanation}")
     written = [*(name for name in FILES if (folder / name).exists()), "bushings/"]
     output.print(f"wrote {', '.join(written)} to {folder}")

@@ -80,7 +80,7 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
                 "link": links[index],
                 "texts": [part.result or ""] * bool(batch.limits) + [part.labels.get(name, "") for name in labels],
                 "curve": sparkline(relative[index], relative[usual], scale, color) if np.isfinite(mean) else "",
-                "deviation": number(mean, 2, "+") if np.isfinite(mean) else "",
+                "deviation": f"{mean:+.1f}" if np.isfinite(mean) else "",
                 "cells": list(zip(values, tones, strict=True)),
                 "remarks": "; ".join(filter(None, remarks)),
             }
