@@ -47,6 +47,12 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _FACTOR = r"(?:[^\W\d_]+|[%‰°1])(?:(?:\^|\*\*)-?[1-9]|⁻?[¹²³])?"
 #: Products and quotients of units; nothing else is passed to pint, which would evaluate any arithmetic.
 _UNIT = re.compile(rf"{_FACTOR}(?:(?:\s*[*/·⋅]\s*|\s+){_FACTOR})*")
+#: Multiple in front of a unit: 10^5 N/m, 1e-3 N, 1/100 mm, x 1000 N.
+_MULTIPLE = re.compile(
+    r"(?:[x×*]\s*)?(?:(?:10(?:\^|\*\*)|1?[eE])(?P<power>[+-]?\d{1,2})|1/(?P<part>10+)|(?<=[x×* ])(?P<factor>\d+\.?\d*))"
+    r"(?![\d.])\s*[*·]?(?P<unit>.*)"
+)
+_SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 #: Maximum length of a unit [characters]; pint is slow with longer texts.
 _LONGEST_UNIT = 40
 #: Unit by spelling: in lower case, with capitals, and spellings of an acceleration and of a length.
@@ -296,8 +302,18 @@ def _kind(expected: str) -> tuple[str, str]:
 def _resolve(text: str) -> tuple[float, str]:
     """Factor to SI, and SI base unit, of a unit; the base unit of an angle is the radian."""
     text = text.strip().rstrip(".")
+    text = re.sub("(?<=10)[⁻⁰¹²³⁴-⁹]+", lambda power: "^" + power[0].translate(_SUPERSCRIPTS), text)
+    if match := _MULTIPLE.fullmatch(text):
+        scale, base = _resolve(match["unit"])
+        return scale * float(match["factor"] or f"1e{match['power'] or 1 - len(match['part'])}"), base
     unit = "1" if text in ("", "-") else text
     return _EVERYDAY.get(unit) or _by_pint(unit)
+
+
+def _spell(word: re.Match[str]) -> str:
+    """Return the usual spelling of one unit; a word of five letters or more has no capitals in pint."""
+    lower = word[0].lower()
+    return _EXACT.get(word[0]) or _SPELLINGS.get(lower, lower if word[0].istitle() and len(lower) > 4 else word[0])
 
 
 def _by_pint(text: str) -> tuple[float, str]:
@@ -306,7 +322,7 @@ def _by_pint(text: str) -> tuple[float, str]:
         "unknown unit", found=f'"{text[:_LONGEST_UNIT]}"', expected="a unit such as mm, N, kN/mm, deg, Hz or %"
     )
     if len(text) <= _LONGEST_UNIT:
-        text = _WORD.sub(lambda word: _EXACT.get(word[0]) or _SPELLINGS.get(word[0].lower(), word[0]), text)
+        text = _WORD.sub(_spell, text)
         text = _POWER.sub("^", _JOINT.sub("*", text))
     if len(text) > _LONGEST_UNIT or not _UNIT.fullmatch(text):
         raise unknown

@@ -286,7 +286,7 @@ def _add_by_unit(
             continue
         if motion is STRAINING and (role == "force_amplitude" or not (qualifier or is_beside_stiffness)):
             continue  # a ratio or a pressure may be any quantity
-        expected = {si_unit(role, kind) for kind in motions}
+        expected = {si_unit(role, kind) for kind in motions} | ({"rad/s"} if role == "frequency" else set())
         fitting = [
             column
             for column, words in free.items()

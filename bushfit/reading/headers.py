@@ -65,7 +65,7 @@ _UNITS_OF_MOTION = {
     **dict.fromkeys(("stiffness", "storage_stiffness", "loss_stiffness"), "stiffness_unit"),
 }
 #: Starts of the names of an angular frequency.
-_ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsation", "角频率")
+_ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsa", "角频率")
 #: Channel of a test rig in brackets: "Load(Linear:Load) (kN)".
 _CHANNEL = re.compile(r"\([^()]*[:|][^()]*\)")
 #: Loss factor written as a function, with brackets that do not contain a unit.
@@ -79,6 +79,16 @@ _LOGARITHM = re.compile(
 _LOGARITHM_OF_UNIT = re.compile(
     r"(?:(?:log_?10|lg|(?P<ln>ln))\s*\(|(?P<dB>dB)\s*\(?(?:\s*rel?f?\.?(?![^\W_]))?(?:\s*1(?=\s))?)\s*(?P<unit>[^()]*)\)?"
 )
+#: Reference of decibels in brackets of its own, or behind the unit: "dB (re 1 N/m)", "[dB] re 1 N/m".
+_DECIBELS = re.compile(r"(?:\s+in\s+|\s*/\s*|\s+)?[\[(]?\bdB\s*[\])]?\s*[\[(]?\s*(rel?f?\.?\s[^()\[\]]*)[\])]?$")
+#: Symbol of a stiffness or modulus, in the spelling that `plain` returns: k', |k*|, g''.
+_SYMBOL = re.compile(r"\|?[a-z]{1,4}(?:\*|'{1,2})\|?|\|[a-z]\|")
+#: Words in a name whose symbol does not tell what the column is: a mean of K*, the imaginary part of K*.
+_UNLIKE_SYMBOL = frozenset(
+    plain_word for kind in ("not_measured", "real", "imaginary") for plain_word in WORDS["qualifiers"][kind]
+)
+#: Symbol of a travel over its unit, which is no unit of seconds: "s / mm".
+_TRAVEL = re.compile(r"s\s*/")
 #: Quotation mark that means two primes: G".
 _TWO_PRIMES = re.compile(r"(?<![^\W_])([A-Za-z])\"")
 #: Words that do not change the meaning of a channel.
@@ -90,6 +100,7 @@ _UNITS_OF = {
     ("a", "amplitude"): ("m", "rad"),
     ("da", "amplitude"): ("m", "rad", "1"),
     **dict.fromkeys((("k", "stiffness"), ("cdyn", "stiffness")), ("N/m", "N*m/rad")),
+    **dict.fromkeys((("k1", "storage_stiffness"), ("k2", "loss_stiffness")), ("N/m", "N*m/rad")),
     **{
         (name, "damping_coefficient"): ("N*s/m", "N*m*s/rad", "Pa*s")
         for name in ("c", "cdyn", "damping", "dampfung", "amortissement", "damp")
@@ -277,16 +288,16 @@ class Vocabulary:
 
     def _read(self, header: str) -> Heading | None:
         text = _TWO_PRIMES.sub(r"\1''", _TAN.sub("tan delta", _CHANNEL.sub("", header))).translate(_SPELLINGS)
+        text = _DECIBELS.sub(r" [dB \1]", text)
         logarithm = 0.0
         if match := _LOGARITHM.match(text):
             kind = match["kind"].lower()
             logarithm = {"ln": 2.718281828459045, "log": float("nan")}.get(kind, 10.0)
             text = f"{(match['inner'] or '').replace('/', ' ', 1)} {text[match.end() :]}".strip()
         if plain(header) in self._stated:  # a campaign may name a header together with its unit
-            without, convention = split_convention(text)
-            name, unit = units.split_header(without)
+            name, unit, convention = split_unit(text)
             counting = "peak-to-peak" if plain(name) in _PEAK_TO_PEAK_NAMES else convention
-            return Heading(self._stated[plain(header)], unit, counting, logarithm)
+            return Heading(self._stated[plain(header)], None if unit == name else unit, counting, logarithm)
         # try the header without, then with the words of its convention
         without, convention = split_convention(text)
         for name, unit, certain in (split for form in dict.fromkeys((without, text)) for split in _splits(form)):
@@ -295,19 +306,29 @@ class Vocabulary:
             bare = plain(name)
             implied: AmplitudeConvention | None = "peak-to-peak" if bare in _PEAK_TO_PEAK_NAMES else convention
             amplitudes = [bare + "amplitude"] * bool(implied) + ["amplitude"] * (bare in _PEAK_TO_PEAK_NAMES)
-            for word in (bare, plain(_ASIDES.sub("", _folded(name))), *amplitudes, *self._names_with_symbol(name)):
+            for word in (
+                bare,
+                plain(_ASIDES.sub("", _folded(name))),
+                *amplitudes,
+                *self._names_with_symbol(name, unit),
+            ):
                 for role in self._roles.get(word, ()):
                     is_unit = units.is_unit if role != "temperature" else units.kelvin_scale
                     if (certain or is_unit(unit or "")) and fits(word, role, unit):
                         return Heading(role, unit, implied, logarithm)
         return None
 
-    def _names_with_symbol(self, name: str) -> Iterator[str]:
-        """Yield the words of a header without the symbol of its quantity, as in "Storage modulus G'" or "Weg s"."""
+    def _names_with_symbol(self, name: str, unit: str | None) -> Iterator[str]:
+        """Yield the words of a header without the symbol of its quantity, as in "Storage modulus G'" or "Weg s".
+
+        The symbol of a stiffness decides if the words are not known, as in "Rigidezza elastica K' [N/mm]".
+        """
         for blank in re.finditer(r"[\s,(]+", name):
             word, symbol = plain(name[: blank.start()]), plain(name[blank.end() :])
             if word in self._roles and set(self._roles[word]) & set(self._roles.get(symbol, ())):
                 yield word
+            elif _SYMBOL.fullmatch(symbol) and _UNLIKE_SYMBOL.isdisjoint(_folded(name).split()):
+                yield from [symbol] * any(units.is_compatible(unit or "", si) for si in ("N/m", "N*m/rad", "Pa"))
 
 
 @lru_cache(maxsize=64)
@@ -373,7 +394,7 @@ def split_unit(header: str) -> tuple[str, str | None, AmplitudeConvention | None
     """Return name, unit or None, and amplitude convention or None, of a header whose meaning is not known."""
     text, convention = split_convention(header)
     for name, unit, certain in _splits(text):
-        if certain and unit is None and units.is_unit(name) and name != "-":
+        if certain and unit is None and units.is_unit(name) and name != "-" and not _TRAVEL.match(name):
             return name, name, convention  # a unit alone
         if unit and (certain or units.is_unit(unit)):
             return name, unit, convention
@@ -386,7 +407,8 @@ def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
     yield name, unit, True
     if unit is None:
         for end in reversed(list(_NAME_END.finditer(name))):
-            if not (text := name[end.end() :].replace("_", " ")).startswith("dyn"):  # dynamic, and no dyne
+            text = name[end.end() :].replace("_", " ")
+            if not (text.startswith("dyn") or units.is_number(text)):  # dynamic, and no dyne; the first of several
                 yield name[: end.start()], text, False
 
 

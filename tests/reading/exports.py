@@ -397,6 +397,36 @@ EXPORTS: dict[str, Export] = {
         sweep("f [Hz]|A0 [mm]|K* [N/mm]|delta [°]|Status", [*F[:5], "MW", *F[5:], "MW"], [*A[:5], "", *A[5:], ""], [*K[:5], 2.5, *K[5:], 2.5], [*PHASE[:5], 2.5, *PHASE[5:], 2.5], ["OK"] * 12),
         words=["2 rows left out"],
     ),
+    # symbols, units and names that colleagues wrote without knowing the reader
+    **{
+        f"the symbol decides: {header}": Export(sweep(f"f [Hz]|A [mm]|{header} [kN/mm]|tan delta", F, A, values / 1e3, ETA))
+        for header, values in (
+            ("Rigidezza elastica K'", STIFFNESS.real), ("Steifigkeit K'", STIFFNESS.real), ("Kd'", STIFFNESS.real), ("K1", STIFFNESS.real),
+            ("Rigidez dinámica K*", K),
+        )
+    },
+    "the symbols decide, of a loss": Export(sweep("f [Hz]|A [mm]|Rigidità K* [N/mm]|Rigidità K'' [N/mm]", F, A, K, STIFFNESS.imag)),
+    **{
+        f"multiples: {header}": Export(sweep(f"Pulsación (rad/s)|{header}|tan delta (x 10^-3)", 2 * np.pi * F, A * xs, K * ks, 1e3 * ETA))
+        for header, xs, ks in (
+            ("Amp [mm]|K* [10^5 N/m]", 1, 1e-2), ("Amp (1/100 mm)|K* (x1000 N/m)", 100, 1), ("Amp [10⁻² mm]|K* [E5 N/m]", 100, 1e-2),
+            ("Amp [x 0.01 mm]|K* [N/mm]", 100, 1),
+        )
+    },
+    **{
+        f"a reference behind: {unit}": Export(sweep(f"f in Hz|Amplitude 0-p in mm|Kdyn{unit}|Phase in Grad", F, A, 20 * np.log10(1e3 * K), PHASE))
+        for unit in (" in dB (re 1 N/m)", " [dB] re 1 N/m", "/dB re. 1 N/m")
+    },
+    "DSA": Export(sweep("Freq. (Hz)|DSA (%)|G' (MPa)|tan δ", F, 20 * A, G.real, ETA), reference=MODULUS),
+    "s over its unit": Export(loop("t / s|s / µm|F / kN", TIME, 1e3 * DISPLACEMENT, FORCE / 1e3, mark=";"), "loop"),
+    "s over its unit, named": Export(loop("t / s|s / µm|F / kN", TIME, 1e3 * DISPLACEMENT, FORCE / 1e3), "loop", (), {"columns": {"displacement": "s / µm"}}),
+    "LabVIEW, unnamed channels and words for units": Export(
+        LVM.replace("\tmm\tN\t", "\tmillimeters\tNewtons\t").replace("LVDT\tLoad Cell", "Untitled\tUntitled 1"), "loop", name="loop.lvm"
+    ),
+    "LabVIEW, an unnamed channel named": Export(
+        LVM.replace("\tmm\tN\t", "\tmillimeters\tNewtons\t").replace("LVDT\tLoad Cell", "Untitled\tUntitled 1"), "loop", (),
+        {"columns": {"displacement": "Untitled"}}, "loop.lvm",
+    ),
     **{
         f"no time below {line}": Export(f"{line}\n" + loop("displacement [mm]|force [N]", DISPLACEMENT, FORCE), kind, words)
         for line, kind, words in (
