@@ -1,18 +1,24 @@
 """Residuals of loops and sweeps in units of noise, white where the model is right; and which tests count in a fit."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from bushfit.campaign.schema import FitSettings, RigSettings
+from bushfit.effects.contract import Array
 from bushfit.errors import FitError
+from bushfit.fitting.loop_cycles import steady_cycles
+from bushfit.fitting.loop_harmonics import MOST_ROWS
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, prepare_loops
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.prepared_loop import prepare_loop
 from bushfit.geometry import Direction
-from bushfit.model.model import FIVE
-from bushfit.reading.measurement import Sweep
+from bushfit.model import rig
+from bushfit.model.model import FIVE, Model
+from bushfit.reading.measurement import Loop, Sweep
 
 RANDOM, SHARED = (5e-3, 7e-3), (4e-3, 3.5e-3)
 BLOCKS = {(1e-4, 1): 16, (1e-4, 2): 9, (5e-4, 1): 16}
@@ -153,3 +159,195 @@ def test_dynamic_amplitudes_choose_the_levels(measured):
     absent = PreparedCampaign.from_campaign(replace(measured.campaign, fit=FitSettings(dynamic_amplitudes=(3e-4,))))
     with pytest.raises(FitError, match="no sweep at these amplitudes"):
         _ = absent.smallest_sweep
+
+
+FREQUENCY, AMPLITUDE = 0.1, 1e-3
+
+
+def measured(
+    model: Model,
+    *,
+    waveform: str = "sine",
+    cycles: float = 1.0,
+    start: float = 0.0,
+    rows: int = 1000,
+    uneven: bool = False,
+    noise: float = 3e-3,
+    jitter: float = 1e-3,
+    offset: float = 0.0,
+    preload: float = 0.0,
+    seed: int = 0,
+) -> Loop:
+    """A settled loop: displacement noise `jitter` of the amplitude, force noise `noise` of the half range."""
+    whole = rig.record(model, Direction.AXIAL, FREQUENCY, AMPLITUDE, cycles=6, run_in=8, waveform=waveform, kind="loop")
+    rng = np.random.default_rng(seed)
+    count = round(rows * cycles)
+    share = np.sort(rng.random(count)) if uneven else np.arange(count) / count
+    time = (start + cycles * share) / FREQUENCY
+    motion, force = (np.interp(time, whole.time, column) for column in (whole.displacement, whole.force))
+    return Loop(
+        "loop",
+        Direction.AXIAL,
+        time - time[0],
+        motion + offset + jitter * AMPLITUDE * rng.standard_normal(count),
+        force + preload + noise * np.ptp(force) / 2.0 * rng.standard_normal(count),
+    )
+
+
+CASES: dict[str, dict[str, Any]] = {
+    "sine": {},
+    "triangle": {"waveform": "triangle"},
+    "several": {"cycles": 4.0},
+    "fractional": {"cycles": 2.37, "start": 0.11},
+    "starts at a peak": {"start": 0.25},
+    "uneven": {"uneven": True, "cycles": 2.0},
+    "uneven triangle": {"uneven": True, "cycles": 3.0, "waveform": "triangle", "start": 0.4},
+    "coarse": {"rows": 40, "cycles": 3.0},
+    "offset": {"offset": 2e-4, "cycles": 2.0},
+    "preloaded": {"offset": -2e-4, "preload": -80.0, "cycles": 2.0},
+    "very noisy displacement": {"jitter": 1e-2, "cycles": 3.0},
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_motion_is_cleared_and_the_true_model_leaves_only_noise(paper_model, case):
+    """One peak and one trough a cycle, where the motion has them, although the sensor turns at every other row."""
+    loop = measured(paper_model, **CASES[case])
+    data_set = MeasuredLoop(prepare_loop(loop))
+    cycle = data_set.prepared.history(is_transient=False).value
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(np.append(cycle, cycle[0])))) != 0)
+    residual = data_set.residual(paper_model)
+    reduced = float(residual @ residual) / residual.size
+    print(f"{case}: f {data_set.prepared.frequency:.6f} Hz, turns {turns.size}, reduced chi-square {reduced:.3f}")
+    assert data_set.prepared.frequency == pytest.approx(FREQUENCY, rel=2e-3)
+    assert turns.size
+    assert np.all(np.abs(cycle[turns]) > 0.95 * AMPLITUDE)
+    assert (cycle.max(), -cycle.min()) == pytest.approx((AMPLITUDE, AMPLITUDE), rel=1.5e-2)
+    assert data_set.relative_noise == pytest.approx(3e-3, rel=0.35)
+    assert reduced < 1.0 + 6.0 * np.sqrt(2.0 / residual.size) + 0.1
+
+
+def test_from_rest_the_virgin_curve_is_followed(paper_model):
+    whole = rig.record(paper_model, Direction.AXIAL, FREQUENCY, AMPLITUDE, cycles=3, steps_per_cycle=1000)
+    loop = Loop("loop", Direction.AXIAL, whole.time, whole.displacement, whole.force)
+    prepared = prepare_loop(loop)
+    assert prepared.from_rest
+    assert not prepared.history(is_transient=False).periodic
+    gap = np.max(np.abs(MeasuredLoop(prepared).force(paper_model) - loop.force)) / prepared.half_range
+    print(f"from rest: model within {gap:.1e} of the record")
+    assert gap < 2e-3
+    settled = prepare_loop(measured(paper_model))
+    assert not settled.from_rest
+
+
+@pytest.mark.parametrize(("cycles", "amplitude"), [(1, 1e-4), (1, 1e-3), (4, 1e-3), (3.5, 1e-4)])
+def test_rest_may_be_a_preload(paper_model, cycles, amplitude):
+    whole = rig.record(paper_model, Direction.AXIAL, FREQUENCY, amplitude, cycles=4, steps_per_cycle=1000)
+    rows = slice(round(1000 * cycles) + 1)
+    noise = 3e-3 * np.ptp(whole.force) * np.random.default_rng(0).standard_normal(whole.force.size)
+    force, settled = whole.force + 640.0 + noise, slice(2000, None)
+    loop = Loop("loop", Direction.AXIAL, whole.time[rows], whole.displacement[rows] + 1.2e-3, force[rows])
+    data_set = MeasuredLoop(prepare_loop(loop))
+    residual = data_set.residual(paper_model)
+    reduced = float(residual @ residual) / data_set.residual_count
+    print(f"{cycles} cycles of {1e3 * amplitude:g} mm from rest about a preload: reduced chi-square {reduced:.3f}")
+    assert data_set.prepared.from_rest
+    assert reduced < 1.2
+    assert "recorded about a mean displacement of 1.2 mm" in " ".join(data_set.notes)
+    later = Loop("loop", Direction.AXIAL, whole.time[settled], whole.displacement[settled] + 1.2e-3, force[settled])
+    assert not prepare_loop(later).from_rest
+
+
+def test_many_rows_are_binned_without_loss(paper_model):
+    loop = measured(paper_model, cycles=5.0, rows=40_000)
+    prepared = prepare_loop(loop)
+    assert prepared.force.size <= 5 * 1024 + 1
+    assert 0.99 * loop.force.size < prepared.weight.sum() < loop.force.size  # the turning points carry none
+    assert loop.force.size > MOST_ROWS
+    residual = MeasuredLoop(prepared).residual(paper_model)
+    reduced = float(residual @ residual) / residual.size
+    print(f"{loop.force.size} rows in {prepared.force.size} bins: reduced chi-square {reduced:.3f}")
+    assert 0.9 < reduced < 1.15
+    few = prepare_loop(measured(paper_model, cycles=5.0, rows=500))
+    assert prepared.first_harmonic == pytest.approx(few.first_harmonic, rel=2e-3)
+
+
+def with_hole(loop: Loop, begin: float, end: float) -> Loop:
+    """A loop without the rows from one cycle count to another."""
+    kept = (loop.time * FREQUENCY < begin) | (loop.time * FREQUENCY >= end)
+    return replace(loop, **{name: getattr(loop, name)[kept] for name in ("time", "displacement", "force")})
+
+
+@pytest.mark.parametrize("waveform", ["sine", "triangle"])
+@pytest.mark.parametrize("hole", [(1.0, 2.0), (1.3, 2.3), (1.3, 1.8), (1.3, 1.55), (0.5, 1.5), (1.3, 2.9)])
+def test_rows_that_are_missing_do_not_change_the_frequency(paper_model, waveform, hole):
+    prepared = prepare_loop(with_hole(measured(paper_model, waveform=waveform, cycles=3.0), *hole))
+    assert prepared.frequency == pytest.approx(FREQUENCY, rel=1e-3)
+    assert prepared.amplitude == pytest.approx(AMPLITUDE, rel=5e-3)
+    if hole[1] - hole[0] > 0.4:
+        (note,) = prepared.notes
+        assert "rows are missing" in note
+
+
+PERIOD = 10.0
+
+
+def frequency_found(waveform: str, phase: Array) -> float:
+    """Frequency over the true one, of a motion at even times with 0.3 % noise."""
+    noise = 3e-3 * np.random.default_rng(0).standard_normal(phase.size)
+    motion = AMPLITUDE * (rig.wave(waveform, phase) + noise)
+    loop = Loop("loop", Direction.AXIAL, (phase - phase[0]) * PERIOD, motion, motion)
+    return steady_cycles(loop).frequency * PERIOD
+
+
+@pytest.mark.parametrize("waveform", ["sine", "triangle"])
+@pytest.mark.parametrize("cycles", [1.005, 1.02, 1.03, 1.1, 1.2, 1.4, 1.7])
+def test_a_cycle_and_a_part_is_not_one_longer_cycle(waveform, cycles):
+    starts = np.arange(0.0, 1.0, 0.05) if cycles > 1.1 else (0.0, 0.1, 0.4, 0.6)  # at an extreme a little is not seen
+    found = [frequency_found(waveform, np.linspace(a, a + cycles, 2000)) for a in starts]
+    assert found == pytest.approx([1.0] * len(starts), abs=2e-3)
+
+
+def test_less_than_a_cycle_is_refused():
+    with pytest.raises(FitError, match=r"does not contain a whole cycle[\s\S]*at least one closed cycle"):
+        frequency_found("sine", np.linspace(0.0, 0.9, 2000))
+
+
+def sine(cycles: float, share: float = 1.0, start: float = 0.0) -> Array:
+    return share * AMPLITUDE * np.sin(2.0 * np.pi * (start + np.arange(0.0, cycles, 1e-3)))
+
+
+def ramp(first: float, last: float, seconds: float) -> Array:
+    return AMPLITUDE * np.linspace(first, last, int(seconds * 100), endpoint=False)
+
+
+RUN_INS = {
+    "ramp to the peak": [ramp(0, 1, 12.0), sine(3, start=0.25)],
+    "ramp, hold, cycles": [ramp(0, 1, 3.0), ramp(1, 1, 20.0), sine(4, start=0.25)],
+    "hold at zero": [ramp(0, 0, 15.0), sine(4)],
+    "smaller cycles": [sine(2, 0.3), sine(2, 0.6), sine(4)],
+    "growing cycles": [*(sine(1, share) for share in (0.2, 0.4, 0.6, 0.8)), sine(5)],
+    "two cycles after a ramp": [ramp(0, -1, 4.0), sine(2, start=0.75)],
+    "back to zero at the end": [sine(3.25), ramp(1, 0, 15.0)],
+    "run-in and run-out": [ramp(0, -1, 15.0), sine(4, start=0.75), ramp(-1, 0, 15.0)],
+}
+
+
+def recorded(model: Model, *motions: Array, noise: float = 3e-3) -> Loop:
+    """A motion that starts from rest, put through the rig's equations."""
+    clean = rig.imposed(model, Direction.AXIAL, np.concatenate(motions), PERIOD / 1000, 1.0 / PERIOD)
+    scatter = noise * np.ptp(clean.force) / 2.0 * np.random.default_rng(0).standard_normal(clean.time.size)
+    return Loop("loop", Direction.AXIAL, clean.time, clean.displacement, clean.force + scatter)
+
+
+@pytest.mark.parametrize("case", RUN_INS)
+def test_the_true_model_leaves_only_noise_of_the_steady_cycles(paper_model, case):
+    prepared = prepare_loop(recorded(paper_model, *RUN_INS[case]))
+    gap = float(np.sqrt(np.mean(np.square(MeasuredLoop(prepared).relative(paper_model)))))
+    print(f"{case}: {prepared.notes}; true model within {100 * gap:.2f} % of half the force range, noise 0.3 %")
+    (note,) = prepared.notes
+    assert "left out" in note
+    assert prepared.frequency == pytest.approx(1.0 / PERIOD, rel=2e-3)
+    assert prepared.amplitude == pytest.approx(AMPLITUDE, rel=1e-2)
+    assert prepared.cycles == pytest.approx(round(prepared.cycles * 4) / 4, abs=0.05)
+    assert gap < 6e-3  # a long hold is remembered for longer than a cycle

@@ -9,13 +9,15 @@ from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.commands.compare import compare as compare_results
+from bushfit.commands.compare import compared_result
 from bushfit.effects.contract import Array
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
-from bushfit.geometry import Direction
+from bushfit.geometry import Bushing, Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
-from bushfit.model.result import Result
+from bushfit.model.result import Range, Result
 from bushfit.prediction.bands import Band
 from bushfit.prediction.comparison import Comparison, ParameterContrast, compare, holm, with_holm
 from bushfit.simulation.measured import measure
@@ -163,3 +165,26 @@ def test_uneven_bands_are_subtracted_end_from_opposite_end():
     difference = one.minus(two)
     ends = difference.value, difference.low, difference.high
     assert ends == pytest.approx((1.0, 1.0 - np.hypot(0.1, 0.1), 1.0 + np.hypot(0.3, 0.3)))
+
+
+def mu_alone(model: Model, frequency: tuple[float, float], displacement: tuple[float, float]) -> Result:
+    low, high = (x * model.unit_strain(Direction.AXIAL) for x in displacement)
+    covariance = Covariance(("mu",), np.array([[1e6]]))
+    return Result(model, fitted=("mu",), covariance=covariance, measured=Range(frequency, (low, high), ("axial",)))
+
+
+def test_the_warning_names_the_result_that_is_extrapolated(paper_model):
+    inside, outside = (mu_alone(paper_model, ends, (1e-4, 1e-3)) for ends in ((5.0, 155.0), (200.0, 300.0)))
+    output = compare_results(compared_result(inside, "one.json"), compared_result(outside, "two.json"))
+    assert any(line.startswith("B: axial: predicted at frequencies of 5 to 155 Hz") for line in output.warnings)
+    assert not any(line.startswith("A: axial: predicted") for line in output.warnings)
+
+
+def test_another_shape_is_compared_at_the_same_displacement(paper_model):
+    """Twice the length, twice the stiffness, and the same material."""
+    longer = replace(paper_model, bushing=Bushing("longer", 0.010, 0.018, 0.068))
+    (pair,) = compare_results(
+        *(mu_alone(model, (1.0, 155.0), (1e-4, 1e-3)) for model in (paper_model, longer))
+    ).comparisons
+    np.testing.assert_allclose(np.expm1(pair.contrasts[0].stiffness.value), 1.0)
+    assert [row.difference for row in pair.parameters if row.difference is not None] == [0.0]
