@@ -12,12 +12,11 @@ from pathlib import Path
 import production
 import pytest
 from commandline import Done, Shared, call
+from fits import joint_fit
 from hypothesis import HealthCheck, settings
 
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.effects import BASE
-from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -78,7 +77,7 @@ def campaign() -> Campaign:
 @pytest.fixture(scope="session")
 def result(campaign) -> Result:
     """The joint fit to its axial tests."""
-    return fit_joint(PreparedCampaign.from_campaign(campaign))
+    return joint_fit(campaign)
 
 
 @pytest.fixture(scope="session")

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from fits import joint_fit
 
 from bushfit.campaign.campaign import Campaign, load_campaign, model_of
 from bushfit.campaign.simulated import SimulateSettings
@@ -86,11 +87,7 @@ def campaign(root) -> Campaign:
 
 @pytest.fixture(scope="module")
 def compound(campaign) -> Result:
-    return fit_joint(
-        PreparedCampaign.from_campaign(campaign),
-        effects=PreparedCampaign.from_campaign(campaign).effects,
-        directions=["DMA", "DMA 2"],
-    )
+    return joint_fit(campaign, effects=PreparedCampaign.from_campaign(campaign).effects, directions=["DMA", "DMA 2"])
 
 
 @pytest.fixture(scope="module")

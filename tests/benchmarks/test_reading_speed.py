@@ -58,8 +58,7 @@ def run(program: tuple[str, str], file: Path) -> dict[str, float]:
     code = _WHOLE.format(imports=program[0], work=program[1])
     arguments = [sys.executable, "-c", code, str(file)]
     output = subprocess.run(arguments, check=True, capture_output=True, env=os.environ).stdout
-    figures: dict[str, float] = json.loads(output.splitlines()[-1])  # DuckDB draws a progress bar
-    return figures
+    return json.loads(output.splitlines()[-1])  # DuckDB draws a progress bar
 
 
 @pytest.fixture

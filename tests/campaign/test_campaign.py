@@ -116,7 +116,6 @@ sweeps = [{ direction = "torsion", amplitudes = ["1 deg"], frequencies = ["5 Hz"
     assert fit.residuals == "magnitude_loss_factor"
     assert predict.frequencies == tuple(range(5, 156, 10))
     assert predict.directions == (Direction.AXIAL, Direction.TORSION)
-    assert simulate is not None
     assert simulate.parameters == {"mu": 1.2e6, "m": 2e5, "alpha": 0.24}
     assert simulate.effects == {"inertia": {"mass": 0.1}, "delay": {"tau": 5e-5}}
     assert (simulate.noise, simulate.gain_error, simulate.loops[0].cycles) == (0.005, 0.0, 3)

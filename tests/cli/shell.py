@@ -47,8 +47,7 @@ def names(folder: Path) -> set[str]:
 
 
 def document(file: Path) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-    return found
+    return json.loads(file.read_text(encoding="utf-8"))
 
 
 def values(done: Done) -> dict[str, float]:

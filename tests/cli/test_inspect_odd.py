@@ -127,8 +127,7 @@ def odd(typed: Run, folder: Path, header: str, stiffness: np.ndarray, frequency:
     columns = (frequency, np.full(frequency.size, 0.1), stiffness, np.full(frequency.size, 0.1))
     np.savetxt(folder / "axial.csv", np.column_stack(columns), "%.6g", ",", header=header, comments="")
     (seen,) = json.loads(typed("inspect", "axial.csv", "--json", "--no-plots").stdout)["files"]
-    sentences: list[str] = seen["odd"]
-    return sentences
+    return seen["odd"]
 
 
 @pytest.mark.parametrize("row", [0, 1, 5, 9])

@@ -94,7 +94,6 @@ def test_predictions_use_it_inside_the_range_and_open_outside(result):
     far, plain_far = (predict(each, Direction.AXIAL, outside, amplitude) for each in (result, plain))
     assert far.stiffness.value == pytest.approx(plain_far.stiffness.value, rel=2e-3)
     unnamed = result.model.unnamed
-    assert unnamed is not None
     half_far = (far.stiffness.high - far.stiffness.low) / 2.0 / far.stiffness.value
     assert half_far == pytest.approx([unnamed.largest], rel=0.05)
     told = " ".join(line for line in caveats(result) if line.startswith("the unnamed correction"))

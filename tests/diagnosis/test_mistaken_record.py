@@ -41,7 +41,6 @@ def on_loops(change: Callable[[Loop], Loop], *numbers: int) -> Tamper:
 
 
 def as_diameters(c: Campaign) -> Campaign:
-    assert c.bushing is not None
     a, b = c.bushing.inner_radius, c.bushing.outer_radius
     return replace(c, bushing=replace(c.bushing, inner_radius=2.0 * a, outer_radius=2.0 * b))
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fits import joint_fit
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
@@ -72,15 +73,11 @@ def test_kilonewtons_taken_for_newtons_are_told(small):
     """In the sweep, and in the loop as well."""
     axial = without(small, Direction.RADIAL)
     slip = replace(small, sweeps=tuple(stiffer(sweep, 1e-3) for sweep in axial))
-    (told,) = [line for line in fit_joint(PreparedCampaign.from_campaign(slip)).warnings if "units" in line]
+    (told,) = [line for line in joint_fit(slip).warnings if "units" in line]
     assert told.startswith(f"{small.loops[0].name} shows ")
     assert f"times the modulus of {axial[0].name}, which no rubber does: check the units" in told
     loops = tuple(replace(loop, force=1e-3 * loop.force) for loop in small.loops)
-    (told,) = [
-        line
-        for line in fit_joint(PreparedCampaign.from_campaign(replace(slip, loops=loops))).warnings
-        if "units" in line
-    ]
+    (told,) = [line for line in joint_fit(replace(slip, loops=loops)).warnings if "units" in line]
     assert "kPa is that of no rubber" in told
 
 
@@ -130,8 +127,7 @@ def runs(result: Result, direction: str) -> dict[float | None, Misfit]:
 
 
 def test_thousands_of_rows_of_a_loop_do_not_hide_a_level_that_is_off(levelled):
-    result = fit_joint(PreparedCampaign.from_campaign(level_off(levelled, 1, 2e-4, 1.03)))
-    assert result.quality is not None
+    result = joint_fit(level_off(levelled, 1, 2e-4, 1.03))
     told = runs(result, "radial")
     assert result.quality.nrmse < 0.01, "the loop's rows make the total look well"
     assert told[2e-4].gain == pytest.approx(0.03, abs=0.01)
@@ -151,14 +147,13 @@ def test_a_run_held_out_is_a_refit_without_it(levelled):
     for level in LEVELS:
         rows = np.flatnonzero(np.tile(sweep.amplitude == level, 2))
         step = LeaveOut.from_fit(best.jacobian, best.residual).step(rows)
-        assert step is not None
         rest = solve(FitProblem(best.model, [sweep.without(np.flatnonzero(sweep.amplitude == level))], FIVE))
         moved = best.coordinates.point(rest.model.values) - best.coordinates.point(best.model.values)
         np.testing.assert_allclose(step / errors, moved / errors, atol=0.5)
 
 
 def test_usable_within_what_95_of_a_hundred_points_show(levelled):
-    result = fit_joint(PreparedCampaign.from_campaign(level_off(levelled, 1, 5e-4, 1.05)))
+    result = joint_fit(level_off(levelled, 1, 5e-4, 1.05))
     by_place = {place.place: place for place in result.usable}
     assert by_place["axial"].held_out
     assert 0.004 < by_place["axial"].stiffness < 0.02

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fits import joint_fit
 from scipy.optimize import brentq
 from scipy.stats import binomtest
 from tries import SEEDS
@@ -133,7 +134,7 @@ def test_bands_hold_the_truth_within_the_tested_preloads(case, seeds):
     largest, claimed, inside = max(preload.value for preload in preloads), 0, []
     ends = min(preload.value for preload in preloads), largest
     for seed in range(seeds):
-        result = fit_joint(PreparedCampaign.from_campaign(campaign(rubber, preloads, seed, effects)))
+        result = joint_fit(campaign(rubber, preloads, seed, effects))
         claimed += "preload" in result.model.effects
         for value in np.linspace(*ends, 5):
             preload = Preload(float(value), preloads[0].unit)
@@ -151,11 +152,11 @@ def test_bands_hold_the_truth_within_the_tested_preloads(case, seeds):
 
 
 def test_two_preloads_give_a_line_with_a_warning_and_one_is_a_label():
-    result = fit_joint(PreparedCampaign.from_campaign(campaign(STIFF, newtons(0.0, 800.0), seed=1)))
+    result = joint_fit(campaign(STIFF, newtons(0.0, 800.0), seed=1))
     curvatures = [result.model.values[f"preload.{name}"] for name in ("c3", "friction_square", "rate_square")]
     assert curvatures == [0.0, 0.0, 0.0]
     assert any("axial: 2 preloads, 0 to 800 N: the model follows a straight line" in line for line in result.warnings)
-    single = fit_joint(PreparedCampaign.from_campaign(campaign(STIFF, newtons(800.0), seed=1)))
+    single = joint_fit(campaign(STIFF, newtons(800.0), seed=1))
     assert "preload" not in single.model.effects
     assert single.measured
     assert single.measured.preloads == ()
@@ -172,7 +173,7 @@ def test_a_preload_without_influence_is_a_sentence_and_can_be_predicted():
 
 
 def test_only_tested_preloads_are_predicted_also_from_the_model_file():
-    fitted = fit_joint(PreparedCampaign.from_campaign(campaign(STIFF, newtons(300.0, 600.0, 900.0), seed=3)))
+    fitted = joint_fit(campaign(STIFF, newtons(300.0, 600.0, 900.0), seed=3))
     result = from_document(to_document(fitted))
     stated = predict(result, Direction.AXIAL, [20.0], [1e-4], preload=Preload(300.0, "N"))
     default = predict(result, Direction.AXIAL, [20.0], [1e-4])
@@ -189,7 +190,7 @@ def test_only_tested_preloads_are_predicted_also_from_the_model_file():
 
 
 def test_static_curves_and_comparisons_are_about_a_preload():
-    result = fit_joint(PreparedCampaign.from_campaign(campaign(STIFF, newtons(0.0, 500.0, 1000.0), seed=3)))
+    result = joint_fit(campaign(STIFF, newtons(0.0, 500.0, 1000.0), seed=3))
     preload, reach, rate = Preload(700.0, "N"), 2e-4, 1e-4
     curve = static_curve(result, Direction.AXIAL, reach, rate, preload=preload)
     assert curve.secant.value > 1.1 * static_curve(result, Direction.AXIAL, reach, rate).secant.value

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fits import joint_fit
 from tries import SEEDS
 
 from bushfit.campaign.campaign import Campaign
@@ -47,10 +48,7 @@ def shown(values: np.ndarray) -> str:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_an_ideal_rig_gives_the_truth_within_0_2_percent(rig, models, name):
-    found = errors(
-        fit_joint(PreparedCampaign.from_campaign(rig(model=models[name], settings=SimulateSettings()))),
-        models[name].values,
-    )
+    found = errors(joint_fit(rig(model=models[name], settings=SimulateSettings())), models[name].values)
     print(f"{name}, no noise: {shown(found)}")
     assert np.max(np.abs(found)) < 2e-3
 
@@ -107,9 +105,7 @@ def test_errors_of_held_parameters_are_carried_over(measured, result):
 
 
 def test_magnitude_and_loss_factor_residuals_give_the_same_answer(measured, result):
-    other = fit_joint(
-        PreparedCampaign.from_campaign(replace(measured.campaign, fit=FitSettings(residuals="magnitude_loss_factor")))
-    )
+    other = joint_fit(replace(measured.campaign, fit=FitSettings(residuals="magnitude_loss_factor")))
     for name in FIVE:
         error = 0.3 * (result.covariance.stderr(name) or 0.0)
         assert other.model.values[name] == pytest.approx(result.model.values[name], abs=error)
@@ -158,10 +154,7 @@ def bands_covered(result: Result, truth: Model) -> np.ndarray:
 def coverage(rig: Rig, truth: Model, seeds: int, **noise: Any) -> tuple[np.ndarray, np.ndarray]:
     """Per seed whether each parameter's interval, (seeds, 5), and the share of each band, hold the truth."""
     exact = RigSettings(gain_error=0.0, phase_error=0.0)  # as it is simulated: no calibration is off
-    results = [
-        fit_joint(PreparedCampaign.from_campaign(replace(rig(seed, truth, **noise), rig=exact)))
-        for seed in range(seeds)
-    ]
+    results = [joint_fit(replace(rig(seed, truth, **noise), rig=exact)) for seed in range(seeds)]
     inside = np.array([covered(result, truth.values) for result in results])
     return inside, np.array([bands_covered(result, truth) for result in results])
 
@@ -209,9 +202,7 @@ def test_95_percent_intervals_cover_where_the_gain_of_a_loop_is_off(rig, paper_m
     inside, wide = [], []
     for seed in range(seeds):
         campaign = rig(seed, gain_error=5e-3, level_gain_error=5e-3)
-        result = fit_joint(
-            PreparedCampaign.from_campaign(replace(campaign, rig=RigSettings(gain_error=5e-3) if stated else UNSTATED))
-        )
+        result = joint_fit(replace(campaign, rig=RigSettings(gain_error=5e-3) if stated else UNSTATED))
         inside.append(covered(result, paper_model.values))
         ends = np.log([result.interval(name) or (np.nan, np.nan) for name in FIVE])
         off = np.log([paper_model.values[name] for name in FIVE]) - ends.mean(axis=1)
@@ -258,7 +249,7 @@ def test_errors_of_levels_are_told(rig, paper_model, error):
 
 def test_held_and_bounded_parameters(measured):
     settings = {"alpha": ParameterSetting(value=0.3, vary=False), "mu": ParameterSetting(max=1.05e6)}
-    result = fit_joint(PreparedCampaign.from_campaign(replace(measured.campaign, fit=FitSettings(parameters=settings))))
+    result = joint_fit(replace(measured.campaign, fit=FitSettings(parameters=settings)))
     assert result.model.values["alpha"] == 0.3
     assert "alpha" not in result.fitted
     assert result.covariance.stderr("alpha") is None

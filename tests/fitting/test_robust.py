@@ -6,12 +6,11 @@ from itertools import product
 
 import numpy as np
 import pytest
+from fits import joint_fit
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import FitSettings
 from bushfit.campaign.simulated import SimulatedSweep
-from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE
@@ -61,7 +60,7 @@ def with_factor(campaign: Campaign, rows: Sequence[int] | np.ndarray, factor: fl
 
 
 def robust(campaign: Campaign) -> Result:
-    return fit_joint(PreparedCampaign.from_campaign(replace(campaign, fit=SOFT)))
+    return joint_fit(replace(campaign, fit=SOFT))
 
 
 def moved(one: Result, other: Result) -> np.ndarray:
@@ -78,7 +77,7 @@ def test_three_percent_outliers_move_no_parameter_by_a_standard_error(rig, kind,
     for seed in range(seeds):
         clean = rig(seed, shared=shared)
         after = robust(spoilt_campaign(clean, kind, seed))
-        shifts.append(moved(after, fit_joint(PreparedCampaign.from_campaign(clean))))
+        shifts.append(moved(after, joint_fit(clean)))
         assert (after.quality.reduced_chi_square if after.quality else 0.0) == pytest.approx(1.0, abs=0.1)
     worst = np.max(np.abs(shifts), axis=0)
     print(f"{kind}, block errors {shared}: moved by at most {dict(zip(FIVE, worst.round(2), strict=True))} errors")
@@ -91,7 +90,7 @@ def test_clean_tests_have_no_outliers_and_the_same_answer(rig, other_models, see
     shifts = []
     for model, shared, seed in product(other_models.values(), (False, True), range(seeds)):
         campaign = rig(seed, model, shared=shared)
-        before, after = fit_joint(PreparedCampaign.from_campaign(campaign)), robust(campaign)
+        before, after = joint_fit(campaign), robust(campaign)
         assert before.outliers == after.outliers == ()
         shifts.append(moved(after, before))
     print(f"{len(shifts)} clean campaigns: soft_l1 moves a parameter by {np.max(np.abs(shifts)):.2f} errors at most")
@@ -112,7 +111,7 @@ def test_outliers_are_listed_by_file_and_row_and_told(rig):
     force = campaign.loops[0].force.copy()
     force[123] *= -1.0
     dirty = with_factor(replace(campaign, loops=(replace(campaign.loops[0], force=force),)), [4, 70], 1.1)
-    linear, soft = fit_joint(PreparedCampaign.from_campaign(dirty)), robust(dirty)
+    linear, soft = joint_fit(dirty), robust(dirty)
     places = [(entry.test, entry.row, entry.column) for entry in soft.outliers]
     assert places == [("loop_axial_1", 124, "force"), ("sweep_axial", 5, "stiffness"), ("sweep_axial", 71, "stiffness")]
     assert all(entry.distance > 5.0 for entry in soft.outliers)

@@ -160,7 +160,6 @@ def entries(node: Any) -> Iterator[tuple[Any, Any]]:
 def options(rng: random.Random, command: str) -> list[str]:
     """Up to three options of a command with random values."""
     found = cli.get_command(click.Context(cli), command)
-    assert found is not None
     known = [option for option in found.params if isinstance(option, click.Option)]
     words = []
     for option in rng.choices(known, k=rng.randint(0, 3)):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fits import joint_fit
 from scipy.stats import binom, false_discovery_control
 from scipy.stats import f as fisher
 from scipy.stats import t as student
@@ -12,8 +13,6 @@ from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSe
 from bushfit.commands.compare import compare as compare_results
 from bushfit.commands.compare import compared_result
 from bushfit.effects.contract import Array
-from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
@@ -39,7 +38,7 @@ OTHER = {"mu": 1.08, "m": 1.05, "alpha": 1.04, "sigma_fmax": 0.9}
 
 
 def fitted(clean: Undisturbed, seed: int) -> Result:
-    return fit_joint(PreparedCampaign.from_campaign(measure(clean, replace(PLAN, seed=seed)).campaign()))
+    return joint_fit(measure(clean, replace(PLAN, seed=seed)).campaign())
 
 
 def against(reference: Result, other: Result) -> Comparison:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from fits import joint_fit
 from scipy.signal import lfilter
 from scipy.stats import norm
 from tries import SEEDS
@@ -17,8 +18,6 @@ from tries import SEEDS
 from bushfit.campaign.campaign import Campaign
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
-from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.procedures import fit_joint
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.model import FIVE, Model
 from bushfit.prediction.response import TimeResponse, time_response
@@ -109,7 +108,7 @@ def respond(truth: Truth, amplitude: float, random: np.random.Generator, times: 
     stiffness = truth.stiffness(frequency, amplitude) * noise
     sweep = Sweep("sweep", Direction.AXIAL, frequency, np.full(frequency.size, amplitude), stiffness, repeat)
     campaign = Campaign("arm", Path("arm"), BUSHING, (loop,), (sweep,))
-    result = fit_joint(PreparedCampaign.from_campaign(campaign))
+    result = joint_fit(campaign)
     sines = random.uniform(0.5, 20.0, 12), random.uniform(0.0, 2.0 * np.pi, 12)
     road = np.sin(2.0 * np.pi * sines[0] * TIME[:, None] + sines[1]).sum(axis=1) * np.minimum(TIME / 0.2, 1.0)
     history = History.sampled(times * amplitude / np.abs(road).max() * road, STEP)

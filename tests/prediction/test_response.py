@@ -242,7 +242,6 @@ def test_channels_of_hidden_motions_are_those_of_the_rig(paper_model, law):
         output = respond(Result(model), channels, step=STEP)
         for response in output.responses:
             place = response.direction
-            assert isinstance(place, Direction)
             frequency = History.sampled(channels[str(place)], STEP).frequency
             record = rig.imposed(model, place, scales[place] * motions[place](fine), STEP / FINER, frequency)
             expected = record.force[::FINER]

@@ -97,7 +97,6 @@ def test_a_coupon_gives_strain_and_modulus(tmp_path):
     sweep = sweep_from(COUPON, tmp_path, direction=DMA)
     np.testing.assert_allclose(sweep.amplitude, [1.1e-4, 1e-3, 1.1e-2])
     np.testing.assert_allclose(sweep.stiffness, [5.2e6 + 4e5j, 4.5e6 + 5e5j, 3.1e6 + 6e5j])
-    assert sweep.source is not None
     assert sweep.source.conditions == {"temperature_degC": 22.2}
     np.testing.assert_allclose(sweep_from(COUPON, tmp_path, direction=TENSOR).amplitude, [2.2e-4, 2e-3, 2.2e-2])
     without = "\n".join(line.rpartition(",")[0] for line in COUPON.splitlines())
@@ -127,7 +126,6 @@ def test_the_rows_at_a_stated_temperature_are_taken_with_their_repeats(tmp_path)
 )  # fmt: skip
 def test_the_temperature_of_a_file_is_its_condition_if_it_has_a_unit(unit, value, degrees, tmp_path):
     source = sweep_from(at_temperatures(value, value).replace(" [degC]", unit), tmp_path).source
-    assert source is not None
     assert source.conditions.get("temperature_degC") == (degrees and pytest.approx(degrees))
 
 

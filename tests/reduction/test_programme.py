@@ -97,7 +97,6 @@ def test_each_steady_part_is_a_loop_in_its_order(paper_model, case):
         assert [sentence.count("before its steady cycles") for sentence in sentences] == [1, 1, 1]
         assert [sentence.count("4.99 s after its steady cycles") for sentence in sentences] == [0, 0, 1]
     for loop in loops:
-        assert loop.part is not None
         rows = slice(loop.part.first_row, loop.part.first_row + loop.force.size)
         np.testing.assert_array_equal(loop.force, record.force[rows])
 

@@ -27,8 +27,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def answers(folder) -> dict[str, Any]:
-    document: dict[str, Any] = json.loads((folder / "answers.json").read_text())
-    return document
+    return json.loads((folder / "answers.json").read_text())
 
 
 def test_300_campaigns_are_balanced_and_no_two_alike():
