@@ -32,6 +32,7 @@ NUMBERS: dict[Kind, list[list[Decimal]]] = {
         for f in (1, 2, 5, 10, 20, 50)
     ],
 }
+MACHINE = ["Instrument: EL-7 Nº 3", "Operator{0}A. B.", "Date{0}2026-01-01", "Speed{0}10{0}mm/min", ""]
 
 
 def expected(kind: Kind) -> list[Floats]:
@@ -105,7 +106,6 @@ UNITS: dict[Kind, list[str]] = {
     "sweep": ["Hz", "mm", "N/mm", "-"],
     "coupon": ["Hz", "%", "MPa", "MPa"],
 }
-MACHINE = ["Instrument: EL-7 Nº 3", "Operator{0}A. B.", "Date{0}2026-01-01", "Speed{0}10{0}mm/min", ""]
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,10 @@ from bushfit.simulation.undisturbed import undisturbed
 
 #: Draws of noise; simulated data.
 SEEDS = 20
+GRAVITY = 9.80665
+#: Stated mass by the name of its files, and that of the discs [kg].
+MASSES, DISCS = {"118g": 0.118, "253g": 0.253, "573g": 0.573, "1196g": 1.196}, 0.0148
+LEVELS = {"01g": 0.1, "1g": 1.0}
 
 
 @pytest.fixture(scope="module")
@@ -72,12 +76,6 @@ def test_so_they_do_whatever_the_noise(root, off, claimed):
     drawn = [100.0 * off(measure(clean, replace(plan, seed=seed)).campaign())[0] for seed in range(SEEDS)]
     print(f"{SEEDS} draws: radial stiffness, median {np.median(drawn):.2f} %, worst {max(drawn):.2f} %")
     assert [f"{np.median(drawn):.1f}", f"{max(drawn):.1f}"] == [claimed[2], claimed[3]]
-
-
-GRAVITY = 9.80665
-#: Stated mass by the name of its files, and that of the discs [kg].
-MASSES, DISCS = {"118g": 0.118, "253g": 0.253, "573g": 0.573, "1196g": 1.196}, 0.0148
-LEVELS = {"01g": 0.1, "1g": 1.0}
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,9 @@ from bushfit.model.result import Result
 from bushfit.reading.measurement import Sweep
 from bushfit.reduction.arrays import scatter
 
+ROW = '[[bushings]]\ncampaign = "a.toml"\n'
+finite = st.floats(-1e3, 1e3)
+
 
 def written(folder: Path, text: str, name: str = "m.toml") -> str:
     (folder / name).write_text(text, encoding="utf-8")
@@ -62,12 +65,6 @@ def test_a_pattern_takes_every_match_and_names_by_folder_where_files_share_a_nam
     inside = read(shop, '[[bushings]]\ncampaign = "bushings/b[01]/*.toml"\n[[bushings]]\ncampaign = "x.toml"\n')
     assert [row.name for row in inside.rows] == ["b0", "b1", "x"]
     assert inside.title == "m"
-
-
-ROW = '[[bushings]]\ncampaign = "a.toml"\n'
-
-
-finite = st.floats(-1e3, 1e3)
 
 
 @given(finite, st.floats(0, 1e3), finite, st.floats(0, 1e3))

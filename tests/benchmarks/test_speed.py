@@ -36,6 +36,10 @@ pytestmark = pytest.mark.slow
 
 
 Rows = list[tuple[str, str, str]]
+#: Communication step [s]: usual in multibody codes, 16 in a cycle of the highest frequency of the motion, 60 Hz.
+STEP = 1e-3
+#: Simulated time [s], and that of the ordinary test run.
+LONG, SHORT = 100.0, 0.2
 
 
 @pytest.fixture(scope="module")
@@ -174,12 +178,6 @@ def test_diagnose(benchmark, table, kind, hidden, without):
     if benchmark.enabled:
         (once,) = seconds([work], 3)
         table.append((f"diagnose where {kind} is hidden, seconds", f"{once:.2f}", "<= 2"))
-
-
-#: Communication step [s]: usual in multibody codes, 16 in a cycle of the highest frequency of the motion, 60 Hz.
-STEP = 1e-3
-#: Simulated time [s], and that of the ordinary test run.
-LONG, SHORT = 100.0, 0.2
 
 
 def test_faster_than_real_time(paper_model, tmp_path, benchmark):

@@ -36,6 +36,8 @@ LOOP = "displacement [mm],force [N],time [s]\n" + "".join(f"{math.sin(i)},{math.
 SWEEP = "frequency [Hz],amplitude [mm],stiffness [N/mm],loss factor [-]\n" + "".join(
     f"{f},0.1,600,0.1\n" for f in (5, 15, 25)
 )
+RUBBER = Bushing("CMP 15 961", 0.010, 0.018, 0.034)
+COUPON = Specimen("DMA", "modulus")
 
 
 @pytest.fixture
@@ -120,10 +122,6 @@ sweeps = [{ direction = "torsion", amplitudes = ["1 deg"], frequencies = ["5 Hz"
     assert simulate.effects == {"inertia": {"mass": 0.1}, "delay": {"tau": 5e-5}}
     assert (simulate.noise, simulate.gain_error, simulate.loops[0].cycles) == (0.005, 0.0, 3)
     assert simulate.sweeps[0].amplitudes == pytest.approx((math.radians(1),))
-
-
-RUBBER = Bushing("CMP 15 961", 0.010, 0.018, 0.034)
-COUPON = Specimen("DMA", "modulus")
 
 
 def test_turns_strains_and_rests_of_a_session():

@@ -107,6 +107,9 @@ MODEL: dict[str, Any] = {
     "warnings": [],
     "provenance": {"bushfit": "0.1.0", "inputs": [], "packages": {}},
 }  # fmt: skip
+READING = ("fit-static", "fit-dynamic", "fit", "diagnose", "run", "plan")
+#: The formats that are written without a compiler.
+EXPORT = ("export", "model.json", *(f"--format={name}" for name in ("nastran", "abaqus", "adams", "csv", "xlsx")))
 
 
 def loop(rows: int = 200) -> list[str]:
@@ -135,15 +138,12 @@ FILES = {
     "loop.csv": "\n".join(loop()) + "\n", "sweep.csv": "\n".join(sweep()) + "\n",
     "shaker.csv": "\n".join(shaker()) + "\n",
 }  # fmt: skip
-READING = ("fit-static", "fit-dynamic", "fit", "diagnose", "run", "plan")
 TAKING_MODELS = (
     ("predict", "model.json"), ("compare", "model.json", "campaign.toml"), ("simulate", "model.json"),
     ("plan", "model.json"), ("diagnose", "campaign.toml", "--model", "model.json"),
     ("fit-static", "campaign.toml", "--dynamic", "model.json"),
     ("fit-dynamic", "campaign.toml", "--static", "model.json"),
 )  # fmt: skip
-#: The formats that are written without a compiler.
-EXPORT = ("export", "model.json", *(f"--format={name}" for name in ("nastran", "abaqus", "adams", "csv", "xlsx")))
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,10 @@ COMMANDS = cli.list_commands(click.Context(cli))
 #: Lines of the longest help on a terminal of 80 columns.
 LONGEST = 70
 EXAMPLES = re.compile(r"^  Examples?:\n((?:    .*\n)+)\Z", re.MULTILINE)
+PREDICT = ("predict", "model.json", "-o", "x", "--no-plots", "--json", "-q")
+BATCH = ("batch", "campaign.toml", "more.toml", "-o", "x", "--jobs", "1", "--no-plots", "--json", "-q")
+BUSHFIT = (sys.executable, "-m", "bushfit")
+SIMULATE = ("simulate", "model/model.json")
 
 
 @pytest.mark.parametrize(
@@ -184,11 +188,6 @@ def test_the_line_on_the_page_is_what_each_shell_takes(root, shell):
     assert f"{shell}_complete" in done.stdout
 
 
-PREDICT = ("predict", "model.json", "-o", "x", "--no-plots", "--json", "-q")
-BATCH = ("batch", "campaign.toml", "more.toml", "-o", "x", "--jobs", "1", "--no-plots", "--json", "-q")
-BUSHFIT = (sys.executable, "-m", "bushfit")
-
-
 @pytest.fixture
 def folder(tmp_path, monkeypatch) -> Path:
     monkeypatch.chdir(tmp_path)
@@ -283,9 +282,6 @@ def test_an_early_ctrl_c_and_a_request_to_end(after, sent, folder):
     assert_one_line(run.returncode, err.lstrip(b"\n"))
     assert err.endswith(b"bushfit: aborted\n")
     assert not (folder / "results").exists()
-
-
-SIMULATE = ("simulate", "model/model.json")
 
 
 class Terminal(io.StringIO):

@@ -51,6 +51,10 @@ ARGUMENTS = {
 UNDRAWN = ("simulate", "example", "plan", "export")
 #: Commands that draw, each with a form of tables; a commit tries one, and sees the files of the others in their tests.
 COMMANDS = some([*zip(ARGUMENTS, cycle(("xlsx", "decimal-comma")), strict=False)], [("reduce", "xlsx")])
+#: What a fit may have said: longer than a comment of a deck, with signs that mean something to CSV, HTML and XML.
+ODD = 'sweep_axial: "5 < 7 & 9", |K| of 3 points, ' + "far from the others, " * 5 + "left out of the fit"
+#: Options of every format that is written without a compiler.
+ALL = [f"--format={name}" for name in ("nastran", "abaqus", "adams", "csv", "xlsx", "prony")]
 
 
 @pytest.fixture(scope="module")
@@ -124,8 +128,6 @@ def test_a_wide_table_is_read_back(place, form):
     assert "amplitudes: 0.1, 0.25 mm" in seen.stderr
 
 
-#: What a fit may have said: longer than a comment of a deck, with signs that mean something to CSV, HTML and XML.
-ODD = 'sweep_axial: "5 < 7 & 9", |K| of 3 points, ' + "far from the others, " * 5 + "left out of the fit"
 PAPER = (
     "radial: not fitted, predicted from the",
     "+4.9 % in stiffness and +36 % in strain compared with finite elements",
@@ -210,10 +212,6 @@ def test_every_export_says_what_predict_says(ran, model, bushfit, tmp_path):
     for file in (*files, tmp_path / "x/provenance.csv"):
         text = " ".join(text_of(file).split())
         assert [line for line in told if line not in text] == [], file.name
-
-
-#: Options of every format that is written without a compiler.
-ALL = [f"--format={name}" for name in ("nastran", "abaqus", "adams", "csv", "xlsx", "prony")]
 
 
 def test_every_format_at_once_and_what_it_leaves_out(bushfit, tmp_path):

@@ -25,6 +25,9 @@ FILES = {
 SWEEP = "data/cmp_15961/sweep_axial.csv"
 REPEATS_OFF = "repeats differ as a whole by an error of"
 ROWS_APART = "repeats of the same points differ by up to"
+#: Files that run and diagnose write alike.
+ALIKE = ("diagnosis.json", "gap.csv", "candidates.csv")
+UNKNOWN = "the tests leave mu, m, alpha open (unknown by 100 % or more)"
 
 
 @pytest.mark.parametrize("command", FILES)
@@ -160,11 +163,6 @@ def test_a_parameter_on_a_bound_shows_no_interval(own):
         (row,) = [line for line in done.stderr.splitlines() if line.split()[:1] == [name]]
         assert row.split()[:3] == [name, "(at", f"{end})"]
         assert " to " not in row
-
-
-#: Files that run and diagnose write alike.
-ALIKE = ("diagnosis.json", "gap.csv", "candidates.csv")
-UNKNOWN = "the tests leave mu, m, alpha open (unknown by 100 % or more)"
 
 
 def test_run_does_the_whole_chain_and_says_what_two_steps_cost(bushfit, tmp_path):

@@ -12,6 +12,8 @@ from bushfit.effects.contract import Array
 from bushfit.model.file import load_result
 
 HEADER = "time [s],displacement [mm],force [N]"
+FREQUENCY = np.linspace(5.0, 155.0, 10)
+SWEEP_HEADER = "frequency [Hz],amplitude [mm],stiffness [N/mm],loss factor [-]"
 
 
 def record(file: Path, time: Array, motion: Array, force: Array) -> None:
@@ -117,10 +119,6 @@ def test_a_small_test_with_time_for_itself_is_read(typed, tmp_path, levels, mean
     names = points.dtype.names or ()
     reached = np.atleast_1d(points[next(name for name in names if "amplitude" in name)])
     assert sorted(reached) == pytest.approx(levels, rel=0.01)
-
-
-FREQUENCY = np.linspace(5.0, 155.0, 10)
-SWEEP_HEADER = "frequency [Hz],amplitude [mm],stiffness [N/mm],loss factor [-]"
 
 
 def odd(typed: Run, folder: Path, header: str, stiffness: np.ndarray, frequency: np.ndarray = FREQUENCY) -> list[str]:

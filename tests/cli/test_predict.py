@@ -11,6 +11,9 @@ import pytest
 from shell import CAMPAIGN, document, names, typing, values
 
 FILES = {"compare.json", "parameters.csv", "differences.csv", "compare.png", "compare.html"}
+ARM = "data/arm_bushing/truth.json"
+NEW, OTHER = "configs/new_bushing.toml", "data/practice/case_003/bushing.toml"
+TARGETS = (NEW, "--no-plots", "--json")
 
 
 def test_a_folder_a_model_and_a_campaign_of_the_same_tests_differ_in_nothing(bushfit, tmp_path):
@@ -58,9 +61,6 @@ def test_families_of_one_campaign_are_fitted_and_held_out(bushfit, tmp_path):
     assert table["held out [noise]"].notna().all()
     assert "\nthe first family meets these tests within their noise" in done.stderr
     assert table["words"][2].endswith("alike within 1 %")
-
-
-ARM = "data/arm_bushing/truth.json"
 
 
 def test_predict_lays_measurements_over_takes_grids_and_shows_at_most_eight_amplitudes(bushfit, tmp_path):
@@ -254,10 +254,6 @@ def test_specimens_are_mounted_once_in_their_order_and_each_tells_its_scatter(ty
         swept = Counter((*map(tuple, (run["amplitudes"], run["frequencies_Hz"])),) for run in mine if run["stepped"])
         steps = {test: max(map(len, test)) for test in swept}
         assert sum((count - 1) * (steps[test] - 1) for test, count in swept.items() if steps[test] > 2) >= fewest
-
-
-NEW, OTHER = "configs/new_bushing.toml", "data/practice/case_003/bushing.toml"
-TARGETS = (NEW, "--no-plots", "--json")
 
 
 def test_a_plan_for_targets_stops_once_they_are_met(root, tmp_path):

@@ -22,6 +22,7 @@ MILLIMETRES = {
     "type": 164, "units_code": 10, "units_description": "mm N", "temp_mode": 1,
     "length": 1000.0, "force": 1.0, "temp": 1.0, "temp_offset": 273.15,
 }  # fmt: skip
+LOOP = pd.read_csv(Path(__file__).parents[2] / "data/cmp_15961/loop_axial_1.csv")
 
 
 @pytest.mark.parametrize("endings", MIXED, ids="-".join)
@@ -61,9 +62,6 @@ def test_frequency_responses_of_uff_are_sweeps(own, force, length):
         run("init", *files, *GEOMETRY, "-o", name)
         fitted.append(values(run("fit", f"{name}/campaign.toml", "-o", f"{name}/x", "--no-plots", "--json")))
     assert fitted[0] == pytest.approx(fitted[1], rel=1e-3 if force == "nodes" else 1e-6), "dataset 55 has six digits"
-
-
-LOOP = pd.read_csv(Path(__file__).parents[2] / "data/cmp_15961/loop_axial_1.csv")
 
 
 def of_two_rates(file: Path) -> None:

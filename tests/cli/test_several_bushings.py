@@ -16,6 +16,7 @@ N = 200
 TIME = np.arange(N) / 200.0
 MOTION = 0.2 * np.sin(2.0 * np.pi * 5.0 * TIME)
 SIZES = 'inner_radius = "10 mm"\nouter_radius = "18 mm"\nlength = "50 mm"\n'
+LONG = 'fit."stiffness_factor.front left"'
 
 
 @pytest.fixture(scope="module")
@@ -191,9 +192,6 @@ def test_a_diagnosis_knows_the_places_of_its_effects(root, tmp_path, option):
     campaign = root / "configs/three_shapes.toml"
     done = typing(tmp_path)("diagnose", campaign, option, "stiffness_factor.lung", "-o", "x", status=2)
     assert "no such direction or specimen" in done.stderr
-
-
-LONG = 'fit."stiffness_factor.front left"'
 
 
 def written(root: Path, folder: Path, name: str, tables: str) -> Path:

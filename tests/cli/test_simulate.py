@@ -12,6 +12,10 @@ from bushfit.geometry import Direction
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.sweeps import read_sweep
 
+RECORD = "data/cmp_15961_raw/stepped_sine_axial.csv"
+RESONANCE = "data/measured/epdm_70/shaker_1g_573g.csv"
+MASS = ("--mass", "0.573 kg", "--mass-added", "14.8 g")
+
 
 def test_simulate_writes_a_campaign_that_run_takes(bushfit, tmp_path):
     for folder, seed in (("one", 7), ("same", 7), ("other", 8)):
@@ -25,11 +29,6 @@ def test_simulate_writes_a_campaign_that_run_takes(bushfit, tmp_path):
     assert fitted == pytest.approx({name: truth[name]["value"] for name in fitted}, rel=0.06)
     bushfit("simulate", "model/model.json", "--effect", "stiffness_factor.radial=1.1", "-o", tmp_path / "sim")
     assert document(tmp_path / "sim/truth.json")["parameters"]["stiffness_factor.radial"]["value"] == 1.1
-
-
-RECORD = "data/cmp_15961_raw/stepped_sine_axial.csv"
-RESONANCE = "data/measured/epdm_70/shaker_1g_573g.csv"
-MASS = ("--mass", "0.573 kg", "--mass-added", "14.8 g")
 
 
 def test_a_raw_record_becomes_a_sweep_that_fits(typed, root, tmp_path, paper_model, table_1):

@@ -18,6 +18,10 @@ from spoiled import CAMPAIGN, FILES, ROWS, Spoiled
 from bushfit.cli import cli
 
 ERROR = re.compile(r"^(bushfit: error: |Error: )", re.MULTILINE)
+#: Address space [bytes] and processor time [s] of a command: a fit of the paper's campaign takes a third of each.
+LIMITS = (1_500_000_000, 30)
+LOOP = '[[loops]]\nfile = "{}"\ndirection = "axial"\n'
+SECRET = 'url = https://user:TOPSECRET@host\n\tTOPSECRET = "more"\n' * 3
 
 
 @pytest.fixture(scope="module")
@@ -75,10 +79,6 @@ def test_every_command_is_among_them():
     assert set(cli.commands or cli.list_commands(None)) <= commands  # type: ignore[arg-type]
 
 
-#: Address space [bytes] and processor time [s] of a command: a fit of the paper's campaign takes a third of each.
-LIMITS = (1_500_000_000, 30)
-
-
 def bounded(folder: Path, *arguments: str, times: int = 1) -> Done:
     """A command in a process of its own that the system lets have so much, its time so many times, and no more; its
     processes as well."""
@@ -130,10 +130,6 @@ def test_a_fit_to_runs_of_12_000_points(long_runs):
     done = bounded(long_runs, "fit-dynamic", "campaign.toml", "--static", "model.json", "-o", "x", "--no-plots")
     assert done.returncode == 0, done.stderr
     assert json.loads((long_runs / "x" / "dynamic.json").read_text())["fit"]["points"] == 2 * 12_000
-
-
-LOOP = '[[loops]]\nfile = "{}"\ndirection = "axial"\n'
-SECRET = 'url = https://user:TOPSECRET@host\n\tTOPSECRET = "more"\n' * 3
 
 
 def loop(points_a_cycle: int = 100, header: str = "time [s],displacement [mm],force [N]", tail: str = "") -> str:

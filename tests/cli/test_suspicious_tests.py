@@ -11,6 +11,7 @@ from bushfit.model.file import load_result
 
 LOOP = "data/cmp_15961/loop_axial_1.csv"
 SWEEP = "data/cmp_15961/sweep_axial.csv"
+SWEEP_TEST, LOOP_TEST = "sweep_axial", "loop_axial_1"
 
 
 @pytest.fixture
@@ -38,9 +39,6 @@ def test_copies_count_once(bushfit, own, once, command):
     single, copied = (load_result(own / folder / "model.json") for folder in ("once", "copied"))
     assert vars(copied.model)["values"] == vars(single.model)["values"]
     assert copied.covariance.stderr("m") == single.covariance.stderr("m")
-
-
-SWEEP_TEST, LOOP_TEST = "sweep_axial", "loop_axial_1"
 
 
 @pytest.mark.parametrize(

@@ -39,6 +39,9 @@ Measured = Callable[..., Campaign]
 Diagnosed = Callable[..., Diagnosis]
 Fitted = Callable[..., Evidence]
 Tamper = Callable[[Campaign], Campaign]
+INERTIA = {"inertia": {"mass": 0.06}}
+SLIP = {"interface_slip": {"force": 6.0}}
+TWO = {"delay": {"tau": 1e-4}, "strain_stiffening": {"c3": 20.0}}
 
 
 def in_closed_form(truth: Model, plan: SimulateSettings) -> Undisturbed:
@@ -94,11 +97,6 @@ def both(one: Tamper, other: Tamper) -> Tamper:
 def loop_too_strong(campaign: Campaign) -> Campaign:
     first, second = campaign.loops
     return replace(campaign, loops=(first, replace(second, force=1.06 * second.force)))
-
-
-INERTIA = {"inertia": {"mass": 0.06}}
-SLIP = {"interface_slip": {"force": 6.0}}
-TWO = {"delay": {"tau": 1e-4}, "strain_stiffening": {"c3": 20.0}}
 
 
 def asked(campaign: Campaign, model: Model | None = None, **settings: object) -> Diagnosis:

@@ -25,6 +25,8 @@ PAPER = Model.with_defaults(
 )
 POINTS = 900
 SCATTER = 0.01
+UP = np.geomspace(5.0, 60.0, 450)
+BENT = [1.0 + 9.0 / (1.0 + (f - middle) ** 2) for f, middle in ((UP, 25.0), (UP[::-1], 18.0))]
 
 
 def swept(model: Model, points: int = POINTS, repeats: int = 2, seed: int = 3) -> Sweep:
@@ -85,10 +87,6 @@ def test_of_very_many_levels_some_are_diagnosed_and_none_forgotten():
         assert astuple(after.test_conditions.select(point)) == astuple(
             before.test_conditions.select(int(np.flatnonzero(same)[0]))
         )
-
-
-UP = np.geomspace(5.0, 60.0, 450)
-BENT = [1.0 + 9.0 / (1.0 + (f - middle) ** 2) for f, middle in ((UP, 25.0), (UP[::-1], 18.0))]
 
 
 @pytest.mark.parametrize(

@@ -36,6 +36,14 @@ from bushfit.prediction.stiffness import predict
 from bushfit.report.results import to_json
 from bushfit.units import number
 
+FREQUENCIES, AMPLITUDES = np.geomspace(5.0, 155.0, 9), np.geomspace(1e-4, 5e-4, 5)
+#: How much stiffer the radial tests are than the axial ones predict, of the bushing or of the rig.
+STIFFER = 1.06
+#: A term's stiffness, complex [N/m], by frequency [Hz], amplitude [m] and the stiffness without it.
+Added = Callable[[Array, Array, Array], Array]
+#: Campaigns with terms of random phase and powers.
+RANDOM = 30
+
 
 def with_relaxation(campaign: Campaign, size: float = 0.06) -> Campaign:
     """A relaxation in parallel whose time grows with amplitude, a share of the stiffness: no effect of the library."""
@@ -100,11 +108,6 @@ def test_predictions_use_it_inside_the_range_and_open_outside(result):
     percent = [float(figure) for figure in re.findall(r"up to (?:\+/-)?([\d.]+) %", told)]
     assert percent == pytest.approx([196.0 * unnamed.far_deviation, 100.0 * unnamed.largest], rel=0.05)
     assert any("extrapolated" in line for line in far.warnings)
-
-
-FREQUENCIES, AMPLITUDES = np.geomspace(5.0, 155.0, 9), np.geomspace(1e-4, 5e-4, 5)
-#: How much stiffer the radial tests are than the axial ones predict, of the bushing or of the rig.
-STIFFER = 1.06
 
 
 def covered(campaign: Campaign, *truths: Array) -> list[float]:
@@ -185,12 +188,6 @@ def test_bands_hold_the_truth_whichever_it_is(measured, paper_model):
         shares += covered(measured({"sleeve_compliance": {"compliance": soft}}, seed=seed), radial(sleeve))
     assert len(shares) > 5
     assert np.mean(shares) > 0.93
-
-
-#: A term's stiffness, complex [N/m], by frequency [Hz], amplitude [m] and the stiffness without it.
-Added = Callable[[Array, Array, Array], Array]
-#: Campaigns with terms of random phase and powers.
-RANDOM = 30
 
 
 def with_stiffness(campaign: Campaign, stiffness: Sequence[Array]) -> Campaign:

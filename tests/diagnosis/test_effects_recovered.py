@@ -30,6 +30,8 @@ NEAR = ("force_saturation.level", "force_saturation.share")
 
 #: Of twins, which answer alike to the last bit (see tests/effects/test_family.py), one.
 SINGLE = [name for name in hideable() if twins_of(name)[0] == name]
+SMALL = {"interface_slip.force": 5.0, "self_heating.beta": 1e-3, "viscous.eta": 80.0, "delay.tau": 4e-5}
+NAMES = ("kraus", "sliders", "distributed_sliders", "fractional_zener", "intrinsic_time")
 
 
 @pytest.mark.parametrize("name", some(SINGLE, set(SINGLE[::3]) - SLOW))
@@ -74,9 +76,6 @@ def agrees(result: Result, truths: Mapping[str, float]) -> float:
     return reduced
 
 
-SMALL = {"interface_slip.force": 5.0, "self_heating.beta": 1e-3, "viscous.eta": 80.0, "delay.tau": 4e-5}
-
-
 @pytest.mark.parametrize("name", SMALL)
 def test_a_small_effect_is_not_taken_for_one_at_rest_on_its_bound(measured, name):
     """However wide the bounds: it has an error of its own, and the others carry their share of it."""
@@ -106,7 +105,6 @@ TRUTHS: dict[str, dict[str, float]] = {
     "intrinsic_time": {"d": 3.0},
     "paper": {},
 }
-NAMES = ("kraus", "sliders", "distributed_sliders", "fractional_zener", "intrinsic_time")
 
 
 def begun(model: Model, campaign: Campaign) -> tuple[Model, list[MeasuredTest]]:

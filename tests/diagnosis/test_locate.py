@@ -13,6 +13,8 @@ from bushfit.diagnosis.record import MisfitRegion
 from bushfit.fitting.coordinates import residual
 
 DELAY = {"delay": {"tau": 1e-4}}
+#: A mass that bends a plain model far.
+HEAVY = {"inertia": {"mass": 0.2}}
 
 
 def one(found: tuple[MisfitRegion, ...], direction: str, component: str) -> MisfitRegion:
@@ -69,10 +71,6 @@ def test_loops_alone(where_of, effects):
     found = where_of(effects)
     assert {where.kind for where in found} == {"loop"}
     assert all("a constant force" in where.reading for where in found)
-
-
-#: A mass that bends a plain model far.
-HEAVY = {"inertia": {"mass": 0.2}}
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,8 @@ from bushfit.geometry import Bushing, Direction
 from bushfit.reading.measurement import Loop, Sweep
 
 AXIAL = "peak_to_peak:sweep_axial"
+PHASE = np.linspace(0.0, 4.0 * np.pi, 200)
+LOOP = Loop("slow", Direction.AXIAL, PHASE, 1e-3 * np.sin(PHASE), 400.0 * np.sin(PHASE + 0.1))
 
 
 def doubled(sweep: Sweep) -> Sweep:
@@ -161,10 +163,6 @@ def test_verdict_does_not_depend_on_how_sweeps_are_parted(root, tmp_path):
     assert many.verdict == one.verdict == "unexplained"
     assert many.effects == one.effects == ()
     assert [found.odds.explanations[0][0].count("Hz in axial") for found in (one, many)] == [1, 1]
-
-
-PHASE = np.linspace(0.0, 4.0 * np.pi, 200)
-LOOP = Loop("slow", Direction.AXIAL, PHASE, 1e-3 * np.sin(PHASE), 400.0 * np.sin(PHASE + 0.1))
 
 
 def swept(loss: float, direction: Direction = Direction.AXIAL, magnitude: float = 5e5) -> Sweep:

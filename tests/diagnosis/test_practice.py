@@ -45,6 +45,11 @@ SIZES = {
     "asymmetry.c2": ("quadratic", "c2"),
     "coupled_breakdown.q": ("coupled", "q"),
 }
+#: Time steps in a cycle of the rig.
+STEPS = 1024
+PLAN = SimulateSettings(noise=5e-3, force_noise=3e-3, repeats=3, gain_error=4e-3, phase_error=float(np.radians(0.2)))
+#: The rival's name.
+SCALE = "strain_scale.radial"
 
 
 @pytest.fixture(scope="module")
@@ -131,13 +136,6 @@ def test_sizes(root, truths, found, name):
         value, stderr, ends = result.model.values[name], result.covariance.stderr(name), result.interval(name)
         assert stderr is not None
     assert ends[0] <= truth <= ends[1] or abs(value - truth) <= 3.0 * stderr, (case, value, stderr, truth)
-
-
-#: Time steps in a cycle of the rig.
-STEPS = 1024
-PLAN = SimulateSettings(noise=5e-3, force_noise=3e-3, repeats=3, gain_error=4e-3, phase_error=float(np.radians(0.2)))
-#: The rival's name.
-SCALE = "strain_scale.radial"
 
 
 @pytest.fixture(scope="module")

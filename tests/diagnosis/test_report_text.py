@@ -23,6 +23,17 @@ from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.model import Model
 
+#: 3 % of give in the axial direction, 17 % in the radial, measured at a few frequencies.
+SOFT_RIG = {"rig_compliance": {"compliance": 4e-8}}
+FEW = tuple(replace(sweep, frequencies=(5.0, 25.0, 55.0, 85.0, 115.0, 155.0)) for sweep in SHARED.sweeps)
+#: With torsion, in which nothing gives way along a line: it tells the rubber by itself.
+TURNED = replace(SHARED, sweeps=(*FEW, replace(FEW[0], direction=Direction.TORSION, amplitudes=(0.01, 0.03))))
+EVEN = (0.5, 0.5)
+SLIP = {"interface_slip.force": 2.0}
+SECOND = {"second_friction.sigma_fmax": 2e3, "second_friction.eps_half": 5e-4}
+STOP = {"bump_stop.gap": 4e-4, "bump_stop.stiffness": 1e5}
+TOLERANCE = 0.01
+
 
 def test_the_class_of_a_rig_that_is_assumed_is_said(measured):
     campaign = no_repeats(measured({}, SHARED))
@@ -33,13 +44,6 @@ def test_the_class_of_a_rig_that_is_assumed_is_said(measured):
     ):
         assumed = PreparedCampaign.from_campaign(replace(campaign, rig=rig)).assumed
         assert [note.partition(" class of the rig, ")[2] for note in assumed] == [words] * bool(words)
-
-
-#: 3 % of give in the axial direction, 17 % in the radial, measured at a few frequencies.
-SOFT_RIG = {"rig_compliance": {"compliance": 4e-8}}
-FEW = tuple(replace(sweep, frequencies=(5.0, 25.0, 55.0, 85.0, 115.0, 155.0)) for sweep in SHARED.sweeps)
-#: With torsion, in which nothing gives way along a line: it tells the rubber by itself.
-TURNED = replace(SHARED, sweeps=(*FEW, replace(FEW[0], direction=Direction.TORSION, amplitudes=(0.01, 0.03))))
 
 
 @pytest.mark.slow
@@ -75,7 +79,6 @@ def test_compliance_in_one_direction_alone_is_never_a_bold_name(measured):
 
 SENTENCES = [test.sentence for test in BUSHING_TESTS]
 SENTENCES += [test.sentence.format(place=place) for test in FIXTURE_TESTS for place in ("axial", "radial")]
-EVEN = (0.5, 0.5)
 
 
 @pytest.fixture
@@ -87,11 +90,6 @@ def data_sets(measured) -> list[MeasuredTest]:
 def with_each(model: Model, *effects: dict[str, float]) -> list[Model]:
     """The model with one effect more, each in turn, by the values of its parameters."""
     return [model.with_effect(next(iter(values)).partition(".")[0], values) for values in effects]
-
-
-SLIP = {"interface_slip.force": 2.0}
-SECOND = {"second_friction.sigma_fmax": 2e3, "second_friction.eps_half": 5e-4}
-STOP = {"bump_stop.gap": 4e-4, "bump_stop.stiffness": 1e5}
 
 
 @pytest.mark.parametrize(
@@ -144,9 +142,6 @@ def test_coupons_with_a_bushing_are_followed_by_a_sweep_of_it(bushing, paper_mod
     sweep = planned_sweep(model, coupon, np.array([5.0, 25.0, 105.0]), np.full(3, 0.01), (2e-3, 2e-3), (2e-3, 2e-3))
     rivals = [model, model.with_effect("stiffness_factor.radial", {"stiffness_factor.radial": 1.2})]
     assert ("radial direction" in deciding_test(rivals, EVEN, [sweep])) == bushing
-
-
-TOLERANCE = 0.01
 
 
 def one(parts: str, odds: float, *, size: float = 0.05, last: float = 0.0, p_value: float = 0.5) -> Hypothesis:

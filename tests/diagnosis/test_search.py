@@ -44,6 +44,9 @@ from bushfit.simulation.undisturbed import undisturbed
 
 #: The axial level of 0.2 mm.
 level_too_stiff = off(0, 1.05, amplitude=LEVELS[1])
+#: Sweeps of several frequencies show a mass; loops at 0.1 Hz and sweeps at 25 Hz do not.
+SHOW_MASS = (no_loops, one_direction, no_repeats, missing_points, one_level)
+CUTS = (*SHOW_MASS, no_sweeps, one_loop, one_frequency)
 
 
 @pytest.mark.parametrize(
@@ -190,11 +193,6 @@ def test_a_branch_of_the_paper_that_a_model_lacks_is_named(measured, fitted):
     assert said(diagnosis) == "named springpot"
     for name, value in fitted(campaign).model.values.items():
         assert diagnosis.result.model.values[name] == pytest.approx(value, rel=1e-2)
-
-
-#: Sweeps of several frequencies show a mass; loops at 0.1 Hz and sweeps at 25 Hz do not.
-SHOW_MASS = (no_loops, one_direction, no_repeats, missing_points, one_level)
-CUTS = (*SHOW_MASS, no_sweeps, one_loop, one_frequency)
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,10 @@ from bushfit.model.sensitivity import force_and_slopes, stiffness_and_slopes
 from bushfit.model.structure import Structure
 from bushfit.testing import CONDITIONS, check_effect, operating_point, random_model
 
+HARMONIC_ONLY = tuple(name for name in ADDED if LIBRARY[name].harmonic_only)
+#: The reversal of dry friction falls on a sample only to the accuracy of the sampling.
+SAMPLES = 2**14
+
 
 @pytest.fixture
 def rng() -> np.random.Generator:
@@ -37,11 +41,6 @@ def rng() -> np.random.Generator:
 @pytest.fixture(params=ADDED)
 def effect(request) -> Effect:
     return LIBRARY[request.param]
-
-
-HARMONIC_ONLY = tuple(name for name in ADDED if LIBRARY[name].harmonic_only)
-#: The reversal of dry friction falls on a sample only to the accuracy of the sampling.
-SAMPLES = 2**14
 
 
 def drawn(rng: np.random.Generator, *names: str) -> tuple[Model, Model, Direction, float, float]:

@@ -28,6 +28,9 @@ AMPLITUDE = np.array([1e-4, 2e-4, 5e-4])
 AXIAL, RADIAL = (("axial", FREQUENCY, AMPLITUDE), ("radial", FREQUENCY, AMPLITUDE))
 LOOP = History.steady(5e-4 * np.cos(2.0 * np.pi * np.arange(512) / 512), 5.0)
 STARTED = History(5e-4 * np.sin(2.0 * np.pi * np.arange(20480) / 2048), 1.0 / (20.0 * 2048), False, 20.0)
+SLIDERS = {"sigma": 2.5e4, "e_s": 0.015, "spread": 1.3}
+VALUES = {"sigma_fmax": 1.46e4, "eps_half": 1.3e-2}
+X = np.concatenate([np.logspace(-8, 6, 561), [0.025, 0.02565, 0.026, 1.0]])
 
 
 def added(name: str, model: Model = PLAIN, **values: float) -> Model:
@@ -181,9 +184,6 @@ def test_a_spring_alone_under_a_force_channel_that_saturates():
     np.testing.assert_array_equal(np.abs(found) < np.abs(k), np.abs(k) * AMPLITUDE > 40.0)
 
 
-SLIDERS = {"sigma": 2.5e4, "e_s": 0.015, "spread": 1.3}
-
-
 @pytest.mark.parametrize("strain", [1e-6, 3e-3, 5e-3, 0.015, 0.05, 0.1, 1.0])
 def test_sliders_are_the_mean_of_very_many(strain):
     """Below the range of their slip strains (4e-3 to 0.055), in it and beyond."""
@@ -207,10 +207,6 @@ def test_distributed_sliders_are_the_mean_of_very_many(strain):
     values = {"delta": 5e5, "e_s": 0.01, "spread": 0.9}
     result = distributed_sliders.modulus(values, np.array([30.0]), np.array([strain]))
     np.testing.assert_allclose(result, 5e5 * np.mean(modulus), rtol=2e-4)
-
-
-VALUES = {"sigma_fmax": 1.46e4, "eps_half": 1.3e-2}
-X = np.concatenate([np.logspace(-8, 6, 561), [0.025, 0.02565, 0.026, 1.0]])
 
 
 def exact_shape(x: float) -> tuple[mpmath.mpf, mpmath.mpf]:

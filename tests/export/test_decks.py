@@ -29,6 +29,8 @@ MODEL = 2e-4
 #: What the five digits of a deck leave of a value, and ten of what a table goes over.
 DIGITS, ALONG = 5e-5, 2e-9
 SYSTEMS = ["N, s, t, mm", "m kg s N", "mm kg ms kN", "in lbf*s^2/in s lbf"]
+ENDS = ("FX", "FY", "FZ", "TX", "TY", "TZ")
+WRITERS: list[Callable[[ExportRequest], Exported]] = [nastran.export, abaqus.export, adams.export]
 
 
 def read(name: str, export_request: ExportRequest, folder: Path) -> tuple[Exported, Curves]:
@@ -281,12 +283,6 @@ def test_the_rate_of_adams_is_the_stated_one(export_request):
     ratio = {end: fast[f"{end}_CURVE"][2][-1, 1] / slow[f"{end}_CURVE"][2][-1, 1] for end in ("FZ", "TZ")}
     assert 1.05 < ratio["FZ"] < 1.4
     assert ratio["TZ"] == 1.0
-
-
-ENDS = ("FX", "FY", "FZ", "TX", "TY", "TZ")
-
-
-WRITERS: list[Callable[[ExportRequest], Exported]] = [nastran.export, abaqus.export, adams.export]
 
 
 @pytest.mark.parametrize("export", WRITERS)

@@ -37,6 +37,7 @@ FADING = {
     "viscous.eta": 150.0, "maxwell.mu1": 8e4, "maxwell.tau": 3e-3, "second_maxwell.mu1": 5e4,
     "second_maxwell.tau": 0.2, "second_springpot.m": 3e3, "second_springpot.alpha": 0.6, "fractional_zener.c": 0.1,
 }  # fmt: skip
+OF_THE_RIG = [name for name, effect in LIBRARY.items() if effect.level is Level.INSTRUMENT]
 
 
 def motions(what: str, level: int) -> tuple[Array, float, float]:
@@ -184,9 +185,6 @@ FUNCTIONS = {
     for name in names
     for kind in kinds
 }
-
-
-OF_THE_RIG = [name for name, effect in LIBRARY.items() if effect.level is Level.INSTRUMENT]
 
 
 def archive(exported: Exported) -> dict[str, bytes]:

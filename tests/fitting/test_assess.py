@@ -25,6 +25,7 @@ from bushfit.model.result import Misfit, Result
 from bushfit.reading.measurement import Sweep
 
 BAND = (5.0, 15.0, 45.0, 100.0, 155.0)
+LEVELS = (1e-4, 2e-4, 5e-4)
 
 
 def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(measured, result):
@@ -101,9 +102,6 @@ def test_what_wrong_weights_cost_is_that_of_a_mean_of_two_groups(paper_model):
     grown = wide.matrix[0, 0] / plain.matrix[0, 0] - 1.0
     assert grown == pytest.approx(4.0 * np.sum(share * (1.0 - share) / freedom), rel=1e-3)
     assert wide.freedom(np.ones((1, 1)))[0] == pytest.approx(1.0 / np.sum(share**2 / freedom), rel=0.01)
-
-
-LEVELS = (1e-4, 2e-4, 5e-4)
 
 
 @pytest.fixture

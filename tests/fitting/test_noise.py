@@ -20,6 +20,7 @@ AMPLITUDES = (1e-4, 2e-4, 5e-4)
 
 
 Noisy = Callable[..., Sweep]
+ROWS = 3000
 
 
 @pytest.fixture
@@ -91,9 +92,6 @@ def test_no_repeats_fall_back_to_a_smooth_curve_and_an_assumption(noisy_sweep):
     assert {noise.shared for noise in found} == {ASSUMED}
     assert {noise.origin for noise in found} == {"assumed"}
     assert "from the class of [rig]" in found[0].describe()
-
-
-ROWS = 3000
 
 
 def filtered(random: np.random.Generator, rows: int, correlation: float) -> np.ndarray:

@@ -22,6 +22,8 @@ from bushfit.reading.measurement import Loop, Sweep
 
 RANDOM, SHARED = (5e-3, 7e-3), (4e-3, 3.5e-3)
 BLOCKS = {(1e-4, 1): 16, (1e-4, 2): 9, (5e-4, 1): 16}
+FREQUENCY, AMPLITUDE = 0.1, 1e-3
+PERIOD = 10.0
 
 
 @pytest.fixture
@@ -161,9 +163,6 @@ def test_dynamic_amplitudes_choose_the_levels(measured):
         _ = absent.smallest_sweep
 
 
-FREQUENCY, AMPLITUDE = 0.1, 1e-3
-
-
 def measured(
     model: Model,
     *,
@@ -287,9 +286,6 @@ def test_rows_that_are_missing_do_not_change_the_frequency(paper_model, waveform
     if hole[1] - hole[0] > 0.4:
         (note,) = prepared.notes
         assert "rows are missing" in note
-
-
-PERIOD = 10.0
 
 
 def frequency_found(waveform: str, phase: Array) -> float:

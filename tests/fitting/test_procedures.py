@@ -30,6 +30,12 @@ from bushfit.prediction.stiffness import predict
 
 Rig = Callable[..., Campaign]
 NAMES = ("paper", "soft and long", "stiff and thin", "strongly filled")
+#: Three standard errors of a share of 95 % over that many campaigns.
+CHANCE = 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
+#: How many times as wide intervals have to be to hold all five parameters at once: the normal quantile of 1 % over that
+#: of 5 % (Bonferroni).
+AT_ONCE = 1.3
+BOTH = ["axial", "radial"]
 
 
 @pytest.fixture(scope="module")
@@ -116,14 +122,6 @@ def test_missing_tests_are_said(measured, result):
         fit_static(PreparedCampaign.from_campaign(replace(measured.campaign, loops=())))
     with pytest.raises(FitError, match="fit-dynamic needs a sweep"):
         fit_dynamic(PreparedCampaign.from_campaign(replace(measured.campaign, sweeps=())), result)
-
-
-#: Three standard errors of a share of 95 % over that many campaigns.
-CHANCE = 3.0 * np.sqrt(0.95 * 0.05 / SEEDS)
-
-#: How many times as wide intervals have to be to hold all five parameters at once: the normal quantile of 1 % over that
-#: of 5 % (Bonferroni).
-AT_ONCE = 1.3
 
 
 def covered(result: Result, truth: Mapping[str, float]) -> list[bool]:
@@ -215,9 +213,6 @@ def test_95_percent_intervals_cover_where_the_gain_of_a_loop_is_off(rig, paper_m
     least, most = (0.93, 0.97) if stated else (0.90, 1.0)
     assert least - chance * CHANCE / 2.0 <= np.mean(inside) <= most + chance * CHANCE / 2.0
     assert np.mean(wide) >= 0.95 - chance * CHANCE
-
-
-BOTH = ["axial", "radial"]
 
 
 def off_by_level(campaign: Campaign, error: float, seed: int) -> Campaign:

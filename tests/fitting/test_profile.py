@@ -23,6 +23,7 @@ from bushfit.model.result import Result
 from bushfit.progress import report_progress_to
 
 FREQUENCIES = (5.0, 15.0, 45.0, 100.0, 155.0)
+BAND = tuple(float(f) for f in range(5, 156, 10))
 
 
 def plan(largest: float, **changes: Any) -> dict[str, Any]:
@@ -134,9 +135,6 @@ def test_profiles_hold_the_truth_as_often_as_they_say(rig, paper_model, shared):
     print(f"profile intervals, block errors {shared}: {share:.3f}, {dict(zip(FIVE, each, strict=True))}")
     chance = np.sqrt(0.95 * 0.05 / len(inside))
     assert 0.93 - 2.0 * chance <= share <= 0.97 + 2.0 * chance
-
-
-BAND = tuple(float(f) for f in range(5, 156, 10))
 
 
 def loop(amplitude: float, rate: float) -> SimulatedLoop:

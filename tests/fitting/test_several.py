@@ -42,6 +42,7 @@ eps_half = "0.5 %"
 long = 1.04
 thick = 0.98
 {TESTS}"""
+RIG = 'noise = "0.5 %"\nlevel_gain_error = "0.5 %"\nlevel_phase_error = "0.25 deg"'
 
 
 def test_factors_of_three_shapes_are_recovered_and_read_back(tmp_path):
@@ -88,9 +89,6 @@ def test_each_bushing_is_predicted_by_the_others(factor, band, tmp_path):
     common = output.result.covariance.stderr("mu") or 0.0
     assert (half > band).all()
     assert factor == "free" or (half < 4.0 * common / output.result.model.values["mu"]).all()
-
-
-RIG = 'noise = "0.5 %"\nlevel_gain_error = "0.5 %"\nlevel_phase_error = "0.25 deg"'
 
 
 @pytest.mark.slow

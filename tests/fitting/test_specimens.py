@@ -37,6 +37,13 @@ DMA = Specimen("DMA", "modulus")
 MOUNT = Specimen("mount", "shear", area=772e-6, thickness=6e-3, elements=2)
 FREQUENCIES = np.geomspace(1.0, 200.0, 15)
 STRAINS = np.geomspace(1e-4, 0.1, 15)
+VALUES = {"temperature.softening": 4e-3, "temperature.shift": 0.12}
+DEGREES = (-10.0, 8.0, 23.0, 38.0, 53.0)
+BAND = tuple(np.geomspace(1.0, 100.0, 7).tolist())
+SWEEPS = tuple(
+    SimulatedSweep(Direction.AXIAL, (1e-4, 5e-4), BAND, temperature=CELSIUS + degrees) for degrees in DEGREES
+)
+SEEDS = 12
 
 
 def sweep(
@@ -88,12 +95,6 @@ def test_effects_of_the_campaign_are_in_every_fit(coupons, paper_model):
         joint_fit(unknown)
 
 
-VALUES = {"temperature.softening": 4e-3, "temperature.shift": 0.12}
-DEGREES = (-10.0, 8.0, 23.0, 38.0, 53.0)
-BAND = tuple(np.geomspace(1.0, 100.0, 7).tolist())
-SWEEPS = tuple(
-    SimulatedSweep(Direction.AXIAL, (1e-4, 5e-4), BAND, temperature=CELSIUS + degrees) for degrees in DEGREES
-)
 PLAN = SimulateSettings(
     loops=(SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=2, temperature=CELSIUS + 23.0),),
     sweeps=SWEEPS,
@@ -101,7 +102,6 @@ PLAN = SimulateSettings(
     force_noise=2e-3,
     displacement_noise=1e-3,
 )
-SEEDS = 12
 
 
 @pytest.fixture(scope="module")

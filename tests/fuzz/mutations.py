@@ -30,6 +30,8 @@ model = "model.json"
 commands = ["predict"]
 """
 FOLDER = ROOT / "data/reports/mystery_mount"
+SIZES = ("--inner-radius", "10 mm", "--outer-radius", "18 mm", "--length", "34 mm")
+PIECES = [b"", b"\0", b'"', b",", b"[", b"]", b"=", b"\n", b"9" * 300, b"\xff", b"{", b"#", b"nan", b"-", b";"]
 
 
 def thinned(name: str, step: int) -> str:
@@ -43,7 +45,6 @@ INPUTS = {
     "limits.toml": (ROOT / "configs/limits.toml").read_text(encoding="utf-8"),
     **{f"res/{file.name}": file.read_text(encoding="utf-8") for file in FOLDER.iterdir() if file.suffix in (".json", ".csv")},
 }  # fmt: skip
-SIZES = ("--inner-radius", "10 mm", "--outer-radius", "18 mm", "--length", "34 mm")
 #: Command lines of each command, of which one is taken at a time.
 LINES: dict[str, list[tuple[str, ...]]] = {
     **{name: [("campaign.toml",)] for name in ("run", "diagnose", "fit")},
@@ -89,7 +90,6 @@ OPTIONS = [
     "1e999 Hz", "1 kg", "0.1 g", "2", "sine", "5:1e9:0.001 Hz", "-300 degC", "force=N", "force=x", "axial 25 Hz 0.1 mm", "xlsx",
     "soft_l1", "model.json", "campaign.toml", "peak_to_peak:sweep", "\u202e", "a" * 500, "inertia.mass=1 kg", "500 N axial",
 ]  # fmt: skip
-PIECES = [b"", b"\0", b'"', b",", b"[", b"]", b"=", b"\n", b"9" * 300, b"\xff", b"{", b"#", b"nan", b"-", b";"]
 
 
 def mutated(rng: random.Random, name: str, text: str) -> bytes:

@@ -17,6 +17,11 @@ from bushfit.geometry.shape import RADIUS_RATIO_RANGE, SLENDERNESS_RANGE, Correc
 
 RATIOS = (0.1, 0.2, 0.35, 0.5, 0.5556, 0.7, 0.85, 0.93, 0.97)
 LENGTHS = (0.05, 0.1, 0.3, 1.0, 1.889, 5.0, 20.0, 50.0, 100.0)
+radius_ratios = st.floats(*RADIUS_RATIO_RANGE)
+slendernesses = st.floats(*map(math.log, SLENDERNESS_RANGE)).map(
+    lambda log: min(max(math.exp(log), SLENDERNESS_RANGE[0]), SLENDERNESS_RANGE[1])
+)
+moduli = st.floats(1e5, 1e7)
 
 
 def radial_exact(a: float, b: float, length: float) -> mpmath.mpf:
@@ -93,13 +98,6 @@ def test_radial_is_refused_beyond_the_checked_shapes(lengths):
     assert np.isfinite(bushing.stiffness_per_modulus(Direction.AXIAL))
     with pytest.raises(ModelError, match="not checked for this shape"):
         radial(bushing)
-
-
-radius_ratios = st.floats(*RADIUS_RATIO_RANGE)
-slendernesses = st.floats(*map(math.log, SLENDERNESS_RANGE)).map(
-    lambda log: min(max(math.exp(log), SLENDERNESS_RANGE[0]), SLENDERNESS_RANGE[1])
-)
-moduli = st.floats(1e5, 1e7)
 
 
 def correction(radius_ratio: float, slenderness: float) -> Correction:

@@ -21,6 +21,8 @@ from bushfit.simulation.files import raw_loop_table, raw_sweep_table
 from bushfit.simulation.measured import measure, simulate
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
+CHANNELS = ("time", "displacement", "force")
+
 
 @pytest.fixture(scope="module")
 def clean(paper_model) -> Undisturbed:
@@ -35,9 +37,6 @@ def loop(clean) -> Loop:
 @pytest.fixture
 def sweep(clean) -> Sweep:
     return measure(clean, plan(seed=1, noise=5e-3, gain_error=2e-3, phase_error=2e-3)).sweeps[0]
-
-
-CHANNELS = ("time", "displacement", "force")
 
 
 def test_loops_sines_and_triangles_are_described(loop, tmp_path, paper_model):

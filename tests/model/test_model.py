@@ -23,6 +23,10 @@ from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
 from bushfit.model.sensitivity import differences, force_and_slopes, stiffness_and_slopes
 
+PACKAGES = (effects, geometry, model)
+FREQUENCY = np.array([0.1, 5.0, 55.0, 155.0])
+AMPLITUDE = np.array([1e-3, 1e-4, 2e-4, 5e-4])
+
 
 def test_the_whole_reference_table(paper_model, root):
     """192 points of an independent computation."""
@@ -49,7 +53,6 @@ def test_extrapolated_to_no_step_and_no_transient_it_is_the_closed_form(paper_mo
     assert gap < 2e-6
 
 
-PACKAGES = (effects, geometry, model)
 MODULES = [
     *(package.__name__ for package in PACKAGES),
     *(found.name for package in PACKAGES for found in pkgutil.iter_modules(package.__path__, f"{package.__name__}.")),
@@ -69,10 +72,6 @@ def test_the_examples_are_right(name, paper_model):
     done = doctest.testmod(import_module(name), extraglobs=known)
     assert done.failed == 0
     assert done.attempted or not name.startswith("bushfit.effects.")
-
-
-FREQUENCY = np.array([0.1, 5.0, 55.0, 155.0])
-AMPLITUDE = np.array([1e-3, 1e-4, 2e-4, 5e-4])
 
 
 def test_analytic_derivatives_are_used_and_agree_with_the_differences(paper_model, monkeypatch):

@@ -42,6 +42,11 @@ SWEEPS = (
 )
 TESTS: tuple[Test, ...] = (*SWEEPS, SimulatedLoop(AXIAL, 1e-3, 0.1), SimulatedLoop(RADIAL, 2e-4, 1.0))
 POINTS = tuple(Points(at, np.tile(BAND, 3), np.repeat([1e-4, 2e-4, 5e-4], len(BAND))) for at in (AXIAL, RADIAL))
+RIG = RigSettings(gain_error=0.005, phase_error=0.0044, max_force=5e3, max_frequency=200.0)
+WANTED = Points(AXIAL, np.array([10.0, 50.0, 150.0]), np.array([2e-4, 2e-4, 5e-4]))
+BUSHING = Bushing("guessed", 0.010, 0.018, 0.034)
+#: Table 1 of Garcia Tarrago et al. 2007; the compound is that of its section 2: 61 Shore A, 27 phr, natural rubber.
+TABLE_1 = {"mu": 1.09e6, "m": 2e5, "alpha": 0.24, "sigma_fmax": 14.6e3, "eps_half": 0.013}
 
 
 @pytest.fixture(scope="module")
@@ -222,10 +227,6 @@ def test_a_rig_without_limits_and_an_error_of_the_model_are_told(root):
     assert row["planned"] == pytest.approx(np.sqrt(np.mean(first**2)))
 
 
-RIG = RigSettings(gain_error=0.005, phase_error=0.0044, max_force=5e3, max_frequency=200.0)
-WANTED = Points(AXIAL, np.array([10.0, 50.0, 150.0]), np.array([2e-4, 2e-4, 5e-4]))
-
-
 @pytest.fixture(scope="module")
 def small() -> Plan:
     known = guess_parameters(Bushing("planned", 0.010, 0.018, 0.034), Compound(61.0, 27.0))
@@ -276,11 +277,6 @@ def test_the_campaign_of_a_plan_is_what_simulate_reads(small, tmp_path):
             numbers = isinstance(expected, tuple | float)
             assert getattr(other, each.name) == (pytest.approx(expected) if numbers else expected), each.name
     assert dict(model_of(campaign).values) == pytest.approx(dict(model.values), rel=1e-10)
-
-
-BUSHING = Bushing("guessed", 0.010, 0.018, 0.034)
-#: Table 1 of Garcia Tarrago et al. 2007; the compound is that of its section 2: 61 Shore A, 27 phr, natural rubber.
-TABLE_1 = {"mu": 1.09e6, "m": 2e5, "alpha": 0.24, "sigma_fmax": 14.6e3, "eps_half": 0.013}
 
 
 def off(known: Knowledge, truth: dict[str, float]) -> np.ndarray:

@@ -24,6 +24,9 @@ STEP, ROWS, FINER = 1e-3, 3000, 10
 TIME = np.arange(ROWS) * STEP
 _RANDOM = np.random.default_rng(54)
 _FREQUENCIES, _PHASES = _RANDOM.uniform(0.5, 25.0, 30), _RANDOM.uniform(0.0, 2.0 * np.pi, 30)
+_BANDS = np.random.default_rng(9)
+_LOW, _HIGH = _BANDS.uniform(0.5, 3.0, 12), _BANDS.uniform(15.0, 25.0, 12)
+_BAND_PHASES = _BANDS.uniform(0.0, 2.0 * np.pi, 24)
 
 
 def random(time: Array) -> Array:
@@ -198,11 +201,6 @@ def test_sliders_in_blocks_are_sliders_at_once(paper_model, monkeypatch):
     monkeypatch.setattr("bushfit.effects.sliders._BLOCK", 1000)
     both = replace(history, value=np.stack([history.value, history.value[::-1]]))
     np.testing.assert_allclose(model.force("axial", both)[0], expected, rtol=1e-12, atol=1e-9)
-
-
-_BANDS = np.random.default_rng(9)
-_LOW, _HIGH = _BANDS.uniform(0.5, 3.0, 12), _BANDS.uniform(15.0, 25.0, 12)
-_BAND_PHASES = _BANDS.uniform(0.0, 2.0 * np.pi, 24)
 
 
 def sweep(time: Array) -> Array:

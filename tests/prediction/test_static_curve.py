@@ -26,6 +26,8 @@ LAWS = {
     "bump_stop": {},
     "sleeve_compliance": {"sleeve_compliance.compliance": 3e-7},
 }
+#: Of the harmonic: frequency [Hz] and amplitude [m].
+FREQUENCY, AMPLITUDE = 21.0, 1e-4
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -138,8 +140,6 @@ SUPERPOSED_LAWS = {
     "bump_stop": {"bump_stop.gap": 7e-4, "bump_stop.stiffness": 2e5},
     "sleeve_compliance": {"sleeve_compliance.compliance": 3e-7},
 }
-#: Of the harmonic: frequency [Hz] and amplitude [m].
-FREQUENCY, AMPLITUDE = 21.0, 1e-4
 
 
 def on_the_rig(model: Model, motion: LargeMotion) -> complex:

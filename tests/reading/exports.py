@@ -17,6 +17,13 @@ DAMPING = STIFFNESS.imag / (2.0 * np.pi * FREQUENCY)
 TIME = np.arange(600) * 0.05
 DISPLACEMENT = np.sin(2.0 * np.pi * 0.1 * TIME)
 FORCE = 1000.0 * np.sin(2.0 * np.pi * 0.1 * TIME + 0.1)
+F, A, K = FREQUENCY, AMPLITUDE, np.abs(STIFFNESS)
+USUAL = "Frequency [Hz]|Amplitude [mm]|K* [N/mm]|"
+LOOP = "time [s],displacement [mm],force [N]".replace(",", "\t")
+G = STIFFNESS / 200.0  # [MPa] at strains of 1 and 5 %
+MODULUS = {"frequency": F, "amplitude": A / 10.0, "stiffness": 1e6 * G}
+ONE_HZ = {"frequency": 0 * F + 1.0, "amplitude": A / 10.0, "stiffness": 1e6 * G}
+EXCEL_DAYS = TIME / 86_400.0 + 46_352.5
 
 
 @dataclass(frozen=True)
@@ -44,11 +51,6 @@ def table(headers: Sequence[str], *columns: Any, mark: str = "\t", form: str = "
 def sweep(headers: str, *columns: Any, mark: str = "\t", **other: Any) -> str:
     """A sweep whose headers are separated by "|"."""
     return "\n".join(table(headers.split("|"), *columns, mark=mark, **other)) + "\n"
-
-
-F, A, K = FREQUENCY, AMPLITUDE, np.abs(STIFFNESS)
-USUAL = "Frequency [Hz]|Amplitude [mm]|K* [N/mm]|"
-LOOP = "time [s],displacement [mm],force [N]".replace(",", "\t")
 
 
 def loop(headers: str = "time [s]|displacement [mm]|force [N]", *columns: Any, **other: Any) -> str:
@@ -96,7 +98,6 @@ LVM_NO_X = LVM.replace("X_Columns\tOne", "X_Columns\tNo")
 LVM_NO_X = "\r\n".join(
     "\t" + line.partition("\t")[2] if line[:1].isdigit() else line for line in LVM_NO_X.split("\r\n")
 )
-G = STIFFNESS / 200.0  # [MPa] at strains of 1 and 5 %
 RHEO = "\n".join(
     [
         "Project:\tEPDM", "Test:\tAmplitude sweep", "", "Interval and data points:\t1\t10",
@@ -112,13 +113,10 @@ RHEO = "\n".join(
         ),
     ]
 )  # fmt: skip
-MODULUS = {"frequency": F, "amplitude": A / 10.0, "stiffness": 1e6 * G}
-ONE_HZ = {"frequency": 0 * F + 1.0, "amplitude": A / 10.0, "stiffness": 1e6 * G}
 T10 = (
     "Frequency\tDynamic Displacement p-p\tK*\tTan Delta\tPhase\tC\tMean Load\n"
     "Hz\tmm\tN/mm\t\tdeg\tN-s/mm\tN\n" + "\n".join(table([], F, 2 * A, K, ETA, PHASE, DAMPING, 0 * F + 500.0)[1:])
 )  # fmt: skip
-EXCEL_DAYS = TIME / 86_400.0 + 46_352.5
 
 EXPORTS: dict[str, Export] = {
     # sweeps that have other columns too

@@ -14,6 +14,8 @@ from test_exports import options
 
 GEOMETRY = ("--inner-diameter", "20 mm", "--outer-diameter", "36 mm", "--length", "34 mm", "--direction", "axial")
 PLAIN = {"sweep": EXPORTS["damping is a loss factor"], "loop": Export(loop(), "loop")}
+#: One of each kind runs with the quick tests.
+_QUICK = {"blocks with amplitudes", "clock"}
 
 
 def with_hum(amplitude: float) -> Export:
@@ -65,8 +67,6 @@ CLASSES: dict[str, tuple[str, ...]] = {
     ),
     "contradictions": ("amplitudes that agree",),
 }
-#: One of each kind runs with the quick tests.
-_QUICK = {"blocks with amplitudes", "clock"}
 
 
 def fitted(folder: Path, *exports: Export) -> dict[str, float]:

@@ -37,6 +37,7 @@ ZERO_TO_PEAK = [
     "Amplituda szczytowa [mm]",
     "Амплитуда пиковая [мм]", "片振幅[mm]", "振幅(ピーク)[mm]", "振幅峰值 (mm)",
 ]  # fmt: skip
+ALL = {**DIALECTS, **MACHINES}
 
 
 def amplitudes(folder: Path, header: str, columns: Mapping[str, str] | None = None, **stated: str) -> np.ndarray:
@@ -129,9 +130,6 @@ def by_bushfit(file: Path) -> Loop | Sweep:
         return read_loop(file, Direction.AXIAL, LoopFile(file=file.name))
     place = Direction.AXIAL if file.stem == "sweep" else Specimen("DMA", "modulus")
     return read_sweep(file, place, SweepFile(file=file.name))
-
-
-ALL = {**DIALECTS, **MACHINES}
 
 
 def in_si(dialect: Dialect) -> list[Floats]:

@@ -14,6 +14,18 @@ from bushfit.geometry import Specimen
 from bushfit.reading.measurement import Sweep
 from bushfit.reading.runs import nominal, runs_of
 
+ONE_LEVEL = "\n".join(["frequency [Hz],stiffness [N/mm],loss factor [-]", *(f"{f},{500 + f},0.1" for f in (5, 15, 25))])
+ONE_FREQUENCY = "\n".join(
+    ["amplitude [mm],stiffness [N/mm],loss factor [-]", *(f"0.{a},{500 + a},0.1" for a in (1, 2, 5))]
+)
+DMA, TENSOR = Specimen("DMA", "modulus"), Specimen("DMA", "modulus", strain="tensor")
+PHASE = SWEEP.replace("loss factor [-]", "phase [deg]")
+#: A storage stiffness with a phase.
+STORAGE = PHASE.replace("stiffness", "storage stiffness")
+LOSS = STORAGE.replace("phase [deg]", "loss stiffness [N/mm]")
+AMPLITUDES = np.geomspace(1e-5, 1e-3, 15)
+FREQUENCIES = np.array([5.0, 20.0, 80.0])
+
 
 def test_repeats_and_errors_of_the_points_are_read(tmp_path):
     doubled = "\n".join([SWEEP_HEADER, *SWEEP_ROWS, *SWEEP_ROWS])
@@ -54,12 +66,6 @@ def sweep_of(header: str, rows: Iterable[str], folder: Path, **stated: Any) -> S
     return sweep_from("\n".join([header, *rows]), folder, **stated)
 
 
-ONE_LEVEL = "\n".join(["frequency [Hz],stiffness [N/mm],loss factor [-]", *(f"{f},{500 + f},0.1" for f in (5, 15, 25))])
-ONE_FREQUENCY = "\n".join(
-    ["amplitude [mm],stiffness [N/mm],loss factor [-]", *(f"0.{a},{500 + a},0.1" for a in (1, 2, 5))]
-)
-
-
 def test_what_a_file_has_no_column_for_is_stated(tmp_path):
     assert set(sweep_from(ONE_LEVEL, tmp_path, at_amplitude=2e-4).amplitude) == {2e-4}
     assert set(sweep_from(ONE_LEVEL, tmp_path, at_amplitude=2e-4, amplitude="peak-to-peak").amplitude) == {1e-4}
@@ -80,7 +86,6 @@ def test_amplitudes_reached_count_as_their_header_says_or_else_as_the_levels(tmp
     np.testing.assert_allclose(sweep.amplitude_reached, factor * np.array([9.9e-5, 1e-4, 1.01e-4]))
 
 
-DMA, TENSOR = Specimen("DMA", "modulus"), Specimen("DMA", "modulus", strain="tensor")
 #: A simulated strain sweep, in the form of a DMA's export.
 COUPON = "\n".join(
     [
@@ -129,10 +134,6 @@ def test_the_temperature_of_a_file_is_its_condition_if_it_has_a_unit(unit, value
     assert source.conditions.get("temperature_degC") == (degrees and pytest.approx(degrees))
 
 
-PHASE = SWEEP.replace("loss factor [-]", "phase [deg]")
-#: A storage stiffness with a phase.
-STORAGE = PHASE.replace("stiffness", "storage stiffness")
-LOSS = STORAGE.replace("phase [deg]", "loss stiffness [N/mm]")
 #: What is wrong, what is stated, and what the error says besides what tests/cli/spoiled_tables.py has.
 BAD_SWEEPS: list[tuple[str, dict[str, Any], list[str]]] = [
     (ONE_FREQUENCY, {}, ["line 1", "no column for the frequency", 'at_frequency = "10 Hz"']),
@@ -170,10 +171,6 @@ BAD_SWEEPS: list[tuple[str, dict[str, Any], list[str]]] = [
 def test_spoiled_sweeps_have_one_clear_error(text, stated, words, tmp_path):
     with refused("sweep.csv", *words):
         sweep_from(text, tmp_path, **stated)
-
-
-AMPLITUDES = np.geomspace(1e-5, 1e-3, 15)
-FREQUENCIES = np.array([5.0, 20.0, 80.0])
 
 
 def swept(amplitudes: np.ndarray, frequencies: np.ndarray, repeats: int, scatter: float, seed: int) -> list[np.ndarray]:

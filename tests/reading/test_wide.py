@@ -23,6 +23,15 @@ from bushfit.reduction.resonance import transmissibility
 FREQUENCIES = ("5", "15", "25", "35")
 AMPLITUDES = ("0,05", "0,1", "0,5")
 IN_MM = [f"{amplitude} mm" for amplitude in AMPLITUDES]
+Cell = Callable[[str, str], str]
+G = 9.80665
+FREQUENCY = np.linspace(50.0, 400.0, 60)
+RATIO = transmissibility(np.full(60, 1e6 * (1 + 0.1j)), 0.5, FREQUENCY)
+BASE = 2.0 + 0.01 * FREQUENCY
+MASS = BASE * np.abs(RATIO)
+ANGLE = np.angle(RATIO)
+IN_G = (BASE / G, MASS / G, np.degrees(ANGLE))
+REAL, IMAGINARY = MASS / G * np.cos(ANGLE), MASS / G * np.sin(ANGLE)
 
 
 def number(text: str) -> float:
@@ -37,9 +46,6 @@ def stiffness(frequency: str, amplitude: str) -> str:
 def loss(frequency: str, amplitude: str) -> str:
     """[-] A value that no other point has."""
     return f"{0.1 + number(frequency) / 1e3 + number(amplitude) / 1e2:.4f}".replace(".", ",")
-
-
-Cell = Callable[[str, str], str]
 
 
 def block(cell: Cell, heads: Sequence[str] = IN_MM, corner: str = "f [Hz]") -> list[str]:
@@ -169,14 +175,6 @@ def test_spoiled_wide_tables_have_one_clear_error(text, words, tmp_path):
         sweep_from("\n".join(text), tmp_path)
 
 
-G = 9.80665
-FREQUENCY = np.linspace(50.0, 400.0, 60)
-RATIO = transmissibility(np.full(60, 1e6 * (1 + 0.1j)), 0.5, FREQUENCY)
-BASE = 2.0 + 0.01 * FREQUENCY
-MASS = BASE * np.abs(RATIO)
-ANGLE = np.angle(RATIO)
-
-
 def written(folder: Path, header: str, *columns: np.ndarray) -> Path:
     """A file with frequencies and these columns; with decimal commas where semicolons part the header."""
     table = pd.DataFrame(dict(enumerate((FREQUENCY, *columns))))
@@ -194,8 +192,6 @@ def read(file: Path, base_acceleration: float | None = None) -> ResonanceTest:
     return read_resonance(table, Direction.AXIAL, base_acceleration)
 
 
-IN_G = (BASE / G, MASS / G, np.degrees(ANGLE))
-REAL, IMAGINARY = MASS / G * np.cos(ANGLE), MASS / G * np.sin(ANGLE)
 FILES = {
     "freq_hz,base_accel_ms2,base_phase_rad,mass_accel_ms2,mass_phase_rad": (BASE, 0.3 + 0 * BASE, MASS, 0.3 + ANGLE),
     "Frequency [Hz],Base acceleration [g],Mass acceleration [g],Phase [deg]": IN_G,

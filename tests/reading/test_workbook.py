@@ -27,6 +27,15 @@ from bushfit.reading.tablefile import Form, ending, escape_formula, to_bytes, to
 from bushfit.simulation.files import raw_loop_table, raw_sweep_table
 
 Sheets = dict[str, list[list[object]]]
+FORCE = np.array([float(row[2]) for row in NUMBERS["loop"]])
+PREAMBLE: list[list[object]] = [["Maschine", "EL-7"], ["Datum", "01.02.2026"], ["Version", 1.234], []]
+FORMS: tuple[Form, ...] = get_args(Form)
+PHASE = np.linspace(0.0, 12.0, 50)
+TABLE = pd.DataFrame(
+    {"x [mm], low": [1.0 / 3.0, np.nan, -1e-12], "n": [1, 2, 3], "=text": ["=1+1", "a; b, c", "Prüfling"]}
+)
+RUN = ["=1+1", "+cmd", "-2+3", "@SUM(A1)", "\t=1", "  =1", '=HYPERLINK("http://x")', "\uff1d1", '"=1', "%0A=1", "|x"]
+STAY = ["loop_axial_1", "0.1 mm", "a=b", "A-4", "", "'quoted'", "Prüfling 3"]
 
 
 def table(kind: Any, language: str = "german", number: Callable[[Any], object] = float) -> list[list[object]]:
@@ -54,8 +63,6 @@ def forces(file: Path, **stated: Any) -> Any:
     return read_loop(file, Direction.AXIAL, LoopFile(file=file.name, **stated)).force
 
 
-FORCE = np.array([float(row[2]) for row in NUMBERS["loop"]])
-PREAMBLE: list[list[object]] = [["Maschine", "EL-7"], ["Datum", "01.02.2026"], ["Version", 1.234], []]
 SHEETS: dict[str, Sheets] = {
     "one sheet": {"Loop": table("loop")},
     "preamble": {"Loop": [*PREAMBLE, *table("loop")]},
@@ -147,13 +154,6 @@ def test_formulas_whose_values_were_not_saved_are_said(cells, tmp_path):
     assert "open it in a spreadsheet program and save it again" in str(caught.value)
 
 
-FORMS: tuple[Form, ...] = get_args(Form)
-PHASE = np.linspace(0.0, 12.0, 50)
-TABLE = pd.DataFrame(
-    {"x [mm], low": [1.0 / 3.0, np.nan, -1e-12], "n": [1, 2, 3], "=text": ["=1+1", "a; b, c", "Prüfling"]}
-)
-
-
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("direction", list(Direction))
 def test_tests_are_read_back(form, direction, tmp_path):
@@ -182,10 +182,6 @@ def test_cells_of_a_text_have_seven_digits_and_run_nothing():
     assert [escape_formula(text) for text in RUN] == [f"'{text}" for text in RUN]
     assert [escape_formula(text) for text in STAY] == STAY
     assert (escape_formula("a\r\nb"), escape_formula("a\r\n=1")) == ("a b", "a =1")
-
-
-RUN = ["=1+1", "+cmd", "-2+3", "@SUM(A1)", "\t=1", "  =1", '=HYPERLINK("http://x")', "\uff1d1", '"=1', "%0A=1", "|x"]
-STAY = ["loop_axial_1", "0.1 mm", "a=b", "A-4", "", "'quoted'", "Prüfling 3"]
 
 
 def test_what_a_sheet_does_not_hold_is_refused_and_cells_of_all_sheets_count(tmp_path, monkeypatch):

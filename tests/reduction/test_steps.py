@@ -17,6 +17,8 @@ from bushfit.reduction.steps import reduce
 FREQUENCIES = (5.0, 25.0, 100.0, 101.0, 155.0)
 #: The rig misses 0.1, 0.2 and 0.5 mm.
 POINTS = [(f, a * (1.0 - 1e-4 * f)) for a in (1.02e-4, 1.99e-4, 4.9e-4) for f in FREQUENCIES]
+TIME = np.arange(0.0, 30.0, 5e-4)
+SLOW = 20.0 * np.exp(np.linspace(0.0, 0.6, TIME.size))
 
 
 @pytest.fixture(scope="module")
@@ -151,10 +153,6 @@ def test_repeats_and_levels(paper_model):
     assert np.unique(column(named, "level")).tolist() == [0.97e-4, 1.03e-4]
     with pytest.raises(MeasurementError, match=r"none of the levels[\s\S]*0.097 mm at 10 Hz[\s\S]*30 % of 0.2 mm"):
         reduce([first], levels=(2e-4,))
-
-
-TIME = np.arange(0.0, 30.0, 5e-4)
-SLOW = 20.0 * np.exp(np.linspace(0.0, 0.6, TIME.size))
 
 
 @pytest.mark.parametrize(

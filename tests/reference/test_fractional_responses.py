@@ -25,6 +25,8 @@ MU = 1.0e6
 RATIO = 4.0  # m over 2 mu [s^alpha]: a record of 1 s sees a good part of the relaxation
 
 Response = Callable[[float, Array], tuple[Array, Array]]
+VALUES = {"sigma_fmax": 1.46e4, "eps_half": 1.3e-2}
+SCALED = (1e-3, 0.1, 0.5, 3.8, 50.0, 1000.0)  # e0/eps_half
 
 
 @cache
@@ -145,10 +147,6 @@ def test_as_the_rig_measures_it(bushing, agree):
         exact = 0.5e5 * bushing.stiffness_per_modulus(Direction.AXIAL) * (10.0j * np.pi) ** alpha
         found.append(digits(rig.dynamic_stiffness(model, Direction.AXIAL, np.array([5.0]), np.array([1e-4])), exact))
     agree("springpot, stiffness on the rig", found)
-
-
-VALUES = {"sigma_fmax": 1.46e4, "eps_half": 1.3e-2}
-SCALED = (1e-3, 0.1, 0.5, 3.8, 50.0, 1000.0)  # e0/eps_half
 
 
 def branches(strain: list[float]) -> list[mpmath.mpf]:

@@ -30,6 +30,11 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="processes are f
 
 OLD = {"a.csv": b"old a", "b.json": b"old b"}
 NEW = {"a.csv": b"new a", "b.json": b"new b"}
+#: A text with markup, the end of a comment, what mathematics would be, and letters that the font lacks.
+NASTY = "<script>alert(1)</script> --> & $x_1$ 衬套"
+#: A formula, mathematics that is none, and in names of files what clears the screen and turns a line around.
+NAME = r"=cmd|' /C calc'!A0 $\foo{x}$ _a_ <b>"
+FILE = "=1+1 $\\foo$ \x1b[2J\u202ecsv.exe"
 
 
 def write(folder: Path, files: dict[str, bytes], *, force: bool = False, inputs: tuple[Path, ...] = ()) -> None:
@@ -141,10 +146,6 @@ def test_a_file_that_bushfit_did_not_write_is_never_replaced(tmp_path, force):
     assert (tmp_path / "results" / "b.json").read_bytes() == b"old b"
 
 
-#: A text with markup, the end of a comment, what mathematics would be, and letters that the font lacks.
-NASTY = "<script>alert(1)</script> --> & $x_1$ 衬套"
-
-
 @pytest.fixture(scope="module")
 def data(root) -> PreparedCampaign:
     return PreparedCampaign.from_campaign(load_campaign(root / "configs/cmp_15961.toml"))
@@ -185,11 +186,6 @@ def test_loops_row_by_row_and_sweeps_by_amplitude_repeat_and_frequency(data, pap
     stiffness = paper_model.stiffness("axial", frequency, amplitude / 1e3)
     np.testing.assert_allclose(axial["model stiffness [N/mm]"], np.abs(stiffness) / 1e3, rtol=1e-12)
     np.testing.assert_allclose(axial["model loss factor [-]"], stiffness.imag / stiffness.real, rtol=1e-9)
-
-
-#: A formula, mathematics that is none, and in names of files what clears the screen and turns a line around.
-NAME = r"=cmd|' /C calc'!A0 $\foo{x}$ _a_ <b>"
-FILE = "=1+1 $\\foo$ \x1b[2J\u202ecsv.exe"
 
 
 @pytest.fixture(scope="module")

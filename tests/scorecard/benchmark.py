@@ -37,6 +37,9 @@ _ANSWERS, _VOCABULARY = "answers.json", "vocabulary.csv"
 
 #: What a tool answers of a campaign: `sees`, `claims` and `where`.
 ToolAnswer = dict[str, Any]
+#: Places at fault, by the words in which bushfit reports them.
+_PLACES = {"level": "level", "frequency": " Hz", "repeat": "repeat", "loop": "loop", "direction": ""}
+FOLDER = click.argument("folder", type=click.Path(path_type=Path))
 
 
 def tasks(seed: int, count: int) -> list[tuple[str, str, float, int, str]]:
@@ -83,10 +86,6 @@ def sha256(path: Path) -> str:
         if file.is_file():
             digest.update(file.relative_to(path).as_posix().encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()
-
-
-#: Places at fault, by the words in which bushfit reports them.
-_PLACES = {"level": "level", "frequency": " Hz", "repeat": "repeat", "loop": "loop", "direction": ""}
 
 
 def _vocabulary_name(name: str) -> str:
@@ -218,9 +217,6 @@ def table(answers: Mapping[str, Any], tools: Mapping[str, Mapping[str, ToolAnswe
 def benchmark() -> None:
     """Make sealed campaigns, run a tool on them, score its answers: make FOLDER, run FOLDER, score FOLDER."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
-
-FOLDER = click.argument("folder", type=click.Path(path_type=Path))
 
 
 @benchmark.command("make")

@@ -24,6 +24,8 @@ _TRIES, _NEAR = 14, 0.05
 Place = Literal["level", "frequency", "repeat", "loop", "direction"]
 Mask = NDArray[np.bool_]
 Rows = NDArray[np.int_]
+#: What changes by an amount, which is about the share of |K| that changes at most.
+Sized = Callable[[float], Change]
 
 
 @dataclass(frozen=True)
@@ -79,8 +81,6 @@ class Bench:
         return float(self.random.choice([-1.0, 1.0]))
 
 
-#: What changes by an amount, which is about the share of |K| that changes at most.
-Sized = Callable[[float], Change]
 Made = Callable[[Bench], Sized]
 
 

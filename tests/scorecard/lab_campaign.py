@@ -45,6 +45,8 @@ _JITTER = 2e-4
 _LEVELS, _PLANNED = ((0.2, 0.4), (0.1, 0.3), (0.25, 0.5, 0.7), (0.4,)), (0.5, 0.2, 0.2, 0.1)
 #: Strain of the top level, frequency of a loop [Hz], and scatter of a point and of a loop's force.
 _STRAIN, _LOOP, _SCATTER, _FORCE = (0.03, 0.06), 0.1, (0.003, 0.006), (0.002, 0.004)
+#: What a clean campaign has.
+NOTHING = Kind("nothing", lambda _: lambda _: Change())
 
 
 @dataclass(frozen=True)
@@ -125,10 +127,6 @@ class OtherRubber:
     def stress(self, strain: Array, frequency: Array) -> Array:
         """Stress [Pa] over a steady cycle of the strain."""
         return self.law(StrainHistory(strain, 1.0 / (SAMPLES * frequency[:, None]), periodic=True))
-
-
-#: What a clean campaign has.
-NOTHING = Kind("nothing", lambda _: lambda _: Change())
 
 
 def draw(kind: str, seed: int, law: str) -> tuple[Plan, Rubber, Bench]:

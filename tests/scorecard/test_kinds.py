@@ -17,6 +17,9 @@ from bushfit.effects import BASE
 from bushfit.model.model import Model
 
 RUBBER = Rubber(1.09e6, 2.0e5, 0.24, 1.46e4, 1.3e-2)
+TABLE_1 = Rubber(1.09e6, 2.0e5, 0.24, 1.46e4, 1.3e-2)
+CMP = Bushing(0.010, 0.018, 0.034)
+PHASE = 2.0 * np.pi * np.arange(512) / 512
 
 
 def a_session() -> Tests:
@@ -48,10 +51,6 @@ def test_the_same_seed_writes_the_same_campaign(name, tmp_path):
     assert first == second
     for file in (tmp_path / "a").iterdir():
         assert file.read_bytes() == (tmp_path / "b" / file.name).read_bytes()
-
-
-TABLE_1 = Rubber(1.09e6, 2.0e5, 0.24, 1.46e4, 1.3e-2)
-CMP = Bushing(0.010, 0.018, 0.034)
 
 
 def points(bushing: Bushing, frequency: object, amplitude: object, direction: object) -> Tests:
@@ -103,9 +102,6 @@ def test_friction_with_further_turns_is_that_walked_from_rest():
         walked.append(stress)
         before = value
     assert np.allclose(friction(wave[None, :], largest, half)[0], walked[-512:], atol=1e-5 * largest)
-
-
-PHASE = 2.0 * np.pi * np.arange(512) / 512
 
 
 def steady(frequency: float, amplitude: float = 1.0) -> StrainHistory:

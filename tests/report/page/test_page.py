@@ -24,6 +24,13 @@ from bushfit.report.page.record import read_results
 from bushfit.report.page.report import comparable_sweeps, report_page
 from bushfit.report.results import ResultFile, contents
 
+#: Keys of the documents whose texts come from a user's files.
+FOREIGN = {"name", "summary", "next_test", "command", "reading", "sentence", "evidence", "preload", "date", "warnings"}
+STYLED = re.compile(r"<(style|script)>(.*?)</\1>", re.DOTALL)
+Spoil = Callable[[Path], object]
+#: A batch in which nothing happened.
+EMPTY = ("failed", "missed", "conditional", "not_judged", "differ", "warnings", "curve_points", "parts")
+
 
 @pytest.mark.parametrize("name", ["cmp_15961", "mystery_mount"])
 def test_run_writes_a_whole_page_that_loads_nothing_and_its_folder_gives_the_same(results, name):
@@ -191,10 +198,6 @@ def page_from(documents: dict[str, Any], tables: dict[str, Any]) -> str:
     )
 
 
-#: Keys of the documents whose texts come from a user's files.
-FOREIGN = {"name", "summary", "next_test", "command", "reading", "sentence", "evidence", "preload", "date", "warnings"}
-
-
 def test_names_do_no_harm(root):
     """Whatever stands in a text, the page has the same elements and attributes, and says it to the letter."""
     documents, tables = read(root / "data/reports/mystery_mount")
@@ -209,9 +212,6 @@ def test_beside_a_prediction_at_23_degrees_only_sweeps_of_that_temperature_are_d
     warm = Result(paper_model.with_effect("temperature"))
     shown = [comparable_sweeps(table, result) for result in (warm, Result(paper_model))]
     assert [list(rows["sweep"]) for rows in shown if rows is not None] == [["room", "none"], ["cold", "room", "none"]]
-
-
-STYLED = re.compile(r"<(style|script)>(.*?)</\1>", re.DOTALL)
 
 
 def bare(page: str) -> str:
@@ -259,9 +259,6 @@ def test_the_results_to_try_it_on_are_current(root, results):
         assert one == other, f"stale: copy {file.name} of bushfit run configs/mystery_mount.toml to {file}"
 
 
-Spoil = Callable[[Path], object]
-#: A batch in which nothing happened.
-EMPTY = ("failed", "missed", "conditional", "not_judged", "differ", "warnings", "curve_points", "parts")
 BATCH = {
     **{"schema": "bushfit/batch/2", "title": "x", "rows": 1, "done": 1, "headline": "1 part", "detectable": None},
     **{"quantities": {}, "limits": {}},

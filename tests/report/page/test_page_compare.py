@@ -20,6 +20,8 @@ from bushfit.report.results import Formats, encode_all
 NAMES = ["two", "families"]
 #: Keys of compare.json whose texts come from a user's files or names.
 FOREIGN = {"name", "source", "words", "warnings", "command", "file", "note", "part", "reason"}
+#: A batch that is diagnosed and reported takes ten seconds.
+SLOW = pytest.mark.slow
 
 
 def page_of(document: Any) -> str:
@@ -73,10 +75,6 @@ def test_names_do_no_harm(compared):
         plain = parsed(page_of(spoiled(document, "plain", FOREIGN)))
         for name in HARMFUL:
             assert_harmless(page_of(spoiled(document, name, FOREIGN)), plain, name)
-
-
-#: A batch that is diagnosed and reported takes ten seconds.
-SLOW = pytest.mark.slow
 
 
 @SLOW

@@ -36,6 +36,10 @@ from bushfit.reduction.steps import reduce
 from bushfit.report.plots.inspection import inspection_figure, reduction_figure
 from bushfit.report.plots.style import to_image
 
+#: A picture that is higher does not fit on three pages of A4 [inch].
+HIGHEST = 33.0
+LONG_NAME = "a file whose name tells all that is known of the test " * 3
+
 
 def test_settings_of_the_user_do_not_matter(root, tmp_path):
     """A backend of a notebook, LaTeX, an unknown font and a misspelt key in matplotlibrc."""
@@ -101,11 +105,6 @@ def test_prediction_over_frequency_and_amplitude_and_means_of_repeats(paper_mode
     mean = 1e-3 * np.abs(both[0].measured[here]).mean()
     assert drawn.get_ydata()[FREQUENCIES == 55.0][0] == pytest.approx(mean, rel=1e-12)
     assert "Points" not in note(prediction(result, Direction.TORSION, *both, amplitudes=TORSION))
-
-
-#: A picture that is higher does not fit on three pages of A4 [inch].
-HIGHEST = 33.0
-LONG_NAME = "a file whose name tells all that is known of the test " * 3
 
 
 def checked(figure: Figure) -> Figure:
