@@ -97,7 +97,7 @@ class PartQuantity:
 
     @property
     def tabled(self) -> PartQuantity:
-        """Copy of the quantity with the unit of its table column; for a parameter it suits the typical value."""
+        """Copy of the quantity in the unit of its table column; for a parameter, that of a typical value."""
         return self.displayed(get_parameter(self.name).typical) if is_parameter(self.name) else self
 
     @property

@@ -22,7 +22,7 @@ def print_validations(output: Output, validations: Sequence[Validation], before:
     Args:
         output: output of the command.
         validations: comparisons of measured and predicted force with the model to use.
-        before: the same without the effects that a diagnosis added; empty if none were added.
+        before: comparisons with the model before a diagnosis added effects; empty if none were added.
     """
     from bushfit.report.response import validation_table
 

@@ -37,10 +37,10 @@ def load_model(path: str | Path) -> Result:
 
 
 def model_file(path: Path) -> Path:
-    """Return the path of a model file: the path itself, or model.json in a results folder.
+    """Find the model file of a path: model.json in a results folder, otherwise the path itself.
 
     Returns:
-        Path of the model file; any other path is returned unchanged.
+        Path of the model file, which need not exist.
 
     Raises:
         ModelError: a campaign, a test file, or a folder without a model.

@@ -160,11 +160,11 @@ def _wanted_points(
 
 
 def _targets(name: str, half_width: float, knowledge: Knowledge, points: Sequence[Points]) -> list[Target]:
-    """Targets with a name such as "mu", "stiffness" (all predicted directions) or "stiffness.axial".
+    """List the targets of a plan that a name selects: "mu", "stiffness" (all directions) or "stiffness.axial".
 
     Args:
         name: name of a parameter or prediction, with or without a direction.
-        half_width: wanted half-width of the 95 % interval relative to the value.
+        half_width: half-width that the 95 % interval shall reach, relative to the value.
         knowledge: knowledge before the tests, with the names of the parameters.
         points: operating points of the predictions.
     """

@@ -259,7 +259,7 @@ def predict(
 
 
 def _assign_bushing(campaign: Campaign, result: Result) -> Campaign:
-    """Assign a campaign's tests to that of several fitted bushings whose geometry is equal; refuse another geometry."""
+    """Assign the tests of a campaign to the one of several fitted bushings that has the campaign's geometry."""
     bushing, fitted = campaign.bushing, result.bushings
     bodies = [body for body in fitted if bushing and replace(bushing, name=body.name) == body]
     listed = {place.bushing for place in campaign.specimens if place.bushing}
@@ -398,7 +398,7 @@ def by_direction(parts: Sequence[Part]) -> list[list[Part]]:
 
 
 def measured_table(result: Result, sweeps: Sequence[MeasuredSweep]) -> pd.DataFrame:
-    """Table of measured sweeps with the model, those to which the model was fitted first."""
+    """Table of measured sweeps beside the values of the model; sweeps to which the model was fitted come first."""
     fitted, not_fitted = split_by_fit(result, sweeps)
     counts = [sum(sweep.frequency.size for sweep in part) for part in (fitted, not_fitted)]
     table = tables.sweeps_table(result.model, [*fitted, *not_fitted])

@@ -42,7 +42,7 @@ def simulate_campaign(truth: Model, settings: SimulateSettings, form: Form = "cs
     """Simulate the tests of a campaign.
 
     Args:
-        truth: the true model; its unnamed correction is left out, because it has no law in time.
+        truth: the true model; a smooth correction in it is left out, because it has no law in time.
         settings: tests, noise and errors of the rig.
         form: format of the tables.
 

@@ -71,7 +71,7 @@ class _Element(NamedTuple):
     damping: Mapping[Kind, float]
 
     def describe_error(self, kind: Kind) -> str:
-        """Sentence on the errors of |K| and loss factor over the grid, due to a single static curve and damping.
+        """Sentence on the errors of |K| and loss factor that a single static curve and damping cause over the grid.
 
         Args:
             kind: "car" for Adams Car, "ride" for Adams Car Ride.

@@ -279,7 +279,7 @@ def common_omissions(request: ExportRequest) -> Iterator[str]:
 
 
 def band_omissions(prediction: Prediction) -> Iterator[str]:
-    """Generate sentences on the omitted 95 % band, and on |K| if an effect of unknown origin is that of the rig."""
+    """Generate sentences on the omitted 95 % band, and on |K| if an unresolved effect belongs to the rig."""
     place, band = prediction.direction, prediction.stiffness
     if (width := float(np.max((band.high - band.low) / (2.0 * band.value)))) > 0.0:
         yield f"{place}: no 95 % band, which is up to +/-{number(100.0 * width, 2)} % of |K|"

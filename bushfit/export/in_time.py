@@ -127,7 +127,7 @@ def time_model(request: ExportRequest) -> TimeModel:
 
 
 def fields_of(effect: Effect) -> list[str]:
-    """Names of the fields in the C sources for the parameters of an effect; empty if the C sources lack the effect."""
+    """Names of the fields in the C sources of an FMU for the parameters of an effect; empty if they lack the effect."""
     kind = f"{effect.name.partition('.')[0]}." if place_suffix(effect.name) else effect.name
     return FIELDS.get(kind, [])
 
@@ -184,7 +184,7 @@ def _values(
 
 
 def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Arms, ...]) -> dict[str, str]:
-    """Name of the FMU value for each field of the C structure of one direction or specimen.
+    """Map the fields of the C structure of one direction or specimen to the names of the FMU values that they take.
 
     Args:
         model: model in the export.
@@ -206,7 +206,7 @@ def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Ar
 def _steady_omissions(
     model: Model, omitted: list[str], prediction: Prediction, conditions: RubberConditions
 ) -> list[str]:
-    """Write a sentence on the relative error of |K| due to constant modifiers and omitted effects; or none.
+    """Write a sentence on the error of |K| in an FMU in which effects are omitted or held constant; none without error.
 
     Args:
         model: model in the export, without effects of the rig.

@@ -56,7 +56,7 @@ def labels_of_file(file: Path, sheet: str, test_options: Mapping[str, Any]) -> L
 def keys_from_labels(
     table: Table, place: Place, test_options: Mapping[str, Any], by_name: Labels, of_book: Labels, *, is_sweep: bool
 ) -> tuple[dict[str, Any], dict[str, str], bool]:
-    """Campaign keys of a test, such as temperature, that only its labels state: text outside the columns.
+    """Find campaign keys of a test, such as temperature, in its labels: texts in names and above the table.
 
     An option takes precedence, then a column, the names, the lines above the table, and the other sheets.
 

@@ -119,7 +119,7 @@ def _name(header: str) -> str:
 
 
 def _is_fitting(column: Column, *, stated: bool) -> bool:
-    """Return False if the unit of a column, or the lack of one, shows that its name means another role."""
+    """Return False if the unit of a column contradicts its role; a header that the user stated is trusted."""
     role, unit, name = column.role, column.unit, _name(column.header)
     if plain(column.header) == "t" and role == "temperature":
         return bool(units.kelvin_scale(unit or ""))  # else a time, or another quantity
@@ -196,7 +196,7 @@ def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | No
 
 
 def _first_numbers(cells: Cells, columns: Sequence[Column]) -> NDArray[np.float64]:
-    """First numbers of columns, (rows, columns), in units of the file; no rows if any of the cells is not a number."""
+    """Numbers in the first rows of columns, (rows, columns), in units of the file; no rows if a cell is no number."""
     rows = [[plainest_value(str(row[column.index])) for column in columns] for row in cells.first_rows[:_FIRST]]
     return np.empty((0, len(columns))) if np.isnan(rows).any() else np.array(rows)
 

@@ -391,7 +391,7 @@ def plain(name: str) -> str:
 
 
 def split_unit(header: str) -> tuple[str, str | None, AmplitudeConvention | None]:
-    """Return name, unit or None, and amplitude convention or None, of a header whose meaning is not known."""
+    """Split a header of unknown meaning into name, unit and amplitude convention; None for what is missing."""
     text, convention = split_convention(header)
     for name, unit, certain in _splits(text):
         if certain and unit is None and units.is_unit(name) and name != "-" and not _TRAVEL.match(name):

@@ -80,7 +80,7 @@ def read_resonance(table: Table, direction: Place, base_acceleration: float | No
 
 
 def _resonance_columns(table: Table, place: Place, *, has_stated_base: bool) -> dict[str, Column]:
-    """Columns of a resonance test by role, with factors to SI: frequency, and the first of _COLUMN_SETS available."""
+    """Columns of a resonance test by role: frequency, and either transmissibility or accelerations of base and mass."""
     columns = next((columns for columns in _COLUMN_SETS if set(columns) <= set(table.roles)), None)
     if columns is None:
         alternatives = ", or ".join(" and ".join(columns) for columns in _COLUMN_SETS).replace("_", " ")

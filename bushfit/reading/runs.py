@@ -154,7 +154,7 @@ def _by_rank(frequency: Floats, amplitude: Floats, repeat: NDArray[np.int64] | N
 
 
 def _medians_if_separate(amplitude: Floats, rank: NDArray[np.intp]) -> Floats:
-    """Median amplitude of all points of the same rank, (n,); the amplitudes themselves if ranks overlap."""
+    """Replace each amplitude by the median of all points of its rank, (n,); unchanged if ranks overlap."""
     levels = np.sort(amplitude[np.argsort(rank)].reshape(rank.max() + 1, -1), axis=1)
     return _group_medians(amplitude, rank) if (levels[:-1, -1] < levels[1:, 0]).all() else amplitude
 

@@ -35,7 +35,7 @@ class Text:
         data: bytes of the text.
         encoding: original encoding of its file.
         before: number of lines of the file before the text.
-        clean: blocks without faulty rows, as line numbers before them and the columns that were read.
+        clean: blocks found to have no faulty rows: number of the line before the block, and columns read.
     """
 
     data: bytes

@@ -232,7 +232,7 @@ class LoopFile(TestFile):
 
     @property
     def states_time(self) -> bool:
-        """True if a key states how the rows follow each other in time."""
+        """True if a sampling rate, speed or frequency gives the time of a file without a time column."""
         return bool(self.sampling_rate or self.rate or self.frequency)
 
     def clock(self, displacement: Floats) -> Floats:

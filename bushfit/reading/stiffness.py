@@ -126,7 +126,7 @@ def complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tu
     """Return the complex stiffness [N/m or N m/rad, or Pa], (n,), and the loss factor [-], (n,), from two columns.
 
     Args:
-        pair: roles of the two columns, one of PAIRS.
+        pair: roles of the two columns, such as ("stiffness", "loss_factor").
         values: values in SI by role, (n,) each; also "amplitude" for a force amplitude, and "frequency" for a damping
             coefficient.
 
@@ -163,7 +163,7 @@ def check_stiffness(
 
     Args:
         table: table of the sweep, for errors.
-        pair: roles of the two columns, one of PAIRS, that gave the stiffness.
+        pair: roles of the two columns that gave the stiffness, such as ("stiffness", "loss_factor").
         columns: columns by role, with their factors to SI.
         values: values in SI by role, (n,) each, with those of redundant columns.
         stiffness: complex stiffness [N/m or N m/rad, or Pa], (n,).

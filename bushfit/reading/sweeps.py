@@ -134,7 +134,7 @@ def sweep_columns(
     Args:
         table: table of the sweep.
         direction: direction of the bushing, or the specimen.
-        pair: roles of the two columns, one of PAIRS, that give the stiffness.
+        pair: roles of the two columns that give the stiffness, such as ("stiffness", "loss_factor").
         stated: frequency [Hz] or amplitude that the campaign states, by role; these roles need no column.
         convention: convention of the amplitudes; None if the campaign does not state it.
 

@@ -94,7 +94,7 @@ class Table(Cells):
         vocabulary = Vocabulary.shared(of_motion(names, motion), numbered)
 
         def lay_out(source: RowSource) -> tuple[RowSource, Layout]:
-            """Return source and layout of the table in a part of the file, as a long table without blocks."""
+            """Return rows and layout of the table in a part of the file; blocks and wide tables become long."""
             delimiter = "" if isinstance(source, Sheet) else DELIMITERS.get(file_format.delimiter or "")
             layout = source.layout or find_layout(
                 source.head(), vocabulary, delimiter=delimiter, header_line=file_format.header_line

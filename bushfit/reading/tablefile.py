@@ -58,7 +58,7 @@ def to_bytes(name: str, table: pd.DataFrame, form: Form) -> bytes:
     Args:
         name: name of the sheet, if the file is a workbook.
         table: table to convert.
-        form: form of the file.
+        form: "csv", "decimal-comma" or "xlsx".
 
     Raises:
         OutputError: the table is too large for a sheet.

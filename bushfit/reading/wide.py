@@ -112,7 +112,7 @@ def unpivot(source: RowSource, file: Path, vocabulary: Vocabulary, layout: Layou
 
 
 def _find_blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple[list[list[str]], list[_Row]]]:
-    """Yield header rows and rows of numbers of each possible block, without the columns to its left and right."""
+    """Yield header rows and rows of numbers of each possible block of a wide table, without columns beside it."""
 
     def first_number(index: int) -> int | None:
         """Index of the first filled column if the row with this index has only numbers; else None."""
@@ -174,7 +174,7 @@ def _read_block(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: 
 
 
 def _read_corner(text: str, vocabulary: Vocabulary) -> list[_Meaning]:
-    """Meanings of the top left cell of a block, which names one role or two: "f [Hz]", "f [Hz] \\ A [mm]"."""
+    """Meanings of the top left cell of a wide table, which names one role or two: "f [Hz]", "f [Hz] \\ A [mm]"."""
     return [_read_header(part, vocabulary) for part in _CORNER.split(text)]
 
 
@@ -212,7 +212,7 @@ def _read_header(text: str, vocabulary: Vocabulary) -> _Meaning:
 
 
 def _named(text: str, vocabulary: Vocabulary) -> _Meaning | None:
-    """Meaning of a header without a frequency or amplitude, such as "K* [N/mm]"; None if it names no known role."""
+    """Meaning of a header of a wide table without a level, such as "K* [N/mm]"; None if it names no known role."""
     heading = vocabulary.heading(text)
     if heading and heading.role in _STEPPED:
         return _Meaning(stepped=heading.role, level_unit=heading.unit, convention=heading.convention)

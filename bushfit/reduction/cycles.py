@@ -183,7 +183,7 @@ def lone_outliers(time: Floats, values: Floats) -> NDArray[np.bool_]:
     return outliers
 
 
-def pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:
+def steady_pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:
     """Split a run of cycles into pieces of steady frequency and amplitude.
 
     Args:
@@ -208,7 +208,7 @@ def pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:
     steady_parts, open_parts = [], [slice(0, log_amplitude.size)]
     while open_parts:
         part = open_parts.pop()
-        cut = _cut(phase[part.start : part.stop + 1] / jitter, log_amplitude[part] / spread, jitter, spread)
+        cut = _change_point(phase[part.start : part.stop + 1] / jitter, log_amplitude[part] / spread, jitter, spread)
         if cut:
             open_parts += [slice(part.start + cut, part.stop), slice(part.start, part.start + cut)]
         else:
@@ -221,7 +221,7 @@ def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
 
     Args:
         edges: times of the upward crossings [s], (m + 1,).
-        parts: slices of the run's cycles, from `pieces`.
+        parts: slices of the run's cycles, from `steady_pieces`.
 
     Returns:
         True if the period changes within the parts as fast as between them; in steps it is constant within a part.
@@ -239,7 +239,7 @@ def keeps_changing(edges: Floats, parts: list[slice]) -> bool:
     return bool(np.median(within_parts / np.where(between_parts == 0.0, np.inf, between_parts)) > 0.5)
 
 
-def _cut(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
+def _change_point(phase: Floats, level: Floats, jitter: float, spread: float) -> int:
     """Number of cycles after which a run of m cycles changes its frequency or amplitude most; 0 if the run is steady.
 
     Args:

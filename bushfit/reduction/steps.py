@@ -20,9 +20,9 @@ from bushfit.reduction.cycles import (
     Cycles,
     keeps_changing,
     lone_outliers,
-    pieces,
     resumes_in_phase,
     select_steady_cycles,
+    steady_pieces,
 )
 from bushfit.reduction.harmonics import HarmonicFit
 from bushfit.reduction.result import Reduction, SkippedStretch, Step
@@ -89,7 +89,7 @@ def steady_sines(history: Loop) -> list[tuple[float, float, int]]:
     for run in cycles.runs():
         edges = cycles.edges[run.start : run.stop + 1]
         size = cycles.range[run] / 2.0
-        for part in pieces(edges, np.log(size)):
+        for part in steady_pieces(edges, np.log(size)):
             count = part.stop - part.start
             if count > 1:
                 frequency = count / float(edges[part.stop] - edges[part.start])
@@ -113,7 +113,7 @@ def find_steps(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStre
     for run in cycles.runs():
         motion, force = cycles.fundamentals(run, history.displacement, history.force)
         edges = cycles.edges[run.start : run.stop + 1]
-        parts = pieces(edges, np.log(np.abs(motion)))
+        parts = steady_pieces(edges, np.log(np.abs(motion)))
         if keeps_changing(edges, parts):
             skipped.append(SkippedStretch(history.name, float(edges[0]), float(edges[-1]), _CHANGING, True))
             continue

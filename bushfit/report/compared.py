@@ -164,7 +164,7 @@ class ComparisonDocument:
         """Rows of the table of model families, as formatted texts.
 
         Returns:
-            An iterator over the families: a text for each of the columns `FAMILY_HEADS`.
+            An iterator over the families: texts of name, parameters, agreement, probability and held-out error.
         """
         for family, entry in zip(self.document["families"] or (), self.document["compared"], strict=False):
             parts = len(family["parts"])

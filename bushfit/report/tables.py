@@ -284,7 +284,7 @@ def sweeps_table(model: Model, data_sets: Sequence[MeasuredSweep]) -> pd.DataFra
 
 
 def condition_columns(data_set: MeasuredSweep) -> dict[str, Any]:
-    """Columns of the stepped quantity of a sweep, and of temperature, preload, part and error if its test has them.
+    """Table columns of a sweep for its stepped quantity and, if stated, temperature, preload, part and error.
 
     Returns:
         Values by column header: one for all points of the sweep, or (n,).

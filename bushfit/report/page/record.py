@@ -73,7 +73,7 @@ def report_record(files: Sequence[ResultFile], folder: Path | None = None) -> Re
         folder: folder of the documents, for error messages; None for documents that were not read from files.
 
     Returns:
-        Input of `report_context`.
+        Model, documents, tables, predictions and figures for `report_page`.
 
     Raises:
         ModelError: no model among the documents, or a document or table that is not as bushfit writes it.
@@ -130,7 +130,7 @@ def _tests(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
 def _predictions(
     result: Result, tables: Mapping[str, pd.DataFrame], sweeps: pd.DataFrame | None
 ) -> dict[str, Prediction]:
-    """Compute the predictions by file name, on the grid of each prediction table or, without one, of the sweeps.
+    """Compute a prediction on the grid of each prediction table, by its file name; without tables, of the sweeps.
 
     Args:
         result: final model.

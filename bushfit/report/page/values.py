@@ -31,7 +31,7 @@ def headline(record: ReportRecord, prediction: Prediction) -> dict[str, str]:
     stiffness; its interval includes the correlation of the two.
 
     Args:
-        record: records of the result.
+        record: input of the report.
         prediction: prediction for one direction or specimen.
 
     Returns:

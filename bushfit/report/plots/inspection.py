@@ -154,12 +154,12 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
 
 
 def _draw_strip(axes: Axes, history: Loop, reduction: Reduction, looks: dict[float, style.Style]) -> None:
-    """Draw displacement over time, with the cycles in use in the colour of their amplitude.
+    """Draw displacement over time, with the cycles used for operating points in the colour of their amplitude.
 
     Args:
         axes: panel.
         history: record to draw.
-        reduction: operating points of the histories, which state the cycles in use.
+        reduction: operating points of the histories, which state the cycles used.
         looks: colour and marker by amplitude level.
     """
     unit, factor = reduction.direction.display.displacement

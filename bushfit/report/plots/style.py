@@ -162,7 +162,7 @@ class Chart(Figure):
 
     @contextmanager
     def panels_alone(self) -> Iterator[None]:
-        """Context in which the figure consists of its panels, whatever its title and explanation are.
+        """Context in which title and explanation are hidden and the figure has the size of its panels.
 
         Returns:
             Iterator for `contextlib.contextmanager`.
