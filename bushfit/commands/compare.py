@@ -16,7 +16,7 @@ from bushfit.diagnosis.families import FittedFamily
 from bushfit.errors import BushfitError, ModelError
 from bushfit.geometry import Place, default_places, get_places
 from bushfit.model.document import BushingTable
-from bushfit.model.file import model_document, versions
+from bushfit.model.file import to_document, versions
 from bushfit.model.result import Result
 from bushfit.prediction.caveats import warnings_of
 from bushfit.prediction.comparison import Comparison, with_holm
@@ -306,7 +306,7 @@ def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> li
 
 def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
     """Convert a compared result to its entry in compare.json; the label, a letter, stands for it in tables."""
-    result, bushing = entry.result, model_document(entry.result.model)["bushing"]
+    result, bushing = entry.result, to_document(Result(entry.result.model))["bushing"]
     return {
         "label": label,
         "name": entry.name,

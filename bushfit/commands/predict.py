@@ -188,7 +188,7 @@ def predict(
         notes, directions = (*notes, note), directions or [str(direction) for direction in _DIRECTIONS]
     campaign = campaign and _assign_bushing(campaign, result)
     sweeps = campaign.sweeps if campaign else ()
-    depends_on_temperature = result.model.depends_on_temperature
+    depends_on_temperature = result.model.depends_on("temperature")
     if temperature is not None and not depends_on_temperature:
         raise ModelError(
             "the model has no effect of temperature",

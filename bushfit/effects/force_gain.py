@@ -6,11 +6,6 @@
 
 from functools import partial
 
-from bushfit.effects.contract import Setting, Value, Values, scaled_response
+from bushfit.effects.contract import scaled_response
 
-
-def _gain(p: Values, setting: Setting) -> Value:
-    return 1.0 + p["gain"] if setting.kind == "loop" else 1.0
-
-
-stiffness = force = partial(scaled_response, _gain)
+stiffness = force = partial(scaled_response, lambda p, setting: 1.0 + p["gain"] if setting.kind == "loop" else 1.0)

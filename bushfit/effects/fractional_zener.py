@@ -46,32 +46,6 @@ def _circle(length: int) -> tuple[Array, Array]:
     return np.log(1.0 - radius * turn), radius ** np.arange(length)
 
 
-def _kernel(alpha: Array, scaled: Array, count: int, step: Array, *, second_order: bool) -> Array:
-    """Weights of past strains in the stress of the spring in series with the springpot, as in Eq. (3), (..., count).
-
-    They are the coefficients of the power series in z of -k v^2/(1 + k v)/step^alpha, with v = (1 - z)^alpha and k =
-    tau^alpha/step^alpha; v (1 + alpha/2 (1 - z)) replaces v in the second order of `springpot.fractional_derivative`.
-
-    Args:
-        alpha: order of the springpot [1], (..., 1).
-        scaled: relaxation time to the power alpha, tau^alpha [s^alpha], (..., 1).
-        count: number of weights.
-        step: time between samples [s], (..., 1).
-        second_order: True for weights of second order in the step.
-
-    Notes: from the values of the series on a circle |z| < 1 (C. Lubich, Numer. Math. 52 (1988) 129).
-    """
-    length = next_fast_len(2 * count, real=True)
-    logarithm, powers = _circle(length)
-    value = np.exp(alpha * logarithm)
-    if second_order:
-        value *= 1.0 + 0.5 * alpha * np.exp(logarithm)
-    unit = step**alpha
-    turn = scaled / unit * value
-    series = np.fft.irfft(-turn * value / (1.0 + turn), length) / unit
-    return series[..., :count] / powers[:count]
-
-
 def stress(p: Values, history: History) -> Array:
     """Stress of the spring in series with the springpot.
 
@@ -84,11 +58,22 @@ def stress(p: Values, history: History) -> Array:
 
     Notes:
         s + tau^alpha D^alpha s = m D^alpha e, less the springpot's own m D^alpha e (Eqs. 1, 3).
+
+        The weights of past strains are the coefficients of the power series in z of -k v^2/(1 + k v)/step^alpha, with
+        v = (1 - z)^alpha and k = tau^alpha/step^alpha, from its values on a circle |z| < 1 (C. Lubich, Numer. Math. 52
+        (1988) 129); v (1 + alpha/2 (1 - z)) replaces v in the second order of `springpot.fractional_derivative`.
     """
     if history.periodic:
         return linear_stress(modulus, p, history)
     count = history.value.shape[-1]
     alpha, scaled, step = (np.atleast_1d(value) for value in (p["alpha"], _scaled(p), history.step))
     length = next_fast_len(2 * count, real=True)
-    kernel = np.fft.rfft(_kernel(alpha, scaled, count, step, second_order=history.second_order), length)
-    return p["m"] * np.fft.irfft(np.fft.rfft(history.value, length) * kernel, length)[..., :count]
+    logarithm, powers = _circle(length)
+    value = np.exp(alpha * logarithm)
+    if history.second_order:
+        value *= 1.0 + 0.5 * alpha * np.exp(logarithm)
+    unit = step**alpha
+    turn = scaled / unit * value
+    series = np.fft.irfft(-turn * value / (1.0 + turn), length) / unit
+    weights = np.fft.rfft(series[..., :count] / powers[:count], length)
+    return p["m"] * np.fft.irfft(np.fft.rfft(history.value, length) * weights, length)[..., :count]

@@ -53,20 +53,6 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
     return {"m": by_m, "alpha": p["m"] * by_m * (np.log(safe) + 0.5j * np.pi)}
 
 
-def grunwald_letnikov_weights(alpha: Value, count: int) -> Array:
-    """Weights of a fractional difference: w_0 = 1, w_j = w_{j-1} (j - 1 - alpha)/j (Eq. 3), (count,).
-
-    Args:
-        alpha: order of the derivative.
-        count: number of weights.
-
-    >>> grunwald_letnikov_weights(0.5, 4)
-    array([ 1.    , -0.5   , -0.125 , -0.0625])
-    """
-    j = np.arange(1, count)
-    return np.insert(np.cumprod((j - 1.0 - alpha) / j, axis=-1), 0, 1.0, axis=-1)
-
-
 def fractional_derivative(alpha: Value, history: History) -> Array:
     """Fractional derivative by the Gruenwald-Letnikov sum with full memory, from rest before the first sample.
 
@@ -99,7 +85,7 @@ def fractional_derivative(alpha: Value, history: History) -> Array:
 
 @lru_cache(maxsize=8)
 def _weight_spectrum(alpha: float, count: int, length: int) -> Array:
-    """Fourier transform of the weights of a fractional difference, as numpy.fft.rfft gives it.
+    """Fourier transform (numpy.fft.rfft) of the weights w_0 = 1, w_j = w_{j-1} (j - 1 - alpha)/j of Eq. 3.
 
     Args:
         alpha: order of the derivative.
@@ -109,7 +95,8 @@ def _weight_spectrum(alpha: float, count: int, length: int) -> Array:
     Returns:
         Spectrum, (length // 2 + 1,).
     """
-    return np.fft.rfft(grunwald_letnikov_weights(alpha, count), length)
+    j = np.arange(1, count)
+    return np.fft.rfft(np.insert(np.cumprod((j - 1.0 - alpha) / j), 0, 1.0), length)
 
 
 def stress(p: Values, history: History) -> Array:

@@ -8,11 +8,6 @@
 
 from functools import partial
 
-from bushfit.effects.contract import Setting, Value, Values, scaled_response
+from bushfit.effects.contract import scaled_response
 
-
-def _factor(p: Values, setting: Setting) -> Value:
-    return p["factor"]
-
-
-stiffness = force = partial(scaled_response, _factor)
+stiffness = force = partial(scaled_response, lambda p, _: p["factor"])

@@ -69,7 +69,7 @@ class FittedTests:
         """Frequency [Hz], equivalent strain and, if the model uses it, temperature [K] of the points, (p,) each."""
         model = self.solution.model
         axes = [*operating_conditions(model.bushing, self.data_sets)]
-        if model.depends_on_temperature:
+        if model.depends_on("temperature"):
             kelvin = [
                 np.broadcast_to(
                     REFERENCE if test.conditions.temperature is None else test.conditions.temperature,

@@ -218,12 +218,6 @@ def values_under(model: Model, conditions: RubberConditions) -> Values:
     return model.without(*model.constant_modifiers).values_at(Specimen("compound", "modulus"), 1.0, 0.0, conditions)
 
 
-def _basis(omega: Array, time: Array) -> Array:
-    """Complex moduli of Maxwell arms of unit stiffness: i w tau_k/(1 + i w tau_k), (n, k)."""
-    turn = 1j * omega[:, None] * time
-    return turn / (1.0 + turn)
-
-
 def _starts(omega: Array, target: Array, arms: int) -> Iterator[tuple[Array, Array]]:
     """Yield start values of Maxwell arms: times evenly in ln over the band, moduli from the loss modulus.
 
@@ -274,7 +268,8 @@ def _fit(
 
     def parts(x: Array) -> tuple[Array, Array]:
         """Modulus of each arm relative to the total, and its derivative by the log of its time, (n, k) each."""
-        basis = _basis(omega, np.exp(x[count:]))
+        turn = 1j * omega[:, None] * np.exp(x[count:])
+        basis = turn / (1.0 + turn)
         # a step that goes too far is held, as `exp` would overflow
         arm = basis * unit * np.exp(np.minimum(x[:count], 100.0)) / total[:, None]
         return arm, arm * (1.0 - basis)

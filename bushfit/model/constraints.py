@@ -101,7 +101,12 @@ class Tie:
         try:
             with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
                 given = {f"p{i}": values[name] for i, name in enumerate(self.names)}
-                value = _evaluate(self.code, given)
+                ast.parse(self.code.strip(), mode="eval")  # asteval also takes several expressions
+                interpreter = _interpreter()
+                interpreter.symtable.update(given)
+                interpreter.error = []
+                # a text or a function is no number
+                value = interpreter(self.code, show_errors=False, raise_errors=True) + 0.0
             if not any(isinstance(number, complex) for number in given.values()) and not np.isfinite(float(value)):
                 raise ValueError(value)
         except Exception as error:
@@ -114,16 +119,6 @@ class Tie:
                 hint="write ** for a power" if "^" in self.expression else None,
             ) from error
         return value
-
-
-def _evaluate(code: str, symbols: Mapping[str, Any]) -> Any:
-    """Evaluate an expression of symbols, numbers and functions to a number."""
-    ast.parse(code.strip(), mode="eval")  # asteval also takes several expressions
-    interpreter = _interpreter()
-    interpreter.symtable.update(symbols)
-    interpreter.error = []
-    value = interpreter(code, show_errors=False, raise_errors=True)
-    return value + 0.0  # a text or a function is no number
 
 
 @cache

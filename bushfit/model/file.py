@@ -192,12 +192,6 @@ def to_document(result: Result) -> dict[str, Any]:
     return dict(to_json_data(tables, ModelFile))
 
 
-def model_document(model: Model) -> dict[str, Any]:
-    """Convert a model without a fit to JSON data: the keys bushing, effects, parameters, unnamed of a model file."""
-    document = to_document(Result(model))
-    return {key: document[key] for key in ("bushing", "effects", "parameters", UNNAMED)}
-
-
 def require_schema(document: Mapping[str, Any], file: Path | None, kind: str, *schemas: str, hint: str) -> None:
     """Raise an error if a document does not have one of the valid schemas.
 

@@ -149,15 +149,9 @@ class Model:
         """True if the response changes from cycle to cycle until it is steady."""
         return any(effect.is_transient for effect in self.records)
 
-    @property
-    def depends_on_temperature(self) -> bool:
-        """True if the response depends on the temperature of the rubber."""
-        return any("temperature" in effect.depends_on for effect in self.records)
-
-    @property
-    def depends_on_preload(self) -> bool:
-        """True if the response depends on the preload."""
-        return any("preload" in effect.depends_on for effect in self.records)
+    def depends_on(self, condition: str) -> bool:
+        """True if the response depends on a condition of the test: "temperature", "preload" or a strain history."""
+        return any(condition in effect.depends_on for effect in self.records)
 
     @property
     def name(self) -> str:

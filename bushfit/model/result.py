@@ -90,10 +90,6 @@ class Range:
     temperature: tuple[float, float] | None = None
     preloads: tuple[PreloadRange, ...] = ()
 
-    def preloads_of(self, place: Place) -> PreloadRange | None:
-        """Preloads of the tests of a direction or specimen; None if it was not tested at two or more."""
-        return next((stated for stated in self.preloads if stated.place == str(place)), None)
-
 
 @dataclass(frozen=True)
 class Misfit:

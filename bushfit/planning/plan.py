@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.planning.candidates import unlimited_rig_warning
 from bushfit.planning.contract import Knowledge, Plan, PlanRequest, Programme
@@ -100,10 +99,12 @@ def explain_miss(search: PlanSearch, goal: TargetSensitivity) -> str | None:
     if goal.met(covariance(counts)):
         return None
 
-    def is_enough(runs: Array) -> bool:
-        return goal.met(covariance(runs)) or problem.budget.spent(runs) > _LONGEST_MINUTES
-
-    more = add_runs(replace(search.strict, weight=goal.weight(limit)), problem.budget, counts, is_enough)
+    more = add_runs(
+        replace(search.strict, weight=goal.weight(limit)),
+        problem.budget,
+        counts,
+        enough=lambda runs: goal.met(covariance(runs)) or problem.budget.spent(runs) > _LONGEST_MINUTES,
+    )
     hours = number(problem.budget.spent(more) / 60.0, 2)
     if goal.met(covariance(more)):
         return f"{number(search.hours, 3)} h are too few, about {hours} h would do"

@@ -166,10 +166,11 @@ def tested_preload(result: Result, place: Place, preload: Preload | None) -> Pre
     Raises:
         ModelError: the tests of this direction do not have several preloads, or none as small or as large.
     """
-    tested = result.measured.preloads_of(place) if result.measured else None
+    ranges = result.measured.preloads if result.measured else ()
+    tested = next((stated for stated in ranges if stated.place == str(place)), None)
     if preload is None:
         return Preload(float(np.clip(0.0, tested.low, tested.high)), tested.unit) if tested else None
-    if result.measured is None and result.model.depends_on_preload:  # of a simulation: exact, without a range
+    if result.measured is None and result.model.depends_on("preload"):  # of a simulation: exact, without a range
         return preload
     refuse = partial(ModelError, place=str(place), found=f"a preload of {preload.text(place)}")
     if tested is None:
