@@ -57,7 +57,7 @@ class Claim:
 
     @property
     def single_tests(self) -> list[Claim]:
-        """Claims of the same mistake, one for each affected test; the claim itself for a mistake in [bushing]."""
+        """Split a claim on several tests into claims of the same mistake in one test; unchanged for [bushing]."""
         return [Claim(self.mistake, (index,)) for index in self.tests] or [self]
 
     def test(self, data: PreparedCampaign) -> str | None:
@@ -339,8 +339,9 @@ def _columns(bushing: Bushing | None, direction: Place, frequency: Array, amplit
 
 
 def _points(data_set: MeasuredTest, mistake: Mistake | None) -> tuple[Place, Array, Array, Array, Array]:
-    """Direction, and frequency, amplitude, stiffness and relative error, (n,) each, of a test with a mistake corrected.
+    """Operating points of a test in which a mistake is corrected.
 
+    Direction, frequency [Hz], amplitude [m or rad], complex stiffness and its relative error, (n,) each.
     Repeated points are averaged, and at most `_MOST_POINTS` points are kept.
     """
     if isinstance(data_set, MeasuredSweep):

@@ -194,7 +194,7 @@ class _Groups:
     def _mean(self, values: Array) -> Array:
         return np.bincount(self.group, values[self.rows]) / self.counts
 
-    def _middle(self, values: Array) -> Array:
+    def _geometric_mean(self, values: Array) -> Array:
         """Geometric mean of values by sweep row over each group, (g,); the value itself for groups of one row."""
         return np.where(self.counts > 1, np.exp(self._mean(np.log(values))), values[self.first])
 
@@ -203,11 +203,15 @@ class _Groups:
         phase, error = np.angle(sweep.stiffness), sweep.relative_error
         return replace(
             sweep,
-            frequency=sweep.frequency[self.first] if sweep.stepped == "amplitude" else self._middle(sweep.frequency),
-            amplitude=sweep.amplitude[self.first] if sweep.stepped == "frequency" else self._middle(sweep.amplitude),
-            stiffness=self._middle(np.abs(sweep.stiffness)) * np.exp(1j * self._mean(phase)),
+            frequency=sweep.frequency[self.first]
+            if sweep.stepped == "amplitude"
+            else self._geometric_mean(sweep.frequency),
+            amplitude=sweep.amplitude[self.first]
+            if sweep.stepped == "frequency"
+            else self._geometric_mean(sweep.amplitude),
+            stiffness=self._geometric_mean(np.abs(sweep.stiffness)) * np.exp(1j * self._mean(phase)),
             repeat=sweep.repeat[self.first],
-            reached=None if sweep.reached is None else self._middle(sweep.reached),
+            reached=None if sweep.reached is None else self._geometric_mean(sweep.reached),
             relative_error=None if error is None else np.sqrt(self._mean(np.square(error)) / self.counts),
             temperature=self.mean(sweep.temperature),
         )

@@ -317,7 +317,7 @@ def _restricted(
 
 
 def _shared_by(evidence: Evidence, loops: Sequence[MeasuredLoop], changes: Callable[[MeasuredLoop], Array]) -> Array:
-    """Change of all whitened residuals by unit amounts of c changes of the force that repeated loops share, (c, n)."""
+    """Change of n residuals of all tests by c force errors that repeats of a loop share, per unit amount, (c, n)."""
     by_loop = [changes(loop) for loop in loops]
     columns = np.zeros((len(by_loop[0]), evidence.residual.size))
     for loop, of_loop in zip(loops, by_loop, strict=True):

@@ -31,7 +31,7 @@ class Group:
 
     @property
     def whole(self) -> Array:
-        """Changes of all n residuals per unit amount of each of the c columns, (c, n); 0 in rows not covered."""
+        """Columns of the explanation extended to all n residuals, (c, n), with 0 in rows that they do not cover."""
         if self.covered_rows is None:
             return self.columns
         rows, count = self.covered_rows

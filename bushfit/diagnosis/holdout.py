@@ -56,7 +56,7 @@ class HoldOutPart:
         )
 
     def rest(self, data_sets: Sequence[MeasuredTest]) -> list[MeasuredTest]:
-        """Tests without the points of this part, with unchanged noise; tests held out entirely are left out."""
+        """Tests that remain if this part is held out, with unchanged noise; tests held out entirely are omitted."""
         remaining = [(data, mask) for data, mask in zip(data_sets, self.points, strict=True) if not mask.all()]
         return [data.without(np.flatnonzero(mask)).with_weight() if mask.any() else data for data, mask in remaining]
 
@@ -192,7 +192,7 @@ class Predicted(NamedTuple):
 
 
 def _leave_out(solution: FitResult) -> LeaveOut:
-    """Leave-out formulas of a fit, for the parameters that are not at a bound."""
+    """Linearise a fit to predict how it changes without some rows; parameters at a bound are fixed."""
     return LeaveOut.from_fit(solution.jacobian[solution.moving], solution.residual)
 
 

@@ -196,7 +196,7 @@ class LinearModel:
 
     @cached_property
     def group_evidence(self) -> list[GroupEvidence]:
-        """Evidence of the tests for each possible explanation in `groups`, with rig errors within the stated class."""
+        """Evidence of the tests for each explanation in `groups`, with rig errors within the stated accuracy."""
         bent = self._deviation > 0.0
         return [
             self._over_nodes(gains, self._plain, self._over_nodes(gains, bent) if bent.any() else None)

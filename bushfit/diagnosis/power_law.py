@@ -113,7 +113,7 @@ class PowerLaw:
 
     @property
     def sentence(self) -> str:
-        """Text of the term, as "in quadrature, grows as f^0.8, independent of amplitude: acts like a damper"."""
+        """Text on the law, such as "in quadrature, grows as f^0.8, independent of amplitude: acts like a damper"."""
         phase, low, high = self.phase_deg
         near = next((text for quarter, text in _QUARTERS.items() if low <= quarter <= high), "")
         parts = [near or f"{number(phase, 2)} deg ahead of the displacement"]
@@ -162,14 +162,14 @@ class Term:
 
     @cached_property
     def tests(self) -> list[tuple[MeasuredTest, slice]]:
-        """Tests that the term acts on, each with the slice of its points among all points."""
+        """Tests to which the stiffness is added, each with the slice of its operating points among all points."""
         tests = [test for test in self.evidence.data_sets if test.direction.motion is not STRAINING]
         ends = np.cumsum([0, *(test.frequency.size for test in tests)]).tolist()
         return [(test, slice(*pair)) for test, pair in zip(tests, pairwise(ends), strict=True)]
 
     @property
     def has_one_meaning(self) -> bool:
-        """False without a test, or if the same stiffness would be added to both translations and rotations."""
+        """True if the added stiffness has one unit: there are tests, of translation only or of rotation only."""
         motions = {test.direction.motion for test, _ in self.tests}
         return len(motions) == 1 if self.measure == "stiffness" else bool(motions)
 

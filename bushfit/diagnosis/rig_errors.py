@@ -137,7 +137,7 @@ def in_scatter_units(evidence: Evidence) -> Evidence:
 
 
 def rig_errors(evidence: Evidence, rig: RigSettings) -> RigErrors:
-    """Build the errors of a rig for the fitted tests, with sizes of the class that the campaign states in [rig]."""
+    """Build the errors of a rig for the fitted tests, with sizes of the accuracy class that [rig] states."""
     return RigErrors(list(blocks(evidence, rig)), nodes(evidence))
 
 

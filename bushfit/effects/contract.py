@@ -233,7 +233,7 @@ class Effect:
 
     @property
     def phrase(self) -> str:
-        """Part of the sentence before the first colon or semicolon, for use within another sentence."""
+        """Description of the effect up to the first colon or semicolon, for use within another sentence."""
         short = re.split("[:;]", self.sentence.rstrip("."))[0]
         return short[0].lower() + short[1:]
 

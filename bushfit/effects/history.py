@@ -166,8 +166,8 @@ class History:
         """Create a history of the same motion at a speed multiplied by a factor: a number, or (..., 1)."""
         return replace(self, step=self.step / factor, frequency=self.frequency * factor, solved={})
 
-    def driven(self) -> History:
-        """Create a history of the same motion that is the driver of all histories derived from it."""
+    def as_driver(self) -> History:
+        """Copy the history and mark its motion as the motion imposed by the rig, for all histories derived from it."""
         return replace(self, driver=self.value, solved={})
 
     def scaled(self, factor: float) -> History:

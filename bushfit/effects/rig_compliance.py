@@ -97,7 +97,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     compliance = p["compliance"]
     if not np.any(compliance):
         return below(history)
-    imposed, solved, history = history.value, history.solved, history.driven()
+    imposed, solved, history = history.value, history.solved, history.as_driver()
     count = imposed.shape[-1]
     length = count if history.periodic else next_fast_len(count, real=True)
     beneath = solved.setdefault("beneath", {})  # solutions of what gives way beneath it, as a sleeve in a rig
@@ -211,7 +211,7 @@ def _pulse_stiffness(below: ForceBelow, history: History, length: int) -> Array:
     """
     pulse = np.zeros_like(history.value)
     pulse[..., 4:5] = np.maximum(history.amplitude, 1e-9)
-    answer = below(history.with_value(pulse).driven())
+    answer = below(history.with_value(pulse).as_driver())
     answer = answer - np.where(np.arange(history.value.shape[-1]) < 5, answer[..., :1], answer[..., -1:])
     measured = np.fft.rfft(answer, n=length) / np.fft.rfft(pulse, n=length)
     return np.maximum(measured.real, 0.0) + 1j * measured.imag

@@ -61,7 +61,7 @@ class LeaveOut:
 
     @classmethod
     def from_fit(cls, jacobian: Array, residual: Array) -> "LeaveOut":
-        """Build from the Jacobian of the whitened residuals by coordinate, (k, n), and the whitened residuals, (n,).
+        """Build the linearised fit from its whitened residuals, (n,), and their Jacobian by fit coordinate, (k, n).
 
         Combinations of parameters that even all rows together do not determine are kept unchanged.
         """
@@ -77,7 +77,7 @@ class LeaveOut:
         return without > _MOST_GROWTH * np.sum(np.square(self.coordinate_steps), axis=1)
 
     def step(self, rows: Array) -> Array | None:
-        """Change of the parameters if `rows` (indices or mask) are left out of the fit, in coordinates, (k,).
+        """Change of the k fitted parameters (in fit coordinates), (k,), if `rows` (indices or mask) are left out.
 
         The change is one Gauss-Newton step, which is exact for a linear model. None if the step is too long to predict
         a refit, or if the remaining rows do not determine one of the parameters.
@@ -308,7 +308,7 @@ def _absolute_difference(modelled: Array, measured: Array) -> Array:
 
 
 def _runs(data_set: MeasuredTest) -> Iterator[_Run]:
-    """Runs of a test, one per amplitude or frequency held constant; a loop, or a sweep without one, is a single run."""
+    """Split a test into runs, one for each constant amplitude or frequency; a loop, or a sweep without, is one run."""
     if not isinstance(data_set, MeasuredSweep) or data_set.sweep.stepped is None:
         yield _Run(None, None, None, np.ones(data_set.frequency.size, dtype=bool))
         return

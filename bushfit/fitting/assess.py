@@ -201,7 +201,10 @@ def lack_of_fit(model: Model, data_sets: Sequence[MeasuredTest], parameters: int
 
 
 def excess_chi_square(chi_square: float, freedom: int) -> float | None:
-    """Return a reduced chi-square that exceeds 1 by more than noise explains (5 standard deviations); else None."""
+    """Return the reduced chi-square `chi_square` if it exceeds 1 by more than noise explains; otherwise None.
+
+    Noise explains 5 standard deviations, for the degrees of freedom `freedom`.
+    """
     return chi_square if chi_square > 1.0 + _LACK_OF_FIT * np.sqrt(2.0 / freedom) else None
 
 

@@ -33,14 +33,14 @@ class CommonError:
 
     @cached_property
     def principal_errors(self) -> tuple[Array, Array]:
-        """Principal directions of the shared error, orthonormal, (n, r), and its standard deviations, (r,), r <= q."""
+        """Principal directions of the shared error, orthonormal columns, (n, r), and standard deviations, (r,)."""
         variance, mixed = np.linalg.eigh(self.columns @ self.columns.T)
         significant = variance > _ROUNDING * variance.max(initial=0.0)
         size = np.sqrt(variance[significant])
         return self.columns.T @ (mixed[:, significant] / size), size
 
     def scaled(self, size: float) -> CommonError:
-        """Return the error multiplied by a size above zero, without another decomposition."""
+        """Multiply the shared error by a positive factor `size`; the factorised covariance is reused."""
         error = CommonError(size * self.columns)
         directions, deviations = self.principal_errors
         error.__dict__["principal_errors"] = directions, size * deviations
@@ -48,7 +48,7 @@ class CommonError:
 
     @property
     def log_det_covariance(self) -> float:
-        """Natural log of the determinant of the residuals' covariance S."""
+        """Natural log of the determinant of the residuals' covariance with the shared error."""
         return float(np.sum(np.log1p(np.square(self.principal_errors[1]))))
 
     def whiten(self, rows: Array) -> Array:

@@ -43,7 +43,7 @@ class Coordinates:
         return cls(tuple(names), tuple(model.parameters[name] for name in names))
 
     def forward(self, name: str, value: float) -> float:
-        """Coordinate of one parameter that has the given value in SI units."""
+        """Convert the value of one parameter [SI] to its dimensionless fit coordinate, mostly the natural log."""
         parameter = self.parameters[self.names.index(name)]
         return float(np.log(value)) if parameter.log else value / parameter.typical
 

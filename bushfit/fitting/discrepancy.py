@@ -81,13 +81,13 @@ class FittedTests:
         return axes
 
     @property
-    def moving(self) -> Array:
+    def free_jacobian(self) -> Array:
         """Derivatives of the whitened residuals by coordinate of the k parameters not at a bound, (k, n)."""
         return self.solution.jacobian[self.solution.moving]
 
     @cached_property
     def slopes(self) -> Array:
-        """Derivatives of ln K at the points by coordinate of the k parameters not at a bound, complex (k, p)."""
+        """Derivatives of ln K at the p operating points by coordinate of the k parameters not at a bound, (k, p)."""
         model, moving = self.solution.model, self.solution.moving
         names = [self.solution.names[i] for i in moving]
         slopes = np.concatenate([log_slopes(model, data_set, names) for data_set in self.data_sets], axis=-1)
@@ -212,7 +212,7 @@ class Discrepancy:
 
     @cached_property
     def complex_shapes(self) -> Array:
-        """Patterns of the process, first in phase and then in quadrature with the stiffness, complex (2 q, p)."""
+        """Complex relative errors of the stiffness by q patterns, in phase and then in quadrature, (2 q, p)."""
         return np.concatenate((self.shapes, 1j * self.shapes))
 
     @cached_property
@@ -234,7 +234,7 @@ class Discrepancy:
             Mean relative error of the model at the operating points, complex (p,), and the standard deviation of its
             real and imaginary parts, errors of the parameters included, (2, p).
         """
-        size, columns, rows = self.best[1], self.tests.columns(self.complex_shapes), self.tests.moving
+        size, columns, rows = self.best[1], self.tests.columns(self.complex_shapes), self.tests.free_jacobian
         inverse = np.linalg.inv(columns @ columns.T + np.eye(len(columns)) / size**2)
         mean = (-inverse @ columns @ self.tests.project(self.tests.solution.residual)) @ self.complex_shapes
         both = np.concatenate((columns, self.tests.project(rows)))

@@ -68,7 +68,7 @@ def master_curve(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[Shift
 
 
 def can_shift(sweep: Sweep) -> bool:
-    """True if a sweep is over frequency, and its temperature known."""
+    """True if a sweep can be part of a master curve: it is over frequency, and its temperature is known."""
     return sweep.temperature is not None and np.unique(sweep.frequency).size >= _FREQUENCIES
 
 

@@ -103,7 +103,7 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def independent_count(self) -> float:
-        """Number of independent residuals, by which a mean over the loop is uncertain; smaller for correlated noise."""
+        """Number of independent residuals, which sets the uncertainty of a mean over the test."""
         return self.residual_count / (1.0 if self.fundamental_only else self.prepared.row_noise.rows_as_one)
 
     @property
@@ -226,7 +226,7 @@ class MeasuredLoop(MeasuredBase):
         return self.prepared.outliers["force"].rows
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
-        """Yield the outliers with file and row, from the indices of the points (of a loop: all outliers)."""
+        """Yield file, row and distance of outliers, given by index (`points`) for a sweep; a loop yields all its outliers."""
         file = str(self.source.file) if self.source else None
         before = self.prepared.first_row + (self.test.part.first_row if self.test.part else 0)
         for column, (rows, distance) in self.prepared.outliers.items():

@@ -204,7 +204,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
     if size:
         bare = [replace(t, model_error=size, first_error=2) if isinstance(t, MeasuredLoop) else t for t in bare]
     tests = _fitted_tests(solution, bare)
-    rows, residual = tests.moving, tests.solution.residual
+    rows, residual = tests.free_jacobian, tests.solution.residual
     information, gain = rows @ rows.T, 0.0
     if size:
         components, processes = tests.project(residual), discrepancies(tests)
@@ -216,7 +216,7 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
         gain = float(np.logaddexp.reduce(evidence)) - np.log(evidence.size)
         best = int(evidence.argmax())
         shares = columns[best] * SIZES[likelihoods[best].gains(SIZES).argmax()]
-        across = shares @ tests.project(tests.moving).T
+        across = shares @ tests.project(tests.free_jacobian).T
         information = information - across.T @ np.linalg.solve(shares @ shares.T + np.eye(len(shares)), across)
     prior = np.diag([prior_precision.get(solution.names[i], 0.0) for i in solution.moving])
     log_size = sum(test.log_det_covariance for test in tests.data_sets) + float(
@@ -239,7 +239,7 @@ def model_error_warning(error: Unnamed) -> str:
 
 
 def _exceeds_noise(solution: FitResult, rig: RigSettings) -> bool:
-    """True if chi-square of all tests, or of one, exceeds that of noise and errors of a rig of the given class."""
+    """True if chi-square of all tests, or of one, exceeds that of noise and errors of the rig's accuracy class."""
     squares, counts = [], [test.residual_count for test in solution.minimised]
     for test, rows in zip(solution.minimised, residual_slices(solution.minimised), strict=True):
         whitened = CommonError(_errors_of_class(test, rig)).whiten(solution.residual[rows])
@@ -250,7 +250,7 @@ def _exceeds_noise(solution: FitResult, rig: RigSettings) -> bool:
 
 
 def _is_smooth(solution: FitResult, rig: RigSettings) -> bool:
-    """True if a smooth discrepancy is more probable than noise and errors of a rig of the given class alone."""
+    """True if a smooth discrepancy is more probable than noise and errors of the rig's accuracy class alone."""
     thinned = _thinned(solution.minimised)
     solution = solution.reevaluate(solution.model, thinned)
     tests = FittedTests(solution, [_errors_of_class(test, rig) for test in thinned])
@@ -265,7 +265,7 @@ def _is_smooth(solution: FitResult, rig: RigSettings) -> bool:
 
 
 def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
-    """Change of the whitened residuals by one standard deviation of each rig error outside the noise, (w, n).
+    """Change of the whitened residuals by one standard deviation of each rig error that the noise excludes, (w, n).
 
     These are the gain error of a loop, or the gain and phase errors of each level of a sweep.
     """

@@ -130,7 +130,7 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     slopes, by_name = dict[str, tuple[float, float]](), {sweep.name: sweep for sweep in sweeps}
     for stepped in {sweep.stepped for sweep in sweeps}:  # one law for all sweeps that step the same
         names = [name for name, sweep in by_name.items() if sweep.stepped == stepped]
-        if slope := _slope([line for key, line in lines.items() if key[0] in names and line.steps.size]):
+        if slope := _scatter_growth([line for key, line in lines.items() if key[0] in names and line.steps.size]):
             slopes |= dict.fromkeys(names, slope)
     for key, line in lines.items():
         if key[0] in slopes and line.steps.size:
@@ -173,8 +173,8 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     return SweepNoise(random, class_errors(rig), "assumed", 0, scatter_freedom)
 
 
-def _slope(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
-    """Exponent of the growth of the scatter along the stepped quantity, and a middle step; None without growth.
+def _scatter_growth(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
+    """Exponent of the growth of the scatter along the stepped quantity, and a reference step; None without growth.
 
     Notes:
         Squares of the deviations over their line's mean are regressed on ln(step) and tested by Koenker (1981), whose

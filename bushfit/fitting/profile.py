@@ -165,5 +165,5 @@ def limit95(best: FitResult, name: str) -> float | None:
 
 
 def _excess(best: FitResult) -> float:
-    """Reduced chi-square of a fit, at least 1: factor on the allowed rise of chi-square if the model misses."""
+    """Reduced chi-square of a fit, at least 1: factor on the allowed rise of chi-square if the model misfits."""
     return max(reduced_chi_square(best.model, best.minimised, len(best.names))[0], 1.0)

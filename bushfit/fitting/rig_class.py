@@ -11,7 +11,7 @@ _MOST_CLASSES = 3.0
 
 
 def class_errors(rig: RigSettings, unstated: tuple[float, float] = ASSUMED) -> tuple[float, float]:
-    """Standard deviations of the gain (relative) and phase [rad] of a rig, as stated in [rig], else `unstated`."""
+    """Standard deviations of a rig's errors of gain (relative) and phase [rad], as stated in [rig], else `unstated`."""
     gain, phase = (default if one is None else one for one, default in zip(rig.stiffness_errors, unstated, strict=True))
     return gain, phase
 

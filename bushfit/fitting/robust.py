@@ -128,7 +128,7 @@ def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
     ):
         rows, lists = defaultdict[str, list[str]](list), []
         for outlier in group:
-            rows[outlier.place].append(str(outlier.row))
+            rows[outlier.source].append(str(outlier.row))
         for place, numbers in rows.items():
             more = f" and {len(numbers) - _MOST_NAMED} more" if len(numbers) > _MOST_NAMED else ""
             lists.append(f"{place} row{'s' if len(numbers) > 1 else ''} {', '.join(numbers[:_MOST_NAMED])}{more}")

@@ -159,8 +159,8 @@ class Outlier:
     distance: Number
 
     @property
-    def place(self) -> str:
-        """File name (or test name) and column, for messages that list the rows."""
+    def source(self) -> str:
+        """Data file (or test name) and column of the outlier, for messages that list the rows."""
         return f"{self.file or self.test}, {self.column}"
 
 

@@ -39,7 +39,7 @@ class Criterion:
     penalty: float
 
     def value(self, counts: Array) -> float:
-        """Value of the objective for the number of runs of each test in `counts`, (tests,)."""
+        """Value of the objective that a plan minimises, for the number of runs of each test in `counts`, (tests,)."""
         return float(self.values([model.total(counts) for model in self.models])[0])
 
     def values_with_one_more(self, counts: Array) -> Array:
