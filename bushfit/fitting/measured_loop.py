@@ -226,7 +226,7 @@ class MeasuredLoop(MeasuredBase):
         return self.prepared.outliers["force"].rows
 
     def outliers(self, points: Array, model: Model) -> Iterator[Outlier]:
-        """Yield file, row and distance of outliers, given by index (`points`) for a sweep; a loop yields all its outliers."""
+        """Yield file, row and distance of the outliers of a sweep with indices `points`, or of all those of a loop."""
         file = str(self.source.file) if self.source else None
         before = self.prepared.first_row + (self.test.part.first_row if self.test.part else 0)
         for column, (rows, distance) in self.prepared.outliers.items():

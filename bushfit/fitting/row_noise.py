@@ -74,7 +74,11 @@ class RowNoise:
         return max(1.0 / float(np.sum(self.filter)) ** 2, 1.0)
 
     def usable_rows(self, weight: Array) -> Array:
-        """Mask of the whitened rows to use: the row and all preceding rows in its filter have weight, (n,)."""
+        """Find the whitened rows to use: those whose row, and all preceding rows in its filter, have weight.
+
+        Returns:
+            Mask, (n,).
+        """
         counts = weight > 0.0
         usable = counts.copy()
         for k in range(1, self.order + 1):
