@@ -116,9 +116,7 @@ def test_a_wide_table_is_read_back(place, form):
     options = ("--direction", "axial", "--amplitudes", "0.1, 0.25 mm", "--no-plots", "--table-format", form)
     typing(place)("predict", "model.json", "--wide", "-o", f"wide-{form}", *options)
     end = "xlsx" if form == "xlsx" else "csv"
-    long, wide = (
-        READ[form](place / f"wide-{form}/axial{end}.{'xlsx' if form == 'xlsx' else 'csv'}") for end in ("", "_wide")
-    )
+    long, wide = (READ[form](place / f"wide-{form}/axial{name}.{end}") for name in ("", "_wide"))
     for amplitude in (0.1, 0.25):
         of_level = long[long["amplitude [mm]"] == amplitude]
         assert wide["frequency [Hz]"].tolist() == of_level["frequency [Hz]"].tolist()

@@ -204,11 +204,8 @@ def test_at_a_terminal_what_lacks_is_asked_for(typed, silent, tmp_path, monkeypa
     assert "impossible bushing" in told
     assert "try:" not in told
     campaign = load_campaign(tmp_path / "x/campaign.toml")
-    assert (campaign.bushing.name, campaign.bushing.inner_radius, campaign.bushing.outer_radius) == (
-        "My B",
-        0.01,
-        0.018,
-    )
+    bushing = campaign.bushing
+    assert (bushing.name, bushing.inner_radius, bushing.outer_radius) == ("My B", 0.01, 0.018)
     assert [str(test.direction) for test in (*campaign.loops, *campaign.sweeps)] == ["axial", "radial"]
     assert campaign.path.read_text(encoding="utf-8").count('preload = "500 N axial"') == 2, "asked for once"
     assert campaign.sweeps[0].amplitude.max() == pytest.approx(0.25e-3)

@@ -57,10 +57,8 @@ def test_directions_are_tests_of_their_own(typed, points, tmp_path, language, en
     export(tmp_path / f"both.{ending}", (head, *HEADERS), rows, delimiter)
     typed("init", f"both.{ending}", *GEOMETRY, "-o", "x")
     sweeps = load_campaign(tmp_path / "x/campaign.toml").sweeps
-    assert [(str(sweep.direction), sweep.name) for sweep in sweeps] == [
-        ("axial", "both axial"),
-        ("radial", "both radial"),
-    ]
+    named = [(str(sweep.direction), sweep.name) for sweep in sweeps]
+    assert named == [("axial", "both axial"), ("radial", "both radial")]
     for sweep in sweeps:
         assert np.abs(sweep.stiffness) == pytest.approx([1e3 * row[2] for row in points[str(sweep.direction)]])
     one = typed("init", f"both.{ending}", *GEOMETRY, "-o", "y", "--direction", "axial")
@@ -70,12 +68,8 @@ def test_directions_are_tests_of_their_own(typed, points, tmp_path, language, en
 
 def test_parts_are_a_batch(typed, points, tmp_path):
     factors = {"17": 1.0, "A/1": 1.1, "19": 0.9}
-    rows = [
-        (part, way, *row[:2], row[2] * by, row[3])
-        for part, by in factors.items()
-        for way in points
-        for row in points[way]
-    ]
+    both = [(way, row) for way in points for row in points[way]]
+    rows = [(part, way, *row[:2], row[2] * by, row[3]) for part, by in factors.items() for way, row in both]
     export(tmp_path / "parts.csv", ("Part No.", "Direction", *HEADERS), rows)
     done = typed("init", "parts.csv", *GEOMETRY, "-o", "x", "--name", "B")
     assert "next: bushfit batch x/batch.toml" in done.stderr
@@ -103,11 +97,8 @@ def test_runs_are_repeats(typed, points, tmp_path, ending, delimiter):
 
 
 def test_what_is_not_understood_is_named(typed, points, tmp_path):
-    rows = [
-        (*row[:2], row[2] * by, row[3], name, k)
-        for name, by in (("NR45", 1.0), ("NR60", 1.1))
-        for k, row in enumerate(points["axial"])
-    ]
+    compounds, points_of_one = (("NR45", 1.0), ("NR60", 1.1)), [*enumerate(points["axial"])]
+    rows = [(*row[:2], row[2] * by, row[3], name, k) for name, by in compounds for k, row in points_of_one]
     export(tmp_path / "axial.csv", (*HEADERS, "Compound", "Pt"), rows)
     said = '"Compound" (column 5) varies from row to row (NR45, NR60) and is not understood'
     done = typed("init", "axial.csv", *GEOMETRY, "-o", "x")

@@ -174,10 +174,8 @@ def test_stated_constants_are_the_rotations_without_a_law(name, export_request, 
 
 def test_stated_constants_in_adams(export_request):
     files = adams.export(replace(export_request, cardanic=60.0 + 6.0j)).files
-    for kind, damping in (
-        ("car", 6.0 * 1e3 * np.radians(1.0) / (2.0 * np.pi * 75.0)),
-        ("ride", np.degrees(np.arctan(0.1))),
-    ):
+    viscous = 6.0 * 1e3 * np.radians(1.0) / (2.0 * np.pi * 75.0)
+    for kind, damping in (("car", viscous), ("ride", np.degrees(np.arctan(0.1)))):
         blocks = teimorbit(files[f"bushing_{kind}.bus"].decode("ascii"))
         for end in ("TX", "TY"):
             turned, moment = blocks[f"{end}_CURVE"][2].T

@@ -65,11 +65,9 @@ def sweep(
 @pytest.fixture
 def coupons(paper_model) -> Campaign:
     """A coupon alone: the strain stepped at two frequencies, the frequency at two strains."""
-    tests = (
-        sweep(paper_model, DMA, [10.0, 100.0], STRAINS, "amplitude"),
-        sweep(paper_model, DMA, FREQUENCIES, [1e-3, 1e-2]),
-    )
-    return Campaign("EPDM", Path("epdm.toml"), None, (), tests, specimens=(DMA,))
+    by_strain = sweep(paper_model, DMA, [10.0, 100.0], STRAINS, "amplitude")
+    by_frequency = sweep(paper_model, DMA, FREQUENCIES, [1e-3, 1e-2])
+    return Campaign("EPDM", Path("epdm.toml"), None, (), (by_strain, by_frequency), specimens=(DMA,))
 
 
 @pytest.fixture
