@@ -125,11 +125,9 @@ def test_its_band_after_one_factor_and_the_second_coupon(campaign, compound, roo
     ratio, half = [], []
     for sweep in campaign.sweeps:
         if str(sweep.direction) == "mount":
-            for frequency, amplitude, stiffness in zip(
-                sweep.frequency, sweep.amplitude_reached, sweep.stiffness, strict=True
-            ):
-                found = predict(compound, sweep.direction, [frequency], [amplitude]).stiffness
-                ratio.append(abs(stiffness) / found.value[0])
+            for row, frequency in enumerate(sweep.frequency):
+                found = predict(compound, sweep.direction, [frequency], [sweep.amplitude_reached[row]]).stiffness
+                ratio.append(abs(sweep.stiffness[row]) / found.value[0])
                 half.append((found.high[0] - found.value[0]) / found.value[0])
     off = np.array(ratio) / np.median(ratio) - 1.0
     inside, width = float(np.mean(np.abs(off) <= half)), float(np.median(half)) / 1.96 / float(np.std(off))

@@ -139,10 +139,7 @@ def test_turns_strains_and_rests_of_a_session():
     strain = up_and_down * unit_strain(RUBBER, Direction.AXIAL)
     np.testing.assert_allclose(found.previous_strain, [0.0, 0.0, 0.0, 0.0, strain[3], strain[3], strain[5], strain[3]])
     np.testing.assert_allclose(7.0 * found.rest_time[4:], [1.0, 2.0, 1.0, 4.0])
-    coupon, mount = (
-        SessionTest(COUPON, np.array([0.5, 0.1])),
-        SessionTest(Direction.RADIAL, np.array([1e-4, 1e-4, 1e-4])),
-    )
+    coupon, mount = SessionTest(COUPON, np.array([0.5, 0.1])), SessionTest(Direction.RADIAL, np.full(3, 1e-4))
     of_coupon, of_mount = session(RUBBER, [coupon, mount])
     np.testing.assert_allclose(of_coupon.session_time, [0.0, 1.0])
     np.testing.assert_allclose(of_mount.session_time, [0.0, 0.5, 1.0])

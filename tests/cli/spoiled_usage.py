@@ -135,6 +135,17 @@ USAGE = [
     ("export|model.json|--format|xlsx|--units|mm t s bar", '--units: "bar" is none of the four units'),
     ("export|model.json|--format|csv|--dialect|optistruct", "'--dialect' requires '--format nastran'."),
     ("export|model.json|--format|nastran|--dialect|msc", "'msc' is not 'optistruct'"),
+    ("export|model.json|--format|prony|--time-domain", "'--time-domain' requires '--format abaqus'"),
+    ("export|model.json|--format|nastran|--cardanic|60 N/m", "--cardanic: the unit does not fit"),
+    ("export|model.json|--format|nastran|--cardanic|60 N m/rad, -1", "a value above zero"),
+    ("predict|model.json|--over|0.5 Hz", "--over"),
+    ("predict|model.json|--over|0.5 Hz -1 mm", "a value above zero"),
+    ("predict|model.json|--over|2 deg", "not a motion of this direction"),
+    ("predict|model.json|--over|50 Hz 1 mm", "do not suit the slow motion"),
+    ("predict|model.json|--frequencies|0 Hz", "predict --static writes the static curve"),
+    ("predict|model.json|--frequencies|0:10:5 Hz", "predict --static writes the static curve"),
+    ("predict|model.json|--static-rate|10 mm", "a speed, such as mm/min"),
+    ("predict|model.json|--static-rate|-1 mm/min", "a value above zero"),
     ("export|campaign.toml|--format|csv", "campaign.toml: a fitted model is needed", "found: a campaign"),
 ]
 #: (a limit for a batch, what the error says ...)

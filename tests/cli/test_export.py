@@ -231,20 +231,6 @@ def test_every_format_at_once_and_what_it_leaves_out(bushfit, tmp_path):
     assert any(line.startswith("radial: not fitted") for line in told)
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (("--format", "prony", "--time-domain"), "'--time-domain' requires '--format abaqus'"),
-        (("--format", "nastran", "--cardanic", "60 N/m"), "--cardanic: the unit does not fit"),
-        (("--format", "nastran", "--cardanic", "60 N m/rad, -1"), "a value above zero"),
-    ],
-)
-def test_constants_and_time_domain_are_checked(bushfit, tmp_path, options, words):
-    done = bushfit("export", "model/model.json", *options, "-o", tmp_path / "x", status=2)
-    assert words in done.stderr
-    assert not (tmp_path / "x").exists()
-
-
 def test_a_prony_series_and_stated_constants(bushfit, tmp_path):
     grid = ("--direction", "axial", "--amplitudes", "0.2 mm", "--frequencies", "5:155:50 Hz")
     options = ("--format=prony", "--format=abaqus", "--time-domain", "--cardanic", "1.2 N m/deg, 0.1")

@@ -59,26 +59,19 @@ def test_a_file_is_run_only_with_permission_and_only_as_it_was(bushfit, root, tm
 
 
 @pytest.mark.parametrize(
-    ("code", "words"),
+    ("name", "code", "words"),
     [
-        ("import no_such_module\n", ["ModuleNotFoundError"]),
-        ("def modulus(p, omega, strain): ...\n", ["EFFECT"]),
-        ("EFFECT = {}\n", ["the functions of its kind"]),
-        ("EFFECT = {'sentense': 'x'}\nmodulus = stress = print\n", ["the effect my_law of"]),
-        ("x = (\n", ["SyntaxError"]),
+        ("my_law", "import no_such_module\n", ["ModuleNotFoundError"]),
+        ("my_law", "def modulus(p, omega, strain): ...\n", ["EFFECT"]),
+        ("my_law", "EFFECT = {}\n", ["the functions of its kind"]),
+        ("my_law", "EFFECT = {'sentense': 'x'}\nmodulus = stress = print\n", ["the effect my_law of"]),
+        ("my_law", "x = (\n", ["SyntaxError"]),
+        ("viscous", "", ["cannot have this name", "viscous"]),
     ],
 )
-def test_a_law_that_is_none(code, words, bushfit, root, tmp_path):
-    (tmp_path / "my_law.py").write_text(code)
+def test_a_law_that_is_none_or_has_the_name_of_another(name, code, words, bushfit, root, tmp_path):
+    (tmp_path / f"{name}.py").write_text(code or (root / EXAMPLE).read_text(encoding="utf-8"))
     text = (root / "configs/own_law.toml").read_text(encoding="utf-8")
-    (tmp_path / "own.toml").write_text(text.replace(f"../{EXAMPLE}", "my_law.py"))
+    (tmp_path / "own.toml").write_text(text.replace(f"../{EXAMPLE}", f"{name}.py"))
     done = bushfit("simulate", tmp_path / "own.toml", "-o", tmp_path / "x", "--trust", status=2)
     refused(done, tmp_path / "x", "own.toml", *words)
-
-
-def test_a_law_cannot_take_the_name_of_another(bushfit, root, tmp_path):
-    shutil.copy(root / EXAMPLE, tmp_path / "viscous.py")
-    text = (root / "configs/own_law.toml").read_text(encoding="utf-8")
-    (tmp_path / "own.toml").write_text(text.replace(f"../{EXAMPLE}", "viscous.py"))
-    done = bushfit("simulate", tmp_path / "own.toml", "-o", tmp_path / "x", "--trust", status=2)
-    refused(done, tmp_path / "x", "cannot have this name", "viscous")

@@ -163,25 +163,6 @@ def test_predict_on_a_large_motion_and_on_an_offset(bushfit, tmp_path):
     assert (stiffness["slow"] < 0.99 * stiffness["alone"]).all()
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (("--over", "0.5 Hz"), "--over"),
-        (("--over", "0.5 Hz -1 mm"), "a value above zero"),
-        (("--over", "2 deg"), "not a motion of this direction"),
-        (("--over", "50 Hz 1 mm"), "do not suit the slow motion"),
-        (("--frequencies", "0 Hz"), "predict --static writes the static curve"),
-        (("--frequencies", "0:10:5 Hz"), "predict --static writes the static curve"),
-        (("--static-rate", "10 mm"), "a speed, such as mm/min"),
-        (("--static-rate", "-1 mm/min"), "a value above zero"),
-    ],
-)
-def test_motions_that_cannot_be_answered_are_told(bushfit, tmp_path, options, words):
-    done = bushfit("predict", "model/model.json", *options, "-o", tmp_path / "x", status=2)
-    assert words in done.stderr
-    assert not (tmp_path / "x").exists()
-
-
 @pytest.fixture(scope="module")
 def planned(root, tmp_path_factory) -> tuple[Path, dict, str]:
     """The folder of a plan for a bushing that was not tested, its document, and what was said."""

@@ -46,16 +46,15 @@ def same(one: Model, other: Model, tolerance: float) -> None:
         assert np.max(np.abs(found - expected)) <= tolerance * np.max(np.abs(expected))
 
 
+FRICTION = {"sigma_fmax": 1.46e4, "eps_half": 1.3e-2}
+
+
 @pytest.mark.parametrize(
     ("one", "other", "tolerance"),
     [
         (added("maxwell", tau=1.1e-5, mu1=100.0 / 1.1e-5), added("viscous", eta=100.0), 1e-2),
         (added("maxwell", tau=99.0, mu1=1e5), PLAIN.with_values({"mu": 1.19e6}), 2e-3),
-        (
-            added("second_friction", sigma_fmax=1.46e4, eps_half=1.3e-2),
-            PLAIN.with_values({"sigma_fmax": 2.92e4}),
-            1e-14,
-        ),
+        (added("second_friction", **FRICTION), PLAIN.with_values({"sigma_fmax": 2.92e4}), 1e-14),
         (added("fixture_resonance", mass=0.1, frequency=1e4, damping=0.1), added("inertia", mass=0.1), 1e-4),
     ],
     ids=["fast arm: dashpot", "slow arm: spring", "second friction like the first: twice it", "stiff fixture: mass"],

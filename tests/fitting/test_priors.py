@@ -95,6 +95,7 @@ def test_a_prior_of_a_parameter_that_the_model_lacks_is_reported(rig):
         ({"prior": "0.24 +- 0"}, "this is not a prior"),
         ({"prior": "5 +- 0.1"}, "this is not a prior"),
         ({"prior": "0.2 MPa +- 0.1 MPa"}, "unit"),
+        ({"prior": "none.json"}, "none.json: there is no such file"),
         ({"prior": "0.2 +- 0.1", "vary": False}, "exclude each other"),
         ({"equal": "mu", "value": 0.2}, "exclude each other"),
         ({"equal": "alfa"}, "unknown key"),

@@ -1,10 +1,12 @@
 """Several bushings of one compound: one set of parameters, and a stiffness factor of each bushing."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from bushfit.campaign.campaign import load_campaign
+from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.commands.fit import fit
 from bushfit.commands.predict import predict
 from bushfit.commands.simulate import simulate
@@ -45,13 +47,18 @@ thick = 0.98
 RIG = 'noise = "0.5 %"\nlevel_gain_error = "0.5 %"\nlevel_phase_error = "0.25 deg"'
 
 
+def simulated(folder: Path, text: str = CAMPAIGN, factor: str = "free") -> Campaign:
+    """Simulated tests of three bushings, whose factors a fit leaves free or takes as one."""
+    (folder / "sim.toml").write_text(text, encoding="utf-8")
+    simulate(load_campaign(folder / "sim.toml"), folder / "tests")
+    file = folder / "tests/campaign.toml"
+    written = file.read_text(encoding="utf-8").replace("[[bushings]]", f'[[bushings]]\nfactor = "{factor}"')
+    file.write_text(written, encoding="utf-8")
+    return load_campaign(file)
+
+
 def test_factors_of_three_shapes_are_recovered_and_read_back(tmp_path):
-    (tmp_path / "sim.toml").write_text(CAMPAIGN, encoding="utf-8")
-    simulate(load_campaign(tmp_path / "sim.toml"), tmp_path / "tests")
-    file = tmp_path / "tests/campaign.toml"
-    text = file.read_text(encoding="utf-8").replace("[[bushings]]", '[[bushings]]\nfactor = "free"')
-    file.write_text(text, encoding="utf-8")
-    campaign = load_campaign(file)
+    campaign = simulated(tmp_path)
     result = fit(campaign).result
     assert campaign.name == result.name == "short and long and thick"
     values = result.model.values
@@ -71,12 +78,7 @@ def test_factors_of_three_shapes_are_recovered_and_read_back(tmp_path):
 @pytest.mark.parametrize(("factor", "band"), [("free", 0.059), ("one", 0.0)])
 def test_each_bushing_is_predicted_by_the_others(factor, band, tmp_path):
     """The spread of free factors holds a bushing 4 % stiffer than its formula; equal factors do not."""
-    (tmp_path / "sim.toml").write_text(CAMPAIGN, encoding="utf-8")
-    simulate(load_campaign(tmp_path / "sim.toml"), tmp_path / "tests")
-    file = tmp_path / "tests/campaign.toml"
-    text = file.read_text(encoding="utf-8").replace("[[bushings]]", f'[[bushings]]\nfactor = "{factor}"')
-    file.write_text(text, encoding="utf-8")
-    output = fit(load_campaign(file))
+    output = fit(simulated(tmp_path, factor=factor))
     (table,) = (part.content for part in output.files if part.name == "bushings")
     rows = table.set_index("bushing")
     assert [*rows.index] == [*SHAPES]
@@ -107,13 +109,10 @@ def test_intervals_hold_the_truth_in_95_of_100_campaigns_of_three_shapes(rig, tm
         factors = 1.0 + 0.03 * np.random.default_rng((seed, 55)).standard_normal(3)
         stated = "\n".join(f"{name} = {factor}" for name, factor in zip(SHAPES, factors, strict=True))
         text = CAMPAIGN.replace("seed = 1", f"seed = {seed}").replace('noise = "0.5 %"', rig)
-        (tmp_path / "sim.toml").write_text(text.replace("long = 1.04\nthick = 0.98", stated), encoding="utf-8")
-        simulate(load_campaign(tmp_path / "sim.toml"), tmp_path / str(seed))
-        truth = load_result(tmp_path / str(seed) / "truth.json").model.values
-        file = tmp_path / str(seed) / "campaign.toml"
-        text = file.read_text(encoding="utf-8").replace("[[bushings]]", '[[bushings]]\nfactor = "free"')
-        file.write_text(text, encoding="utf-8")
-        result = fit(load_campaign(file)).result
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        result = fit(simulated(folder, text.replace("long = 1.04\nthick = 0.98", stated))).result
+        truth = load_result(folder / "tests/truth.json").model.values
         for name, value in truth.items():
             low, high = result.interval(name) or (0.0, 0.0)
             inside.setdefault(name, []).append(low <= value <= high)

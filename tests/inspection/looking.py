@@ -16,10 +16,7 @@ from bushfit.simulation.files import raw_loop_table, raw_sweep_table
 
 NOISE = {
     "good": {"noise": 1e-3, "force_noise": 5e-4, "displacement_noise": 1e-4},
-    "bad": {
-        **{"noise": 0.01, "force_noise": 0.01, "displacement_noise": 2e-3},
-        **{"gain_error": 5e-3, "phase_error": 5e-3},
-    },
+    "bad": {"noise": 1e-2, "force_noise": 1e-2, "displacement_noise": 2e-3, "gain_error": 5e-3, "phase_error": 5e-3},
 }
 #: Clean campaigns: of a commit, and of all.
 SEEDS = [4, pytest.param(12, marks=pytest.mark.slow)]

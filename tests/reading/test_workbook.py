@@ -122,11 +122,7 @@ SPOILED: list[tuple[Sheets, str | None, list[str]]] = [
     ({"A": [["x"]], "B": [["y"]]}, None, ["no sheet", '"A", "B"']),
     ({"Loop": LOOP}, "Lop", ["no such sheet", 'did you mean "Loop"']),
     ({"Loop": []}, None, ['sheet "Loop"', "only one column"]),
-    (
-        {"Loop": [*LOOP[:9], *([["a", 1.0, 2.0]] * 9), *LOOP[9:]]},
-        None,
-        ['row 10, column "Zeit [s]"', '"a", and 8 more'],
-    ),
+    ({"Loop": [*LOOP[:9], *[["a", 1.0, 2.0]] * 9, *LOOP[9:]]}, None, ['row 10, column "Zeit [s]"', '"a", and 8 more']),
     ({"Loop": [LOOP[0], *([t, x, "1.234"] for t, x, _ in LOOP[1:])]}, None, ["two ways", '"1.234"', "decimal ="]),
 ]
 

@@ -89,12 +89,8 @@ class Rubber:
 
     def stress(self, strain: Array, frequency: Array) -> Array:
         """Stress [Pa] over a steady cycle of the strain: Eq. 6."""
-        elastic = 2.0 * self.mu * strain
-        return (
-            elastic
-            + springpot(strain, frequency, self.m, self.alpha)
-            + friction(strain, self.sigma_fmax, self.eps_half)
-        )
+        elastic, viscous = 2.0 * self.mu * strain, springpot(strain, frequency, self.m, self.alpha)
+        return elastic + viscous + friction(strain, self.sigma_fmax, self.eps_half)
 
 
 def springpot(strain: Array, frequency: Array, m: float | Array, alpha: float | Array) -> Array:
