@@ -136,13 +136,14 @@ def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
 
 
 def _form(correction: Unnamed, law: PowerLaw | None) -> str:
-    """Text on the gap's largest size relative to |K|, the relative uncertainty of this size, and the form of the gap.
+    """Text on the gap's largest size relative to |K|, the half width of its 95 % interval, and the form of the gap.
 
     Args:
         correction: smooth relative correction of the stiffness that closes the gap.
         law: nearest power law; None without one.
     """
-    largest, band = (number(100.0 * share, 2) for share in (correction.largest, Z95 * correction.uncertainty))
+    half = Z95 * correction.uncertainty * correction.largest
+    largest, band = (number(100.0 * share, 2) for share in (correction.largest, half))
     if law is None or not any(law.determined):
         form = "its form is unknown"
     elif law.is_likely:
@@ -150,7 +151,7 @@ def _form(correction: Unnamed, law: PowerLaw | None) -> str:
     else:
         form = "it is not a power law of frequency and amplitude"
         form += f"; nearest: {law.sentence}" if all(law.determined) else ""
-    return f"up to {largest} % of |K|, uncertain by {band} % of itself; {form}"
+    return f"up to {largest} ± {band} % of |K|; {form}"
 
 
 def _validity(correction: Unnamed, whole: Evidence) -> str:

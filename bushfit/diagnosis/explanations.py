@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from math import log
 
 import numpy as np
@@ -39,6 +40,9 @@ _CURVE_LENGTHS = {"smooth": (1.5, 1.2), "rough": (0.5, 0.5)}
 _CURVE_PATTERNS = {"nodes": 150, "count": 16, "minimum": 1e-4}
 #: Last overtone of a compound's deviation in a steady cycle, and number of waves of its deviation in the first cycle.
 _LAST_OVERTONE, _TRANSIENT_WAVES = 13, 6
+#: Relative difference in frequency and in amplitude up to which two loops repeat each other: rigs miss their set points
+#: by less.
+_SAME_LOOP = 0.02
 #: Number of phases of a cycle at which harmonics are summed: about six per period of the highest harmonic.
 _PHASES = 32
 
@@ -133,9 +137,16 @@ class OutlierCluster(FaultyPart):
 def is_pattern(faulty_parts: Sequence[FaultyPart]) -> bool:
     """Return True if suspected faults of the tests may be physics that the model lacks.
 
-    These are faults at several frequencies, as of a resonance, or at the smallest or largest level, as of a contact.
+    These are faults at several frequencies, as of a resonance, at the smallest or largest level, as of a contact, or of
+    two loops of one direction, rate and amplitude, which repeat each other.
     """
-    return sum(part.family == "frequency" for part in faulty_parts) > 1 or any(part.extreme for part in faulty_parts)
+    if sum(part.family == "frequency" for part in faulty_parts) > 1 or any(part.extreme for part in faulty_parts):
+        return True
+    loops = [(part.direction, *part.frequency, *part.amplitude) for part in faulty_parts if part.family == "loop"]
+    return any(
+        one[0] == other[0] and np.allclose(one[1:], other[1:], rtol=_SAME_LOOP, atol=0.0)
+        for one, other in combinations(loops, 2)
+    )
 
 
 def outlier_clusters(

@@ -321,10 +321,10 @@ def format_odds(document: Mapping[str, Any]) -> list[str]:
             small = format_probability(1.0 - document["nothing"])
             lines.append(f"Probability of an effect too small for these tests to show: {small}.")
         return lines
-    lines = [f"{format_probability(entry['probability'])}: {entry['words']}" for entry in document["odds"]]
+    lines = [f"probability {format_probability(entry['probability'])}: {entry['words']}" for entry in document["odds"]]
     rest = 1.0 - sum(entry["probability"] for entry in document["odds"])
     if lines and rest > _LEAST_TOLD:
-        lines.append(f"{format_probability(rest)}: other explanations together")
+        lines.append(f"probability {format_probability(rest)}: other explanations together")
     if lines and document["nothing"] > _LEAST_TOLD:
         lines.append(f"Probability that nothing is missing: {format_probability(document['nothing'])}.")
     return lines

@@ -109,11 +109,11 @@ class DiagnosisWriter:
         gap = self._described(after) if not first.best.levels else None
         if gap:
             entries.append(NamedCause(UNNAMED, gap.evidence))
-            rest.append(f"{_NAMELESS}, {gap.sentence}")
+            rest.append(f"{_NAMELESS} ({gap.sentence})")
         elif first.unnamed:
             rest.append(_NAMELESS)
-        summary += f"; the rest: {', '.join(rest)}" if rest else ""
-        return self._finished("partly", summary, gap.after if gap else after, entries, places=first.best, gap=gap)
+        after, remainder = gap.after if gap else after, " and ".join(rest)
+        return self._finished("partly", summary, after, entries, remainder, places=first.best, gap=gap)
 
     def _described(self, evidence: Evidence) -> GapDescription | None:
         """Describe the gap of a fit by a smooth correction; None if effects are excluded or no correction is valid."""
@@ -177,7 +177,9 @@ class DiagnosisWriter:
             advice = f"check the records of the tests; {'; '.join(leader.best.claim.corrections(request.data))}"
         elif leader:
             entries = [NamedCause(name, self._probability(leader), alternatives) for name in leader.names]
-        *labels, last = map(self.label, compositions)
+        names = [" + ".join(self._names(composition)) for composition in compositions]
+        are_distinct = all(names) and len({*names}) == len(names)
+        *labels, last = names if are_distinct else map(self.label, compositions)
         summary = f"these tests cannot distinguish between {', '.join(labels)} and {last}"
         places = next((composition.best for composition in compositions if composition.faulty_parts), None)
         return self._finished("ambiguous", summary, request.base, entries, places=places, next_test=advice)
@@ -194,7 +196,8 @@ class DiagnosisWriter:
             return self._finished("described", summary, gap.after, [NamedCause(UNNAMED, gap.evidence)], gap=gap)
         summary, advice = "no known effect closes the gap" + leads, ""
         if at_fault:
-            summary = f"{at_fault}: this deviates from all other tests; measure it again first"
+            several = len(best.faulty_parts) > 1  # type: ignore[union-attr]
+            summary = f"measure again first: {at_fault} deviate{'s' * (not several)} from all other tests"
         elif is_fault:
             summary = "the levels disagree by more than the class of the rig, and nothing else is missing"
             advice = "measure the levels again in another session, or state the class of the rig (gain_error under "
@@ -203,11 +206,13 @@ class DiagnosisWriter:
 
     def label(self, composition: Composition) -> str:
         """Name of an explanation: its mistakes, effects, faulty parts of the tests and other parts, joined by " + "."""
+        faults = (f"fault: {part.name}" for part in composition.faulty_parts)
+        return " + ".join((*self._names(composition), *faults, *_nameless(composition)))
+
+    def _names(self, composition: Composition) -> list[str]:
+        """Names of the mistakes and effects of an explanation."""
         claim = composition.best.claim
-        names = [*(claim.labels(self.request.data) if claim else ()), *composition.names]
-        return " + ".join(
-            (*names, *(f"fault: {part.name}" for part in composition.faulty_parts), *_nameless(composition))
-        )
+        return [*(claim.labels(self.request.data) if claim else ()), *composition.names]
 
     @cached_property
     def odds(self) -> Odds:
@@ -230,7 +235,7 @@ class DiagnosisWriter:
     def _probability(self, composition: Composition) -> str:
         """Text with the probability of an explanation and of its most probable rival."""
         rivals = [rival for rival in self.finding.reported if rival is not composition][:1]
-        following = [f"next {self.label(rival)} {format_probability(rival.probability)}" for rival in rivals]
+        following = [f"that of {self.label(rival)} {format_probability(rival.probability)}" for rival in rivals]
         return ", ".join([f"probability {format_probability(composition.probability)}", *following])
 
     def _finished(
@@ -239,6 +244,7 @@ class DiagnosisWriter:
         summary: str,
         after: Evidence,
         entries: Sequence[NamedCause] = (),
+        remainder: str = "",
         *,
         places: Hypothesis | None = None,
         next_test: str = "",
@@ -252,6 +258,7 @@ class DiagnosisWriter:
             summary: verdict as a sentence.
             after: fit with the additions, or the starting fit.
             entries: named effects or mistakes.
+            remainder: what the entries do not explain; "" if they explain the gap.
             places: hypothesis whose faulty parts of the tests are reported; None without any.
             next_test: advice on the next test; "" for the usual confirmation of the first entry.
             gap: description of a gap without a name; None without one.
@@ -281,7 +288,7 @@ class DiagnosisWriter:
         amounts = filter(None, (_format_amount(entry.name, result) for entry in entries))
         return Diagnosis(
             verdict,
-            "; ".join([summary, *amounts]),
+            "; ".join([summary, *amounts, *([f"the rest: {remainder}"] if remainder else [])]),
             tuple(entries),
             regions,
             regions if after is base else find_regions(after),

@@ -55,7 +55,7 @@ def test_the_document_names_the_effect_with_its_size_and_the_gap_before_and_afte
     assert done.stdout == (found / "diagnosis.json").read_text(encoding="utf-8")
     for words in ("case 001: named", "inertia", "95 %", "data fitted", "held out", "where", "next test:", "wrote "):
         assert words in done.stderr
-    assert "above 99.5 %: moving mass between bushing and load cell (inertia)\n" in done.stderr
+    assert "probability above 99.5 %: moving mass between bushing and load cell (inertia)\n" in done.stderr
     written = document(found / "diagnosis.json")
     assert written["schema"] == "bushfit/diagnosis/3"
     assert written["verdict"] == "named"
@@ -148,7 +148,7 @@ def test_look_alikes_are_told_with_their_odds(work, bushfit):
     assert 0.97 <= sum(shares) <= 1.0
     page = html.unescape((work / "alike/report.html").read_text(encoding="utf-8"))
     assert "bushfit diagnose looks for" not in run.stderr + (work / "alike/model.json").read_text(encoding="utf-8")
-    lines = [f"{100 * entry['probability']:.0f} %: {entry['words']}" for entry in written["odds"]]
+    lines = [f"probability {100 * entry['probability']:.0f} %: {entry['words']}" for entry in written["odds"]]
     assert len(lines) > 1
     for line in lines:
         assert f"  {line}\n" in run.stderr

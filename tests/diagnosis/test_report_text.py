@@ -145,7 +145,12 @@ def one(parts: str, odds: float, *, size: float = 0.05, last: float = 0.0, p_val
     """Of parts joined by +: effects, "unnamed", "compound", "levels", "kind:place", a mistake by its name; or ""."""
     names = parts.split("+") if parts else []
     spots = [name.split(":") for name in names if ":" in name]
-    places: Any = tuple(SimpleNamespace(family=family, name=name, extreme=False) for family, name in spots)
+    places: Any = tuple(
+        SimpleNamespace(
+            family=family, name=name, extreme=False, direction="axial", frequency=(1.0, 1.0), amplitude=(name[0] == "1",)
+        )
+        for family, name in spots
+    )
     claims: list[Any] = [SimpleNamespace(mistake=MISTAKES[name], key=name) for name in names if name in MISTAKES]
     others = {"unnamed", "compound", "levels", *MISTAKES}
     effects = tuple(name for name in names if ":" not in name and name not in others)
@@ -184,6 +189,8 @@ def told(finding: Finding) -> dict[str, float]:
         ({"frequency:50 Hz": 0.5, "frequency:45 to 55 Hz": 0.49, "": 0.01}, "unexplained", {"part: frequency": 1.0}),
         ({"levels": 0.99, "": 0.01}, "unexplained", {"levels": 1.0}),
         ({"delay+level:1 mm": 0.99, "delay": 0.01}, "unexplained", {"delay+part: level": 0.99}),
+        ({"loop:1 mm+loop:2 mm": 0.99, "": 0.01}, "unexplained", {"part: loop": 1.0}),
+        ({"loop:1 mm+loop:1 mm again": 0.99, "": 0.01}, "described", {"unnamed": 1.0}),
         ({"peak_to_peak": 0.99, "": 0.01}, "named", {"peak_to_peak": 1.0}),
     ],
     ids=str,
