@@ -187,6 +187,12 @@ def predict(
         result, note = transfer_compound(result, bushing)
         notes, directions = (*notes, note), directions or [str(direction) for direction in _DIRECTIONS]
     campaign = campaign and _assign_bushing(campaign, result)
+    if campaign and campaign.bushing and result.model.bushing and not result.bushings:
+        bodies = campaign.bushing, result.model.bushing
+        sizes, fitted_sizes = ((body.inner_radius, body.outer_radius, body.length) for body in bodies)
+        if not np.allclose(sizes, fitted_sizes, atol=0.0):
+            other = f"{result.name}: {campaign.path.name} tests a bushing of another shape, {campaign.bushing.name}"
+            notes = (*notes, f"{other}; --bushing {campaign.path.name} predicts that shape")
     sweeps = campaign.sweeps if campaign else ()
     depends_on_temperature = result.model.depends_on("temperature")
     if temperature is not None and not depends_on_temperature:

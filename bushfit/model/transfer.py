@@ -83,8 +83,8 @@ def transfer_compound(result: Result, bushing: Bushing) -> tuple[Result, str]:
     model = transfer(result.model)
     measured = result.measured
     if measured:
-        of_specimens = tuple(name for name in measured.directions if name in names)
-        measured = replace(measured, directions=of_specimens or (result.name,), preloads=())
+        sources = dict.fromkeys(name if name in names else result.name for name in measured.directions)
+        measured = replace(measured, directions=tuple(sources), preloads=())
     elsewhere = Result(
         model,
         fitted=tuple(name for name in result.fitted if name in model.values),

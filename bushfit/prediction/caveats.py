@@ -36,9 +36,9 @@ _USES: dict[str, str] = tomllib.loads(Path(__file__).with_name("uses.toml").read
 #: Beginnings or words of these meanings, the most important first.
 _RANKS = (
     "^Do not use",
-    "include this error",
     "^Find out|^Look",
     "^For .*estimate|^Values",
+    "include this error",
     "^Use|^For|^Settle",
     "only|do not|no more|near",
     "",
@@ -222,7 +222,11 @@ def point_warnings(
     frequency, amplitude, stiffness = points
     yield from result.undecided
     yield from unfitted_warnings(result, place)
-    yield from extrapolations(result, place, frequency, amplitude, temperature)
+    confirmed = np.zeros(frequency.shape, dtype=bool)
+    if measured is not None and agrees_within_noise(result, place):
+        confirmed = np.isfinite(measured)
+    if not confirmed.all():
+        yield from extrapolations(result, place, frequency[~confirmed], amplitude[~confirmed], temperature)
     requested = {"temperature": temperature, "preload": preload}
     conditions = {name for name, value in requested.items() if value is not None}
     effects = result.model.without(Level.INSTRUMENT).records

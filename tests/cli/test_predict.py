@@ -97,6 +97,7 @@ def test_predict_says_each_warning_once_and_in_its_document(bushfit, root, tmp_p
         ("belong to the rig and not to the bushing", truth),
         ("radial: not fitted", "model/model.json"),
         ("axial, resonance of 0.2 kg: predicted at strains", "model/model.json", *shaken),
+        ("tests a bushing of another shape", "model/model.json", "--campaign", root / "configs/arm_bushing.toml"),
     ):
         done = bushfit("predict", model, *more, "-o", tmp_path / "x", "--no-plots", "--force", "--json", "-v")
         printed = [line for line in done.stderr.splitlines() if line.startswith("warning: ")]
@@ -104,6 +105,12 @@ def test_predict_says_each_warning_once_and_in_its_document(bushfit, root, tmp_p
         warnings = json.loads(done.stdout)["warnings"]
         assert sorted(f"warning: {line}" for line in warnings) == sorted(printed)
         assert any(said in line for line in warnings)
+
+
+@pytest.mark.parametrize(("grid", "is_warned"), [((), False), (("--amplitudes", "0.3 mm"), True)])
+def test_a_measured_sweep_confirms_strains_that_were_not_fitted(bushfit, tmp_path, grid, is_warned):
+    files = "model/model.json", "--campaign", CAMPAIGN, *grid, "-o", tmp_path / "x", "--no-plots", "-v"
+    assert ("radial: predicted at strains" in bushfit("predict", *files).stderr) is is_warned
 
 
 def test_predict_writes_maxwell_arms_where_asked(bushfit, root, tmp_path):

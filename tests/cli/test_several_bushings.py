@@ -232,6 +232,12 @@ def test_a_tie_that_is_not_used_is_reported(bushfit, root, tmp_path, command, ti
     assert re.search(rf"is not used: the model lacks {lacking}\n", done.stderr)
 
 
+def test_a_parameter_tied_to_a_constant_is_fixed(bushfit, root, tmp_path):
+    campaign = written(root, tmp_path, "cmp_15961_prior", '[fit.alpha]\nexpression = "0.24"')
+    done = bushfit("fit", campaign, "-o", tmp_path / "x", "--no-plots")
+    assert ["alpha", "(tied)", "0.2400", "fixed", "-"] in [line.split() for line in done.stderr.splitlines()]
+
+
 @pytest.mark.parametrize("prior", [".24 +- .003", "+0.24 ± 3e-3", "24 % +/- 0.3 %"])
 def test_numbers_of_a_prior_are_written_in_any_way(bushfit, root, tmp_path, prior):
     campaign = written(root, tmp_path, "cmp_15961_prior", f'[fit.alpha]\nprior = "{prior}"')
