@@ -82,7 +82,7 @@ def command(
                 all(map(get_effect, name.split("+")))
         campaign = load_campaign(sources[0])
         name = campaign.name
-        folder = output.checked_folder(name, "compare.json", form="{} families")
+        folder = output.folder(name, "compare.json", form="{} families")
         compared = compare(campaign, families=names, **settings)
     else:
         entries = []
@@ -91,7 +91,7 @@ def command(
             digest = None if isinstance(loaded, Campaign) else model_source(model_file(source)).sha256
             entries.append(compared_result(loaded, str(source), digest, directions))
         name = " and ".join(entry.name for entry in entries)
-        folder = output.checked_folder(name, "compare.json")
+        folder = output.folder(name, "compare.json")
         compared = compare(*entries, **settings)
     _print_comparison(output, name, compared)
     inputs = [source if source.suffix == ".toml" else model_file(source) for source in sources]

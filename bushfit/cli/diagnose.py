@@ -85,7 +85,7 @@ def command(
         if not 0.0 <= share <= 1.0:
             raise BushfitError("this is not a share of |K|", found=f'"{tolerance}"', expected="0 % to 100 %")
     campaign = open_campaign(campaigns)
-    folder = output.checked_folder(campaign.name, "diagnosis.json", "model.json")
+    folder = output.folder(campaign.name, "diagnosis.json", "model.json")
     data = prepare_tests(campaign, loss)
     output.warn(data.notes)
     diagnosed = diagnose(data, model=start, tolerance=share, **settings)

@@ -10,8 +10,8 @@ from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import (
     displacement_rates,
     grid_values,
-    kelvin,
-    positive,
+    parse_positive,
+    parse_temperature,
     prediction_options,
     static_rate_option,
 )
@@ -92,17 +92,17 @@ def command(
         raise click.UsageError("'--dialect' requires '--format nastran'.")
     with error_location(place="--units"):
         settings["units"] = UnitSystem.parse(units) if units is not None else None
-    settings["temperature"] = kelvin(temperature)
+    settings["temperature"] = parse_temperature(temperature)
     if time_domain and "abaqus" not in formats:
         raise click.UsageError("'--time-domain' requires '--format abaqus'.")
     settings["time_domain"] = time_domain
     if cardanic is not None:
         stiffness, separator, loss = cardanic.partition(",")
-        real = positive(stiffness, "--cardanic", "N*m/rad") or 0.0
-        loss_factor = positive(f"{loss} -", "--cardanic", "1") or 0.0 if separator else 0.0
+        real = parse_positive(stiffness, "--cardanic", "N*m/rad") or 0.0
+        loss_factor = parse_positive(f"{loss} -", "--cardanic", "1") or 0.0 if separator else 0.0
         settings["cardanic"] = complex(real, real * loss_factor)
     settings["static_rates"] = displacement_rates(static_rate)
-    settings["accuracy"] = positive(accuracy, "--accuracy", "1")
+    settings["accuracy"] = parse_positive(accuracy, "--accuracy", "1")
     comma = output.formats.table_form == "decimal-comma"
     names, file = tuple(dict.fromkeys(formats)), model_file(model)
     exported = export(file, names, loaded, dialect=dialect or "nastran", decimal_comma=comma, **settings)

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import click
 
-from bushfit.cli.options import DIRECTIONS, FILE, Function, Parameter, add_parameters, option, option_group, option_of
+from bushfit.cli.options import DIRECTIONS, FILE, Function, Parameter, add_parameters, option, option_group, option_name
 from bushfit.errors import BushfitError, MeasurementError
 
 #: Options for metadata that a loop or sweep file may not contain: campaign key, metavar and help text.
@@ -146,7 +146,7 @@ def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tes
 
 def _metadata_option(key: str, metavar: str, words: str | None = None) -> Parameter:
     """Create the option of a campaign key, with its metavar and help text."""
-    return option(option_of(key), metavar, words, type=TYPES.get(key))
+    return option(option_name(key), metavar, words, type=TYPES.get(key))
 
 
 def _refuse_models(context: click.Context, _: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
@@ -168,9 +168,9 @@ def options_named() -> Iterator[None]:
         tables = _PAIRED.findall(hint)
         named = [f'--{kind} "{role}={text}"' for kind, entries in tables for role, text in _ENTRY.findall(entries)]
         keys = _TABLE.sub("", hint)  # in a table, amplitude is a role
-        named += [option_of(key) for key in _SAME_NAME if re.search(rf"\b{key} = ", keys)]
+        named += [option_name(key) for key in _SAME_NAME if re.search(rf"\b{key} = ", keys)]
         if error.file is None and error.place in _SAME_NAME:
-            error.place = option_of(error.place)
+            error.place = option_name(error.place)
         if named:
             error.hint = f"{hint}; for this command: {', '.join(dict.fromkeys(named))}"
         raise

@@ -36,7 +36,7 @@ def static(
     from bushfit.commands.loading import load_model
 
     campaign, start = open_campaign(campaigns), load_model(dynamic) if dynamic else None
-    folder = output.checked_folder(campaign.name, "static.json")
+    folder = output.folder(campaign.name, "static.json")
     _show_fit(output, folder, fit_static(campaign, dynamic=start, loss=loss), dynamic, max_nrmse)
 
 
@@ -64,7 +64,7 @@ def dynamic(
     from bushfit.commands.loading import load_model
 
     campaign, start = open_campaign(campaigns), load_model(static) if static else None
-    folder = output.checked_folder(campaign.name, "dynamic.json")
+    folder = output.folder(campaign.name, "dynamic.json")
     _show_fit(output, folder, fit_dynamic(campaign, static=start, loss=loss), static, max_nrmse)
 
 
@@ -107,7 +107,7 @@ def fit(
     from bushfit.commands.fit import fit as fit_campaign
 
     campaign = open_campaign(campaigns)
-    folder = output.checked_folder(campaign.name, "model.json")
+    folder = output.folder(campaign.name, "model.json")
     result = fit_campaign(campaign, directions=directions, effects=effects, profile=profile, loss=loss)
     _show_fit(output, folder, result, None, max_nrmse)
 

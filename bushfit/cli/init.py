@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from bushfit.cli.file_options import STATED, TYPES, direction_error, metadata_options, options_named
-from bushfit.cli.options import command_called, flag, option, option_group, option_of
+from bushfit.cli.options import command_called, flag, option, option_group, option_name
 from bushfit.cli.output import Output, with_output
 from bushfit.errors import BushfitError, CampaignError, MeasurementError, error_location, quote_path
 from bushfit.progress import track
@@ -183,7 +183,7 @@ def make_bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, d
     except BushfitError as error:
         error.file, keys = None, (error.place or "").split(", ")
         names = [key.replace("radius", "diameter") if key in halved else key for key in keys]
-        error.place = ", ".join(map(option_of, names)) if error.place else None
+        error.place = ", ".join(map(option_name, names)) if error.place else None
         if set(keys) & set(halved):
             error.hint = "a diameter is halved; check that inner and outer are not swapped"
         raise
@@ -322,7 +322,7 @@ class Questions:
                     key
                     for key, answer in answers.items()
                     if key in wanted
-                    or option_of(key[0]) in (error.place or "")
+                    or option_name(key[0]) in (error.place or "")
                     or f'"{answer}"' in error.problem
                     or (error.found or "").strip('"') == str(answer)
                 ]

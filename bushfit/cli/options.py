@@ -136,7 +136,7 @@ def option_group(heading: str, *parameters: Parameter) -> Parameter:
     return decorate
 
 
-def option_of(key: str) -> str:
+def option_name(key: str) -> str:
     """Name of the option for a key, such as --force-sign for force_sign."""
     return "--" + key.replace("_", "-")
 

@@ -120,23 +120,20 @@ class Output:
             console.width = int(columns) if columns.isdecimal() else _WIDTH
         return console
 
-    def folder(self, name: str, form: str = "{}") -> Path:
-        """Folder for results: --output, or results/<name>; `form` is a template of the name, such as "plan {}"."""
-        return self.output or Path("results") / form.format(folder_name(name))
-
-    def checked_folder(self, name: str, *files: str, form: str = "{}") -> Path:
-        """Folder for results, after a check that it is writable and that the files do not exist yet (unless --force).
+    def folder(self, name: str, *files: str, form: str = "{}") -> Path:
+        """Folder for results: --output, or results/<name>; checked for conflicts if names of files are given.
 
         Args:
             name: name of the result.
-            files: names of the main result files, with extensions.
+            files: names of the main result files, with extensions, which must not exist yet (unless --force).
             form: template of the folder name, such as "plan {}".
 
         Raises:
             OutputError: the folder cannot be written, or contains one of the files.
         """
-        folder = self.folder(name, form)
-        check_free(folder, files, overwrite=self.force)
+        folder = self.output or Path("results") / form.format(folder_name(name))
+        if files:
+            check_free(folder, files, overwrite=self.force)
         return folder
 
     def print(self, text: str) -> None:

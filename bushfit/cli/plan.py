@@ -20,7 +20,7 @@ from bushfit.cli.options import (
     option_group,
 )
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.shared_options import grid_options, grid_values, positive
+from bushfit.cli.shared_options import grid_options, grid_values, parse_positive
 from bushfit.errors import error_location
 from bushfit.units import display_unit, number
 
@@ -122,7 +122,7 @@ def command(
     opened, settings_campaign = load_source(source), load_campaign(campaign) if campaign else None
     if settings_campaign and isinstance(opened, Campaign):
         raise click.UsageError("'--campaign' requires MODEL.json.")
-    folder = output.checked_folder(opened.name, "plan.json", form="plan {}")
+    folder = output.folder(opened.name, "plan.json", form="plan {}")
     with error_location(source):
         outcome = plan(opened, settings_campaign, **settings)
     _print_plan(output, outcome)
@@ -144,7 +144,7 @@ def _target(text: str) -> tuple[str, float]:
     name, equals, size = text.rpartition("=")
     if not equals:
         raise click.BadParameter(f"'{text}' is not NAME=SIZE, such as \"mu=2 %\".", param_hint="'--target'")
-    return name.strip(), positive(size.strip(), "--target", "1") or 0.0
+    return name.strip(), parse_positive(size.strip(), "--target", "1") or 0.0
 
 
 def _print_plan(output: Output, outcome: PlanOutput) -> None:

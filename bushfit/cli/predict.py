@@ -14,8 +14,8 @@ from bushfit.cli.shared_options import (
     displacement_rates,
     displacement_unit,
     grid_values,
-    kelvin,
-    positive,
+    parse_positive,
+    parse_temperature,
     prediction_options,
     static_rate_option,
 )
@@ -107,12 +107,12 @@ def command(
         raise click.UsageError("'--mass' and '--base-acceleration' go together.")
     settings: dict[str, Any] = {
         **grid_values(directions, grids),
-        "temperature": kelvin(temperature),
+        "temperature": parse_temperature(temperature),
         "preloads": preload,
         "bushing": None if bushing is None else _bushing_of(result, bushing),
-        "mass": positive(mass, "--mass", "kg"),
-        "base_acceleration": positive(base_acceleration, "--base-acceleration", "m/s^2"),
-        "arms": positive(arms, "--arms", "1"),
+        "mass": parse_positive(mass, "--mass", "kg"),
+        "base_acceleration": parse_positive(base_acceleration, "--base-acceleration", "m/s^2"),
+        "arms": parse_positive(arms, "--arms", "1"),
         "static": static,
         "static_rates": displacement_rates(static_rate),
         "over": _large_motion(over),
@@ -187,8 +187,8 @@ def _large_motion(text: str | None) -> LargeMotion | None:
     with error_location(place="--over"):
         if not hertz:
             return LargeMotion(parse_quantity(size, unit), unit)
-    slow = positive(frequency + hertz, "--over", "Hz")
-    return LargeMotion(positive(size.strip(" ,;"), "--over", unit) or 0.0, unit, slow or 0.0)
+    slow = parse_positive(frequency + hertz, "--over", "Hz")
+    return LargeMotion(parse_positive(size.strip(" ,;"), "--over", unit) or 0.0, unit, slow or 0.0)
 
 
 def _print_static(output: Output, curve: StaticCurve) -> None:
@@ -207,13 +207,13 @@ def _print_static(output: Output, curve: StaticCurve) -> None:
 
 def print_predictions(output: Output, predicted: PredictionOutput) -> None:
     """Print the rows of each prediction table at the lowest and highest frequency, and collect its warnings."""
-    from bushfit.report.tables import prediction_table, spread
+    from bushfit.report.tables import prediction_table, spread_indices
     from bushfit.units import format_aligned, number
 
     for prediction in predicted.predictions:
         table = prediction_table(prediction)
         amplitudes = table.iloc[:, 1].unique()
-        chosen = amplitudes[spread(amplitudes.size, _MOST_AMPLITUDES)]
+        chosen = amplitudes[spread_indices(amplitudes.size, _MOST_AMPLITUDES)]
         owner = "" if prediction.direction in predicted.result.specimens else f"{predicted.result.name}: "
         ends = table.iloc[:, 0].min(), table.iloc[:, 0].max()
         rows = []

@@ -14,7 +14,7 @@ import click
 from bushfit.cli.file_options import direction_error, metadata_options, options_named
 from bushfit.cli.options import command_called, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.shared_options import parse_grid, positive
+from bushfit.cli.shared_options import parse_grid, parse_positive
 from bushfit.errors import BushfitError, MeasurementError
 from bushfit.report import plots
 from bushfit.report.results import ResultFile
@@ -80,7 +80,7 @@ def command(
     from bushfit.reduction.steps import reduce
     from bushfit.report.reduced import reduced_table, resonance_table
 
-    folder = output.checked_folder(files[0].stem, output.formats.table("sweep"))
+    folder = output.folder(files[0].stem, output.formats.table("sweep"))
     table = _resonance_table(files[0], test_options, shaker)
     document: dict[str, Any] = {}
     if table is not None:
@@ -179,7 +179,7 @@ def _reduce_resonance(
         raise MeasurementError(
             "a mass resists no rotation", file=table.file, found=str(direction), expected="a translation"
         )
-    if (mass := positive(shaker["mass"], "--mass", "kg")) is None:
+    if (mass := parse_positive(shaker["mass"], "--mass", "kg")) is None:
         raise MeasurementError(
             "this is a resonance test, and its mass is not stated",
             file=table.file,
@@ -188,8 +188,8 @@ def _reduce_resonance(
             expected="the mass that moves on the mount",
             hint='state it: --mass "0.5 kg"',
         )
-    mass += positive(shaker["mass_added"], "--mass-added", "kg") or 0.0
-    base_acceleration = positive(shaker["base_acceleration"], "--base-acceleration", "m/s^2")
+    mass += parse_positive(shaker["mass_added"], "--mass-added", "kg") or 0.0
+    base_acceleration = parse_positive(shaker["base_acceleration"], "--base-acceleration", "m/s^2")
     read_as = direction or Direction.AXIAL  # which translation it is makes no difference to reading
     with options_named():
         resonance = reduce_resonance(read_resonance(table, read_as, base_acceleration), mass)

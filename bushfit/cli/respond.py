@@ -12,7 +12,7 @@ import click
 from bushfit.cli.file_options import metadata_options, options_named
 from bushfit.cli.options import FILE, command_called, direction_option, flag, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.shared_options import TEMPERATURE, kelvin, positive
+from bushfit.cli.shared_options import TEMPERATURE, parse_positive, parse_temperature
 
 if TYPE_CHECKING:
     from bushfit.commands.respond import ResponseOutput
@@ -64,7 +64,7 @@ def command(
             "'--direction' takes one direction; a file with several directions states them in its headers."
         )
     result = load_model(model)
-    folder = output.checked_folder(result.name, output.formats.table("response"), form="{} response")
+    folder = output.folder(result.name, output.formats.table("response"), form="{} response")
     file_format = FileFormat(**{key.name: test_options.get(key.name) for key in fields(FileFormat)})
     with options_named():
         response = respond(
@@ -75,8 +75,8 @@ def command(
             units=test_options.get("units"),
             file_format=file_format,
             steady=steady,
-            lowpass=positive(lowpass, "--lowpass", "Hz"),
-            temperature=kelvin(temperature),
+            lowpass=parse_positive(lowpass, "--lowpass", "Hz"),
+            temperature=parse_temperature(temperature),
         )
     print_response(output, response)
     output.write(folder, response.files, response.document, [model_file(model), history])

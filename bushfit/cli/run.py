@@ -42,11 +42,17 @@ def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | N
     from bushfit.commands.run import run
 
     campaign = open_campaign(campaigns)
-    folder = output.checked_folder(campaign.name, "model.json", "diagnosis.json")
+    folder = output.folder(campaign.name, "model.json", "diagnosis.json")
     data = prepare_tests(campaign, loss)
     output.warn(data.notes)
     outcome = run(data)
-    print_run(output, campaign.name, outcome, f"use {folder / 'model.json'}, {_model_description(outcome)}")
+    diagnosis, description = outcome.diagnosed and outcome.diagnosed.diagnosis, "the joint fit"
+    if diagnosis and diagnosis.added:
+        effects = ", ".join(effect.label for effect in diagnosis.effects)
+        description = f"with {effects}; joint.json: the fit without effects"
+    elif diagnosis and diagnosis.changed:  # a mistake in the record is named
+        description += " to the uncorrected tests: correct the record first, then run again"
+    print_run(output, campaign.name, outcome, f"use {folder / 'model.json'}, {description}")
     output.write(folder, outcome.files, outcome.document, input_files(campaign))
     exit_above(max_nrmse, outcome.result)
 
@@ -83,16 +89,6 @@ def print_run(output: Output, name: str, outcome: RunOutput, action: str) -> Non
             print_step(output, f"{name}: joint fit", joint)
     left_out = f"{outcome.reason_left_out}: the two-step procedure is skipped"
     output.print(two_step_line(two_step, joint) if two_step else left_out)
-
-
-def _model_description(outcome: RunOutput) -> str:
-    """Phrase that describes the model that the user should use, and how it differs from the plain joint fit."""
-    if outcome.diagnosed and outcome.added:
-        effects = ", ".join(effect.label for effect in outcome.diagnosed.diagnosis.effects)
-        return f"with {effects}; joint.json: the fit without effects"
-    if outcome.diagnosed and outcome.diagnosed.diagnosis.changed:  # a mistake in the record is named
-        return "the joint fit to the uncorrected tests: correct the record first, then run again"
-    return "the joint fit"
 
 
 def _print_range(output: Output, outcome: RunOutput) -> None:

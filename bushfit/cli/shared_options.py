@@ -18,7 +18,7 @@ from bushfit.cli.options import (
     file_option,
     option,
     option_group,
-    option_of,
+    option_name,
 )
 from bushfit.errors import UnitError, error_location
 from bushfit.units import is_compatible, parse_quantity, regular_steps
@@ -139,17 +139,17 @@ def displacement_unit(text: str, per: str = "") -> str:
 def displacement_rates(text: str | None) -> dict[str, float] | None:
     """Parse --static-rate to a rate in SI by the unit of its displacement: m, rad or 1; None if it was not given."""
     unit = displacement_unit(text or "", "/s")
-    rate = positive(text, "--static-rate", f"{unit}/s")
+    rate = parse_positive(text, "--static-rate", f"{unit}/s")
     return None if rate is None else {unit: rate}
 
 
 def grid_values(directions: Sequence[str], grids: Mapping[str, str | None]) -> dict[str, Any]:
     """Convert grid options to keyword arguments: directions, frequencies and amplitudes [SI]; None for a default."""
-    axes = {key: parse_grid(grids[key], option_of(key), unit) for key, unit in _UNITS.items()}
+    axes = {key: parse_grid(grids[key], option_name(key), unit) for key, unit in _UNITS.items()}
     return {"directions": tuple(directions) or None, **axes}
 
 
-def positive(text: str | None, option: str, unit: str) -> float | None:
+def parse_positive(text: str | None, option: str, unit: str) -> float | None:
     """Parse the value of an option to a positive number in SI units; None if the option was not given.
 
     Args:
@@ -169,7 +169,7 @@ def positive(text: str | None, option: str, unit: str) -> float | None:
     return value
 
 
-def kelvin(text: str | None) -> float | None:
+def parse_temperature(text: str | None) -> float | None:
     """Parse the text of --temperature, such as "40 degC", to kelvin; None if the option was not given."""
     from bushfit.units import parse_temperature
 

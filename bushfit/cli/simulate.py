@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.options import FILE, command_called, option, option_group, option_of
+from bushfit.cli.options import FILE, command_called, option, option_group, option_name
 from bushfit.cli.output import Output, with_output
 from bushfit.errors import ModelError, UnitError, error_location
 from bushfit.units import is_number, parse_quantity
@@ -70,7 +70,7 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
     changes = {name: value for name, value in settings.items() if value is not None}
     for name, value in changes.items():
         if isinstance(value, str):
-            with error_location(place=option_of(name)):
+            with error_location(place=option_name(name)):
                 changes[name] = parse_quantity(value, "rad" if name == "phase_error" else "1")
                 if not 0.0 <= changes[name] < 1.0:
                     raise UnitError("impossible size", found=value, expected="0 up to 100 %, or below 1 rad")
@@ -80,7 +80,7 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
         simulated = simulate_campaign(truth, replace(tests, **changes), output.formats.table_form)
     output.warn(simulated.warnings)
     output.print(simulated.simulated.truth.equation())
-    folder = output.folder(simulated.simulated.result.name, "simulated {}")
+    folder = output.folder(simulated.simulated.result.name, form="simulated {}")
     output.write(folder, simulated.files, simulated.document, [source])
 
 

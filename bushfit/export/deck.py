@@ -44,11 +44,6 @@ class StiffnessTable(NamedTuple):
     frequency: Array
     stiffness: Array
 
-    @property
-    def dofs(self) -> tuple[int, ...]:
-        """Degrees of freedom with this stiffness, as solvers number them: 1 to 3 translations, 4 to 6 rotations."""
-        return DOFS[self.direction] if self.amplitude else CARDANIC
-
 
 #: Tables of all directions at one amplitude each, for one property of a solver.
 AmplitudeLevel = tuple[StiffnessTable, ...]
@@ -111,8 +106,9 @@ def amplitude_levels(request: ExportRequest) -> list[AmplitudeLevel]:
 
 
 def by_dof(level: AmplitudeLevel) -> Iterator[tuple[int, StiffnessTable]]:
-    """Yield the number of each degree of freedom (1 to 6) of an amplitude level with its stiffness table."""
-    yield from sorted(((dof, table) for table in level for dof in table.dofs), key=lambda pair: pair[0])
+    """Yield the degrees of freedom (1 to 3 translations, 4 to 6 rotations) of a level, each with its table."""
+    pairs = [(dof, table) for table in level for dof in (DOFS[table.direction] if table.amplitude else CARDANIC)]
+    yield from sorted(pairs, key=lambda pair: pair[0])
 
 
 class StiffnessForm(NamedTuple):

@@ -344,13 +344,13 @@ def shift_factors_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
-def shortened(name: str, letters: int) -> str:
+def shorten(name: str, letters: int) -> str:
     """Shorten a name to at most `letters` characters by an ellipsis in its middle; control characters are escaped."""
     name = printable(name)
     return name if len(name) <= letters else f"{name[: (letters - 1) // 2]}…{name[-(letters // 2) :]}"
 
 
-def spread(count: int, maximum: int) -> Array:
+def spread_indices(count: int, maximum: int) -> Array:
     """Indices of at most `maximum` of `count` elements, evenly from the first to the last, (min(count, maximum),)."""
     return np.linspace(0, count - 1, min(maximum, count)).round().astype(int)
 

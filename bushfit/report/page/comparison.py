@@ -17,7 +17,7 @@ from bushfit.report.compared import (
     format_p_value,
     parameter_cells,
 )
-from bushfit.report.page import rendered
+from bushfit.report.page import render_page
 from bushfit.report.page.report import MOST, summarize_conditions, tube_description
 from bushfit.report.page.svg import picture
 from bushfit.report.page.values import grid_corners
@@ -93,7 +93,7 @@ def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = N
         "warnings": [(line, consequence_of(line)) for line in by_importance(document["warnings"])],
         "files": [(f"{', '.join(letters)}: {file}", sha256) for (file, sha256), letters in labels.items()],
     }
-    return rendered("compare.html", context)
+    return render_page("compare.html", context)
 
 
 def difference_sizes(comparison: ComparisonDocument, place: str) -> Iterator[dict[str, Any]]:

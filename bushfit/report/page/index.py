@@ -10,9 +10,9 @@ from markupsafe import Markup
 from bushfit.effects.contract import Array
 from bushfit.report import plots
 from bushfit.report.batch_document import BatchFile, PartTable
-from bushfit.report.page import rendered, templates
+from bushfit.report.page import render_page, templates
 from bushfit.report.page.svg import picture
-from bushfit.report.tables import spread
+from bushfit.report.tables import spread_indices
 from bushfit.units import number, split_header
 
 #: Largest number of cells of the table of parts, where a curve is three cells: the page stays below 500 kB.
@@ -62,7 +62,7 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
     ordered = sorted(range(len(parts)), key=lambda index: _ORDER.index(status[index]))
     important = sum(map(bool, status))
     first, ordinary = ordered[: min(important, row_limit)], ordered[important:]
-    chosen = first + [ordinary[index] for index in spread(len(ordinary), max(0, row_limit - len(first)))]
+    chosen = first + [ordinary[index] for index in spread_indices(len(ordinary), max(0, row_limit - len(first)))]
     warnings = list(dict.fromkeys(line for index in chosen for line in parts[index].warnings))
     rows = []
     for index in chosen:
@@ -113,7 +113,7 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
         "shown": (len(first), important, len(chosen) - len(first)),
         "tones": _TONES,
     }
-    return rendered("index.html", context)
+    return render_page("index.html", context)
 
 
 def sparkline(curve: Array, usual: Array, scale: float, color: str) -> Markup:

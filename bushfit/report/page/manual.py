@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bushfit.report.page import rendered
+from bushfit.report.page import render_page
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,7 +47,7 @@ def manual_page() -> str:
         for token in tokens:
             _redirect_links(token.children or (), name, names)
         chapters.append((name, title, Markup(parser.renderer.render(tokens, parser.options, {}))))
-    return rendered("manual.html", {"chapters": chapters})
+    return render_page("manual.html", {"chapters": chapters})
 
 
 def _add_identifiers(tokens: Sequence[Token], name: str) -> str:

@@ -23,7 +23,7 @@ from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.files import read_utf8
 from bushfit.reading.tablefile import unescape_formula
 from bushfit.report.results import ResultFile, contents, place_names
-from bushfit.report.tables import require_columns, response_headers, spread
+from bushfit.report.tables import require_columns, response_headers, spread_indices
 from bushfit.validation import validate_tables
 
 #: Documents with a model in order of preference; document of the fit without the effects that a diagnosis added.
@@ -148,7 +148,7 @@ def _predictions(
         headers = ["frequency [Hz]", response_headers(place)[0]]
         axes = [np.unique(column) for column in require_columns(table, *headers)[headers].to_numpy(dtype=float).T]
         if name not in tables:
-            axes = [levels[spread(levels.size, _MOST_LEVELS)] for levels in axes]
+            axes = [levels[spread_indices(levels.size, _MOST_LEVELS)] for levels in axes]
         predictions[name] = predict(result, place, axes[0], axes[1] / place.display.displacement.factor)
     return predictions
 

@@ -18,10 +18,10 @@ from bushfit.model.result import Result
 from bushfit.prediction.caveats import by_importance, consequence_of, warnings_of
 from bushfit.reading.measurement import SAME_TEMPERATURE
 from bushfit.report import plots
-from bushfit.report.page import rendered
+from bushfit.report.page import render_page
 from bushfit.report.page.record import ReportRecord, report_record
 from bushfit.report.page.svg import Picture, picture
-from bushfit.report.page.values import headline, value_rows
+from bushfit.report.page.values import headline_texts, value_rows
 from bushfit.report.parameters import correlation_texts, effect_sizes, parameter_rows
 from bushfit.report.results import ResultFile
 from bushfit.report.tables import DISPLAYS, missing_column
@@ -107,7 +107,7 @@ def report_page(files: Sequence[ResultFile]) -> str:
         },
         "logo": campaign.logo if campaign else None,
         "facts": [*bodies, *summarize_conditions(test.conditions for test in tests)],
-        "headlines": [headline(record, prediction) for prediction in predictions],
+        "headlines": [headline_texts(record, prediction) for prediction in predictions],
         "diagnosis": diagnosis,
         "tone": _TONES.get(diagnosis["verdict"], "fair") if diagnosis else "fair",
         "consequence": _CONSEQUENCES[diagnosis["verdict"]] if diagnosis else "",
@@ -134,7 +134,7 @@ def report_page(files: Sequence[ResultFile]) -> str:
         "levels": " to ".join(dict.fromkeys(f"{end:.1f}" for end in ends)),
         "moduli": any(prediction.direction.motion is STRAINING for prediction in predictions),
     }
-    return rendered("report.html", context)
+    return render_page("report.html", context)
 
 
 def draw_figures(record: ReportRecord) -> tuple[list[Picture], bool]:

@@ -13,7 +13,7 @@ from bushfit.prediction.static_curve import static_curve, static_rate
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.prediction.superposed import untimed_effects
 from bushfit.report.page.record import ReportRecord
-from bushfit.report.tables import spread
+from bushfit.report.tables import spread_indices
 from bushfit.units import display_unit, format_aligned, format_range, number
 
 #: Highest frequency at which a stiffness is reported as static [Hz].
@@ -22,7 +22,7 @@ _STATIC = 1.0
 _FREQUENCIES, _AMPLITUDES, _ROWS = 3, 2, 12
 
 
-def headline(record: ReportRecord, prediction: Prediction) -> dict[str, str]:
+def headline_texts(record: ReportRecord, prediction: Prediction) -> dict[str, str]:
     """Key values of a direction or specimen for the top of a report, as texts.
 
     The operating point is the middle one of the predicted amplitudes and the frequency nearest to the geometric mean of
@@ -53,9 +53,9 @@ def headline(record: ReportRecord, prediction: Prediction) -> dict[str, str]:
         "frequency": f"{number(frequency, 3)} Hz",
         "amplitude": format_range(length, to_length * amplitude),
         "stiffness": f"{number(dynamic[0], 4)} {unit}",
-        "stiffness_band": interval(dynamic),
+        "stiffness_band": format_interval(dynamic),
         "loss_factor": number(loss[0], 3),
-        "loss_factor_band": interval(loss, 3),
+        "loss_factor_band": format_interval(loss, 3),
         "loss_angle": f"{number(math.degrees(math.atan(loss[0])), 3)}°",
         "static": "not tested",
         "static_point": f"lowest frequency {number(lowest, 3)} Hz",
@@ -90,7 +90,7 @@ def band_at(band: Band, index: int, scale: float = 1.0) -> list[float]:
     return [scale * float(end[index]) for end in (band.value, band.low, band.high)]
 
 
-def interval(values: Sequence[float], digits: int = 4) -> str:
+def format_interval(values: Sequence[float], digits: int = 4) -> str:
     """Format (value, low, high) as "low to high" with the decimals of the value; empty if the interval has no width."""
     _, low, high = format_aligned(values, digits, minimum_digits=2)
     return f"{low} to {high}" if values[2] > values[1] else ""
@@ -140,9 +140,9 @@ def value_rows(predictions: Sequence[Prediction]) -> Iterator[list[str]]:
                 f"{number(float(prediction.frequency[index]), 4)} Hz",
                 format_range(length, to_length * float(prediction.amplitude[index])),
                 f"{number(stiffness[0], 4)} {unit}",
-                interval(stiffness),
+                format_interval(stiffness),
                 f"{number(angles[0], 3)}°",
-                interval(angles, 3),
+                format_interval(angles, 3),
                 number(loss[0], 3),
                 *(number(factor * float(band.value[index]), 4) for band in parts),
             ]
@@ -161,7 +161,7 @@ def grid_corners(amplitude: Array, frequency: Array, amplitudes: int, frequencie
         Indices of the chosen points.
     """
     levels = np.unique(amplitude)
-    for level in levels[spread(levels.size, amplitudes)]:
+    for level in levels[spread_indices(levels.size, amplitudes)]:
         rows = np.flatnonzero(amplitude == level)
         rows = rows[np.argsort(frequency[rows], kind="stable")]
-        yield from rows[spread(rows.size, frequencies)].tolist()
+        yield from rows[spread_indices(rows.size, frequencies)].tolist()

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from bushfit.effects.contract import Array
 from bushfit.reduction.arrays import scatter
 from bushfit.report.plots import style
-from bushfit.report.tables import shortened
+from bushfit.report.tables import shorten
 from bushfit.units import number
 
 #: Colours of limits and of values outside the limits, and of values within the limits.
@@ -53,7 +53,7 @@ class Panel:
     missed: Sequence[int] = ()
     intervals: Array | None = None
 
-    def reach(self) -> tuple[float, float]:
+    def y_limits(self) -> tuple[float, float]:
         """Range of the y axis: all values that are not far from the median, the limits, and a typical 95 % interval.
 
         Returns:
@@ -82,7 +82,7 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> s
         Figure with two columns of panels.
     """
     drawn = panels[:_MOST_PANELS]
-    tick_names = [shortened(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
+    tick_names = [shorten(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
     rows = math.ceil(len(drawn) / _COLUMNS)
     letters = max(map(len, tick_names), default=0)
     figure = style.Chart(f"{title}: {len(names)} bushings", style.ROW * rows + 0.12 * letters)
@@ -117,7 +117,7 @@ def _draw_panel(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
         panel: quantity of the n bushings.
         names: names of the bushings, (n,).
     """
-    x, (low, high), bad = np.arange(1, len(names) + 1), panel.reach(), np.isin(range(len(names)), list(panel.missed))
+    x, (low, high), bad = np.arange(1, len(names) + 1), panel.y_limits(), np.isin(range(len(names)), list(panel.missed))
     values = np.clip(panel.values, low, high)
     if panel.intervals is not None and len(names) <= _MOST_INTERVALS:
         axes.vlines(x, *panel.intervals, color=np.where(bad, _OUT, _GOOD), lw=0.8, alpha=0.6, zorder=2)
@@ -137,7 +137,7 @@ def _draw_panel(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
     title, color = panel.title, style.INK
     if missed := [names[index] for index in panel.missed]:
         more = f" and {len(missed) - _MOST_NAMED} more" if len(missed) > _MOST_NAMED else ""
-        named = shortened(", ".join(missed[:_MOST_NAMED]), _MOST_LETTERS)
+        named = shorten(", ".join(missed[:_MOST_NAMED]), _MOST_LETTERS)
         title, color = f"{title}: {len(missed)} out\n{named}{more}", _OUT
     look = {"fontsize": style.SMALL, "color": color, "family": style.fonts(), "parse_math": False}
     axes.set_title(title, loc="left", pad=3, **look)

@@ -17,8 +17,8 @@ from bushfit.report.plots.measured import (
     SECTOR,
     Curve,
     SweepGroup,
+    average_at_x,
     loops_by_direction,
-    means,
     phase_after_turn,
     sector_means,
     sweep_groups,
@@ -171,7 +171,7 @@ def _model_line(group: SweepGroup, curve: Curve, header: str, result: Result) ->
         x and y in the units of the table, (m,) each.
     """
     if not group.shares_levels or result.model.depends_on_conditions:
-        x, values = means(curve.rows, group.x_header, f"model {header}")
+        x, values = average_at_x(curve.rows, group.x_header, f"model {header}")
         return x, values
     x = curve.rows[group.x_header].to_numpy()
     fine = np.geomspace(x.min(), x.max(), _FINE)

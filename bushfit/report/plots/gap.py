@@ -22,8 +22,8 @@ from bushfit.report.plots.measured import (
     SECTOR,
     Curve,
     SweepGroup,
+    average_at_x,
     loops_by_direction,
-    means,
     sector_means,
     sweep_groups,
 )
@@ -172,7 +172,7 @@ def draw_map(axes: Axes, group: SweepGroup, rows: Sequence[Curve], header: str, 
     logarithmic = x_values.size > 2 and np.std(ratios) / np.mean(ratios) < np.std(steps) / np.mean(steps)
     ends = []
     for y, row in enumerate(rows):
-        x, values = means(row.rows, group.x_header, header)
+        x, values = average_at_x(row.rows, group.x_header, header)
         blocks = np.array_split(np.arange(x.size), min(x.size, _MOST_COLUMNS))
         x, values = (np.array([column[block].mean() for block in blocks]) for column in (x, values))
         low, high = cell_edges(x, logarithmic=bool(logarithmic))

@@ -14,7 +14,7 @@ from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction
 from bushfit.reading.measurement import SAME_TEMPERATURE
 from bushfit.reading.preload import SAME_PRELOAD
-from bushfit.report.tables import displacement_header, response_headers, spread
+from bushfit.report.tables import displacement_header, response_headers, spread_indices
 from bushfit.units import format_range, number
 
 #: Quantity along the x axis of a sweep.
@@ -64,7 +64,7 @@ class SweepGroup(NamedTuple):
 
     def thinned(self) -> SweepGroup:
         """Copy of the group of sweeps with at most 24 of its curves, evenly from the first to the last."""
-        return self._replace(curves=[self.curves[index] for index in spread(len(self.curves), MOST_CURVES)])
+        return self._replace(curves=[self.curves[index] for index in spread_indices(len(self.curves), MOST_CURVES)])
 
 
 def header_of(place: Place, axis: Axis) -> str:
@@ -125,7 +125,7 @@ def rows_at_preload(table: pd.DataFrame, prediction: Prediction) -> pd.DataFrame
     return table[~((table[header] - value).abs() > SAME_PRELOAD * max(abs(value), table[header].abs().max()))]
 
 
-def means(rows: pd.DataFrame, x_header: str, *headers: str) -> tuple[Array, ...]:
+def average_at_x(rows: pd.DataFrame, x_header: str, *headers: str) -> tuple[Array, ...]:
     """Average columns of a table over all rows with the same x value.
 
     Args:
@@ -152,7 +152,7 @@ def loops_by_direction(table: pd.DataFrame, result: Result) -> Iterator[tuple[Pl
     """
     for name, of_place in table.rename(columns={"loop": "test"}).groupby("direction", sort=False):
         loops = [(str(test), loop) for test, loop in of_place.groupby("test", sort=False)]
-        yield result.place(str(name)), dict(loops[index] for index in spread(len(loops), MOST_LOOPS))
+        yield result.place(str(name)), dict(loops[index] for index in spread_indices(len(loops), MOST_LOOPS))
 
 
 def sector_means(loop: pd.DataFrame, place: Place, header: str) -> tuple[Array, Array]:

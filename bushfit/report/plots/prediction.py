@@ -16,7 +16,7 @@ from bushfit.reading.runs import nominal
 from bushfit.report.plots import style
 from bushfit.report.plots.fits import draw_curves, draw_points, points_note, points_to_draw, stiffness_scale
 from bushfit.report.plots.measured import Axis, header_of, rows_at_preload, sweep_groups
-from bushfit.report.tables import IF_RIGS, displacement_header, quantity_words, response_headers, spread
+from bushfit.report.tables import IF_RIGS, displacement_header, quantity_words, response_headers, spread_indices
 from bushfit.units import display_unit, format_range
 
 #: Number of points of a line of the model.
@@ -55,10 +55,10 @@ def prediction_figure(
     Returns:
         Figure with one or two rows of panels, and one more for each group of such sweeps.
     """
-    place, fine = prediction.direction, refined(result, prediction, temperature)
+    place, fine = prediction.direction, refine_prediction(result, prediction, temperature)
     rig = None
     if rig_effects(result) and not prediction.over:
-        rig = refined(result, prediction, temperature, rig=True)
+        rig = refine_prediction(result, prediction, temperature, rig=True)
     of_place = None if table is None else rows_at_preload(table[table["direction"] == str(place)], prediction)
     groups = [] if of_place is None or of_place.empty else sweep_groups(of_place, result)
     free = [group.thinned() for group in groups if group.palette == "loop" and np.isnan(group.curves[0].level)]
@@ -126,7 +126,7 @@ def static_figure(curves: Sequence[StaticCurve], title: str) -> style.Chart:
     )
 
 
-def refined(
+def refine_prediction(
     result: Result, prediction: Prediction, temperature: float | None = None, *, rig: bool = False
 ) -> Prediction:
     """Repeat a prediction on a finer grid of frequencies and amplitudes, for smooth lines.
@@ -178,7 +178,7 @@ def draw_prediction(
     points = points_near(table, fixed_header, scales[fixed] * levels)
     measured = np.array([len(rows) > 0 for rows in points])
     chosen = np.flatnonzero(measured) if measured.sum() > 1 else np.arange(levels.size)
-    chosen = chosen[spread(chosen.size, _MOST_LEVELS[axis])]
+    chosen = chosen[spread_indices(chosen.size, _MOST_LEVELS[axis])]
     to_table = place.display.stiffness.factor
     factor, labels = stiffness_scale(place, to_table * float(prediction.stiffness.value.max()))
     x, looks = scales[axis] * getattr(prediction, axis), style.styles(chosen.size, fixed)

@@ -9,7 +9,7 @@ from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.preload import Preload
 from bushfit.report.plots import style
 from bushfit.report.plots.fits import stiffness_scale
-from bushfit.report.tables import spread
+from bushfit.report.tables import spread_indices
 from bushfit.units import format_range
 
 #: Number of preloads of a line of the model.
@@ -35,7 +35,10 @@ def preload_figure(
     """
     place, preloads = predictions[0].direction, [prediction.preload for prediction in predictions if prediction.preload]
     frequencies, amplitudes = np.unique(predictions[0].frequency), np.unique(predictions[0].amplitude)
-    frequency, amplitudes = frequencies[frequencies.size // 2], amplitudes[spread(amplitudes.size, _MOST_LEVELS)]
+    frequency, amplitudes = (
+        frequencies[frequencies.size // 2],
+        amplitudes[spread_indices(amplitudes.size, _MOST_LEVELS)],
+    )
     ends = min(preloads).value, max(preloads).value
     loads = [Preload(value, preloads[0].unit) for value in np.linspace(*ends, _FINE).tolist()]
     fine = [predict(result, place, [frequency], amplitudes, temperature=temperature, preload=load) for load in loads]

@@ -26,7 +26,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from bushfit.effects.contract import Array
 from bushfit.errors import printable
 from bushfit.model.covariance import Z95
-from bushfit.report.tables import shortened, spread
+from bushfit.report.tables import shorten, spread_indices
 
 #: Width of a figure [cm]: the text of a page of A4.
 _WIDTH = 16.0
@@ -299,7 +299,7 @@ def legend(
         title: title of the legend.
         extra_lines: further lines by their labels.
     """
-    named = [(handles[index], labels[index]) for index in spread(len(handles), MOST_NAMED)]
+    named = [(handles[index], labels[index]) for index in spread_indices(len(handles), MOST_NAMED)]
     if omitted := len(handles) - len(named):
         named.append((Line2D([], [], ls=""), f"and {omitted} more"))
     named += [(line, text) for text, line in (extra_lines or {}).items()]
@@ -331,7 +331,7 @@ def name_levels(
     edges = np.arange(len(levels) + 1) - 0.5
     colors = ScalarMappable(BoundaryNorm(edges, len(levels)), ListedColormap([look.color for look in looks]))
     bar = axes.figure.colorbar(colors, cax=axes.inset_axes((1.04, 0.0, 0.05, 1.0)), drawedges=False)
-    ticks = spread(len(levels), MOST_NAMED)
+    ticks = spread_indices(len(levels), MOST_NAMED)
     bar.set_ticks(ticks.tolist(), labels=[levels[tick] for tick in ticks], **WORDS)
     bar.ax.tick_params(length=2, which="both")
     bar.minorticks_off()
@@ -341,7 +341,7 @@ def name_levels(
 
 def file_name(name: str, letters: int = 20) -> str:
     """Shorten a file name to `letters` characters for use in a figure, with dollar signs escaped for matplotlib."""
-    return shortened(name, letters).replace("$", r"\$")
+    return shorten(name, letters).replace("$", r"\$")
 
 
 def warnings_note(sentences: Sequence[str]) -> str:
