@@ -37,7 +37,7 @@ from bushfit.campaign.toml import parse_toml
 from bushfit.diagnosis import document
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
-from bushfit.reduction.arrays import scatter
+from bushfit.reduction.arrays import median_and_scatter
 from bushfit.report.batch_document import LimitResult
 from bushfit.units import number, parse_quantity
 from bushfit.validation import ParameterValue, Share, converter, table, text, validate_tables
@@ -215,7 +215,7 @@ def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[st
             continue
         sample = values.get(name, np.empty(0))
         sample = sample[np.isfinite(sample)]
-        median, deviation = scatter(sample) if sample.size else (0.0, 0.0)
+        median, deviation = median_and_scatter(sample) if sample.size else (0.0, 0.0)
         if sample.size < bounds.at_least:
             notes.append(f"{name}: {sample.size} parts, and at_least = {bounds.at_least}: sigma is not judged")
         elif deviation == 0.0:

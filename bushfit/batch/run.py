@@ -82,7 +82,7 @@ def run_batch(
         with store.batch_folder(output):
             for name in FILES:  # they belong to the results that are about to be replaced
                 (output / name).unlink(missing_ok=True)
-            notes = clear_earlier(plan)
+            notes = remove_unlisted_parts(plan)
             records, counts = [RowFile(status="failed")] * len(plan.rows), Counter[str]()
             lost = lambda reason: (RowFile(status="failed", error=reason), False)  # noqa: E731
             finished = run_rows(plan.rows, plan.task, lost, workers, warn)
@@ -102,7 +102,7 @@ def run_batch(
         raise unwritable(output, error) from error
 
 
-def clear_earlier(plan: BatchPlan) -> list[str]:
+def remove_unlisted_parts(plan: BatchPlan) -> list[str]:
     """Remove results of an earlier batch for parts that are not in this batch; a batch that resumes keeps them.
 
     Returns:
@@ -136,7 +136,7 @@ def batch_files(result: BatchResult) -> list[ResultFile]:
     plan, panels = result.plan, list[Panel]()
     for name, quantity in result.quantities.items() if plan.formats.pictures else ():
         allowed = result.allowed[0].get(name, ())
-        values, low, high, _ = result.figures.get(name, np.full((4, 1), np.nan))
+        values, low, high, _ = result.estimates.get(name, np.full((4, 1), np.nan))
         is_known = np.isfinite(values)
         if is_known.sum() < (1 if allowed else 3):
             continue

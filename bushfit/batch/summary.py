@@ -22,7 +22,7 @@ from bushfit.effects import is_parameter
 from bushfit.effects.contract import Array
 from bushfit.model.covariance import Z95
 from bushfit.prediction.caveats import BEYOND
-from bushfit.reduction.arrays import scatter
+from bushfit.reduction.arrays import median_and_scatter
 from bushfit.report.batch_document import BatchFile, PartTable, QuantityTable
 from bushfit.report.results import Formats
 from bushfit.report.tables import BETWEEN
@@ -32,7 +32,7 @@ from bushfit.validation import to_json_data
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Suffixes of the column headers of a quantity, and the row of `BatchResult.figures` in each column.
+#: Suffixes of the column headers of a quantity, and the row of `BatchResult.estimates` in each column.
 _PARAMETER_COLUMNS = {"": 0, ", std error": 3, ", low": 1, ", high": 2}
 _POINT_COLUMNS = {"": 0, ", low": 1, ", high": 2}
 #: Name of the measured curve among the compared quantities.
@@ -81,7 +81,7 @@ class BatchResult:
     notes: Sequence[str]
 
     @cached_property
-    def figures(self) -> dict[str, Array]:
+    def estimates(self) -> dict[str, Array]:
         """Value, low and high end of the 95 % interval, and standard error of each quantity of n parts [SI], (4, n).
 
         The keys are the names of the quantities; numbers that are not known are NaN.
@@ -102,12 +102,12 @@ class BatchResult:
     @cached_property
     def quantities(self) -> dict[str, PartQuantity]:
         """All quantities of the batch, with their display units, by name."""
-        return list_quantities(self.figures, self.plan.task.points)
+        return list_quantities(self.estimates, self.plan.task.points)
 
     @cached_property
     def allowed(self) -> tuple[dict[str, tuple[float, float]], list[str]]:
         """Lowest and highest allowed value of each quantity with limits [SI], and notes on limits not judged."""
-        values = {name: column[0] for name, column in self.figures.items()}
+        values = {name: column[0] for name, column in self.estimates.items()}
         return resolve_limits(self.plan.limits, values) if self.plan.limits else ({}, [])
 
     @cached_property
@@ -133,14 +133,14 @@ class BatchResult:
         return np.expm1((logarithms - np.nanmedian(logarithms, axis=1, keepdims=True)).mean(axis=0))
 
     @cached_property
-    def compared(self) -> dict[str, tuple[Array, Array]]:
+    def compared_values(self) -> dict[str, tuple[Array, Array]]:
         """Values and standard errors for the comparison of the parts, by name of the quantity, (n,) each.
 
         Measures of the fit are left out; parameters at a bound and values of poor fits are NaN.
         """
         compared = dict[str, tuple[Array, Array]]()
-        for name in (name for name in self.quantities if name in self.figures and name not in FIT_NAMES):
-            value, low, high, stderr = self.figures[name]
+        for name in (name for name in self.quantities if name in self.estimates and name not in FIT_NAMES):
+            value, low, high, stderr = self.estimates[name]
             is_unknown = self.is_poor | np.array([name in record.at_bound for record in self.records])
             errors = np.where(np.isfinite(stderr), stderr, (high - low) / (2.0 * Z95))
             compared[name] = np.where(is_unknown, np.nan, value), errors
@@ -150,14 +150,14 @@ class BatchResult:
     @cached_property
     def outliers(self) -> tuple[dict[str, Array], dict[str, Array]]:
         """Deviations of the parts from the others in standard deviations, and True for outliers; by quantity, (n,)."""
-        return find_outliers(self.compared)
+        return find_outliers(self.compared_values)
 
     @cached_property
     def document(self) -> BatchFile:
         """Content of `batch.json`, the JSON file of the whole batch."""
-        columns = {name: quantity.tabled for name, quantity in self.quantities.items() if name in self.figures}
+        columns = {name: quantity.tabled for name, quantity in self.quantities.items() if name in self.estimates}
         parts = [self.part_table(index, columns) for index in range(len(self.records))]
-        counts = {name: int(np.isfinite(values).sum()) for name, (values, _) in self.compared.items()}
+        counts = {name: int(np.isfinite(values).sum()) for name, (values, _) in self.compared_values.items()}
         count = max((counts[name] for name in counts if name != _CURVE), default=counts.get(_CURVE, 0))
         failed = [part.name for part in parts if part.error]
         missed = [part.name for part in parts if part.misses]
@@ -185,7 +185,7 @@ class BatchResult:
             differ=differ,
             headline=headline,
             warnings=self.warnings(parts),
-            detectable=smallest_deviation(count, len(self.compared)),
+            detectable=smallest_deviation(count, len(self.compared_values)),
             quantities={column.header: self.quantity_table(name, column) for name, column in columns.items()},
             curve_points=[*self.curves],
             parts=parts,
@@ -207,13 +207,13 @@ class BatchResult:
         Returns:
             Entry of the quantity in `batch.json`, in the unit of the column.
         """
-        values = self.figures[name][0] * column.factor
+        values = self.estimates[name][0] * column.factor
         is_known = np.isfinite(values)
         is_usable = is_known & ~self.is_poor if name not in FIT_NAMES else is_known
         known_values, detectable = values[is_usable if is_usable.any() else is_known], None
-        if name in self.compared:
-            is_compared = np.isfinite(self.compared[name][0])
-            limit = smallest_deviation(int(is_compared.sum()), len(self.compared))
+        if name in self.compared_values:
+            is_compared = np.isfinite(self.compared_values[name][0])
+            limit = smallest_deviation(int(is_compared.sum()), len(self.compared_values))
             usual = is_compared & ~np.any([*self.outliers[1].values()], axis=0)
             usual = usual if usual.sum() >= FEWEST - 1 else is_compared & ~self.outliers[1][name]
             detectable = limit and limit * float(values[usual].std(ddof=1))
@@ -221,7 +221,7 @@ class BatchResult:
         fixed = (-np.inf, np.inf)
         if self.plan.limits and name in self.allowed[0] and name not in FIT_NAMES:
             fixed = self.plan.limits.bounds[name].fixed
-        median, sigma = scatter(known_values)
+        median, sigma = median_and_scatter(known_values)
         cp, cpk = capability(known_values, *(end * column.factor for end in fixed))
         minimum, maximum = (end * column.factor if np.isfinite(end) else None for end in (low, high))
         return QuantityTable(known_values.size, median, sigma, detectable, minimum, maximum, cp, cpk)
@@ -245,7 +245,7 @@ class BatchResult:
         outlying = dict(sorted(outlying.items(), key=lambda item: (not is_parameter(item[0]), -abs(item[1]))))
         relative = {_CURVE: self.curve_deviation[index]}
         for name in outlying.keys() - {_CURVE}:
-            relative[name] = self.figures[name][0, index] / np.nanmedian(self.figures[name][0]) - 1.0
+            relative[name] = self.estimates[name][0, index] / np.nanmedian(self.estimates[name][0]) - 1.0
         labels = dict[str, str]()
         if any(row.settings.diagnoses for row in self.plan.rows):
             labels["verdict"] = record.verdict or ""
@@ -253,7 +253,7 @@ class BatchResult:
             labels["cannot be told from"] = ", ".join(record.alternatives)
         labels["on a bound"] = ", ".join(f"{name} ({end})" for name, end in record.at_bound.items())
         labels |= {"campaign name": record.campaign_name, "subgroup": row.subgroup or ""}
-        values = [self.figures[name][0, index] * column.factor for name, column in columns.items()]
+        values = [self.estimates[name][0, index] * column.factor for name, column in columns.items()]
         curve = [float(column[index]) for column in self.curves.values()]
         return PartTable(
             name=row.name,
@@ -331,7 +331,7 @@ class BatchResult:
         for name, quantity in self.quantities.items():
             endings = _PARAMETER_COLUMNS if is_parameter(name) else {"": 0} if name in FIT_NAMES else _POINT_COLUMNS
             for ending, line in endings.items():
-                figures = self.figures.get(name, unknown)[line]
+                figures = self.estimates.get(name, unknown)[line]
                 columns[quantity.tabled.header + ending] = figures * quantity.tabled.factor
         columns["on a bound"] = bounds
         columns["warnings"] = [BETWEEN.join(record.warnings) for record in records]

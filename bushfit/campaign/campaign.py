@@ -10,7 +10,7 @@ from typing import Any
 
 from bushfit.campaign.bodies import specimens_of
 from bushfit.campaign.copies import without_copied_repeats, without_copied_tests
-from bushfit.campaign.quantities import Compound, EffectsSettings, ReportSettings, embedded
+from bushfit.campaign.quantities import Compound, EffectsSettings, ReportSettings, embed_logo
 from bushfit.campaign.schema import CampaignFile, FitSettings, ParameterSetting, PredictSettings, RigSettings
 from bushfit.campaign.simulated import SimulateSettings
 from bushfit.campaign.toml import parse_toml
@@ -102,7 +102,7 @@ def load_campaign(path: str | Path) -> Campaign:
         _check_bodies(content)
         _check_places(content, specimens)
     with error_location(place="[report] logo"):
-        logo = embedded(path.parent / content.report.logo) if content.report.logo else None
+        logo = embed_logo(path.parent / content.report.logo) if content.report.logo else None
     loops, sweeps, records = (
         track(f"{kind} read", reader_keywords(path, tests, specimens), len(tests))
         for kind, tests in (("loops", content.loops), ("sweeps", content.sweeps), ("records", content.validation))

@@ -58,7 +58,7 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
         return parse_quantity(_S_TO_ALPHA.sub("", raw) if unit != file_unit and isinstance(raw, str) else raw, unit)
 
 
-def effect_values(raw: dict[str, Any]) -> dict[str, Any]:
+def convert_effects(raw: dict[str, Any]) -> dict[str, Any]:
     """Convert tables of parameter values by effect to SI; pydantic checks entries that are not tables."""
     return {
         effect: {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
@@ -190,7 +190,7 @@ class ReportSettings:
         return {key: value for key, value in vars(self).items() if value is not None and key != "logo"}
 
 
-def embedded(file: Path) -> str:
+def embed_logo(file: Path) -> str:
     """Encode a logo as a data URI.
 
     Args:

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, InstanceOf, WithJsonSchema
 
 from bushfit.campaign.quantities import (
-    effect_values,
+    convert_effects,
     parameter_value,
 )
 from bushfit.effects.contract import Array
@@ -211,7 +211,7 @@ class SimulateSettings:
         Mapping[str, ParameterValue],
         table(lambda raw: {name: parameter_value(name, name, value) for name, value in raw.items()}),
     ] = field(default_factory=dict)
-    effects: Annotated[Mapping[str, Mapping[str, ParameterValue]], table(effect_values)] = field(default_factory=dict)
+    effects: Annotated[Mapping[str, Mapping[str, ParameterValue]], table(convert_effects)] = field(default_factory=dict)
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     repeats: Repeats = 1
     noise: Share = 0.0

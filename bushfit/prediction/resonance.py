@@ -17,7 +17,7 @@ from bushfit.prediction.bands import alternative_models, car_models
 from bushfit.prediction.caveats import extrapolations, unfitted_warnings
 from bushfit.prediction.stiffness import tested_preload
 from bushfit.reading.preload import Preload
-from bushfit.reduction.resonance import response
+from bushfit.reduction.resonance import shaken_response
 from bushfit.units import number
 
 #: Strain at which the resonance of a mass is looked for first; chosen: small for any rubber.
@@ -105,7 +105,7 @@ def predict_resonance(
 
     def shaken(model: Model) -> PredictedResonance:
         stiffness_at = partial(model.stiffness, place, frequency, conditions=conditions)
-        amplitude, ratio = response(stiffness_at, mass, frequency, base)
+        amplitude, ratio = shaken_response(stiffness_at, mass, frequency, base)
         stiffness = stiffness_at(amplitude)
         return PredictedResonance(place, mass, base_acceleration, frequency, amplitude, ratio, stiffness)
 

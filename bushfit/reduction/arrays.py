@@ -16,7 +16,7 @@ MEDIAN_TO_SIGMA = 1.482602218505602
 CHUNK = 1 << 18
 
 
-def scatter(values: Floats) -> tuple[float, float]:
+def median_and_scatter(values: Floats) -> tuple[float, float]:
     """Median and robust standard deviation (from the median absolute deviation) of values, (n,)."""
     middle = float(np.median(values))
     return middle, MEDIAN_TO_SIGMA * float(np.median(np.abs(values - middle)))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bushfit.reading.measurement import Complex, Floats
-from bushfit.reduction.arrays import CHUNK, scatter
+from bushfit.reduction.arrays import CHUNK, median_and_scatter
 from bushfit.reduction.harmonics import basis
 from bushfit.reduction.turning_points import Integers, middle_crossings, motion_turns, noise_threshold, stroke_middles
 
@@ -203,8 +203,8 @@ def steady_pieces(edges: Floats, log_amplitude: Floats) -> list[slice]:
     # of white noise, squared weights of second differences sum up to 6, of first ones to 2
     jitter = spread = _LEAST_SCATTER
     if log_amplitude.size > 1:
-        jitter = max(jitter, scatter(np.diff(phase, 2))[1] / 6.0**0.5)
-        spread = max(spread, scatter(np.diff(log_amplitude))[1] / 2.0**0.5)
+        jitter = max(jitter, median_and_scatter(np.diff(phase, 2))[1] / 6.0**0.5)
+        spread = max(spread, median_and_scatter(np.diff(log_amplitude))[1] / 2.0**0.5)
     steady_parts, open_parts = [], [slice(0, log_amplitude.size)]
     while open_parts:
         part = open_parts.pop()

@@ -108,7 +108,7 @@ def transmissibility(stiffness: Complex, mass: float, frequency: Floats) -> Comp
     return stiffness / (stiffness - mass * (2.0 * np.pi * frequency) ** 2)
 
 
-def response(
+def shaken_response(
     stiffness: Callable[[Floats], Complex], mass: float, frequency: Floats, base_amplitude: Floats
 ) -> tuple[Floats, Complex]:
     """Compute the response of a mass on a mount whose stiffness depends on the amplitude X of its deformation.

@@ -27,7 +27,7 @@ from bushfit.geometry import Direction, Place
 from bushfit.model import rig
 from bushfit.model.model import Model
 from bushfit.progress import track
-from bushfit.reduction.resonance import response
+from bushfit.reduction.resonance import shaken_response
 
 #: The paper's loop: 1 mm at 0.1 Hz.
 PAPER_LOOPS = (SimulatedLoop(Direction.AXIAL, 1e-3, 0.1, cycles=3),)
@@ -258,9 +258,11 @@ def _clean_resonance(truth: Model, test: SimulatedResonance, steps_per_cycle: in
     def closed(amplitude: Array) -> Array:
         return mount.stiffness(test.direction, frequency, amplitude)
 
-    approximate, _ = response(closed, test.mass, frequency, base)
+    approximate, _ = shaken_response(closed, test.mass, frequency, base)
     stiffness = rig.dynamic_stiffness(mount, test.direction, frequency, approximate, steps_per_cycle=steps_per_cycle)
-    return response(near(mount, test.direction, frequency, approximate, stiffness), test.mass, frequency, base)[1]
+    return shaken_response(near(mount, test.direction, frequency, approximate, stiffness), test.mass, frequency, base)[
+        1
+    ]
 
 
 def near(

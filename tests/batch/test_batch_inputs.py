@@ -17,7 +17,7 @@ from bushfit.errors import BatchError, CampaignError, ModelError
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.result import Result
 from bushfit.reading.measurement import Sweep
-from bushfit.reduction.arrays import scatter
+from bushfit.reduction.arrays import median_and_scatter
 
 ROW = '[[bushings]]\ncampaign = "a.toml"\n'
 finite = st.floats(-1e3, 1e3)
@@ -107,7 +107,7 @@ def test_limits_of_every_kind_and_of_the_scatter_of_the_batch(tmp_path):
     assert allowed["stiffness torsion 10 Hz 1 deg"] == (-math.inf, 100.0)
     assert allowed["loss factor axial 25 Hz 0.1 mm"] == (-math.inf, 0.12)
     assert allowed["NRMSE"] == (-math.inf, 0.02)
-    middle, spread = scatter(values)
+    middle, spread = median_and_scatter(values)
     assert allowed["sigma_fmax"] == pytest.approx((middle - 3 * spread, middle + 3 * spread))
     assert allowed["sigma_fmax"][1] < 1.2e4, "one far out must not widen the limits"
     assert notes == []

@@ -16,7 +16,7 @@ from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.measurement import Source
 from bushfit.reading.resonance import ResonanceTest, read_resonance
 from bushfit.reading.table import Table
-from bushfit.reduction.resonance import MOST_POINTS, Resonance, reduce_resonance, response, transmissibility
+from bushfit.reduction.resonance import MOST_POINTS, Resonance, reduce_resonance, shaken_response, transmissibility
 
 #: [kg] and [m/s^2]: the paper's bushing then has its resonance near 165 Hz, at some 0.1 mm.
 MASS, BASE = 0.6, 20.0
@@ -28,7 +28,7 @@ def shaken(model: Model, rows: int, noise: Callable[[int], Array] | None = None)
     """A test of the paper's bushing from 60 to 500 Hz, simulated; `noise` of T is relative."""
     frequency = np.geomspace(60.0, 500.0, rows)
     base = BASE / (2.0 * np.pi * frequency) ** 2
-    _, ratio = response(lambda x: model.stiffness(Direction.AXIAL, frequency, x), MASS, frequency, base)
+    _, ratio = shaken_response(lambda x: model.stiffness(Direction.AXIAL, frequency, x), MASS, frequency, base)
     if noise:
         ratio = ratio * (1.0 + noise(rows) + 1j * noise(rows))
     return ResonanceTest("t", Direction.AXIAL, frequency, ratio, np.full(rows, BASE), Source(Path("t.csv"), ""))
@@ -49,7 +49,7 @@ def test_a_response_solves_its_equation(stiffness, loss, softer, half, base):
     def of_amplitude(x: Array) -> Array:
         return stiffness * (1.0 - softer * x / (x + half)) * (1.0 + 1j * loss)
 
-    amplitude, ratio = response(of_amplitude, 0.5, frequency, np.full(7, base))
+    amplitude, ratio = shaken_response(of_amplitude, 0.5, frequency, np.full(7, base))
     assert np.allclose(ratio, transmissibility(of_amplitude(amplitude), 0.5, frequency), rtol=1e-12)
     assert np.allclose(amplitude, np.abs(ratio - 1.0) * base, rtol=1e-9)
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from bushfit.effects.contract import Array
-from bushfit.reduction.arrays import scatter
+from bushfit.reduction.arrays import median_and_scatter
 from bushfit.report.plots import style
 from bushfit.report.tables import shorten
 from bushfit.units import number
@@ -60,7 +60,7 @@ class Panel:
             Lower and upper end, in the unit of the panel.
         """
         values = self.values[np.isfinite(self.values)]
-        middle, sigma = scatter(values)
+        middle, sigma = median_and_scatter(values)
         near = values[np.abs(values - middle) <= _FURTHEST * sigma] if sigma > 0.0 else values
         limits = [limit for limit in self.allowed if math.isfinite(limit)]
         widths = np.empty(0) if self.intervals is None else np.ptp(self.intervals, axis=0)
