@@ -138,7 +138,7 @@ def _show_fit(output: Output, folder: Path, fitted: FitOutput, model: Path | Non
             action = action if result.fitted else f"free a parameter in [fit] of {file}, and fit again"
     if fitted.files[0].name == "static":
         action = f"bushfit fit-dynamic {file} --static {written} fits m and alpha"
-    elif left_open := result.unknown_parameters:
+    elif left_open := result.covariance.describe_unknown(result.model.values):
         verdict, action = left_open, f"bushfit plan {file} --hours 1 chooses tests that determine them"
     output.print_headline(campaign.name, verdict, f"next: {action}")
     for title, step in fitted.steps:

@@ -54,7 +54,8 @@ class DiagnosisOutput:
     @property
     def headline(self) -> str:
         """Verdict of the diagnosis as a sentence, with the parameters whose 95 % half width is at least their value."""
-        return "; ".join(filter(None, (self.diagnosis.verdict, self.result.unknown_parameters)))
+        unknown = self.result.covariance.describe_unknown(self.result.model.values)
+        return "; ".join(filter(None, (self.diagnosis.verdict, unknown)))
 
     @property
     def result(self) -> Result:

@@ -224,7 +224,7 @@ def compound_shapes(loop: MeasuredLoop) -> Array:
     """Deviations of the force's shape from the model's laws, of a compound whose stiffness deviates by 100 %.
 
     Returns:
-        Changes of the whitened residuals by independent amounts of unit variance, (c, size).
+        Changes of the loop's whitened residuals by c independent deviations of one standard deviation, (c, size).
 
     Notes:
         An isotropic compound is symmetric, so a steady cycle has odd overtones only. The h-th falls as 1/h^2, because
@@ -308,7 +308,7 @@ def _process(
 def _restricted(
     evidence: Evidence, tests: Sequence[MeasuredTest], chosen: Sequence[MeasuredTest], columns: Array, share: Array
 ) -> tuple[Array, Array]:
-    """Set the columns and relative changes of a smooth process over `tests` to 0 outside of the `chosen` tests.
+    """Restrict a smooth relative change of the stiffness to some of the tests that it was built for.
 
     Args:
         evidence: fitted model and all tests.
@@ -318,7 +318,7 @@ def _restricted(
         share: complex relative changes of the stiffness by each pattern at the points of `tests`, (c, points).
 
     Returns:
-        Columns and relative changes, of the same shapes.
+        Both changes, set to 0 outside of the chosen tests, with unchanged shapes.
     """
     rows = np.zeros(columns.shape[-1], dtype=bool)
     for test in chosen:

@@ -227,12 +227,6 @@ class SearchState:
         total = float(np.logaddexp(self.linear.log_evidence, self.linear.log_evidence_with_compound))
         return self.log_prior + self.log_density + total
 
-    @cached_property
-    def likeliest_deviation(self) -> float:
-        """Likeliest size of the compound's deviation, relative to |K|; 0 if no deviation is more probable."""
-        linear = self.linear
-        return linear.deviation[1] if linear.log_evidence_with_compound > linear.log_evidence else 0.0
-
     def free_columns(self, deviation: float) -> Array | None:
         """Changes of the residuals by faulty parts of the tests and the compound, left free in refits of effects.
 
@@ -278,7 +272,7 @@ class SearchState:
 
     @cached_property
     def _likely_nodes(self) -> Array:
-        """Indices of the likely combinations of rig errors (nodes to average over), with or without a smooth curve."""
+        """Indices of the combinations of rig errors that are likely, alone or together with a smooth curve."""
         smooth = [e.group for e in self.tests.explanations if e.group and e.kind == "unnamed"]
         curves = replace(self.linear, groups=smooth, compound=None)
         return np.union1d(self.linear.likely(_NEAR), curves.likely(_NEAR))
@@ -288,7 +282,7 @@ class SearchState:
 
         Args:
             explanation: the added explanation.
-            evidence: evidence for the columns of the explanation.
+            evidence: evidence of the tests for the explanation.
             log_odds: natural log of the explanation's prior odds.
 
         Returns:

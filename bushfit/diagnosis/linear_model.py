@@ -77,10 +77,13 @@ class LinearModel:
 
     @cached_property
     def _blocks(self) -> list[tuple[Array, Array]]:
-        """Blocks of rows in the stacked matrix of products that share one amount size, sorted by block width.
+        """Blocks of columns that act together, collected by their number of columns (width) for array operations.
+
+        The columns of a group are one block if they act together, else one block each.
 
         Returns:
-            For each width: index of the group of each block, (blocks,), and the row numbers, (blocks, width).
+            For each width, the index of each block's group, (blocks,), and the indices of its columns among residual,
+            Jacobian and all columns, (blocks, width).
         """
         first = 1 + len(self.jacobian) + (len(self.compound.columns) if self.compound else 0)
         ends = first + np.cumsum([0, *(len(group.columns) for group in self.groups)])
@@ -93,7 +96,7 @@ class LinearModel:
 
     @cached_property
     def _at_nodes(self) -> "_AtNodes":
-        """Evidence without a further explanation, and inner products of all groups of columns, at each node.
+        """Evidence without a further explanation, and inner products of all columns, for each node (error sizes).
 
         Nodes are computed in parts to limit memory.
         """
@@ -224,7 +227,7 @@ class LinearModel:
         return GroupEvidence(total - float(np.log(log_evidence[0].size)), size, likeliest, with_compound)
 
     def group_evidence_of(self, groups: Sequence[Group]) -> list[GroupEvidence]:
-        """Compute the evidence of the tests for further groups of columns, in parts to limit memory.
+        """Compute the evidence of the tests for further explanations (groups), in parts to limit memory.
 
         Returns:
             One evidence per group, in the same order.

@@ -191,7 +191,7 @@ class Term:
         )
 
     def unit(self, model: Model) -> Array:
-        """Stiffness that one unit of the term adds at each of the p operating points, (p,) [N/m or N m/rad]."""
+        """Stiffness that one unit of the term's measure adds at each of the p operating points [N/m or N m/rad]."""
         if self.measure == "gain":
             return self.stiffness(model)
         per_unit = model.stiffness_per_modulus if self.measure == "modulus" else lambda _: 1.0

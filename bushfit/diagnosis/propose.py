@@ -92,7 +92,7 @@ def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str
 
 
 def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
-    """Score columns by the decrease of chi-square that each would make together with the model's parameters.
+    """Score possible changes of the residuals by the decrease of chi-square if each is fitted with the parameters.
 
     Args:
         evidence: the fitted model and the tests.

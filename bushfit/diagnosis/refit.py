@@ -85,7 +85,7 @@ def refitted(
 
 
 def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:
-    """Limit the shape parameters of effects to the range that the tests can show.
+    """Limits of the shape parameters of effects to the range that the tests can show.
 
     For example, a stop that is always in contact is a spring, and a resonance far above all frequencies is a mass.
 
@@ -109,7 +109,7 @@ def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:
 def refit_with_free_columns(
     evidence: Evidence, bare: Evidence, columns: Array, start: Mapping[str, float], bounds: Bounds
 ) -> Evidence:
-    """Fit a model while the deviations of a faulty part of the tests are free, so that they do not distort it.
+    """Refit a model together with free deviations of a faulty part of the tests, which else would distort the model.
 
     Args:
         evidence: the fitted model and the tests.

@@ -76,9 +76,9 @@ class RigErrors:
 
     @cached_property
     def combinations(self) -> tuple[Array, Array]:
-        """Distinct combinations of the sizes of the rig's errors among the nodes of the numerical integration.
+        """Distinct combinations of sizes of the rig's errors, so that each is factorised only once.
 
-        Several nodes may share a combination and differ in the size of the compound's deviation alone.
+        Nodes that differ in the size of the compound's deviation alone share a combination.
 
         Returns:
             Scatter and sizes of the errors of runs, levels, drift and loops, (combinations, 1 + kinds); and the index

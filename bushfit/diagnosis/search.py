@@ -161,7 +161,7 @@ class Search:
         yield from self._with_faulty_parts(state, depth)
 
     def _promising(self, state: SearchState, by_evidence: int, by_score: int) -> list[str]:
-        """Names of the effects to refit next to a state.
+        """Names of the effects that are most promising as additions to a state of the search, to refit them.
 
         Args:
             state: state that the effects are added to.
@@ -198,7 +198,9 @@ class Search:
         proposed = [proposal for proposal in state.proposals if proposal.name in names]
         start = request.start if not state.effects and state.evidence.reduced_chi_square > _BENT else {}
         grown: dict[str, SearchState] = {}
-        for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
+        linear = state.linear
+        likeliest = linear.deviation[1] if linear.log_evidence_with_compound > linear.log_evidence else 0.0
+        for deviation in dict.fromkeys((likeliest, 0.0)):
             columns = state.free_columns(deviation)
             fits = refitted(state.evidence, proposed, start, request.fixed, request.bounds, columns)
             for name, evidence in fits.items():

@@ -51,7 +51,7 @@ class Composition:
 
     @property
     def may_mislead(self) -> bool:
-        """True if a fault at one amplitude level, repeat or frequency may bias the effects that are reported beside it.
+        """True if a fault at one amplitude level, repeat or frequency may bias the effects that are reported with it.
 
         A faulty loop is a separate test, and points that were left out have no weight, so they distort no effect.
         """

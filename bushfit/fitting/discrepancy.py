@@ -110,7 +110,10 @@ class FittedTests:
         return blocks
 
     def project(self, rows: Array) -> Array:
-        """Reduce whitened residuals of all tests, (..., n), to the d combinations that the stiffness can change."""
+        """Reduce whitened residuals of all tests, (..., n), to the d combinations that depend on the model's stiffness.
+
+        These are all residuals of a sweep, and two combinations of the residuals of a loop.
+        """
         parts = [
             rows[..., block] if directions is None else rows[..., block] @ directions
             for _, block, directions, _ in self._blocks

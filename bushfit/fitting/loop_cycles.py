@@ -308,7 +308,7 @@ def waveform(coefficients: Array) -> str:
 
 
 def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
-    """Note on a loop whose time was made from its motion and contradicts its rows; else None.
+    """Note on a loop whose generated time contradicts the even sampling of its rows; None without contradiction.
 
     Returns:
         The sentence, or None.

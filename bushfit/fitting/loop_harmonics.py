@@ -60,11 +60,6 @@ class LoopHarmonics(NamedTuple):
     force_noise: float
     outliers: Mapping[str, OutlierRows]
 
-    @property
-    def force_mean(self) -> float:
-        """Mean force of the loop [N or N m]."""
-        return float(self.force[0].real)
-
 
 def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics:
     """Determine harmonics of displacement and force, the noise of the force, and outliers of both.
@@ -108,7 +103,7 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
 
 
 def _cleared(coefficients: Array, noise: float, phase: Array, displacement: Array, inliers: Array) -> Array:
-    """Keep the harmonics of a motion that exceed its noise, or those of a triangle if the rows agree with one.
+    """Remove noise from the harmonics of a motion: keep those above the noise, or those of an ideal triangle wave.
 
     Args:
         coefficients: complex harmonics of the displacement, mean first [m or rad].
@@ -267,7 +262,7 @@ def phase_bins(
     edges = np.append(np.arange(int(cycles * GRID) + 1) / (frequency * GRID), np.inf)
 
     def sums(bins: slice) -> Array:
-        """Sum the rows in each bin of a range that is not empty.
+        """Sum the rows in each of a range of bins; empty bins are left out.
 
         Returns:
             Index of the bin, number of rows, sum of the phase within the bin, and sum of the force, (4, k).

@@ -229,7 +229,7 @@ def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> PreparedLoop:
         mean, _, cosine, _, sine = least_squares(basis(prepared.phase, 2), prepared.force, prepared.weight)
         preload = float(mean) if abs(mean) - np.hypot(cosine, sine) > _PRELOADED * half_force else None
         unknown = prepared.has_predecessor or abs(found.motion[0]) > 0.01 * half_motion
-        prepared = replace(prepared, datum=found.force_mean if unknown else preload)
+        prepared = replace(prepared, datum=float(found.force[0].real) if unknown else preload)
     return replace(prepared, notes=(*prepared.notes, *_preload(prepared)))
 
 
@@ -333,7 +333,7 @@ def _starts_at_rest(
         return False, False
     near, scatter, reach = _AT_REST * half_force, 3.0 * noise, _AT_REST * half_motion
     unmoved, unloaded = abs(loop.displacement[0]) <= reach, abs(loop.force[0]) <= near + scatter
-    off_mean = abs(loop.displacement[0] - harmonics.motion[0].real), abs(loop.force[0] - harmonics.force_mean)
+    off_mean = abs(loop.displacement[0] - harmonics.motion[0].real), abs(loop.force[0] - harmonics.force[0].real)
     # the virgin curve moves the mean by up to 0.3 of the change
     in_middle = off_mean[0] <= reach and off_mean[1] <= max(near, 0.5 * change) + scatter
     is_first = loop.part is None or loop.part.first_row == 0

@@ -47,7 +47,7 @@ class SharedError:
 
     @cached_property
     def weight(self) -> Array:
-        """Sum over each group of the squared changes of its deviations [noise] by a shared error of 1, (g,)."""
+        """Squared norm of the change of each group's deviations, in units of noise, by a shared error of 1, (g,)."""
         return np.maximum(np.add.reduceat(self.unit**2, self.starts), np.finfo(float).tiny)
 
     @cached_property
@@ -56,7 +56,7 @@ class SharedError:
         return 1.0 - 1.0 / np.sqrt(1.0 + self.variance * self.weight)
 
     def components(self, rows: Array) -> Array:
-        """Component of deviations along the shared error: per group, sum of the deviations times their change by it.
+        """Project deviations on the shared error: for each group, the sum of the deviations times their unit change.
 
         Args:
             rows: deviations in units of noise, (..., m).

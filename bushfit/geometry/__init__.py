@@ -304,7 +304,7 @@ def get_place(name: str, specimens: Iterable[Specimen]) -> Place:
 
 
 def get_places(name: str, specimens: Sequence[Specimen]) -> list[Place]:
-    """Return the directions and specimens that a name stands for: of several bushings, all of a bushing or direction.
+    """Return the directions and specimens with a name; the name of a bushing or direction may stand for several.
 
     Raises:
         ModelError: no direction, specimen or bushing has this name.
@@ -317,7 +317,7 @@ def get_places(name: str, specimens: Sequence[Specimen]) -> list[Place]:
 
 
 def default_places(bushing: Bushing | None, specimens: Sequence[Specimen]) -> list[Place]:
-    """List the axial and radial directions of all bushings, and all coupons: what a prediction contains by default."""
+    """List what is predicted without a request: the axial and radial directions of all bushings, and all coupons."""
     directions = [Direction.AXIAL, Direction.RADIAL] if bushing or not specimens else []
     return [*directions, *(place for place in specimens if place.axis is not Direction.TORSION)]
 

@@ -336,11 +336,6 @@ class Result:
         return [*dict.fromkeys(specimen.bushing for specimen in self.specimens if specimen.bushing)]
 
     @property
-    def unknown_parameters(self) -> str:
-        """Sentence that names the parameters with a 95 % half width of at least their value; "" if there are none."""
-        return self.covariance.describe_unknown(self.model.values)
-
-    @property
     def undecided(self) -> list[str]:
         """List with one warning if the tests do not rule out other models; otherwise empty."""
         if not self.alternatives:

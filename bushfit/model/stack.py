@@ -40,7 +40,7 @@ def layered_stiffness(
     }
 
     def below(count: int) -> StiffnessBelow:
-        """Build the steady response of the rubber and the innermost groups of layers.
+        """Build the functions for the steady response of the rubber and its `count` innermost groups of layers.
 
         Args:
             count: number of groups of layers, from the rubber outward.

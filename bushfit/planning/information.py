@@ -51,9 +51,10 @@ class Information(NamedTuple):
         return self.products[..., : self.products.shape[-2]]
 
     def noncentralities(self) -> Array:
-        """Expected chi-square of the fitted model if an effect it lacks, or a rival model, is true, (choices, e).
+        """Chi-square expected in excess of noise if an effect that the model lacks, or a rival model, is true.
 
-        There is one row for each choice of tests; the parameters are refitted, and noise alone is subtracted.
+        Array of a row for each choice of tests and a column for each effect or rival, (choices, e). The parameters of
+        the model are refitted.
         """
         cross = self.products[..., self.products.shape[-2] :]
         fitted = np.linalg.solve(self.parameters, cross)
@@ -80,7 +81,7 @@ class ModelInformation:
     bounded: int = 0
 
     def of_runs(self, counts: Array) -> Information:
-        """Information of each test separately, (tests, ...), with `counts` runs of each, (tests,); without the prior.
+        """Fisher information of each test separately, (tests, ...), made `counts` times, (tests,); without the prior.
 
         The gain and phase errors that all runs of a test share are eliminated.
         """
@@ -88,14 +89,17 @@ class ModelInformation:
         return Information(products, self.squares * counts[:, None] - decrease)
 
     def total(self, counts: Array) -> Information:
-        """Information of all tests together and of the prior, (1, ...), with `counts` runs of each test, (tests,)."""
+        """Fisher information of the prior and all tests together, (1, ...), each made `counts` times, (tests,)."""
         tests = self.of_runs(counts)
         products, k = tests.products.sum(axis=0, keepdims=True), len(self.prior)
         products[..., :k] += self.prior
         return Information(products, tests.squares.sum(axis=0, keepdims=True))
 
     def with_one_more(self, counts: Array) -> Information:
-        """Total information with one run of each test in turn added to `counts`, (tests, ...)."""
+        """Fisher information of the prior and all tests after one more run of each test in turn, (tests, ...).
+
+        Before this run, each test is made `counts` times, (tests,).
+        """
         total, now, more = self.total(counts), self.of_runs(counts), self.of_runs(counts + 1)
         return Information(
             *(all_tests + (after - before) for all_tests, before, after in zip(total, now, more, strict=True))

@@ -111,18 +111,19 @@ class TargetSensitivity:
         return cls(target, rows, wanted.model_error[1] / loss, wanted.undecided[1] / loss, wanted.points)
 
     def variances(self, error_covariance: Array) -> Array:
-        """Relative variance of the quantity at each point, (n,), from the covariance of the parameters, (k, k)."""
+        """Relative variance of the target's quantity at each point, (n,), from the parameters' covariance, (k, k)."""
         return np.asarray(np.einsum("nk,kl,nl->n", self.rows, error_covariance, self.rows))
 
     def half_widths(self, error_covariance: Array) -> Array:
-        """Relative half width of the 95 % interval at each point, (n,), from the covariance of the parameters, (k, k).
+        """Relative half width of the target's 95 % interval at each point, (n,).
 
-        The interval includes the model error and the undecided explanations.
+        The interval follows from the covariance of the parameters, (k, k), the error of the model, and explanations
+        of earlier tests that are undecided.
         """
         return self.undecided + Z95 * np.sqrt(self.variances(error_covariance) + self.model_error**2)
 
     def half_width(self, error_covariance: Array) -> float:
-        """Largest relative half width of the 95 % interval, from the covariance of the parameters, (k, k)."""
+        """Relative half width of the target's widest 95 % interval, from the parameters' covariance, (k, k)."""
         return float(self.half_widths(error_covariance).max())
 
     def met(self, error_covariance: Array) -> bool:

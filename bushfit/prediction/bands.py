@@ -49,9 +49,9 @@ class Band:
 
 
 def car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
-    """List the models that may describe the bushing in the car, without instrument effects.
+    """List the models that may describe the bushing away from the test rig, as in a car.
 
-    Each model has a different subset of the unresolved effects.
+    Effects of the rig are left out; each model has a different subset of the unresolved effects.
 
     Args:
         model: fitted model.
@@ -66,11 +66,11 @@ def car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
 
 
 def alternative_models(result: Result, *, rig: bool) -> Iterator[Model]:
-    """Yield each model that the tests do not rule out, with the effects of the rig or as in the car (`car_models`).
+    """Yield each other model that the tests do not rule out, with or without the effects of the rig.
 
     Args:
         result: fitted result.
-        rig: True to keep the effects of the rig, as in the tests.
+        rig: True to keep the effects of the rig, as in the tests; False for the models of `car_models`.
     """
     resolved = {*result.model.effects} - {*result.unresolved}
     for model in (alternative.model for alternative in result.alternatives):

@@ -72,7 +72,7 @@ def grid_settings(requested: PredictSettings, campaign: Campaign | None) -> Pred
 
 
 def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ()) -> tuple[Array, Array]:
-    """Choose the default grid of a prediction.
+    """Choose the frequencies and amplitudes of a prediction for which the user requests none.
 
     The first available of: the operating points of the sweeps (one value per level, and at most ten values over a range
     without levels); the points of the tests in the model file; the paper's grid within the measured range; a few values
@@ -154,7 +154,7 @@ def _limit(values: Array, ranges: Sequence[Any], count: int) -> Array:
 
 
 def _inside(values: Array, ranges: Sequence[Any]) -> Array:
-    """Select the values, (n,), within all ranges (low, high), with a margin for set points that the rig missed."""
+    """Mask of the values, (n,), within all ranges (low, high), with a margin for inaccurate set points of the rig."""
     return values[np.all([(values >= a * (1 - MARGIN)) & (values <= b * (1 + MARGIN)) for a, b in ranges], axis=0)]
 
 
@@ -192,7 +192,7 @@ def _even(low: float, high: float, count: int) -> Array:
 
 
 def _distinct(values: Array) -> Array:
-    """Sort values, (n,), and merge those within 1 % of each other, which are one set point that the rig missed."""
+    """Sort values, (n,), and merge those within 1 % of each other: the rig reaches a set point only approximately."""
     distinct: list[float] = []
     for value in np.unique(values):
         if not distinct or value > distinct[-1] * (1.0 + MARGIN):

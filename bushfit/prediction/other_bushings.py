@@ -41,7 +41,7 @@ class OtherBushings:
 def predict_each_bushing(
     data: PreparedCampaign, effects: Sequence[str], directions: Sequence[str] | None = None
 ) -> list[OtherBushings]:
-    """Fit all bushings but one, from the start values of a fit to them, and predict that one; each in turn.
+    """Cross-validate several bushings: predict the tests of each by a model that is fitted to the others.
 
     If the factors of bushings are free, the band includes their spread.
 

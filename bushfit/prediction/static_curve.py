@@ -102,7 +102,7 @@ def static_curve(
     temperature: float | None = None,
     preload: Preload | None = None,
 ) -> StaticCurve:
-    """Compute the static curve of a fitted model, as the bushing has it in the car.
+    """Compute the static curve of a fitted model without the effects of the test rig.
 
     Args:
         result: fitted result.
