@@ -152,7 +152,7 @@ def test_rows_of_other_cycles_are_whitened_anew():
     np.testing.assert_allclose(white.T @ white, np.eye(sum(lengths)), atol=1e-12)
     weight = np.ones(sum(lengths))
     weight[[3, 11]] = 0.0
-    assert np.flatnonzero(~noise.counting(weight)).tolist() == [3, 4, 11]
+    assert np.flatnonzero(~noise.usable_rows(weight)).tolist() == [3, 4, 11]
 
 
 @pytest.mark.parametrize(
