@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bushfit.geometry import Place
+from bushfit.reading.headers import ZERO_TO_PEAK
 from bushfit.reading.names import Labels, StatedQuantity, labels_in_names
 from bushfit.reading.sweeps import ONE_TEST
 from bushfit.reading.table import Table
@@ -86,12 +87,19 @@ def keys_from_labels(
             label, found = _held_quantity(table, place, key, sources)
             counted = test_options.get("amplitude") or found.convention
             keys[key] = words = found.text
-            if role == "amplitude" and counted == "peak-to-peak":
+            if role == "amplitude" and counted in ("peak-to-peak", "rms"):
                 number, _, unit = found.text.partition(" ")
-                keys[key] = f"{float(number) / 2.0:g} {unit}"
-                words = f"{keys[key]}, half of {found.text}"
+                keys[key] = f"{float(number) * ZERO_TO_PEAK[counted]:.6g} {unit}"
+                share = "half of" if counted == "peak-to-peak" else "the square root of two times the rms of"
+                words = f"{keys[key]}, {share} {found.text}"
             facts.setdefault(label, []).append(f"{role} {words}")
             is_counted &= role != "amplitude" or counted is not None
+    amplitude = table.roles.get("amplitude")
+    for label, labels in sources.items() if is_sweep and amplitude and "amplitude" not in test_options else ():
+        if amplitude and labels.convention and not amplitude.convention:
+            keys["amplitude"] = labels.convention
+            facts.setdefault(label, []).append(f"amplitudes {labels.convention}")
+            break
     for key, word in _CONDITIONS.items():
         label, text = next(
             ((label, text) for label, labels in sources.items() if (text := getattr(labels, key))), ("", "")
@@ -156,8 +164,8 @@ def wrong_labels(
     )
     for name, expected, values, to_display, written in quantities:
         labelled = labels.of_dimension(expected)
-        counted = [1.0 + (label.convention == "peak-to-peak") for label in labelled]
-        sizes = [parse_quantity(label.text, expected) / count for label, count in zip(labelled, counted, strict=True)]
+        factors = [ZERO_TO_PEAK[label.convention or "zero-to-peak"] for label in labelled]
+        sizes = [factor * parse_quantity(label.text, expected) for label, factor in zip(labelled, factors, strict=True)]
         ratios = np.divide.outer(np.array(sizes), np.asarray(values))
         if not labelled or np.any(np.abs(ratios - 1.0) <= _AGREEMENT):
             continue

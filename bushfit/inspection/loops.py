@@ -41,6 +41,9 @@ _REAL_CHANGE = 6.0
 _SMALLEST_CHANGE = 2e-3
 #: Minimum offset of a loop's zero, relative to half the range; chosen: less does not matter; preloads are more.
 _SMALLEST_OFFSET = 0.02
+#: Ratio of a mean displacement to that which the stiffness of the loop gives for its mean force, above which it counts
+#: from another zero, as the position of an actuator; chosen: rubber creeps and softens by less.
+_MOST_SOFTENING = 10.0
 #: Maximum number of cycles that are compared at each end of a loop; chosen: enough to show settling.
 _MOST_END_CYCLES = 6
 #: Harmonic of the motion above which a spectral line is a ripple, unless a triangle; chosen: waveforms have fewer.
@@ -200,7 +203,9 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     }
     sizes = (np.array([size]) for size in (prepared.frequency, amplitude, half_force / amplitude))
     if means := recorded_means(prepared):
-        facts["preload"] = means[0].text(loop.direction)
+        at_mean_force = amplitude * abs(mean_force) / half_force
+        is_position = len(means) > 1 and abs(mean_motion) > _MOST_SOFTENING * at_mean_force
+        facts["preload"] = means[-1 if is_position else 0].text(loop.direction)
     odd = [
         *wrong_labels(labels, loop.direction, [amplitude, half_motion], [prepared.frequency]),
         *implausible_sizes(loop.direction, *sizes),

@@ -8,7 +8,7 @@ from itertools import islice, pairwise
 from bushfit import units
 from bushfit.errors import UnitError
 from bushfit.reading.cells import Cells, FaultyRow
-from bushfit.reading.headers import AmplitudeConvention, Column, Vocabulary, parse_unit, plain, split_unit
+from bushfit.reading.headers import COUNTED, Column, Vocabulary, parse_unit, plain, split_unit
 from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row, is_units_row, split
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names, named_direction
 from bushfit.reading.numerals import is_like_number
@@ -26,10 +26,6 @@ _COMPLEX = re.compile(
 )
 #: First rows that are searched for complex numbers; chosen: room for remarks.
 _FIRST = 8
-#: Text of each amplitude convention in the header of an added column.
-COUNTED: dict[AmplitudeConvention | None, str] = {
-    "peak-to-peak": " p-p", "zero-to-peak": " 0-p", "rms": " rms", None: ""
-}  # fmt: skip
 
 #: Row of a block: line number, cells, and index of the block from 0.
 _BlockRow = tuple[int, Sequence[str | float], int]

@@ -37,6 +37,8 @@ _ALIKE = 0.4
 _FIRST = 50
 #: Relative difference up to which two columns for one amplitude agree; chosen: some are rounded to few digits.
 _AGREEMENT = 0.02
+#: Smallest correlation of two channels that record the same motion; chosen: a force lags too far behind.
+_ALONG = 0.999
 #: Relative difference up to which force over displacement agrees with a stiffness; chosen: other channels differ more.
 _STIFFNESS_AGREEMENT = 0.1
 #: Roles that are ignored, without an error, if two different columns have them: other columns can replace them.
@@ -105,7 +107,9 @@ def classify(
             roles[role] = _preferred(cells, roles[role], column)
     if "amplitude_reached" in roles and "amplitude" not in roles:
         roles["amplitude"] = replace(roles.pop("amplitude_reached"), role="amplitude")
-    notes = _add_by_unit(cells, roles, names, motion)
+    notes, unused = _add_by_unit(cells, roles, names, motion)
+    if {"displacement", "force"} <= {*roles} and "displacement" not in columns:
+        _refuse_second_motion(cells, roles["displacement"], unused)
     if {"force_amplitude", "stiffness"} & set(roles) and "amplitude" not in roles:
         notes += _add_motion_as_amplitude(cells, roles, stated_units)
     time = roles.get("time")
@@ -247,7 +251,7 @@ def _preferred(cells: Cells, first: Column, second: Column) -> Column:
 
 def _add_by_unit(
     cells: Cells, roles: dict[str, Column], names: Mapping[str, Sequence[str]], motion: Motion
-) -> list[str]:
+) -> tuple[list[str], list[Column]]:
     """Recognise columns by their unit and words in their name, and add them to the known columns.
 
     A column is added if no other column has such a unit, apart from set points and means. Frequency, amplitude and
@@ -260,10 +264,10 @@ def _add_by_unit(
         motion: kind of motion: translation, rotation or strain.
 
     Returns:
-        A sentence on each added column.
+        A sentence on each added column, and the columns that are still unknown.
     """
     if len(roles) + len(cells.headers) < 3:
-        return []
+        return [], []
     usual = Vocabulary.shared(of_motion({**LOOP_COLUMNS, **SWEEP_COLUMNS}, motion), {})
     free: dict[Column, set[str]] = {}
     for index, header in enumerate(cells.headers):
@@ -301,7 +305,35 @@ def _add_by_unit(
     if "time" in names and "time" not in roles:
         stamps = [column for column in free if clock(str(cells.first_row[column.index])) is not None]
         roles |= {"time": replace(stamps[0], role="time")} if len(stamps) == 1 else {}
-    return notes
+    return notes, list(free)
+
+
+def _refuse_second_motion(cells: Cells, known: Column, unused: Sequence[Column]) -> None:
+    """Refuse a displacement beside another channel of the same motion and of another size, such as an extensometer.
+
+    Args:
+        cells: header and rows of the table.
+        known: column of the displacement by its name.
+        unused: columns without a known name.
+
+    Raises:
+        MeasurementError: another channel moves along with the displacement.
+    """
+    for column in unused:
+        if not (known.unit and column.unit and units.is_compatible(column.unit, known.unit)):
+            continue
+        pairs = [[plainest_value(str(row[one.index])) for one in (known, column)] for row in cells.first_rows]
+        factors = [units.si_factor(unit, known.unit) for unit in (known.unit, column.unit)]
+        numbers = np.array(pairs)[~np.isnan(pairs).any(axis=1)] * factors
+        spans = np.ptp(numbers, axis=0) if len(numbers) > 2 else np.zeros(2)
+        if spans.min() > 0.0 and np.corrcoef(numbers.T)[0, 1] > _ALONG and abs(spans[1] / spans[0] - 1.0) > _AGREEMENT:
+            choices = " or ".join(f'columns = {{ displacement = "{one.header}" }}' for one in (known, column))
+            raise cells.header_error(
+                "two columns record this motion, and they differ",
+                found=f'"{known.header}" and "{column.header}", {spans[1] / spans[0]:.3g} times as large',
+                expected="one displacement: that of the part, without the frame of the machine",
+                hint=f"choose it in the campaign: {choices}",
+            )
 
 
 def _add_motion_as_amplitude(cells: Cells, roles: dict[str, Column], stated_units: Mapping[str, str]) -> list[str]:

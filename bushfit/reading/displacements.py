@@ -112,7 +112,7 @@ def read_displacements(
             )
         roles = dict.fromkeys(named_places, "displacement")
     wanted = {role: table.column(role, place) for place, role in roles.items()}
-    rate = table.sampling_rate
+    rate = None if "time" in table.roles else table.sampling_rate
     wanted |= {} if rate else {"time": time_column(table, next(iter(roles)))}
     values, notes = table.read(wanted, fewest_rows=FEWEST_ROWS)
     if rate:

@@ -44,6 +44,10 @@ OF_MOTION = (*_STRAINING, "amplitude_reached", "force_amplitude", "damping_coeff
 AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak", "rms"]
 #: Factor that converts an amplitude to zero-to-peak, by its convention.
 ZERO_TO_PEAK: dict[AmplitudeConvention, float] = {"zero-to-peak": 1.0, "peak-to-peak": 0.5, "rms": 2.0**0.5}
+#: Text of each amplitude convention in the header of an added column.
+COUNTED: dict[AmplitudeConvention | None, str] = {
+    "peak-to-peak": " p-p", "zero-to-peak": " 0-p", "rms": " rms", None: ""
+}  # fmt: skip
 #: Pairs of columns that determine a complex stiffness and must agree, in order of preference.
 AGREEING_PAIRS = (
     *(("stiffness", "loss_factor"), ("stiffness", "phase"), ("storage_stiffness", "loss_stiffness")),
@@ -108,7 +112,7 @@ _UNITS_OF = {
     **{(name, "force_amplitude"): ("N", "N*m", "Pa") for name in ("force", "load", "kraft", "torque", "moment")},
 }
 #: Names of an amplitude that imply peak-to-peak.
-_PEAK_TO_PEAK_NAMES = frozenset(WORDS["counting"]["peak_to_peak"])
+PEAK_TO_PEAK_NAMES = frozenset(WORDS["counting"]["peak_to_peak"])
 #: One peak, in texts without accents; CJK characters need no blank before and after a word.
 _PEAK = r"(?:peak|pk|spitze|sp\.?|crete|cresta|picco|pico|pic)"
 _ONE_PEAK = (
@@ -296,7 +300,7 @@ class Vocabulary:
             text = f"{(match['inner'] or '').replace('/', ' ', 1)} {text[match.end() :]}".strip()
         if plain(header) in self._stated:  # a campaign may name a header together with its unit
             name, unit, convention = split_unit(text)
-            counting = "peak-to-peak" if plain(name) in _PEAK_TO_PEAK_NAMES else convention
+            counting = "peak-to-peak" if plain(name) in PEAK_TO_PEAK_NAMES else convention
             return Heading(self._stated[plain(header)], None if unit == name else unit, counting, logarithm)
         # try the header without, then with the words of its convention
         without, convention = split_convention(text)
@@ -304,8 +308,8 @@ class Vocabulary:
             if unit is None and name.endswith(("%", "‰", "°")):
                 continue  # the unit without a bracket
             bare = plain(name)
-            implied: AmplitudeConvention | None = "peak-to-peak" if bare in _PEAK_TO_PEAK_NAMES else convention
-            amplitudes = [bare + "amplitude"] * bool(implied) + ["amplitude"] * (bare in _PEAK_TO_PEAK_NAMES)
+            implied: AmplitudeConvention | None = "peak-to-peak" if bare in PEAK_TO_PEAK_NAMES else convention
+            amplitudes = [bare + "amplitude"] * bool(implied) + ["amplitude"] * (bare in PEAK_TO_PEAK_NAMES)
             for word in (
                 bare,
                 plain(_ASIDES.sub("", _folded(name))),

@@ -45,6 +45,9 @@ _WIDE_GAP = re.compile(" {3,}")
 #: Gap between columns whose headers contain single blanks.
 _COLUMN_GAP = re.compile(r"\t|\s{2,}")
 
+#: Cell of a line whose columns are separated by wide gaps.
+_CELL = re.compile(r"\S+(?: \S+)*")
+
 #: A line of a text, or the cells of a row of a workbook: texts and numbers.
 Content = str | Sequence[str | float]
 
@@ -90,6 +93,7 @@ class Layout:
         written: original header cells of a wide table that name a quantity; `headers` belong to the long table.
         numbered: True if all rows begin with a number after a # ("#1"), so that # does not mark a comment.
         headerless: True if the table has no header.
+        notes: sentences on columns that are left out.
     """
 
     delimiter: str
@@ -100,6 +104,7 @@ class Layout:
     written: tuple[str, ...] = ()
     numbered: bool = False
     headerless: bool = False
+    notes: tuple[str, ...] = ()
 
     @property
     def lines_before_data(self) -> int:
@@ -107,9 +112,9 @@ class Layout:
         return self.units_line or self.header_line - self.headerless
 
     def is_repeated(self, cells: Sequence[str]) -> bool:
-        """Return True if a row repeats the header or the row of units."""
-        texts = [plain(cell) for cell in cells]
-        return any(texts) and any(texts == list(map(plain, row)) for row in (self.headers, self.units))
+        """Return True if a row repeats the header or the row of units, however a blank in a name splits it."""
+        text = plain("".join(cells))
+        return text != "" and any(text == plain("".join(row)) for row in (self.headers, self.units))
 
     def is_header(self, cells: Sequence[str], vocabulary: Vocabulary) -> bool:
         """Return True if at least two cells of a row name columns of the table, with these or other names and units."""
@@ -308,7 +313,7 @@ def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence
     if below:
         cells = [cell.strip("[]() ") for cell in below[0][1]]
         if delimiter == " " and isinstance(text := next(_below(lines, index, delimiter)).content, str):
-            wide = _COLUMN_GAP.split(text.strip())  # a unit may contain a single blank
+            wide = [cell.strip("[]() ") for cell in _below_headers(str(lines[index].content), text)]
             cells = wide if len(wide) == len(headers) else cells
         if len(cells) <= len(headers) and is_units_row(cells):
             units_line, row = below[0][0], [*cells, *row][: len(headers)]
@@ -326,6 +331,17 @@ def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence
         _NUMBERED.match(next(filter(None, split(content, delimiter)), "")) for content in contents
     )
     return Layout(delimiter, tuple(headers), number, tuple(row), units_line, numbered=numbered)
+
+
+def _below_headers(header: str, row: str) -> list[str]:
+    """Split a row of units at wide gaps, as a unit may contain a blank, with "" below a header without a unit."""
+    spans, cells = ([(*cell.span(), cell[0]) for cell in _CELL.finditer(line.expandtabs())] for line in (header, row))
+    by_column = {
+        max(range(len(spans)), key=lambda n: min(end, spans[n][1]) - max(start, spans[n][0])): text
+        for start, end, text in cells
+    }
+    aligned = [by_column.get(n, "") for n in range(len(spans))]
+    return aligned if len(by_column) == len(cells) < len(spans) else [text for *_, text in cells]
 
 
 def is_units_row(cells: Sequence[str]) -> bool:

@@ -1,5 +1,6 @@
 """Hysteresis loops read from files."""
 
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +19,8 @@ from bushfit.reading.times import DAY, are_day_numbers, spread, without_midnight
 
 #: Latest time of a record [s]; chosen: the year 5138 in seconds since 1970, or March 1973 in milliseconds.
 _LATEST_SECOND = 1e11
+#: Relative difference up to which the step of a time agrees with a sampling rate; chosen: steps are rounded.
+_RATE_AGREEMENT = 0.02
 #: Smallest number of rows of a loop; chosen: fewer do not show its shape.
 _FEWEST_LOOP_ROWS = 10
 
@@ -42,7 +45,7 @@ def read_loop(
     """
     rows = test.rows_of_test(shared=shared)
     table = Table.open(file, LOOP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
-    stated_rate = None if test.states_time else table.sampling_rate
+    stated_rate = None if test.states_time or "time" in table.roles else table.sampling_rate
     test = replace(test, sampling_rate=stated_rate) if stated_rate else test
     wanted = loop_columns(table, direction, test)
     values, notes = table.read(wanted, fewest_rows=_FEWEST_LOOP_ROWS)
@@ -118,18 +121,22 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
 
 
 def time_column(table: Table, place: Place) -> Column:
-    """Return the time column with its factor to seconds; without a unit, it may contain day numbers."""
+    """Return the time column with its factor to seconds.
+
+    Without a unit, it may contain day numbers of a spreadsheet, or a sampling rate above the table shows its unit.
+    """
     time = table.roles.get("time")
-    in_days = time and time.unit is None and time.index not in table.clocks and _has_day_numbers(table, time)
-    return replace(time, scale=DAY) if time and in_days else table.column("time", place)
-
-
-def _has_day_numbers(table: Table, time: Column) -> bool:
-    """Return True if a time column without a unit contains day numbers of a spreadsheet."""
-    try:
-        return are_day_numbers(table.read({"time": time}, fewest_rows=1)[0]["time"])
-    except ValueError:
-        return False
+    if time is None or time.unit or time.index in table.clocks:
+        return table.column("time", place)
+    with suppress(ValueError):  # which the reading of the table reports
+        values = table.read({"time": time}, fewest_rows=2)[0]["time"]
+        step = (values[-1] - values[0]) / (values.size - 1)
+        rate = table.sampling_rate
+        scales = [DAY] if are_day_numbers(values) else [1.0, 1e-3, 60.0] if rate else []
+        fitting = [scale for scale in scales if scale == DAY or abs(rate * step * scale - 1.0) < _RATE_AGREEMENT]
+        if fitting:
+            return replace(time, scale=fitting[0])
+    return table.column("time", place)
 
 
 def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats, tuple[str, ...]]:

@@ -12,7 +12,16 @@ from typing import Any, NamedTuple
 from bushfit import units
 from bushfit.errors import UnitError
 from bushfit.geometry import Direction
-from bushfit.reading.headers import SWEEP_COLUMNS, WORDS, AmplitudeConvention, Vocabulary, plain, split_convention
+from bushfit.reading.headers import (
+    COUNTED,
+    PEAK_TO_PEAK_NAMES,
+    SWEEP_COLUMNS,
+    WORDS,
+    AmplitudeConvention,
+    Vocabulary,
+    plain,
+    split_convention,
+)
 from bushfit.reading.layout import Line
 
 #: Usual spelling of the units in names, by their spelling in lower case.
@@ -53,7 +62,13 @@ _KEY_OF = {plain(name): key for key, names in WORDS["above"].items() for name in
 #: SI unit of the two keys for the time between rows.
 _SAMPLING = {"sampling_rate": "Hz", "sampling_interval": "s"}
 #: Usual names of amplitude and frequency above a table.
-_VOCABULARY = Vocabulary({role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}, {})
+_VOCABULARY = Vocabulary(
+    {
+        "frequency": SWEEP_COLUMNS["frequency"],
+        "amplitude": [*SWEEP_COLUMNS["amplitude"], "excitation", "excitation level", "level", "Anregung"],
+    },
+    {},
+)
 #: Separator between a name and its value above a table.
 _AFTER_KEY = re.compile(r"\t|;|:\s|:$|\s=\s|=|,(?!\d)|(?<=[^\W\d]),")
 #: Blank between a name and its value at the end of a line: "Sample rate 512 Hz".
@@ -71,6 +86,21 @@ _LONGEST_VALUE = 60
 _WORD_STARTS = {start: Direction(name) for name, starts in WORDS["direction"].items() for start in starts}
 #: Direction by its abbreviation in names; in headers rad is a unit.
 _SHORT = {"ax": Direction.AXIAL, "rad": Direction.RADIAL, "tors": Direction.TORSION, "tor": Direction.TORSION}
+#: Starts of words for a motion whose convention a line above a table may state.
+_OF_AMPLITUDES = (
+    "amplit",
+    "ampl",
+    "displ",
+    "stroke",
+    "deflect",
+    "schwing",
+    "weg",
+    "ausschlag",
+    "dehn",
+    "strain",
+    "deplac",
+)
+_LETTERS = re.compile(r"[^\W\d_]+")
 #: Word that is not a unit after a number.
 _WORD = re.compile(r"(?<![a-z\d.,])(?:[a-z]+)")
 
@@ -100,6 +130,7 @@ class Labels:
         direction: direction of the bushing; None if it is not named.
         temperature, preload, date, operator, specimen_number: values for these keys of a campaign, as texts.
         sampling: sampling rate or interval of a record as its number and unit, separated by a blank.
+        convention: convention of the amplitudes in the table.
     """
 
     quantities: tuple[StatedQuantity, ...] = ()
@@ -110,6 +141,7 @@ class Labels:
     operator: str | None = None
     specimen_number: str | None = None
     sampling: str | None = None
+    convention: AmplitudeConvention | None = None
 
     def of_dimension(self, unit: str) -> list[StatedQuantity]:
         """Return the distinct quantities with the dimension of an SI unit; only marked ones if any `is_marked`."""
@@ -180,7 +212,20 @@ def labels_above(lines: Iterable[Line]) -> Labels:
 
     Unknown names and quantities without a unit are ignored.
     """
-    return reduce(or_, map(_label_in_line, lines), NO_LABELS)
+    lines = list(lines)
+    conventions = {found for line in lines if (found := _convention_in_line(line))}
+    convention = conventions.pop() if len(conventions) == 1 else None
+    return reduce(or_, map(_label_in_line, lines), Labels(convention=convention))
+
+
+def _convention_in_line(line: Line) -> AmplitudeConvention | None:
+    """Convention of amplitudes in a line such as "all amplitudes pk-pk"; None in a line on something else."""
+    text = line.content if isinstance(line.content, str) else " ".join(map(str, line.content))
+    words = set(map(plain, _LETTERS.findall(text)))
+    if not any(word.startswith(_OF_AMPLITUDES) for word in words) or words & _WORDS["force"]:
+        return None
+    doubled = any(word.startswith(name) for word in words for name in PEAK_TO_PEAK_NAMES if len(name) > 3)
+    return "peak-to-peak" if doubled else split_convention(text)[1]
 
 
 def _label_in_line(line: Line) -> Labels:
@@ -191,8 +236,9 @@ def _label_in_line(line: Line) -> Labels:
         cells = [cell if isinstance(cell, str) else f"{cell:.12g}" for cell in line.content]
         cells = [*_AFTER_KEY.split(cells[0], maxsplit=1), *cells[1:]]
     cells = [cell.strip(' "') for cell in cells if cell.strip(' "')]
-    if len(cells) == 1 and (end := _BEFORE_VALUE.search(cells[0])):
-        cells = [cells[0][: end.start()], cells[0][end.end() :]]
+    if len(cells) == 1 and (end := _BEFORE_VALUE.search(split_convention(cells[0])[0])):
+        convention = split_convention(cells[0])[1]
+        cells = [end.string[: end.start()], f"{end.string[end.end() :]} {COUNTED[convention]}"]
     if len(cells) < 2 or len(cells[0]) > _LONGEST_VALUE:
         return NO_LABELS
     name, unit = units.split_header(cells[0])
@@ -213,10 +259,11 @@ def _label_in_line(line: Line) -> Labels:
             return Labels(temperature=text)
         if key == "preload" and (_is_quantity(text, "m") or _is_quantity(text, "N")):
             return Labels(preload=text)
-        if heading and not key and text[0].isdigit():
+        text, convention = split_convention(text)
+        if heading and not key and text[:1].isdigit():
             fitting = [si for si in ("Hz", "m", "rad", "1") if _is_quantity(text, si)]
             if fitting and (fitting[0] == "Hz") == (heading.role == "frequency"):
-                return Labels((StatedQuantity(text, text.split()[-1], True, heading.convention),))
+                return Labels((StatedQuantity(text, text.split()[-1], True, heading.convention or convention),))
     return NO_LABELS
 
 

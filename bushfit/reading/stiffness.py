@@ -25,6 +25,8 @@ _WAYS_ON = {
     "compliance": "a complex compliance is the reciprocal of the stiffness: write K* = 1 / J*, with its real and "
     "imaginary part or its magnitude and phase, into columns of the file",
     "decrement": 'divide the logarithmic decrement by pi, and write the quotient as "loss factor [-]" into the file',
+    "acceleration": "divide the amplitude of the acceleration by (2 pi f)^2, turn its phase by 180 deg, and write the "
+    "displacement into the file",
     "quality": 'write the reciprocal of the quality factor as "loss factor [-]" into the file',
 }
 _DERIVED = Vocabulary(WORDS["derived"], {})

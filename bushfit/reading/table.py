@@ -128,7 +128,7 @@ class Table(Cells):
         essential = ({"displacement", "force"}, *(set(pair) for pair in PAIRS))
         present = next((pair for pair in essential if pair <= set(roles)), set(roles) & {"displacement", "force"})
         needed = frozenset(roles[role].index for role in present)
-        table = replace(table, roles=roles, notes=notes, clocks=clocks, needed=needed)
+        table = replace(table, roles=roles, notes=(*layout.notes, *notes), clocks=clocks, needed=needed)
         return replace(table, selected=select_rows(table, table.row_labels, rows)) if rows else table
 
     @cached_property
@@ -138,9 +138,9 @@ class Table(Cells):
 
     @cached_property
     def sampling_rate(self) -> float | None:
-        """Sampling rate [Hz] above a table without time, in its notation of numbers; None without a clear one."""
+        """Sampling rate [Hz] that a line above the table states clearly, in the notation of its numbers; else None."""
         text, _, unit = (self.labels_above.sampling or "").partition(" ")
-        if not text or "time" in self.roles:
+        if not text:
             return None
         values = {way.value(text) for way in ALL_NUMERALS} - {None}
         value = values.pop() if len(values) == 1 else self.numerals.value(text)
@@ -210,7 +210,7 @@ class Table(Cells):
             )
         if column.unit is None and (expected != "1" or role in OF_MOTION):
             angular = expected == "Hz" and is_angular(column.header, "1/s")
-            second = "rad/s" if angular else "rad" if expected == "rad" and role == "phase" else ""
+            second = "rad/s" if angular else {"phase": "rad", "time": "ms"}.get(role, "")
             alternative = f', or units = {{ {role} = "{second}" }}' if second else ""
             raise unclear(
                 f"the {label} has no unit",

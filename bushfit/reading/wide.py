@@ -17,9 +17,8 @@ from pathlib import Path
 
 from bushfit import units
 from bushfit.errors import MeasurementError
-from bushfit.reading.blocks import COUNTED
-from bushfit.reading.headers import AmplitudeConvention, Vocabulary, split_convention
-from bushfit.reading.layout import Layout, is_comment, is_row
+from bushfit.reading.headers import COUNTED, AmplitudeConvention, Vocabulary, split_convention
+from bushfit.reading.layout import Layout, is_comment, is_row, is_summary_row
 from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.source import RowSource, Sheet, cells_of
 
@@ -97,7 +96,7 @@ def unpivot(source: RowSource, file: Path, vocabulary: Vocabulary, layout: Layou
     """
     roles, mark = [heading.role for cell in layout.headers if (heading := vocabulary.heading(cell))], layout.delimiter
     is_long = len(roles) > 2 and len(set(roles)) == len(roles) and not set(roles).isdisjoint(_STEPPED)
-    if is_long or len(layout.headers) > _MOST_COLUMNS:
+    if (is_long and "" not in layout.headers) or len(layout.headers) > _MOST_COLUMNS:
         return None
     lines = [(line.number, cells_of(line, mark)) for line in source.head() if not is_comment(line.content, mark)]
     rows = [(n, [c[:_LONGEST_HEADER] if isinstance(c, str) else c for c in cells]) for n, cells in lines]
@@ -105,10 +104,12 @@ def unpivot(source: RowSource, file: Path, vocabulary: Vocabulary, layout: Layou
     series = [column for headers, data in blocks for column in _read_block(headers, data, vocabulary)]
     if not series:
         return None
-    texts = (text for headers, _ in blocks for row in headers for text in row)
+    texts = [text for headers, _ in blocks for row in headers for text in row]
+    summaries = dict.fromkeys(text for text in texts if is_summary_row([text]))
     written = tuple(text for text in texts if any(m.role or m.stepped for m in _read_corner(text, vocabulary)))
     sheet, long_layout = _long_table(series, source, file, vocabulary)
-    return sheet, replace(long_layout, delimiter=mark, written=written)
+    notes = tuple(f'the column "{text}" is left out, as a summary of others' for text in summaries)
+    return sheet, replace(long_layout, delimiter=mark, written=written, notes=notes)
 
 
 def _find_blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple[list[list[str]], list[_Row]]]:
@@ -152,9 +153,11 @@ def _read_block(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: 
         merged: Iterator[str] = accumulate(cells, lambda before, cell: cell or before)
         texts = list(merged) if distance else cells
         row = {column: _read_header(texts[column], vocabulary) for column in columns}
-        if any(texts[column] and row[column] == _Meaning() for column in columns):
-            break
         levels = {meaning.stepped for meaning in row.values() if meaning.level}
+        unclear = [column for column in columns if texts[column] and row[column] == _Meaning()]
+        if unclear and not (levels and all(is_summary_row([texts[column]]) for column in unclear)):
+            break
+        columns = [column for column in columns if column not in unclear]
         for corner in _read_corner(cells[0], vocabulary):
             if corner.role is not None or corner.level:
                 continue
@@ -163,10 +166,10 @@ def _read_block(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: 
                 across |= axis
             else:
                 down |= axis
-        meanings = {column: meaning | row[column] for column, meaning in meanings.items()}
+        meanings = {column: meanings[column] | row[column] for column in columns}
     stepped = next((meaning.stepped for meaning in (*meanings.values(), across) if meaning.stepped), None)
     stepped = stepped or next((role for role in _STEPPED if down.stepped and role != down.stepped), None)
-    meanings = {n: meaning | across | _Meaning(stepped=stepped) for n, meaning in meanings.items()}
+    meanings = {n: meanings[n] | across | _Meaning(stepped=stepped) for n in columns}
     if stepped is None or len(columns) < 2 or not all(meaning.level for meaning in meanings.values()):
         return []
     down = replace(down, stepped=_STEPPED[stepped == _STEPPED[0]])
@@ -174,8 +177,9 @@ def _read_block(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: 
 
 
 def _read_corner(text: str, vocabulary: Vocabulary) -> list[_Meaning]:
-    """Meanings of the top left cell of a wide table, which names one role or two: "f [Hz]", "f [Hz] \\ A [mm]"."""
-    return [_read_header(part, vocabulary) for part in _CORNER.split(text)]
+    """Meanings of the top left cell of a wide table, which names one role or two: "f / Hz", "f [Hz] \\ A [mm]"."""
+    whole = _read_header(text, vocabulary)
+    return [whole] if whole.stepped else [_read_header(part, vocabulary) for part in _CORNER.split(text)]
 
 
 def _read_header(text: str, vocabulary: Vocabulary) -> _Meaning:

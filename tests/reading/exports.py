@@ -426,6 +426,58 @@ EXPORTS: dict[str, Export] = {
         {"columns": {"displacement": "Untitled"}}, "loop.lvm",
     ),
     **{
+        f"a second motion: {first}, {second}": Export(
+            loop(f"time [s]|{first} [mm]|{second} [um]|force [N]", TIME, DISPLACEMENT, 1e3 * factor * DISPLACEMENT, FORCE), kind, words
+        )
+        for first, second, factor, kind, words in (
+            ("Crosshead travel", "Extensometer", 0.8, None, ["they differ", "0.8 times", "Extensometer [um]"]),
+            ("Weg Traverse", "Feinmesser", 0.9, None, ["they differ", "Feinmesser [um]"]),
+            ("Stroke", "LVDT", 1.01, "loop", []), ("Stroke", "command", 1.2, "loop", []),
+        )
+    },
+    "a second motion, chosen": Export(
+        loop("time [s]|Stroke [mm]|LVDT [mm]|force [N]", TIME, 1.2 * DISPLACEMENT, DISPLACEMENT, FORCE), "loop", (), {"columns": {"displacement": "LVDT [mm]"}}
+    ),
+    **{
+        f"counted above: {line}": Export(f"{line}\n" + sweep("Freq. Hz|Ampl. mm|Kd N/mm|δ deg", F, factor * A, K, PHASE))
+        for line, factor in (
+            ("Dyn. test: stroke given as total amplitude (pk-pk)", 2), ("All amplitudes pk-pk", 2), ("Amplituden sind Schwingbreiten", 2),
+            ("Displacement amplitudes: rms", 0.5**0.5), ("Force: pk-pk", 1),
+        )
+    },
+    **{
+        f"an amplitude above: {line}": Export(
+            f"{line}\n" + sweep("f [Hz]|K* [N/mm]|tan delta", F[:5], K[:5], ETA[:5]), reference={"frequency": F[:5], "amplitude": 1e-3 * A[:5], "stiffness": 1e3 * STIFFNESS[:5]}
+        )
+        for line in ("Amplitude: 0.2 mm peak-to-peak", "Dyn Amp  0.2 mm p-p", "Excitation: 0.07071068 mm rms", "Schwingbreite: 0,2 mm", "Excitation level 0.1 mm")
+    },
+    "a wide table with a mean and a stepped name above": Export(
+        "Frequency / Hz;K' / kN/mm;;;;K'' / kN/mm;;\n;0.2 mm pp;1 mm pp;Mittel;;0.2 mm pp;1 mm pp\n"
+        + "".join(
+            f"{f:g};{a.real / 1e3:.9f};{b.real / 1e3:.9f};1;;{a.imag / 1e3:.9f};{b.imag / 1e3:.9f}\n"
+            for f, a, b in zip(F[:5], STIFFNESS[:5], STIFFNESS[5:], strict=True)
+        ),
+        words=["Mittel"],
+    ),
+    "units in brackets below wide gaps": Export("\n".join([
+        "Freq      Amp pk-pk   K'          C               K*", "(Hz)      (mm)        (kN/m)      (kN-s/m)        (kN/m)",
+        *(f"{f:<10.1f}{2 * a:<12.4f}{k.real:<12.6f}{c:<16.9f}{abs(k):<12.6f}" for f, a, k, c in zip(F, A, STIFFNESS, DAMPING, strict=True)),
+    ])),
+    "blocks of fixed width, a ratio without a unit": Export("\n".join(
+        line for n in (slice(5), slice(5, None)) for line in [
+            "   Frequency  Dyn Disp p-p          K*  Tan Delta     Energy", "          Hz            mm        N/mm                  N-mm",
+            *(f"{f:12.3f}{2 * a:14.5f}{k:14.7f}{eta:12.8f}{1:9.3f}" for f, a, k, eta in zip(F[n], A[n], K[n], ETA[n], strict=True)),
+            "        Mean       0.50000",
+        ]
+    ), words=["2 rows left out"]),
+    **{
+        f"a time in {unit} beside its rate": Export("Messrate: 20 Hz\n" + loop("Zeit|Weg [mm]|Kraft [N]", TIME / factor, DISPLACEMENT, FORCE), "loop")
+        for unit, factor in (("s", 1.0), ("ms", 1e-3), ("min", 60.0))
+    },
+    "a time without unit beside another rate": Export("Messrate: 30 Hz\n" + loop("Zeit|Weg [mm]|Kraft [N]"), None, ['time = "s"', 'time = "ms"']),
+    "a receptance": Export(sweep("f [Hz]|Receptance x/F [mm/kN]|Phase x/F [deg]", F, 1e3 / K, -PHASE), None, ["K* = 1 / J*"]),
+    "an acceleration": Export(sweep("f [Hz]|Accel amplitude (g pk)|Force amplitude (N pk)|Phase (deg)", F, A, A * K, PHASE - 180), None, ["(2 pi f)^2"]),
+    **{
         f"no time below {line}": Export(f"{line}\n" + loop("displacement [mm]|force [N]", DISPLACEMENT, FORCE), kind, words)
         for line, kind, words in (
             *((line, "loop", ["20 a second"]) for line in (
