@@ -326,7 +326,11 @@ def _refuse_second_motion(cells: Cells, known: Column, unused: Sequence[Column])
         factors = [units.si_factor(unit, known.unit) for unit in (known.unit, column.unit)]
         numbers = np.array(pairs)[~np.isnan(pairs).any(axis=1)] * factors
         spans = [float(np.ptp(values)) for values in numbers.T] if len(numbers) else [0.0, 0.0]
-        if min(spans) > 0.0 and np.corrcoef(numbers.T)[0, 1] > _ALONG and abs(spans[1] / spans[0] - 1.0) > _AGREEMENT:
+        if (
+            min(spans) > 0.0
+            and float(np.min(np.corrcoef(numbers.T))) > _ALONG
+            and abs(spans[1] / spans[0] - 1.0) > _AGREEMENT
+        ):
             choices = " or ".join(f'columns = {{ displacement = "{one.header}" }}' for one in (known, column))
             raise cells.header_error(
                 "two columns record this motion, and they differ",
