@@ -182,7 +182,7 @@ def test_harmonics_err_as_the_noise_says(kind, cycles, rows, correlation):
         data_set = MeasuredLoop(prepare_loop(Loop("long", Direction.AXIAL, 10.0 * phase, motion, force)))
         prepared = data_set.prepared
         assert prepared.force.size < phase.size or cycles < 5
-        error = data_set.whiten((true_force(prepared.phase) - prepared.force) * data_set._rows_per_noise)
+        error = data_set.whiten((true_force(prepared.phase) - prepared.force) * data_set._per_noise)
         squares.append(np.mean(np.square(error @ np.linalg.qr(data_set.smooth_changes()[1:].T)[0])))
     mean, unsure = np.mean(squares), np.std(squares) / np.sqrt(len(squares))
     print(f"{kind}, {cycles} of {rows} rows: mean square of the harmonics {mean:.2f} +- {unsure:.2f}, 1 if right")
