@@ -135,7 +135,7 @@ def test_sizes(root, truths, found, name):
         truth = 1.0 / truth if theirs == "rig" else truth
         value, stderr, ends = result.model.values[name], result.covariance.stderr(name), result.interval(name)
         assert stderr is not None
-    assert ends[0] <= truth <= ends[1] or abs(value - truth) <= 3.0 * stderr, (case, value, stderr, truth)
+        assert ends[0] <= truth <= ends[1] or abs(value - truth) <= 3.0 * stderr, (case, value, stderr, truth)
 
 
 @pytest.fixture(scope="module")
