@@ -17,6 +17,7 @@ from hypothesis import HealthCheck, settings
 
 from bushfit.campaign.campaign import Campaign, load_campaign
 from bushfit.effects import BASE
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Bushing
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -72,6 +73,12 @@ def paper_model() -> Model:
 def campaign() -> Campaign:
     """The paper's bushing as an independent rig simulation measured it."""
     return load_campaign(ROOT / "configs/cmp_15961.toml")
+
+
+@pytest.fixture(scope="session")
+def measured(campaign) -> PreparedCampaign:
+    """The same, made ready; its joint fit is `result`."""
+    return PreparedCampaign.from_campaign(campaign)
 
 
 @pytest.fixture(scope="session")

@@ -102,8 +102,7 @@ def test_every_residual_and_every_candidate_is_in_a_table(found):
     assert table.set_index("effect").why["inertia"] == "part of the most probable explanation"
     assert table.score.is_monotonic_decreasing
     assert table.effect[table.probability.idxmax()] == "inertia"
-    refitted = table[table["chi-square gain"].notna() & ~mistakes]
-    assert refitted.parameters.str.contains("=").all()
+    assert table[table["chi-square gain"].notna() & ~mistakes].parameters.str.contains("=").all()
 
 
 def test_its_own_model_is_consistent_and_predicts_without_the_rig(bushfit, found, tmp_path):
@@ -111,8 +110,7 @@ def test_its_own_model_is_consistent_and_predicts_without_the_rig(bushfit, found
     again = bushfit("diagnose", CAMPAIGN, "--model", model, "-o", tmp_path / "again", "--json", "--no-plots")
     assert json.loads(again.stdout)["verdict"] == "consistent"
     assert document(tmp_path / "again/model.json")["effects"] == [*BASE, "inertia"]
-    predicted = bushfit("predict", model, "-o", tmp_path / "predicted", "--no-plots")
-    assert "inertia" in predicted.stderr
+    assert "inertia" in bushfit("predict", model, "-o", tmp_path / "predicted", "--no-plots").stderr
 
 
 def test_options_reach_the_workflow(bushfit, tmp_path):

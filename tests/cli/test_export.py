@@ -266,8 +266,7 @@ def test_without_a_grid_it_is_the_measured_one_and_files_say_where_they_hold(roo
         text = " ".join((tmp_path / "x" / deck).read_text().replace("** |", "$ |").replace("\n$ |", "").split())
         for words in (*said, today):
             assert words in text, (deck, words)
-    provenance = pd.read_csv(tmp_path / "x/provenance.csv")
-    assert (provenance["what"] == "valid").sum() == 2
+    assert (pd.read_csv(tmp_path / "x/provenance.csv")["what"] == "valid").sum() == 2
 
 
 def test_a_deck_is_of_the_temperature_asked_for(bushfit, root, tmp_path):

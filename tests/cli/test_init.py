@@ -247,8 +247,7 @@ def test_files_of_several_parts_are_campaigns_and_a_manifest(name, typed, root, 
     for number, part in enumerate(parts):
         above = "" if "part" in name else f"Specimen: {part}\n"
         sweep(root, tmp_path / "lab" / f"{name.format(number=number, part=part)}.csv", above)
-    done = typed("init", "lab", *GEOMETRY, "-o", "x")
-    assert "next: bushfit batch x/batch.toml" in done.stderr
+    assert "next: bushfit batch x/batch.toml" in typed("init", "lab", *GEOMETRY, "-o", "x").stderr
     rows = tomllib.loads((tmp_path / "x/batch.toml").read_text(encoding="utf-8"))["bushings"]
     assert [row["campaign"] for row in rows] == [f"{part}.toml" for part in parts]
     for number, part in enumerate(parts):

@@ -94,8 +94,7 @@ def test_a_fit_is_the_same_with_a_ripple(bushfit, work, own):
     bushfit("fit", own / CAMPAIGN, "-o", own / "rippled", "--no-plots")
     clean, rippled = (load_result(folder / "model.json") for folder in (work / "model", own / "rippled"))
     assert rippled.quality.nrmse == pytest.approx(clean.quality.nrmse, rel=0.05)
-    for name, value in clean.model.values.items():
-        assert rippled.model.values[name] == pytest.approx(value, rel=0.02)
+    assert dict(rippled.model.values) == pytest.approx(dict(clean.model.values), rel=0.02)
 
 
 def small_tests(levels: Sequence[float], mean: float, wait: float) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rigged import LEVELS
 
-from bushfit.campaign.campaign import Campaign, load_campaign
+from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.condense import condensed
 from bushfit.diagnosis.workflow import diagnose
@@ -121,9 +121,10 @@ def test_a_hidden_lag_is_named_in_a_long_sweep_and_the_means_are_told():
 
 
 @pytest.mark.parametrize(("most", "kept"), [(6.0, "012345"), (5.0, "01235"), (4.1, "0125"), (3.2, "015"), (0.1, "15")])
-def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_repeated(root, monkeypatch, most, kept):
+def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_repeated(
+    campaign, monkeypatch, most, kept
+):
     """Three that differ, one of them radial and of a third as many rows, and three repeats of one."""
-    campaign = load_campaign(root / "configs/cmp_15961.toml")
     (loop,) = campaign.loops
     once = loop.select(slice(0, loop.time.size // 3 + 1))  # of three cycles
     made = [(loop, 1.0, 0), (loop, 0.5, 0), (loop, 1.0, 0), (loop, 1.0, 0), (loop, 1.0, 0), (once, 1.0, 1)]

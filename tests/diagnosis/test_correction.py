@@ -83,8 +83,7 @@ def test_what_the_diagnosis_says(measured):
     assert found.holdout.after - 1.0 < 0.5 * (found.holdout.before - 1.0)  # type: ignore[operator]
     assert "power law" in found.summary
     assert found.description is None
-    words = found.summary.partition(";")[0]
-    assert "% of |K|" in words, "the size comes first"
+    assert "% of |K|" in found.summary.partition(";")[0], "the size comes first"
     document = found.to_document()
     assert any("the parameters were fitted with it" in line for line in document["warnings"])
     assert complaints("diagnosis", json.loads(to_json(document)), whole=True) == []

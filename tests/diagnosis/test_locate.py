@@ -24,8 +24,7 @@ def one(found: tuple[MisfitRegion, ...], direction: str, component: str) -> Misf
 
 
 def test_a_clean_campaign_has_no_place(measured, fitted):
-    evidence = fitted(measured(plan=SHARED))
-    assert find_regions(evidence) == ()
+    assert find_regions(fitted(measured(plan=SHARED))) == ()
 
 
 @pytest.fixture(scope="module")

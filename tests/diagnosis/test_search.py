@@ -191,8 +191,7 @@ def test_a_branch_of_the_paper_that_a_model_lacks_is_named(measured, fitted):
     lacking = Model.with_defaults(campaign.bushing, ("elastic", "friction"), {"eps_half": 0.01})
     diagnosis = asked(campaign, lacking)
     assert said(diagnosis) == "named springpot"
-    for name, value in fitted(campaign).model.values.items():
-        assert diagnosis.result.model.values[name] == pytest.approx(value, rel=1e-2)
+    assert dict(diagnosis.result.model.values) == pytest.approx(dict(fitted(campaign).model.values), rel=1e-2)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ import pytest
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.simulated import SimulateSettings
-from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.model import Model
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
@@ -40,9 +39,3 @@ def rig(paper_model) -> Callable[..., Campaign]:
         return measure(cleaned[key], replace(noise, seed=seed)).campaign()
 
     return campaign
-
-
-@pytest.fixture(scope="session")
-def measured(campaign) -> PreparedCampaign:
-    """The paper's bushing as an independent rig simulation measured it; its joint fit is `result`."""
-    return PreparedCampaign.from_campaign(campaign)

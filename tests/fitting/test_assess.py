@@ -35,8 +35,7 @@ def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(measu
     slope = jacobian(model, data_sets, FIVE)
     values = np.array([model.values[name] for name in FIVE])
     plain = np.sqrt(np.diag(np.linalg.inv(slope @ slope.T))) * values
-    stated = np.array([found.stderr(name) for name in FIVE])
-    assert np.all(stated >= plain * (1.0 - 1e-6))
+    assert np.all(np.array([found.stderr(name) for name in FIVE]) >= plain * (1.0 - 1e-6))
     known = [replace(each, gain_error=0.0) if isinstance(each, MeasuredLoop) else each for each in data_sets]
     certain = covariance(model, [FitStage(FIVE, known)])  # of gain
     np.testing.assert_allclose([certain.stderr(name) for name in FIVE], plain, rtol=0.1)

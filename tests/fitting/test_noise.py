@@ -108,16 +108,14 @@ def low_passed(random: np.random.Generator, rows: int) -> np.ndarray:
 
     numerator, denominator = butter(2, 0.1)
     noise = lfilter(numerator, denominator, random.standard_normal(rows + 1000))[1000:]
-    response = lfilter(numerator, denominator, np.eye(1, 1000)[0])
-    return noise / np.linalg.norm(response)
+    return noise / np.linalg.norm(lfilter(numerator, denominator, np.eye(1, 1000)[0]))
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.9, 0.98])
 def test_the_rig_s_filter_is_found_and_taken_out(rig, paper_model, correlation):
     found = [MeasuredLoop(prepare_loop(rig(seed, force_correlation=correlation).loops[0])) for seed in range(15)]
     rows = np.array([data_set.prepared.row_noise.rows_as_one for data_set in found])
-    true = (1.0 + correlation) / (1.0 - correlation)
-    assert rows.mean() == pytest.approx(true, rel=0.15)
+    assert rows.mean() == pytest.approx((1.0 + correlation) / (1.0 - correlation), rel=0.15)
     assert np.mean([data_set.relative_noise for data_set in found]) == pytest.approx(3e-3, rel=0.06)
     assert found[0].independent_count == pytest.approx(found[0].residual_count / rows[0])
     white = [data_set.residual(paper_model)[data_set.residual(paper_model) != 0.0] for data_set in found]

@@ -41,8 +41,7 @@ def test_a_prior_weighs_as_one_more_measurement_of_the_parameter(measured, paper
 
 
 def _fitted(campaign: Campaign, **settings: ParameterSetting) -> Result:
-    fit = replace(campaign.fit, parameters=settings)
-    return joint_fit(replace(campaign, fit=fit))
+    return joint_fit(replace(campaign, fit=replace(campaign.fit, parameters=settings)))
 
 
 def test_a_tie_holds_in_values_errors_and_derivatives(rig):

@@ -98,8 +98,7 @@ def test_passes_agree_and_settle_where_plain_passes_would(measured):
     before, last = found.passes[-2], found.passes[-1]
     assert all(abs(last[name] / before[name] - 1.0) < 1e-4 for name in FIVE)
     static = fit_static(measured, found.result)
-    dynamic = fit_dynamic(measured, static)
-    assert np.max(np.abs(errors(dynamic, found.result.model.values))) < 1e-3
+    assert np.max(np.abs(errors(fit_dynamic(measured, static), found.result.model.values))) < 1e-3
 
 
 def test_errors_of_held_parameters_are_carried_over(measured, result):

@@ -221,8 +221,7 @@ def test_an_amplitude_without_a_column_is_read_from_the_name_unless_stated(
     assert seen.measured.amplitude[0] == pytest.approx(amplitude)
     assert ("from the name" in seen.facts) == ("at_amplitude" not in stated)
     assert (seen.assumed is not None) == (name == "axial_A0,1mm")
-    overruled = name == "axial_0.2mm" and "at_amplitude" in stated
-    assert bool(seen.odd) == overruled
+    assert bool(seen.odd) == (name == "axial_0.2mm" and "at_amplitude" in stated)
 
 
 @pytest.mark.parametrize(

@@ -23,8 +23,7 @@ def modulus_of(arms: Arms, omega: Array) -> Array:
 def error_of(arms: Arms, alpha: float) -> float:
     """Largest relative error, worked out apart from the fit, between its frequencies too."""
     omega = 2.0 * np.pi * np.geomspace(*arms.band, 3001)
-    made = modulus_of(arms, omega)
-    return float(np.abs(made / (0.5 * (1j * omega) ** alpha) - 1.0).max())
+    return float(np.abs(modulus_of(arms, omega) / (0.5 * (1j * omega) ** alpha) - 1.0).max())
 
 
 @pytest.mark.parametrize(

@@ -94,8 +94,7 @@ def test_standard_errors_cover_what_points_miss(paper_model, rows, sigma, shared
         found = reduce_resonance(shaken(paper_model, rows, noise), MASS)
         missed = misses(found, paper_model) / found.relative_error
         off += [missed.real, missed.imag]
-    covered = float(np.mean(np.abs(np.concatenate(off)) < 1.96))
-    assert least < covered < most
+    assert least < float(np.mean(np.abs(np.concatenate(off)) < 1.96)) < most
 
 
 def test_the_measured_mount(root):

@@ -51,8 +51,7 @@ def test_every_step_has_the_stiffness_of_the_closed_form(clean, paper_model, kin
         "coarse, nearly 8 rows per cycle": np.arange(0, count, 4),
     }[kind]
     reduction = reduce([clean if rows is None else clean.select(rows)])
-    off = np.abs(off_truth(reduction, paper_model)).max()
-    assert off < limit
+    assert np.abs(off_truth(reduction, paper_model)).max() < limit
     assert any("rows per cycle" in line for line in reduction.warnings) == kind.startswith("coarse")
     frequency, amplitude = np.array(POINTS).T
     np.testing.assert_allclose(column(reduction, "frequency"), frequency, rtol=1e-6)
@@ -125,8 +124,7 @@ def test_whatever_controller_and_logger_do(controller, logger):
     motion, force = channel(1.0, 2e-4), channel(stiffness, 120.0)
     reduction = reduce([Loop("x", Direction.AXIAL, np.arange(motion.size) / rate, motion, force)])
     assert [(round(step.frequency), float(f"{step.amplitude:.1g}")) for step in reduction.steps] == points
-    off = column(reduction, "stiffness") / stiffness - 1.0
-    assert np.abs(off).max() < 1e-3
+    assert np.abs(column(reduction, "stiffness") / stiffness - 1.0).max() < 1e-3
 
 
 def test_overtones_of_both_channels_are_reported_and_do_no_harm():

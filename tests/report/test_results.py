@@ -21,7 +21,6 @@ from bushfit.commands.compare import compare, compared_result
 from bushfit.commands.fit import fit
 from bushfit.commands.predict import predict
 from bushfit.errors import CONTROL, OutputError
-from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.report.plots.style import to_image
 from bushfit.report.results import Formats, Picture, ResultFile, encode_all, write_results
 from bushfit.report.tables import loops_table, sweeps_table
@@ -146,11 +145,6 @@ def test_a_file_that_bushfit_did_not_write_is_never_replaced(tmp_path, force):
     assert (tmp_path / "results" / "b.json").read_bytes() == b"old b"
 
 
-@pytest.fixture(scope="module")
-def data(root) -> PreparedCampaign:
-    return PreparedCampaign.from_campaign(load_campaign(root / "configs/cmp_15961.toml"))
-
-
 def drawn() -> Figure:
     figure = Figure()
     figure.subplots().fill_between([1.0, 2.0], [1.0, 2.0], [2.0, 3.0], hatch="//")
@@ -169,16 +163,16 @@ def test_a_picture_is_the_same_bytes_each_time_without_date_or_version(form):
         assert not {"script", "text", "image"} & names
 
 
-def test_loops_row_by_row_and_sweeps_by_amplitude_repeat_and_frequency(data, paper_model):
-    table, loop = loops_table(paper_model, data.loops), data.loops[0].test
+def test_loops_row_by_row_and_sweeps_by_amplitude_repeat_and_frequency(measured, paper_model):
+    table, loop = loops_table(paper_model, measured.loops), measured.loops[0].test
     assert len(table) == loop.time.size
     np.testing.assert_allclose(table["force [N]"], loop.force, rtol=1e-12)
     np.testing.assert_allclose(table["displacement [mm]"], 1e3 * loop.displacement, atol=2e-3)
-    off = (table["force [N]"] - table["model force [N]"]) / data.loops[0].prepared.noise
+    off = (table["force [N]"] - table["model force [N]"]) / measured.loops[0].prepared.noise
     np.testing.assert_allclose(table["residual [noise]"], off, rtol=1e-9, atol=1e-9)
     assert np.std(table["residual [noise]"]) == pytest.approx(1.0, abs=0.1)
-    table = sweeps_table(paper_model, data.sweeps)
-    assert len(table) == sum(data_set.sweep.frequency.size for data_set in data.sweeps)
+    table = sweeps_table(paper_model, measured.sweeps)
+    assert len(table) == sum(data_set.sweep.frequency.size for data_set in measured.sweeps)
     assert list(dict.fromkeys(table["direction"])) == ["axial", "radial"]
     axial = table[table["direction"] == "axial"].reset_index(drop=True)
     frequency, amplitude = axial[["frequency [Hz]", "amplitude [mm]"]].to_numpy().T

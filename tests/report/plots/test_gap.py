@@ -85,8 +85,7 @@ def test_loops_are_means_in_percent_of_half_the_force_range(paper_model, looped)
     figure = whole(gap(paper_model, paper_model, [data_set]))
     (axes,) = figure.axes
     assert headings(figure)[0].startswith("nothing added\n")
-    curve = axes.get_lines()[0]
-    assert len(curve.get_xdata()) == 36
+    assert len(axes.get_lines()[0].get_xdata()) == 36
     assert legend(axes) == ["1 mm, 0.1 Hz"]
     stiff = paper_model.with_values({name: 1.2 * paper_model.values[name] for name in ("mu", "m", "sigma_fmax")})
     after_turn = gap(stiff, paper_model, [data_set]).axes[0].get_lines()[0].get_ydata()[0]
