@@ -176,7 +176,7 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
 
 
 def _large_motion(text: str | None) -> LargeMotion | None:
-    """Parse --over: a slow sine ("2 Hz 3 mm") or offset ("3 mm") below the predicted vibration; None if not given."""
+    """Parse --over: a slow sine ("2 Hz 3 mm") or offset ("3 mm") under the predicted vibration; None if not given."""
     from bushfit.prediction.superposed import LargeMotion
     from bushfit.units import parse_quantity
 

@@ -273,7 +273,7 @@ class Vocabulary:
 
     @classmethod
     def shared(cls, names: Mapping[str, Sequence[str]], columns: Mapping[str, str]) -> "Vocabulary":
-        """Return a vocabulary, built once, of usual names and the user's `columns`, both by role."""
+        """Return the cached vocabulary of usual names and the user's `columns`, both by role."""
         return _shared(tuple((role, tuple(usual)) for role, usual in names.items()), tuple(columns.items()))
 
     def heading(self, header: str) -> Heading | None:
@@ -395,7 +395,7 @@ def plain(name: str) -> str:
 
 
 def split_unit(header: str) -> tuple[str, str | None, AmplitudeConvention | None]:
-    """Split a header of unknown meaning into name, unit and amplitude convention; None for what is missing."""
+    """Return name, unit and amplitude convention of a header of unknown meaning; None if not in the header."""
     text, convention = split_convention(header)
     for name, unit, certain in _splits(text):
         if certain and unit is None and units.is_unit(name) and name != "-" and not _TRAVEL.match(name):

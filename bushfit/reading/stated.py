@@ -59,7 +59,7 @@ def place_tested(test: Mapping[str, object], specimens: Sequence[Specimen]) -> P
     """Find the direction of the bushing, or the specimen, that was tested, from the keys of a test.
 
     Args:
-        test: keys of the test, of which direction, specimen and bushing matter; a missing key may be None.
+        test: keys of the test; direction, specimen and bushing are used, and a missing key may be None.
         specimens: all specimens of the campaign.
 
     Returns:

@@ -151,7 +151,7 @@ class Table(Cells):
 
     @property
     def note_sampling(self) -> str:
-        """Sentence on a time that comes from the sampling rate above the table."""
+        """Note for the user that the time comes from the sampling rate above the table."""
         return (
             f"the file has no time: its rows are {self.sampling_rate:.6g} a second, as the lines above the table state"
         )
@@ -232,7 +232,7 @@ class Table(Cells):
             return replace(column, scale=strain_factor * units.si_factor(unit, expected))
 
     def agrees(self, role: str, expected: str) -> bool:
-        """Return True if the table has a column for a role in a unit of the dimension of `expected`, or in 1."""
+        """Return True if the table has a column for a role whose unit has the dimension of `expected` or is 1."""
         column = self.roles.get(role)
         return column is not None and units.is_compatible(column.unit or "1", expected)
 
