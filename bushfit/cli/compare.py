@@ -112,7 +112,8 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
     else:
         different = []
         for label, comparison in zip(labels, compared.comparisons, strict=True):
-            names = [row.name for row in comparison.parameters if row.holm is not None and row.holm < _CHANCE]
+            names = comparison.differing
+            names += [row.name for row in comparison.parameters if row.holm is not None and row.holm < _CHANCE]
             if not names and comparison.joint and comparison.joint[0] < _CHANCE:
                 names = ["all parameters together"]
             if names:
@@ -120,7 +121,7 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
         verdict = f"{'; '.join(different)}, by more than chance"
         action = "use each result for its own part; differences.csv lists stiffness and loss factor at each point"
         if not different:
-            verdict = f"no parameter differs from that of {first} by more than chance"
+            verdict = f"no stiffness, loss factor or parameter differs from that of {first} by more than chance"
             action = "the compounds agree within the intervals below"
         sentences = [*compared.notes, *compared.words]
     output.print_headline(name, verdict, action)

@@ -88,8 +88,8 @@ def command(
     """Write a campaign from test files and the geometry of the bushing.
 
     A campaign is a text file that lists a bushing and its tests. FILE is a test file, a workbook or a folder. In a
-    terminal, init asks for missing information. An option applies to all given files. Writes campaign.toml, or the
-    file given by -o my_bushing.toml.
+    terminal, init asks for missing information. An option applies to all given files. Writes the file given by -o
+    my_bushing.toml, or campaign.toml to the folder; for several parts, a campaign each and batch.toml to the folder.
     """
     from bushfit.geometry import Specimen
     from bushfit.inspection.record import campaign_text, campaigns_of_parts, with_specimens_named
@@ -313,8 +313,8 @@ class Questions:
             except BushfitError as error:
                 if not self.enabled:
                     raise
-                bare_error = type(error)(**{**vars(error), "hint": None})
                 named = [(kind or key.replace("-", "_"), role) for kind, role, key in _NAMED.findall(error.hint or "")]
+                bare_error = type(error)(**{**vars(error), "hint": None if named else error.hint})
                 wanted = [(name, role) for name, role in named if role or name in STATED or name in _WORDS]
                 wanted.sort(key=lambda key: key[0] == "column")  # which is rarely needed
                 new = [key for key in wanted if key not in answers and not options.get(key[0])]

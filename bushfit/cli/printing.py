@@ -62,7 +62,7 @@ def print_result(output: Output, title: str, result: Result) -> None:
         loops = f", gain error of a loop {number(100 * gain, 2)} % ([rig] gain_error)" if gain else ""
         output.print(
             f"NRMSE {number(100 * quality.nrmse, 2)} %, reduced chi-square {number(quality.reduced_chi_square, 3)} "
-            f"over {quality.points} points, noise {number(100 * quality.noise, 2)} % per point{loops}"
+            f"over {quality.points} values, noise {number(100 * quality.noise, 2)} % per point{loops}"
         )
     print_tests(output, result.tests, result.usable)
     if correlations := correlation_texts(result, 0.0) if output.verbose else correlation_texts(result):

@@ -283,7 +283,7 @@ class DiagnosisWriter:
             next_test = f"measure again: {places.faulty_parts[0].name}"
         lacking = verdict in ("partly", "ambiguous", "unexplained") and not (self.first and self.first.best.claim)
         resolved, corrected = {*base.model.effects} - {*self.unresolved}, gap.fitted if gap else None
-        regions = (*at_fault, *find_regions(base))
+        regions = tuple(sorted((*at_fault, *find_regions(base)), key=lambda region: -region.excess))
         result = self.odds.averaged(result_of(after, bounds, resolved, lacking=lacking, corrected=corrected))
         amounts = filter(None, (_format_amount(entry.name, result) for entry in entries))
         return Diagnosis(

@@ -305,7 +305,7 @@ def implausible_modulus(bushing: Bushing | None, data_sets: Sequence[MeasuredTes
     ratio = moduli[hardest] / moduli[softest]
     if ratio > _MOST_STIFFENING:
         return [f"{hardest} shows {number(ratio, 2)} times the modulus of {softest}, which no rubber does: {_CHECK}"]
-    sentence = f"a shear modulus of {format_range('Pa', moduli[hardest])} is that of no rubber: {_CHECK}"
+    sentence = f"{hardest}: a shear modulus of {format_range('Pa', moduli[hardest])} is that of no rubber: {_CHECK}"
     return [] if _SOFTEST < moduli[hardest] < _HARDEST else [sentence]
 
 

@@ -44,8 +44,7 @@ LineKey = tuple[str, float]
 _ORIGINS = {
     "repeats": "from repeats",
     "stated": "stated in the campaign",
-    "assumed": "no repeats of three points or more: scatter about a smooth curve; shared errors from the class "
-    "of [rig]",
+    "assumed": "without repeats: scatter about a smooth curve; shared errors assumed for the class of [rig]",
 }
 
 

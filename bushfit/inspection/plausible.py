@@ -41,7 +41,7 @@ def implausible_sizes(place: Place, frequency: Array, amplitude: Array, stiffnes
             found, expected = (
                 f"{number(100.0 * low, 3)} to {number(100.0 * high, 3)} %"
                 if unit == "1"
-                else format_range(unit, low, high)
+                else " to ".join(dict.fromkeys(format_range(unit, end) for end in (low, high)))
                 for low, high in (ends, (lowest, highest))
             )
             yield f"{name} of {found} is outside all tests of rubber ({expected}): is the unit in the header right?"

@@ -135,6 +135,24 @@ class Comparison:
         low, high = (band.value + self.widening * (end - band.value) for end in (band.low, band.high))
         return replace(band, low=low, high=high)
 
+    def significant(self, band: Band) -> Array:
+        """Return True at the points where a difference is significant for all points together, (n,)."""
+        wide = self.widened(band)
+        return bool(len(band.root)) & ((wide.low > 0.0) | (wide.high < 0.0))
+
+    @property
+    def differing(self) -> list[str]:
+        """Stiffnesses and loss factors with a significant difference, such as "axial stiffness"."""
+        return [
+            f"{contrast.place} {name}"
+            for contrast in self.contrasts
+            for name, band in (
+                (contrast.place.motion.words[2], contrast.stiffness),
+                ("loss factor", contrast.loss_factor),
+            )
+            if self.significant(band).any()
+        ]
+
     def sentences(self) -> list[str]:
         """Write sentences on the relative differences of |K| and the absolute differences of the loss factor.
 
@@ -371,6 +389,8 @@ def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
             top, bottom = int(np.nanargmax(size)), int(np.nanargmin(size))
             alike_all = sure.all() and min(abs(band.low[top]), abs(band.high[top])) <= size[bottom]
             parts.append(f"{figures(top, word)} {'throughout' if alike_all else f'at {_format_point(contrast, top)}'}")
+            if 1 < (count := int(sure.sum())) < sure.size:
+                parts[-1] += f" ({word} at {count} of {sure.size} points)"
             if sure.all() and not alike_all:
                 parts.append(f"at least {figures(bottom, word)}, at {_format_point(contrast, bottom)}")
     none = (band.low <= 0.0) & (band.high >= 0.0)

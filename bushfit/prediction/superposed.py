@@ -77,7 +77,7 @@ class LargeMotion:
         low, high = _SLOW * self.frequency, _SLOWEST * self.frequency
         if self.frequency and not (low <= frequency.min() and frequency.max() <= high):
             raise ModelError(
-                "the frequencies of the small harmonic do not suit the slow motion",
+                "the small vibration is not fast compared with the slow motion",
                 place=str(place),
                 found=format_range("Hz", float(frequency.min()), float(frequency.max())),
                 expected=f"{_SLOW:g} to {_SLOWEST:g} times {number(self.frequency, 3)} Hz",

@@ -151,7 +151,7 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
             found=f"{inner.size / 2.0:.2g} cycles from {factor * inner.min() / 2.0:.3g} to "
             f"{factor * inner.max() / 2.0:.3g} {unit}, no two successive ones equal",
             expected="at least two cycles of one amplitude and rate",
-            hint="record more cycles of each amplitude, best five",
+            hint="record more cycles of each amplitude, best five; a road load belongs in respond or [[validation]]",
         )
     if not spans:
         return []

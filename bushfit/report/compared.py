@@ -57,10 +57,9 @@ def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
         ("difference of loss factor [-]", contrast.loss_factor, np.asarray),
     )
     for header, band, convert in differences:
-        wide = comparison.widened(band)
-        sure = bool(len(band.root)) & ((wide.low > 0.0) | (wide.high < 0.0))
+        significant = np.where(comparison.significant(band), "yes", "no")
         columns |= {header: convert(band.value), f"{header}, low": convert(band.low)}
-        columns |= {f"{header}, high": convert(band.high), f"{header}, sure": np.where(sure, "yes", "no")}
+        columns |= {f"{header}, high": convert(band.high), f"{header}, sure": significant}
     return pd.DataFrame(columns)
 
 

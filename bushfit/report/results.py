@@ -264,14 +264,14 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
     if foreign:
         raise OutputError(
             "a result would replace a file that bushfit did not write, or that was changed",
-            file=folder,
+            file=folder if folder.name else None,
             found=", ".join(foreign),
             hint=f"move it away, or {elsewhere}",
         )
     if existing and not overwrite:
         raise OutputError(
             "there are results already",
-            file=folder,
+            file=folder if folder.name else None,
             found=", ".join(existing),
             hint="--force replaces them; -o/--output names another folder",
         )

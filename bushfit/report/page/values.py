@@ -52,11 +52,11 @@ def headline_texts(record: ReportRecord, prediction: Prediction) -> dict[str, st
         "place": str(place),
         "frequency": f"{number(frequency, 3)} Hz",
         "amplitude": format_range(length, to_length * amplitude),
-        "stiffness": f"{number(dynamic[0], 4)} {unit}",
+        "stiffness": f"{format_aligned(dynamic[:1], 4)[0]} {unit}",
         "stiffness_band": format_interval(dynamic),
-        "loss_factor": number(loss[0], 3),
+        "loss_factor": format_aligned(loss[:1], 3)[0],
         "loss_factor_band": format_interval(loss, 3),
-        "loss_angle": f"{number(math.degrees(math.atan(loss[0])), 3)}°",
+        "loss_angle": f"{format_aligned([math.degrees(math.atan(loss[0]))], 3)[0]}°",
         "static": "not tested",
         "static_point": f"lowest frequency {number(lowest, 3)} Hz",
         "stiffening": "",
@@ -68,7 +68,7 @@ def headline_texts(record: ReportRecord, prediction: Prediction) -> dict[str, st
         static, ratio = to_unit * float(curve.secant.value[0]), float(point.stiffness.value[0] / curve.secant.value[0])
         relative = [band.root[:, 0] / band.value[0] for band in (point.stiffness, curve.secant)]
         half = Z95 * ratio * float(np.linalg.norm(relative[0] - relative[1]))
-        row["static"], row["static_point"] = f"{number(static, 4)} {unit}", f"at {curve.rate_text}"
+        row["static"], row["static_point"] = f"{format_aligned([static], 4)[0]} {unit}", f"at {curve.rate_text}"
         decimals = max(2, math.ceil(-math.log10(2.0 * half))) if half else 2  # the interval is not rounded to 0
         row["stiffening"] = f"{ratio:.{decimals}f}" + (f" ± {half:.{decimals}f}" if half else "")
     for usable in result.usable:
@@ -139,12 +139,12 @@ def value_rows(predictions: Sequence[Prediction]) -> Iterator[list[str]]:
                 str(prediction.direction),
                 f"{number(float(prediction.frequency[index]), 4)} Hz",
                 format_range(length, to_length * float(prediction.amplitude[index])),
-                f"{number(stiffness[0], 4)} {unit}",
+                f"{format_aligned(stiffness[:1], 4)[0]} {unit}",
                 format_interval(stiffness),
-                f"{number(angles[0], 3)}°",
+                f"{format_aligned(angles[:1], 3)[0]}°",
                 format_interval(angles, 3),
-                number(loss[0], 3),
-                *(number(factor * float(band.value[index]), 4) for band in parts),
+                *format_aligned(loss[:1], 3),
+                *(format_aligned([factor * float(band.value[index])], 4)[0] for band in parts),
             ]
 
 
