@@ -1,12 +1,13 @@
 """Sizes that no test of a rubber part has: the unit in a header is then likely to be wrong."""
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Place
-from bushfit.units import format_range, number
+from bushfit.units import display_unit, number
 
 #: Smallest and largest frequency of a test [Hz]; chosen: from one cycle a month to ultrasound.
 FREQUENCIES = (4e-7, 1e5)
@@ -38,10 +39,9 @@ def implausible_sizes(place: Place, frequency: Array, amplitude: Array, stiffnes
         positive = values[values > 0.0]
         if positive.size and (np.min(positive) < lowest or np.max(positive) > highest):
             ends = [float(np.min(positive)), float(np.max(positive))]
+            shown, factor = ("%", 100.0) if unit == "1" else display_unit(unit, 1.0, math.sqrt(ends[0] * ends[1]))
             found, expected = (
-                f"{number(100.0 * low, 3)} to {number(100.0 * high, 3)} %"
-                if unit == "1"
-                else " to ".join(dict.fromkeys(format_range(unit, end) for end in (low, high)))
-                for low, high in (ends, (lowest, highest))
+                f"{' to '.join(dict.fromkeys(number(factor * end, 3) for end in pair))} {shown}"
+                for pair in (ends, (lowest, highest))
             )
             yield f"{name} of {found} is outside all tests of rubber ({expected}): is the unit in the header right?"
