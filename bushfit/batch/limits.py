@@ -103,7 +103,7 @@ Stiffness = Annotated[float, _STIFFNESS, _LIMIT]
 
 @dataclass(frozen=True, kw_only=True)
 class PointLimits:
-    """Base class of limits at an operating point; the last base, so that pydantic reads the point before the limits.
+    """Operating point to which limits apply; the last base class, so that pydantic reads the point before the limits.
 
     Args:
         at: operating point, such as "axial 25 Hz 0.1 mm".

@@ -195,7 +195,7 @@ def run_commands(
 
 
 def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[str, Estimate], list[Sequence[str]]]:
-    """Estimate the parameters, the quality of the fit, and stiffness and loss factor at the points.
+    """Estimate parameters, quality of the fit, and stiffness and loss factor at operating points, with intervals.
 
     Returns:
         Estimates [SI] by name of the quantity, and the warnings of the prediction at each point.

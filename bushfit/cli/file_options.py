@@ -37,8 +37,8 @@ _OF_TESTS = {
     "sampling_rate": (
         "FREQUENCY",
         (
-            'For a loop without a time column: its speed, such as "10 mm/min", or its frequency, such as "0.1 '
-            'Hz", and its waveform, sine or triangle, or its sampling rate [from lines above the table].'
+            'For a loop without time: speed ("10 mm/min"), frequency ("0.1 Hz") with waveform (sine, triangle), or '
+            "sampling rate [from the file]."
         ),
     ),
     "specimen": (

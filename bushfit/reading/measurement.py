@@ -215,7 +215,7 @@ def rebuild_time(
 
 
 def _stroke_edges(displacement: Floats) -> NDArray[np.intp]:
-    """Indices of the first row, the turning points of the displacement, and the last row, rising."""
+    """Row indices, in ascending order, of the first row, the turning points of the displacement, and the last row."""
     from scipy.signal import find_peaks
 
     prominence = _TURN_PROMINENCE * np.ptp(displacement)
