@@ -96,7 +96,8 @@ def unpivot(source: RowSource, file: Path, vocabulary: Vocabulary, layout: Layou
     """
     roles, mark = [heading.role for cell in layout.headers if (heading := vocabulary.heading(cell))], layout.delimiter
     is_long = len(roles) > 2 and len(set(roles)) == len(roles) and not set(roles).isdisjoint(_STEPPED)
-    if (is_long and "" not in layout.headers) or len(layout.headers) > _MOST_COLUMNS:
+    has_merged_titles = "" in layout.headers and not set(roles).issuperset(_STEPPED)
+    if (is_long and not has_merged_titles) or len(layout.headers) > _MOST_COLUMNS:
         return None
     lines = [(line.number, cells_of(line, mark)) for line in source.head() if not is_comment(line.content, mark)]
     rows = [(n, [c[:_LONGEST_HEADER] if isinstance(c, str) else c for c in cells]) for n, cells in lines]

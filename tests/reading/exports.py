@@ -459,6 +459,9 @@ EXPORTS: dict[str, Export] = {
         ),
         words=["Mittel"],
     ),
+    "padded, below a numbered title": Export(
+        ";;;;;\n;Messung 12;;;;\n;f;Amp;K;eta;\n;Hz;mm;N/mm;-;\n" + "".join(f";{f:g};{a:g};{k:.9g};{eta:.9g};\n" for f, a, k, eta in zip(F, A, K, ETA, strict=True))
+    ),
     "units in brackets below wide gaps": Export("\n".join([
         "Freq      Amp pk-pk   K'          C               K*", "(Hz)      (mm)        (kN/m)      (kN-s/m)        (kN/m)",
         *(f"{f:<10.1f}{2 * a:<12.4f}{k.real:<12.6f}{c:<16.9f}{abs(k):<12.6f}" for f, a, k, c in zip(F, A, STIFFNESS, DAMPING, strict=True)),
