@@ -116,8 +116,8 @@ class HoldOut:
         """Compute the root mean square residuals by part and over all parts.
 
         Args:
-            residuals: predicted residuals by name of the part, (2 models: before and after, 2 units: noise, and noise
-                with prediction error, n).
+            residuals: by name of the part, predicted residuals of the models before and after (first axis), in units of
+                noise, and whitened by noise and prediction error (second axis), (2, 2, n).
             skipped: parts that could not be held out.
         """
         residuals = {name: pair for name, pair in residuals.items() if pair.size}  # one frequency has no top third

@@ -209,7 +209,7 @@ class SearchState:
 
     @cached_property
     def linear(self) -> LinearModel:
-        """Residuals linearised around the fit, without further explanations, at all sizes of the rig's errors."""
+        """Linear model of the residuals around the fit for all sizes of the rig's errors, to compute evidence with."""
         tests, solution = self.tests, self.bare.solution
         precision = np.array([self.precision.get(name, 0.0) for name in solution.coordinates.names])
         moves = np.isfinite(precision)

@@ -147,9 +147,10 @@ class PowerLaw:
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """Complex stiffness that is added to a model, at the p operating points of all tests except those of coupons.
+    """Complex stiffness that is added to a model at p operating points, to find the power law of a gap.
 
-    Values of the term at the points are complex numbers in the unit `measure`; a shape is a set of such values.
+    The points are those of all tests except tests of coupons. Functions take the values of the added stiffness at the
+    points as complex numbers in the unit `measure`; a shape is a set of such values, to be multiplied by an amount.
 
     Args:
         evidence: the fitted model and the tests.
@@ -299,7 +300,7 @@ class _Grid:
 
     @cached_property
     def log_evidences(self) -> Array:
-        """Natural log of the evidence of the tests for each pair of powers, (g,)."""
+        """Natural log of the tests' evidence for each pair of powers of frequency and amplitude, (g,)."""
         return np.array([evidence.log_evidence for evidence in self.linear.group_evidence])
 
     @property

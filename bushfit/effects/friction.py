@@ -67,7 +67,7 @@ def harmonic_shape(x: Array) -> Array:
 
 
 def harmonic_slope(x: Array, shape: Array) -> Array:
-    """Derivative of `harmonic_shape` with respect to x.
+    """Derivative of the friction loop's complex first harmonic h by the relative strain amplitude x.
 
     Args:
         x: strain amplitude over eps_half, any shape.
@@ -188,7 +188,7 @@ def _stroke_slopes(sign: Any, distance: Any, room: Any, reach: Any) -> tuple[Any
     Args:
         sign: +1 or -1, direction of the stroke.
         distance: strain d since the turning point, relative to eps_half.
-        room, reach: terms v and v + d, as `_stroke` returns them.
+        room, reach: terms v and v + d of the equation of the stroke, as `_stroke` returns them.
     """
     return 1.0 - (distance / reach) ** 2, sign * (room / reach) ** 2
 

@@ -87,12 +87,11 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
 
         Solved for the whole history at once. Each iteration computes the force for the motion x - c F and adds its
         difference from F, times 1/(1 + c K), harmonic by harmonic. K is measured once with a pulse; an inaccurate K
-        costs iterations, not accuracy. K and F of the previous solution for this motion are the start of the next
-        solution; the error that this leaves in the last of many models is that of all, and not reduced further.
-        Compliances in inner layers start from their solution of the previous iteration. Anderson mixing
-        reduces the iterations that inner friction needs. If an iteration does not reduce the error,
-        the next steps are halved; if it does, they are doubled up to the full step. The direction of inner dry friction
-        is that of the imposed motion: momentary sticking is neglected.
+        costs iterations, not accuracy. The solution starts from K and F of the previous solution for this motion.
+        Compliances in inner layers start from their solution of the previous iteration. Anderson mixing reduces the
+        iterations that inner friction needs. If an iteration does not reduce the error, the next steps are halved; if
+        it does, they are doubled up to the full step. The direction of inner dry friction is that of the imposed
+        motion: momentary sticking is neglected.
     """
     compliance = p["compliance"]
     if not np.any(compliance):

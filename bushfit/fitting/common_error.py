@@ -52,7 +52,7 @@ class CommonError:
         return float(np.sum(np.log1p(np.square(self.principal_errors[1]))))
 
     def whiten(self, rows: Array) -> Array:
-        """Whiten residuals or derivatives in units of noise, (..., n), so that their covariance is 1; same shape."""
+        """Whiten residuals or derivatives in units of noise, (..., n), by the shared error; same shape."""
         directions, size = self.principal_errors
         return rows - (rows @ directions * (1.0 - 1.0 / np.hypot(1.0, size))) @ directions.T
 

@@ -235,7 +235,7 @@ def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> fl
     Args:
         clock, x: time [s] and motion relative to its middle, (n,) each.
         duration: duration of the record [s].
-        whole: period that is returned if the difference is within its error [s].
+        whole: expected period [s], returned if the ends determine no significantly different one.
     """
     few, ends = max(3, int(0.02 * x.size)), []
     for rows, origin in ((slice(few), clock[0]), (slice(-few, None), clock[-1])):

@@ -89,10 +89,12 @@ def shift_factors(result: Result, temperature: Array) -> tuple[Array, Array]:
 
 
 def _further_shift(model: Model, sweep: MeasuredSweep) -> tuple[float, float]:
-    """Shift of a sweep's time scale in addition to that of the model [neper], and its standard error.
+    """Fit the remaining shift of a sweep along ln frequency relative to the model.
 
-    Notes: Gauss-Newton with equal weights, because the residuals are mostly not noise; nan if the stiffness does not
-    change with frequency.
+    Returns:
+        Addition to the model's ln a_T, and its standard error; nan if the stiffness does not change with frequency.
+
+    Notes: Gauss-Newton with equal weights, because the residuals are mostly not noise.
     """
     shift, place, conditions = 0.0, sweep.direction, sweep.conditions
 

@@ -355,10 +355,10 @@ class MeasuredLoop(MeasuredBase):
         return CommonError(self._error_waves[2 * (self.first_error - 1) :])
 
     def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
-        """Inner products of the residual and its derivatives, from which the size of a model error is estimated.
+        """Inner products of the residuals and their derivatives by parameter, to estimate the size of a model error.
 
         Args:
-            model: model of the residual and derivatives.
+            model: model at whose values residuals and derivatives are computed.
             names: names of the parameters.
         """
         slopes = self._slopes(model, names)

@@ -120,7 +120,7 @@ class MeasuredSweep(MeasuredBase):
         return self.weighted(np.isin(np.arange(self.frequency.size), points, invert=True)) if points.size else self
 
     def select(self, points: Array) -> Self:
-        """Return the sweep with only the points of a mask, (n,)."""
+        """Return the sweep with only the points for which the mask `points`, (n,), is True."""
         return replace(self, weight=self.weights[points], part=self.order[points])
 
     def with_weight(self) -> Self:

@@ -80,7 +80,7 @@ class _Profile:
         """Square root of the rise of chi-square above its minimum, with the parameter fixed at a coordinate."""
         return float(np.sqrt(max(self.fitted(coordinate).chi_square - self.best.chi_square, 0.0)))
 
-    def end(self, start: float, bound: float, step: float, allowed: float) -> float | None:
+    def find_limit(self, start: float, bound: float, step: float, allowed: float) -> float | None:
         """Find the value [SI] at which the root of the rise of chi-square reaches `allowed`; None if that side is open.
 
         Args:
@@ -144,7 +144,7 @@ def profile95(best: FitResult, covariance: Covariance) -> Mapping[str, Interval]
     for i, name in enumerate(track("profiles", names)):
         profile = _Profile(name, best, {start[i]: best})
         step = min(_FIRST_REACH * allowed[i] * linear[i], _LONGEST_STEP)
-        low, high = (profile.end(start[i], bound, step, allowed[i]) for bound in limits[i])
+        low, high = (profile.find_limit(start[i], bound, step, allowed[i]) for bound in limits[i])
         found[name] = low, high
     return found
 
@@ -161,7 +161,7 @@ def limit95(best: FitResult, name: str) -> float | None:
     i = list(best.names).index(name)
     start, inward = best.coordinates.point(best.model.values)[i], int(best.at_bound[name] == "min")
     profile = _Profile(name, best, {start: best})
-    return profile.end(start, best.problem.limits[inward][i], _BLIND_STEP, _ONE_SIDED * np.sqrt(_excess(best)))
+    return profile.find_limit(start, best.problem.limits[inward][i], _BLIND_STEP, _ONE_SIDED * np.sqrt(_excess(best)))
 
 
 def _excess(best: FitResult) -> float:

@@ -56,13 +56,10 @@ class SharedError:
         return 1.0 - 1.0 / np.sqrt(1.0 + self.variance * self.weight)
 
     def components(self, rows: Array) -> Array:
-        """Project deviations on the shared error: for each group, the sum of the deviations times their unit change.
-
-        Args:
-            rows: deviations in units of noise, (..., m).
+        """Project deviations in units of noise, (..., m), on the shared error of each group.
 
         Returns:
-            Components, (..., g).
+            Inner products of the deviations with their change by a shared error of 1, (..., g).
         """
         return np.add.reduceat(rows * self.unit, self.starts, axis=-1)
 

@@ -123,7 +123,7 @@ class Tie:
 
 @cache
 def _interpreter() -> Any:
-    """Interpreter of asteval, as lmfit has it, without all but arithmetic."""
+    """Interpreter (asteval, as in lmfit) of the expressions of ties, restricted to arithmetic; created once."""
     from asteval import Interpreter
     from asteval.asteval import ALL_NODES
 

@@ -40,7 +40,7 @@ def wave(waveform: str, phase: Array) -> Array:
     return 2.0 / np.pi * np.arcsin(np.clip(np.sin(2.0 * np.pi * phase), -1.0, 1.0))
 
 
-def record(
+def simulate_cycles(
     model: Model,
     direction: Place,
     frequency: float,
@@ -79,7 +79,7 @@ def record(
     motion = amplitude * wave(waveform, phase)
     if swell[0]:
         motion *= 1.0 + (swell[1] - 1.0) * np.sin(np.pi * np.minimum(phase / swell[0], 1.0)) ** 2
-    whole = imposed(
+    whole = simulate_motion(
         model, direction, motion, 1.0 / (frequency * steps_per_cycle), frequency, kind=kind, conditions=conditions
     )
     recorded = slice(before * steps_per_cycle, None)
@@ -90,7 +90,7 @@ def record(
     )
 
 
-def imposed(
+def simulate_motion(
     model: Model,
     direction: Place,
     motion: Array,
@@ -158,6 +158,6 @@ def dynamic_stiffness(
     >>> bool(abs(measured / paper.stiffness("axial", 20.0, 1e-3) - 1.0).max() < 1e-3)
     True
     """
-    measured = partial(record, model, direction, cycles=1, run_in=run_in, steps_per_cycle=steps_per_cycle)
+    measured = partial(simulate_cycles, model, direction, cycles=1, run_in=run_in, steps_per_cycle=steps_per_cycle)
     points = enumerate(zip(np.atleast_1d(frequency), np.atleast_1d(amplitude), strict=True))
     return np.array([lock_in(measured(f, x, conditions=conditions.select(number)), f) for number, (f, x) in points])

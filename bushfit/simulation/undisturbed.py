@@ -124,7 +124,7 @@ def _clean_loop(truth: Model, test: SimulatedLoop, conditions: RubberConditions)
     else:
         ((frequency, amplitude),) = test.parts
         run_in, swell = _run_in(truth, test.direction, amplitude)
-        record = rig.record(
+        record = rig.simulate_cycles(
             truth,
             test.direction,
             frequency,
@@ -187,7 +187,7 @@ def _clean_programme(truth: Model, test: SimulatedLoop, conditions: RubberCondit
         phase = np.arange(round(test.cycles / (frequency * step))) * (frequency * step)
         motions += [amplitude * rig.wave(test.waveform, phase), rest]
     motion = np.concatenate([*motions[:-1], [0.0]])
-    return rig.imposed(truth, test.direction, motion, step, test.parts[0][0], conditions=conditions)
+    return rig.simulate_motion(truth, test.direction, motion, step, test.parts[0][0], conditions=conditions)
 
 
 def _clean_record(truth: Model, test: SimulatedRecord, seed: list[int]) -> rig.Record:
@@ -230,7 +230,7 @@ def _clean_record(truth: Model, test: SimulatedRecord, seed: list[int]) -> rig.R
     motion *= np.minimum(time / (_FADE_IN * test.duration), 1.0)
     conditions = RubberConditions(test.temperature)
     mean_frequency = History.sampled(motion, step).frequency
-    record = rig.imposed(truth, test.direction, motion, step, mean_frequency, conditions=conditions)
+    record = rig.simulate_motion(truth, test.direction, motion, step, mean_frequency, conditions=conditions)
     rows = slice(None, None, _STEPS_PER_RECORD_ROW)
     return rig.Record(record.time[rows], record.displacement[rows], record.force[rows])
 

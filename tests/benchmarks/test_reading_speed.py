@@ -67,7 +67,7 @@ def long_loop(paper_model, tmp_path, benchmark) -> tuple[Path, int]:
     polars = pytest.importorskip("polars", reason="the group bench is not installed")
     pytest.importorskip("duckdb", reason="the group bench is not installed")
     rows = 50_000 if benchmark.disabled else 10_000_000
-    cycle = rig.record(paper_model, Direction.AXIAL, 0.1, 1e-3, cycles=1, run_in=6, kind="loop")
+    cycle = rig.simulate_cycles(paper_model, Direction.AXIAL, 0.1, 1e-3, cycles=1, run_in=6, kind="loop")
     time, rng = np.arange(rows) * (1000.0 / rows), np.random.default_rng(0)
     motion, force = (np.interp(time % 10.0, cycle.time, column) for column in (cycle.displacement, cycle.force))
     table = {

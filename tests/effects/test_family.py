@@ -23,7 +23,7 @@ from bushfit.effects import (
 from bushfit.errors import ModelError
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
-from bushfit.model.rig import lock_in, record
+from bushfit.model.rig import lock_in, simulate_cycles
 from bushfit.model.sensitivity import force_and_slopes, stiffness_and_slopes
 from bushfit.model.structure import Structure
 from bushfit.testing import CONDITIONS, check_effect, operating_point, random_model
@@ -112,7 +112,7 @@ def test_the_rig_from_rest_finds_the_frequency_face(name, rng):
     model = sized(plain, name, direction, amplitude, rng)
     errors = []
     for each in (plain, model):
-        measured = record(
+        measured = simulate_cycles(
             each, direction, frequency, amplitude, cycles=1, run_in=12, steps_per_cycle=2048, conditions=CONDITIONS
         )
         closed = np.ravel(each.stiffness(direction, frequency, amplitude, conditions=CONDITIONS))[0]
@@ -136,7 +136,7 @@ def test_what_has_no_law_in_time_answers_the_first_harmonic_and_the_rig_refuses_
     late = model.force(direction, started) - plain.force(direction, started)
     np.testing.assert_allclose(late, np.tile(extra[0], 2), atol=1e-9 * np.ptp(extra[0]))
     with pytest.raises(ModelError, match="needs a law in time"):
-        record(model, direction, frequency, amplitude, cycles=1)
+        simulate_cycles(model, direction, frequency, amplitude, cycles=1)
 
 
 def random_cycle(rng: np.random.Generator, amplitude: float) -> History:

@@ -21,7 +21,7 @@ from bushfit.export.fmu import export
 from bushfit.export.in_time import FIELDS, time_model
 from bushfit.geometry import Bushing, Direction, Specimen
 from bushfit.model.model import Model
-from bushfit.model.rig import imposed, wave
+from bushfit.model.rig import simulate_motion, wave
 from bushfit.units import CELSIUS
 
 #: Root mean square error that the force may have, relative: asked for.
@@ -56,7 +56,7 @@ def motions(what: str, level: int) -> tuple[Array, float, float]:
 def on_the_rig(model: Model, motion: Array, step: float, frequency: float) -> Array:
     """Forces of all directions, (n, 3)."""
     return np.stack(
-        [imposed(model, place, motion[:, k], step, frequency).force for k, place in enumerate(LEVELS)], axis=-1
+        [simulate_motion(model, place, motion[:, k], step, frequency).force for k, place in enumerate(LEVELS)], axis=-1
     )
 
 

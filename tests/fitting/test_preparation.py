@@ -178,7 +178,9 @@ def measured(
     seed: int = 0,
 ) -> Loop:
     """A settled loop: displacement noise `jitter` of the amplitude, force noise `noise` of the half range."""
-    whole = rig.record(model, Direction.AXIAL, FREQUENCY, AMPLITUDE, cycles=6, run_in=8, waveform=waveform, kind="loop")
+    whole = rig.simulate_cycles(
+        model, Direction.AXIAL, FREQUENCY, AMPLITUDE, cycles=6, run_in=8, waveform=waveform, kind="loop"
+    )
     rng = np.random.default_rng(seed)
     count = round(rows * cycles)
     share = np.sort(rng.random(count)) if uneven else np.arange(count) / count
@@ -227,7 +229,7 @@ def test_the_motion_is_cleared_and_the_true_model_leaves_only_noise(paper_model,
 
 
 def test_from_rest_the_virgin_curve_is_followed(paper_model):
-    whole = rig.record(paper_model, Direction.AXIAL, FREQUENCY, AMPLITUDE, cycles=3, steps_per_cycle=1000)
+    whole = rig.simulate_cycles(paper_model, Direction.AXIAL, FREQUENCY, AMPLITUDE, cycles=3, steps_per_cycle=1000)
     loop = Loop("loop", Direction.AXIAL, whole.time, whole.displacement, whole.force)
     prepared = prepare_loop(loop)
     assert prepared.from_rest
@@ -240,7 +242,7 @@ def test_from_rest_the_virgin_curve_is_followed(paper_model):
 
 @pytest.mark.parametrize(("cycles", "amplitude"), [(1, 1e-4), (1, 1e-3), (4, 1e-3), (3.5, 1e-4)])
 def test_rest_may_be_a_preload(paper_model, cycles, amplitude):
-    whole = rig.record(paper_model, Direction.AXIAL, FREQUENCY, amplitude, cycles=4, steps_per_cycle=1000)
+    whole = rig.simulate_cycles(paper_model, Direction.AXIAL, FREQUENCY, amplitude, cycles=4, steps_per_cycle=1000)
     rows = slice(round(1000 * cycles) + 1)
     noise = 3e-3 * np.ptp(whole.force) * np.random.default_rng(0).standard_normal(whole.force.size)
     force, settled = whole.force + 640.0 + noise, slice(2000, None)
@@ -330,7 +332,7 @@ RUN_INS = {
 
 def recorded(model: Model, *motions: Array, noise: float = 3e-3) -> Loop:
     """A motion that starts from rest, put through the rig's equations."""
-    clean = rig.imposed(model, Direction.AXIAL, np.concatenate(motions), PERIOD / 1000, 1.0 / PERIOD)
+    clean = rig.simulate_motion(model, Direction.AXIAL, np.concatenate(motions), PERIOD / 1000, 1.0 / PERIOD)
     scatter = noise * np.ptp(clean.force) / 2.0 * np.random.default_rng(0).standard_normal(clean.time.size)
     return Loop("loop", Direction.AXIAL, clean.time, clean.displacement, clean.force + scatter)
 

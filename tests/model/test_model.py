@@ -42,7 +42,7 @@ def test_the_whole_reference_table(paper_model, root):
 
 def measured(model: Model, at: tuple[Direction, float, float], steps: int, run_in: int) -> complex:
     """Stiffness by lock-in, over that of the closed form, less 1."""
-    record = rig.record(model, *at, cycles=1, run_in=run_in, steps_per_cycle=steps)
+    record = rig.simulate_cycles(model, *at, cycles=1, run_in=run_in, steps_per_cycle=steps)
     return rig.lock_in(record, at[1]) / complex(model.stiffness(*at)) - 1.0
 
 

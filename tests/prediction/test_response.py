@@ -75,7 +75,7 @@ def test_the_force_is_that_of_the_rig_at_a_tenth_of_the_step(paper_model, law, m
     history = History.sampled(motion(TIME), STEP)
     force = time_response(Result(model), Direction.AXIAL, history).force.value
     fine = np.arange((ROWS - 1) * FINER + 1) * STEP / FINER
-    record = rig.imposed(model, Direction.AXIAL, motion(fine), STEP / FINER, history.frequency)
+    record = rig.simulate_motion(model, Direction.AXIAL, motion(fine), STEP / FINER, history.frequency)
     expected = record.force[::FINER]
     assert np.sqrt(np.mean((force - expected) ** 2)) < 0.003 * np.sqrt(np.mean(expected**2))
 
@@ -147,7 +147,7 @@ def test_arrays_that_are_no_history_are_one_error(paper_model, history, step, pr
 def test_a_low_pass_removes_the_noise_that_friction_would_follow(paper_model, noise):
     """A displacement of the rig with known noise; the force is that of the true motion at a tenth of the step."""
     fine = np.arange((ROWS - 1) * FINER + 1) * STEP / FINER
-    expected = rig.imposed(paper_model, Direction.AXIAL, random(fine), STEP / FINER, 10.0).force[::FINER]
+    expected = rig.simulate_motion(paper_model, Direction.AXIAL, random(fine), STEP / FINER, 10.0).force[::FINER]
     true, size = random(TIME), float(np.std(random(TIME)))
     measured = true + noise * size * np.random.default_rng(5).standard_normal(ROWS)
     plain, smooth = (
@@ -241,7 +241,7 @@ def test_channels_of_hidden_motions_are_those_of_the_rig(paper_model, law):
         for response in output.responses:
             place = response.direction
             frequency = History.sampled(channels[str(place)], STEP).frequency
-            record = rig.imposed(model, place, scales[place] * motions[place](fine), STEP / FINER, frequency)
+            record = rig.simulate_motion(model, place, scales[place] * motions[place](fine), STEP / FINER, frequency)
             expected = record.force[::FINER]
             error = np.sqrt(np.mean((response.force.value - expected) ** 2) / np.mean(expected**2))
             print(f"{law}, {motions[place].__name__}, {place}: {error:.3%} rms")

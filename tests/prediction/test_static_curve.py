@@ -37,7 +37,7 @@ def test_the_curve_is_that_of_the_virtual_rig(paper_model, law):
     reach = 2e-3
     curve = static_curve(Result(model), Direction.AXIAL, reach, RATE)
     frequency = RATE / (4.0 * reach)
-    record = rig.record(
+    record = rig.simulate_cycles(
         model, Direction.AXIAL, frequency, reach, cycles=1, run_in=11, steps_per_cycle=4000, waveform="triangle"
     )
     top, bottom = np.argmax(record.displacement), np.argmin(record.displacement)
@@ -79,7 +79,7 @@ def test_about_a_preload_it_is_that_of_the_rig_with_the_whole_elastic_law(paper_
     motion = offset * np.minimum(2.0 * phase, 1.0) + reach * rig.wave("triangle", phase - 0.5) * (phase >= 0.5)
     whole = paper_model.with_effect("asymmetry", {"asymmetry.c2": c2})
     whole = whole.with_effect("strain_stiffening", {"strain_stiffening.c3": c3})
-    force = rig.imposed(whole, Direction.AXIAL, motion, 1.0 / (frequency * samples), frequency).force
+    force = rig.simulate_motion(whole, Direction.AXIAL, motion, 1.0 / (frequency * samples), frequency).force
     rising = np.diff(motion[-samples - 1 :]) > 0.0
     ways = []
     for way in (rising, ~rising):
@@ -153,7 +153,7 @@ def on_the_rig(model: Model, motion: LargeMotion) -> complex:
         phase = np.arange(300 * steps) / steps
         large, whole = motion.displacement * np.minimum(phase / 10.0, 1.0), 6
     displacement = large + AMPLITUDE * np.sin(2.0 * np.pi * phase)
-    record = rig.imposed(model, Direction.AXIAL, displacement, 1.0 / (steps * FREQUENCY), FREQUENCY)
+    record = rig.simulate_motion(model, Direction.AXIAL, displacement, 1.0 / (steps * FREQUENCY), FREQUENCY)
     against_creep = 1.0 if motion.frequency else np.hanning(whole * steps + 1)[:-1]
     window = against_creep * np.exp(-2j * np.pi * phase[-whole * steps :])
     return complex(window @ record.force[-whole * steps :]) / complex(window @ record.displacement[-whole * steps :])

@@ -36,7 +36,7 @@ def hold(seconds: float) -> Array:
 def recorded(model: Model, *motions: Array, seed: int = 0, noise: float = 3e-3) -> Loop:
     """Motions one after the other from rest, with noise relative to the largest force."""
     motion, random = np.concatenate(motions), np.random.default_rng(seed)
-    clean = rig.imposed(model, Direction.AXIAL, motion, STEP, 0.1)
+    clean = rig.simulate_motion(model, Direction.AXIAL, motion, STEP, 0.1)
     jitter = 2e-4 * np.abs(motion).max() * random.standard_normal(motion.size)
     scatter = noise * np.abs(clean.force).max() * random.standard_normal(motion.size)
     return Loop("loop", Direction.AXIAL, clean.time, motion + jitter, clean.force + scatter)

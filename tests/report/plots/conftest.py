@@ -45,7 +45,7 @@ def looped() -> Callable[..., MeasuredLoop]:
     def loop(
         model: Model, amplitude: float, *, cycles: int = 3, run_in: int = 0, direction: Direction = Direction.AXIAL
     ) -> MeasuredLoop:
-        record = rig.record(
+        record = rig.simulate_cycles(
             model, direction, 0.1, amplitude, cycles=cycles, run_in=run_in, steps_per_cycle=1024, kind="loop"
         )
         force = record.force + 0.005 * np.ptp(record.force) * np.random.default_rng(7).normal(size=record.force.size)
