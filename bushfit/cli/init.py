@@ -87,9 +87,9 @@ def command(
 ) -> None:
     """Write a campaign from test files and the geometry of the bushing.
 
-    A campaign is a text file that lists a bushing and its tests. FILE is a test file, a workbook or a folder. In a
-    terminal, init asks for missing information. An option applies to all given files. Writes campaign.toml, or
-    the file given by -o my_bushing.toml; for several parts, a campaign each and batch.toml.
+    A campaign is a text file of a bushing and its tests. FILE is a test file, a workbook or a folder. In a terminal,
+    init asks for missing information. An option applies to all files. Writes campaign.toml, or the file given by
+    -o my_bushing.toml; for several parts, a campaign each and batch.toml.
     """
     from bushfit.geometry import Specimen
     from bushfit.inspection.record import campaign_text, campaigns_of_parts, with_specimens_named
