@@ -37,12 +37,12 @@ def print_validations(output: Output, validations: Sequence[Validation], before:
         output.warn(f"{validation.record.name}: {sentence}" for sentence in sentences)
 
 
-def print_step(output: Output, title: str, result: Result) -> None:
-    """Print a fit result with its warnings and, with -v, its equation and input files."""
+def print_step(output: Output, title: str, result: Result, source: str = "") -> None:
+    """Print a fit result with its warnings, which begin with `source`, and with -v its equation and input files."""
     from bushfit.prediction.caveats import warnings_of
 
     print_result(output, title, result)
-    output.warn(warnings_of(result))
+    output.warn(f"{source}{line}" for line in warnings_of(result))
     print_origin(output, result)
 
 

@@ -235,7 +235,7 @@ def table_omissions(request: ExportRequest, form: StiffnessForm) -> Iterator[str
             unit, factor = place.display.displacement
             low, value, high = (number(table.amplitude * factor, 4) for table in (tables[0], reference, tables[-1]))
             yield (
-                f"{place}: one amplitude per property: with {value} {unit}, the error of |K| is "
+                f"{place}: one amplitude per property, {value} {unit}: the error of |K| is "
                 f"{format_deviation(ratios)} at {low} to {high} {unit}"
             )
         if tables[0].frequency.size > 1:

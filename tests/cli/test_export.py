@@ -220,7 +220,7 @@ def test_every_format_at_once_and_what_it_leaves_out(bushfit, tmp_path):
         for line in each["left_out"]:
             assert f"limit of {name}: {line}" in done.stderr
     for words in (
-        "axial: one amplitude per property: with 0.2 mm, the error of |K| is ",
+        "axial: one amplitude per property, 0.2 mm: the error of |K| is ",
         "axial: no 95 % band, which is up to ",
         "no law in time",
         "no stiffness in torsion, rotations about x and y",

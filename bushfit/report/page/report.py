@@ -89,6 +89,8 @@ def report_page(files: Sequence[ResultFile]) -> str:
     place_warnings = [prediction.warnings for prediction in record.predictions.values()]
     warnings = warnings_of(result, place_warnings, diagnosis["warnings"] if diagnosis else ())
     pictures, left_out = draw_figures(record)
+    plain = record.joint  # of an earlier run if no effect was added
+    plain = plain if plain and plain.model.effects != result.model.effects else None
     sizes = [p.stiffness.value for p in predictions if p.direction.motion is TRANSLATION]
     ends = [20.0 * math.log10(end) for end in (min(map(np.min, sizes)), max(map(np.max, sizes)))] if sizes else []
     named = [(file.file, file.sha256) for file in ([campaign] if campaign else []) + [*tests]]
@@ -117,7 +119,7 @@ def report_page(files: Sequence[ResultFile]) -> str:
         "left_out": left_out,
         "rows": list(parameter_rows(result)),
         "interval": "95 % by profile" if result.profile else "95 % interval",
-        "plain": {row.name: row.value for row in parameter_rows(record.joint)} if record.joint else {},
+        "plain": {row.name: row.value for row in parameter_rows(plain)} if plain else {},
         "quality": result.quality,
         "correlations": correlation_texts(result),
         "model_error": result.model_error is not None,
