@@ -8,6 +8,7 @@ import os
 import shutil
 import sys
 import tempfile
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from unittest import mock
@@ -31,6 +32,10 @@ class Done:
     stderr: str
 
 
+#: Types a command, and gives what it left; an exit status other than `status=0` fails the test.
+Run = Callable[..., Done]
+
+
 def call(folder: Path, *arguments: object, program: click.Command = cli) -> Done:
     """`bushfit`, or another program of its kind, with these arguments, in a folder."""
     out, err = io.StringIO(), io.StringIO()
@@ -46,6 +51,17 @@ def call(folder: Path, *arguments: object, program: click.Command = cli) -> Done
     ):
         main(program)
     return Done(int(left.value.code or 0), out.getvalue(), err.getvalue())
+
+
+def typing(folder: Path) -> Run:
+    """Type commands in a folder, each of which has to end with `status`, by default 0."""
+
+    def run(*arguments: object, status: int = 0) -> Done:
+        done = call(folder, *arguments)
+        assert done.returncode == status, done.stderr
+        return done
+
+    return run
 
 
 @dataclass(frozen=True)

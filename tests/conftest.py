@@ -5,13 +5,11 @@ import os
 # Small matrices, and a worker a core: threads of the linear algebra would only stand in each other's way.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import production
 import pytest
-from commandline import Done, Shared, call
+from commandline import Run, Shared, typing
 from fits import joint_fit
 from hypothesis import HealthCheck, settings
 
@@ -51,8 +49,8 @@ def made(paper_model, tmp_path_factory) -> Path:
     """A simulated production run, and in `out` the batch of it; what the terminal said is in `said`."""
     folder = tmp_path_factory.mktemp("production")
     production.make(folder, paper_model)
-    done = production.fitted(folder, "part_*/bushing.toml", "-o", "out")
-    assert done.returncode == 1, done.stderr
+    batch = ("batch", "part_*/bushing.toml", "--limits", "limits.toml", "--jobs", "1", "-o", "out", "--no-plots")
+    done = typing(folder)(*batch, status=1)
     (folder / "said").write_text(done.stderr, encoding="utf-8")
     return folder
 
@@ -102,9 +100,9 @@ def other_models() -> dict[str, Model]:
 
 
 @pytest.fixture
-def typed(tmp_path) -> Callable[..., Done]:
-    """Run a command line in `tmp_path`."""
-    return partial(call, tmp_path)
+def typed(tmp_path) -> Run:
+    """Commands in an empty folder."""
+    return typing(tmp_path)
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-from commandline import Done, call
 
 from bushfit.model.model import Model
 from bushfit.reading.measurement import loss_factor
@@ -41,8 +40,3 @@ def make(folder: Path, model: Model) -> None:
             f'[[sweeps]]\nfile = "sweep.csv"\ndirection = "axial"\ndate = "2026-05-{COUNT - number:02}"\n'
         )
     (folder / "limits.toml").write_text(LIMITS)
-
-
-def fitted(folder: Path, pattern: str, *options: str) -> Done:
-    """The batch of some of them, into the folder `out`."""
-    return call(folder, "batch", pattern, "--limits", "limits.toml", "--jobs", "1", "--force", "--no-plots", *options)

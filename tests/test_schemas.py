@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from commandline import call
+from commandline import typing
 from jsonschema import Draft202012Validator
 
 from bushfit.schemas import DESCRIBED, schema
@@ -39,8 +39,7 @@ def written(root: Path, folder: Path) -> Documents:
     found: Documents = {name: [] for name in DESCRIBED}
 
     def run(printed: str, *arguments: str, status: int = 0) -> None:
-        done = call(folder, *arguments, "--json", "-q", "--no-plots")
-        assert done.returncode == status, done.stderr
+        done = typing(folder)(*arguments, "--json", "-q", "--no-plots", status=status)
         found[printed].append(json.loads(done.stdout))
 
     def read(name: str, pattern: str) -> None:
@@ -149,16 +148,16 @@ def test_what_is_mistyped_in_a_campaign_is_refused(root, right, wrong):
     assert complaints("campaign", tomllib.loads(text.replace(right, wrong, 1)))
 
 
-def test_printed_and_written_are_the_same(root, tmp_path):
-    printed = call(tmp_path, "schema", "diagnosis", "-q")
-    assert (printed.returncode, printed.stderr) == (0, "")
+def test_printed_and_written_are_the_same(typed, tmp_path):
+    printed = typed("schema", "diagnosis", "-q")
+    assert printed.stderr == ""
     assert json.loads(printed.stdout) == schema("diagnosis")
-    assert call(tmp_path, "schema", "-o", "all").returncode == 0
+    typed("schema", "-o", "all")
     files = {file.name.removesuffix(".schema.json"): file for file in (tmp_path / "all").glob("[!.]*")}
     assert set(files) == set(DESCRIBED)
     assert files["diagnosis"].read_text(encoding="utf-8") == printed.stdout
-    listed = call(tmp_path, "schema", "--json", "-q")
+    listed = typed("schema", "--json", "-q")
     assert json.loads(listed.stdout) == {name: described.files for name, described in DESCRIBED.items()}
-    wrong = call(tmp_path, "schema", "diagnoses")
-    assert (wrong.returncode, wrong.stdout) == (2, "")
+    wrong = typed("schema", "diagnoses", status=2)
+    assert wrong.stdout == ""
     assert 'did you mean "diagnosis"' in wrong.stderr

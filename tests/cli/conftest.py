@@ -4,7 +4,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-from shell import CAMPAIGN, Run, typing
+from commandline import Run, typing
+from shell import CAMPAIGN
 
 
 @pytest.fixture(scope="session")
@@ -30,9 +31,3 @@ def own(work, tmp_path) -> Path:
 def bushfit(work) -> Run:
     """Commands in the folder of the paper's campaign."""
     return typing(work)
-
-
-@pytest.fixture
-def typed(tmp_path) -> Run:
-    """Commands in an empty folder."""
-    return typing(tmp_path)

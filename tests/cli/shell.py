@@ -1,14 +1,11 @@
 """Commands typed in a folder, that end as they should, and what they leave there."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from commandline import Done, call
+from commandline import Done
 
-#: Types a command, and gives what it left; an exit status other than `status=0` fails the test.
-Run = Callable[..., Done]
 #: The paper's tests, in the folder `work`.
 CAMPAIGN = "configs/cmp_15961.toml"
 GEOMETRY = ("--inner-radius", "10 mm", "--outer-radius", "18 mm", "--length", "34 mm")
@@ -22,15 +19,6 @@ sigma_fmax = "14.6 kPa"
 eps_half = 0.013
 """
 BUSHING = '[bushing]\nname = "B"\ninner_radius = "10 mm"\nouter_radius = "18 mm"\nlength = "34 mm"\n'
-
-
-def typing(folder: Path) -> Run:
-    def run(*arguments: object, status: int = 0) -> Done:
-        done = call(folder, *arguments)
-        assert done.returncode == status, done.stderr
-        return done
-
-    return run
 
 
 def refused(done: Done, folder: Path, *words: str) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from commandline import Done
-from shell import Run, document, names, typing
+from commandline import Done, Run, typing
+from shell import document, names
 
 from bushfit.effects import BASE, effects_for_places
 from bushfit.effects.mistakes import MISTAKES

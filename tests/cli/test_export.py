@@ -14,8 +14,8 @@ from pathlib import Path
 import click
 import pandas as pd
 import pytest
-from commandline import Done
-from shell import document, names, refused, typing
+from commandline import Done, typing
+from shell import document, names, refused
 from tries import some
 
 from bushfit.cli import cli

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from commandline import Done
-from shell import CAMPAIGN, Run, document, names, typing, values
+from commandline import Done, Run, typing
+from shell import CAMPAIGN, document, names, values
 from virtual_rig import LOOP, MOUNT, SWEEPS, rig
 
 from bushfit.cli.run import two_step_line

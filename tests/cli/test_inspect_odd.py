@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from shell import CAMPAIGN, Run
+from commandline import Run
+from shell import CAMPAIGN
 
 from bushfit.effects.contract import Array
 from bushfit.model.file import load_result

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from shell import CAMPAIGN, document, names, typing, values
+from commandline import typing
+from shell import CAMPAIGN, document, names, values
 
 FILES = {"compare.json", "parameters.csv", "differences.csv", "compare.png", "compare.html"}
 ARM = "data/arm_bushing/truth.json"

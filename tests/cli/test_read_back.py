@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from commandline import call
+from commandline import call, typing
 from jsonschema import Draft202012Validator
 from shell import document as read
-from shell import typing
 from virtual_rig import LOOP, MOUNT, SWEEP, SWEEPS, rig
 
 from bushfit.model.file import load_result, to_document

@@ -12,8 +12,9 @@ import pytest
 import pyuff
 import recordings
 from asammdf import MDF, Signal
+from commandline import typing
 from scipy.io import savemat
-from shell import BUSHING, GEOMETRY, document, refused, typing, values
+from shell import BUSHING, GEOMETRY, document, refused, values
 
 #: The endings of the loop, the axial and the radial sweep of a campaign, so that each format has both kinds of test.
 MIXED = [("tdms", "mat", "mf4"), ("uff", "parquet", "v73.mat"), ("mat", "tdms", "feather"), ("v73.mat", "mf4", "tdms")]

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from shell import document, refused, typing
+from commandline import typing
+from shell import document, refused
 
 from bushfit.geometry import Specimen
 from bushfit.report.results import place_names

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commandline import call
+from commandline import typing
 from exports import EXPORTS, Export, loop
 from test_exports import options
 
@@ -53,10 +53,8 @@ def fitted(folder: Path, *exports: Export) -> dict[str, float]:
         file.write_bytes(export.content if isinstance(export.content, bytes) else export.content.encode())
         stated |= export.stated
     files = sorted(file.name for file in folder.iterdir())
-    done = call(folder, "init", *files, *GEOMETRY, *options(stated), "-o", "campaign.toml", "--no-input")
-    assert done.returncode == 0, done.stderr
-    done = call(folder, "fit", "campaign.toml", "--json", "-o", "y", "--no-plots")
-    assert done.returncode == 0, done.stderr
+    done = typing(folder)("init", *files, *GEOMETRY, *options(stated), "-o", "campaign.toml", "--no-input")
+    done = typing(folder)("fit", "campaign.toml", "--json", "-o", "y", "--no-plots")
     return {name: entry["value"] for name, entry in json.loads(done.stdout)["parameters"].items()}
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import openpyxl
 import pytest
 import scipy.io
-from commandline import call
+from commandline import typing
 from exports import AMPLITUDE, DISPLACEMENT, EXPORTS, FORCE, FREQUENCY, STIFFNESS, TIME
 
 from bushfit.campaign.campaign import load_campaign
@@ -32,8 +32,7 @@ def options(stated: Mapping[str, Any]) -> Iterator[str]:
 
 def inspected(folder: Path, file: str, **stated: Any) -> tuple[dict[str, Any], list[Loop | Sweep]]:
     """What `inspect --json` prints of a file, and the tests of the campaign in it, as `fit` reads them."""
-    done = call(folder, "inspect", file, *options({"direction": "axial", **stated}), "--json", "--no-plots")
-    assert done.returncode == 0, done.stderr
+    done = typing(folder)("inspect", file, *options({"direction": "axial", **stated}), "--json", "--no-plots")
     document: dict[str, Any] = json.loads(done.stdout)
     (folder / "campaign.toml").write_text(BUSHING + document["campaign"], encoding="utf-8")
     campaign = load_campaign(folder / "campaign.toml")
@@ -55,8 +54,9 @@ def test_an_export_is_read_right_or_raises_a_question(name, tmp_path):
     file = tmp_path / export.name
     file.write_bytes(export.content if isinstance(export.content, bytes) else export.content.encode())
     if export.kind is None:
-        done = call(tmp_path, "inspect", file.name, *options({"direction": "axial", **export.stated}), "--json")
-        assert done.returncode == 2
+        done = typing(tmp_path)(
+            "inspect", file.name, *options({"direction": "axial", **export.stated}), "--json", status=2
+        )
         assert [word for word in export.words if word not in done.stderr] == []
         assert [path.name for path in tmp_path.iterdir()] == [file.name]
         return
@@ -74,8 +74,7 @@ def test_an_export_is_read_right_or_raises_a_question(name, tmp_path):
 def test_complex_numbers_recorded_over_time_are_refused(channel, tmp_path):
     channels = {"time": TIME, "displacement": DISPLACEMENT, "force": FORCE}
     scipy.io.savemat(tmp_path / "loop.mat", {**channels, channel: channels[channel] * (1.0 + 0.1j)})
-    done = call(tmp_path, "inspect", "loop.mat", "--direction", "axial")
-    assert done.returncode == 2
+    done = typing(tmp_path)("inspect", "loop.mat", "--direction", "axial", status=2)
     assert f'loop.mat: the channel "{channel}" holds complex numbers' in done.stderr
 
 
@@ -108,7 +107,6 @@ def test_parts_side_by_side_and_date_cells_of_a_workbook(tmp_path):
 def test_blocks_with_other_units_or_another_order_are_refused(first, second, words, title, tmp_path):
     rows = "\n".join(f"{t:.6g},{x:.6g},{f:.6g}" for t, x, f in zip(TIME, DISPLACEMENT, FORCE, strict=True))
     (tmp_path / "blocks.csv").write_text(f"{title}{first}\n{rows}\n{title}{second}\n{rows}\n")
-    done = call(tmp_path, "inspect", "blocks.csv", "--direction", "axial", "--json")
-    assert done.returncode == 2
+    done = typing(tmp_path)("inspect", "blocks.csv", "--direction", "axial", "--json", status=2)
     assert [word for word in words if word not in done.stderr] == []
     assert [path.name for path in tmp_path.iterdir()] == ["blocks.csv"]

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from commandline import call
+from commandline import typing
 
 #: Campaigns whose pages are looked at, by the names of their folders.
 CAMPAIGNS = {"cmp_15961": "configs/cmp_15961.toml", "mystery_mount": "configs/mystery_mount.toml"}
@@ -18,8 +18,7 @@ def results(root, tmp_path_factory) -> Callable[[str], Path]:
     def made(name: str) -> Path:
         folder = home / name
         if not folder.exists():
-            done = call(root, "run", CAMPAIGNS[name], "-o", folder, "--no-plots", "-q")
-            assert done.returncode == 0, done.stderr
+            typing(root)("run", CAMPAIGNS[name], "-o", folder, "--no-plots", "-q")
         return folder
 
     return made
@@ -32,8 +31,7 @@ def measured(root, tmp_path_factory) -> Path:
     fit = ("fit", "configs/epdm_70.toml", "--direction", "DMA", "--direction", "DMA 2", "-o", folder)
     predict = ("predict", folder / "model.json", "--campaign", "configs/epdm_70.toml", "-o", folder)
     for command in (fit, predict, ("report", folder)):
-        done = call(root, *command, "--no-plots", "-q")
-        assert done.returncode == 0, done.stderr
+        typing(root)(*command, "--no-plots", "-q")
     return folder
 
 
@@ -43,8 +41,7 @@ def compared(root, results, tmp_path_factory) -> Path:
     home = tmp_path_factory.mktemp("compared")
     two = (results("cmp_15961"), results("mystery_mount"), "--direction", "axial", "--direction", "radial")
     for name, what in (("two", two), ("families", ("configs/cmp_15961.toml", "--families", "sliders,kraus"))):
-        done = call(root, "compare", *what, "-o", home / name, "--no-plots", "-q")
-        assert done.returncode == 0, done.stderr
+        typing(root)("compare", *what, "-o", home / name, "--no-plots", "-q")
     return home
 
 
@@ -62,6 +59,5 @@ def batch(root, tmp_path_factory) -> Path:
     rows.append('[[bushings]]\ncampaign = "empty.toml"\nname = "=1+1 <b>"\n')
     (home / "m.toml").write_text('commands = ["diagnose"]\nat = ["axial 25 Hz 0.1 mm"]\n' + "".join(rows))
     (home / "limits.toml").write_text('[parameters.mu]\nmin = "1.2 MPa"\n')
-    done = call(home, "batch", "m.toml", "--limits", "limits.toml", "-o", "out", "--reports", "--jobs", "1", "-q")
-    assert done.returncode == 1, done.stderr
+    typing(home)("batch", "m.toml", "--limits", "limits.toml", "-o", "out", "--reports", "--jobs", "1", "-q", status=1)
     return home / "out"
