@@ -141,7 +141,7 @@ USAGE = [
     ("predict|model.json|--over|0.5 Hz", "--over"),
     ("predict|model.json|--over|0.5 Hz -1 mm", "a value above zero"),
     ("predict|model.json|--over|2 deg", "not a motion of this direction"),
-    ("predict|model.json|--over|50 Hz 1 mm", "do not suit the slow motion"),
+    ("predict|model.json|--over|50 Hz 1 mm", "is not fast compared with the slow motion"),
     ("predict|model.json|--frequencies|0 Hz", "predict --static writes the static curve"),
     ("predict|model.json|--frequencies|0:10:5 Hz", "predict --static writes the static curve"),
     ("predict|model.json|--static-rate|10 mm", "a speed, such as mm/min"),

@@ -196,7 +196,7 @@ def test_a_vanishing_motion_changes_nothing_and_the_band_is_that_of_the_harmonic
 @pytest.mark.parametrize(
     ("effects", "motion", "words"),
     [
-        ([], LargeMotion(1e-3, "m", 1e-4), "do not suit the slow motion"),
+        ([], LargeMotion(1e-3, "m", 1e-4), "is not fast compared with the slow motion"),
         (["kraus"], LargeMotion(1e-3, "m"), "a law in time"),
     ],
 )
