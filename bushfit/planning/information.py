@@ -83,10 +83,16 @@ class ModelInformation:
     def of_runs(self, counts: Array) -> Information:
         """Fisher information of each test separately, (tests, ...), made `counts` times, (tests,); without the prior.
 
-        The gain and phase errors that all runs of a test share are eliminated.
+        Notes:
+            The gain and phase errors that all runs of a test share are eliminated: with their columns U and standard
+            deviations T, an inner product a^T b becomes a^T b - a^T U T (1 + T U^T U T)^-1 T U^T b.
         """
-        products, decrease = eliminate_line_errors(self.products * counts[:, None, None], self.level)
-        return Information(products, self.squares * counts[:, None] - decrease)
+        products, k = self.products * counts[:, None, None], len(self.prior)
+        line = self.level[..., None] * products[..., :2, :]
+        solved = np.linalg.solve(np.eye(2) + line[..., :2] * self.level[..., None, :], line)
+        remaining = products[..., 2:, 2:] - line[..., 2 : 2 + k].mT @ solved[..., 2:]
+        decrease = np.sum(line[..., 2 + k :] * solved[..., 2 + k :], axis=-2)
+        return Information(remaining, self.squares * counts[:, None] - decrease)
 
     def total(self, counts: Array) -> Information:
         """Fisher information of the prior and all tests together, (1, ...), each made `counts` times, (tests,)."""
@@ -123,29 +129,6 @@ class ModelInformation:
         first = free.shape[-1] - self.bounded
         bounded = free[..., first:]
         return free - 0.5 * bounded @ np.linalg.inv(bounded[..., first:, :]) @ bounded.mT
-
-
-def eliminate_line_errors(products: Array, level: Array) -> tuple[Array, Array]:
-    """Eliminate the gain and phase errors that all runs of a test share from the inner products of the columns.
-
-    Args:
-        products: inner products as in `ModelInformation.products`, summed over the runs of each test,
-            (tests, 2 + k, 2 + k + e).
-        level: standard deviations of the gain [1] and phase [rad] errors, (tests, 2).
-
-    Returns:
-        Inner products of the parameters with all remaining columns, (tests, k, k + e), and the decrease of the square
-        of each further column, (tests, e).
-
-    Notes:
-        With U the gain and phase columns and T their standard deviations, a product a^T b becomes
-        a^T b - a^T U T (1 + T U^T U T)^-1 T U^T b.
-    """
-    k = products.shape[-2] - 2
-    line = level[..., None] * products[..., :2, :]
-    solved = np.linalg.solve(np.eye(2) + line[..., :2] * level[..., None, :], line)
-    remaining = products[..., 2:, 2:] - line[..., 2 : 2 + k].mT @ solved[..., 2:]
-    return remaining, np.sum(line[..., 2 + k :] * solved[..., 2 + k :], axis=-2)
 
 
 @dataclass(frozen=True, eq=False)
