@@ -7,7 +7,6 @@ from itertools import product
 from math import log
 
 import numpy as np
-from scipy.linalg import block_diag
 from scipy.special import chdtri, logsumexp
 
 from bushfit.campaign.schema import RigSettings
@@ -193,9 +192,8 @@ def blocks(evidence: Evidence, rig: RigSettings) -> Iterator[Block]:
         rows = np.concatenate(
             [np.arange(evidence.residual_rows[loop].start, evidence.residual_rows[loop].stop) for loop in group]
         )
-        gains, offsets = zip(*(loop.gain_and_offset() for loop in group), strict=True)
-        columns = classes[0] * np.concatenate((np.concatenate(gains)[None], block_diag(*offsets)))
-        yield Block(rows, columns, np.full(len(columns), _LOOP), scatters=False)
+        gain = classes[0] * np.concatenate([loop.gain_and_offset()[0] for loop in group])
+        yield Block(rows, gain[None], np.array([_LOOP]), scatters=False)
 
 
 def _shared_errors(count: int, runs: Sequence[Array]) -> tuple[Array, Array]:

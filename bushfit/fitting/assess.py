@@ -119,7 +119,7 @@ def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | Non
             continue
         for test, rows in blocks:
             if isinstance(test, MeasuredLoop) and not test.gain_weighs:  # which the weights do not count
-                change = test.gain_error * (influence[:, rows] @ test.unit_gain)
+                change = test.gain_error * (influence[:, rows] @ test.gain_and_offset()[0])
                 matrix = matrix + np.outer(change, change)
         for variance, (change, lost) in _changes_by_noise(stage.data_sets, influence, basis).items():
             changes, losses = by_noise.get(variance, (0.0, 0.0))

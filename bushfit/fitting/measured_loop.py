@@ -35,7 +35,8 @@ class MeasuredLoop(MeasuredBase):
         test_conditions: temperature of the rubber in the loop, and its strains before.
         fundamental_only: True to use only the first harmonic of the residuals, so that the loop is one operating point
             with two residuals: for an added stiffness that is known at the loop's frequency only.
-        gain_error: standard deviation of the relative gain error of the whole record, by the accuracy class of its rig.
+        gain_error: standard deviation of the relative gain error of the whole record, by the accuracy class of its rig,
+            and of the offset of its force, relative to half the force range.
         gain_weighs: True if the gain error is part of the noise that weights the residuals, as for a class stated in
             [rig]. An assumed gain error only widens the errors of fitted parameters.
         model_error: standard deviation of the model's error of the force, relative to half the force range, added to
@@ -246,8 +247,7 @@ class MeasuredLoop(MeasuredBase):
 
     def gain_and_offset(self) -> Array:
         """Change of the whitened residuals by a gain error of 100 %, and by an offset of half the range, (2, size)."""
-        offset = np.full(self.prepared.force.size, self.prepared.half_range)
-        return np.array([self._whiten_shared(self.unit_gain), self.whiten(offset * self._per_noise)])
+        return self._whiten_shared(np.array([self._unit_gain, self._unit_offset]))
 
     def columns(self) -> dict[str, Any]:
         """Table columns by header that identify the point of each residual, such as time [s] and amplitude."""
@@ -311,7 +311,12 @@ class MeasuredLoop(MeasuredBase):
         return self.whiten(np.array([wave.real, -wave.imag]) * self._per_noise)
 
     @cached_property
-    def unit_gain(self) -> Array:
+    def _unit_offset(self) -> Array:
+        """Change of the uncorrelated rows by an offset of the force of half its range, (size,)."""
+        return self._whiten_rows(self._per_noise * self.prepared.half_range)
+
+    @cached_property
+    def _unit_gain(self) -> Array:
         """Change of the uncorrelated rows by a gain error of 100 %, (size,).
 
         Notes: computed from the force without its noise. With noise, a fit would attribute noise to the gain, and bias
@@ -324,20 +329,22 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def _shared(self) -> CommonError | None:
-        """Error that all rows of the loop share: the model error, or without one the gain error; None without both.
+        """Error that all rows of the loop share: the model error, or without one the errors of the rig; None without.
 
-        A gain error that the weights of the residuals exclude is left out.
+        The zero of a load cell is uncertain by the class of its gain, relative to half the force range. A gain error
+        that the weights of the residuals exclude is left out.
         """
         if self.model_error:
             return self._unit_error.scaled(self.model_error)
-        return CommonError(self.gain_error * self.unit_gain[None]) if self.gain_weighs and self.gain_error else None
+        errors = [self._unit_offset, *([self._unit_gain] if self.gain_weighs else [])]
+        return CommonError(self.gain_error * np.array(errors)) if self.gain_error else None
 
     @cached_property
     def _error_waves(self) -> Array:
         """Change of the uncorrelated rows by one standard deviation of each part of a model error of 100 %, (c, n).
 
-        The parts are cosine and sine of each harmonic, and for a loop from rest also a deviation of the first cycle and
-        a drift.
+        The parts are cosine and sine of each harmonic and an offset, and for a loop from rest also a deviation of the
+        first cycle and a drift.
         """
         count = 1 if self.fundamental_only else _ERROR_HARMONICS
         angle = 2.0 * np.pi * self.prepared.phase * np.arange(1, count + 1)[:, None]
@@ -347,7 +354,8 @@ class MeasuredLoop(MeasuredBase):
             order = np.arange(2.0 * np.ceil(self.prepared.cycles))[:, None]
             drift = np.cos(np.pi * order * self.prepared.phase / self.prepared.cycles) / (1.0 + order)
             waves = np.concatenate((waves, waves * (self.prepared.phase < 1.0), drift))
-        return self._whiten_rows(waves * (self._per_noise * self.prepared.half_range))
+        rows = self._whiten_rows(waves * (self._per_noise * self.prepared.half_range))
+        return np.concatenate((rows, _ERROR_SIZES[:1, None] * self._unit_offset))
 
     @cached_property
     def _unit_error(self) -> CommonError:
@@ -400,5 +408,5 @@ class MeasuredLoop(MeasuredBase):
             Covariance to be added, (k, k).
         """
         first = influence @ self._whiten_shared(self.model_error * self._error_waves[:2]).T
-        gain = influence @ self._whiten_shared(self.gain_error * self.unit_gain)
+        gain = influence @ self._whiten_shared(self.gain_error * self._unit_gain)
         return np.asarray(np.outer(gain, gain) - first @ first.T)

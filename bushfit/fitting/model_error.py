@@ -270,7 +270,7 @@ def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
     These are the gain error of a loop, or the gain and phase errors of each level of a sweep.
     """
     if isinstance(test, MeasuredLoop):
-        gain = test.gain_error * test.unit_gain[None]
+        gain = test.gain_error * test.gain_and_offset()[:1]
         return gain[:0] if test.gain_weighs else gain
     uncounted = np.sqrt(np.maximum(np.square(class_errors(rig)) - np.square(test.noise.level), 0.0))
     columns = level_error_columns(test)

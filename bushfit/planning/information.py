@@ -204,7 +204,7 @@ class CandidateGrid:
         products, squares, level = [], [], []
         for test, rows in zip(self.tests, self.rows, strict=True):
             if isinstance(test, SimulatedLoop):
-                unit_gain = loops[rows[0] // _ROWS].unit_gain
+                unit_gain = loops[rows[0] // _ROWS].gain_and_offset()[0]
                 line = np.stack((unit_gain, np.zeros(_ROWS)))
                 whitened = np.sqrt(test.cycles) * np.concatenate((line, columns[:, rows]))
             else:

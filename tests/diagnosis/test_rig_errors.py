@@ -11,8 +11,10 @@ from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.priors import WAVES
 from bushfit.diagnosis.rig_errors import blocks, in_scatter_units
+from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
+from bushfit.fitting.prepared_campaign import PreparedCampaign
 
 RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
 RUN, LEVEL, WAVE, LOOP = range(4)
@@ -62,3 +64,12 @@ def test_repeated_loops_share_their_gain(measured, fitted):
     bare = in_scatter_units(fitted(replace(campaign, loops=(first, second, replace(first, name="again")))))
     assert sorted(block.rows.size for block in blocks(bare, RIG)) == [second.time.size, 2 * first.time.size]
     assert all(block.kinds.tolist() == [LOOP] for block in blocks(bare, RIG))
+
+
+def test_a_zero_error_of_the_load_cell_hides_no_effect(measured):
+    """An offset of the class, twenty times its standard error, is neither a faulty loop nor something without a name."""
+    campaign = measured({"inertia": {"mass": 0.2}}, plan=SHARED)
+    first, second = campaign.loops
+    shifted = replace(first, force=first.force + RIG.gain_error * np.ptp(first.force) / 2.0)
+    diagnosis = diagnose(PreparedCampaign.from_campaign(replace(campaign, loops=(shifted, second))))
+    assert (diagnosis.verdict, [effect.name for effect in diagnosis.effects]) == ("named", ["inertia"])
