@@ -67,7 +67,7 @@ def test_repeated_loops_share_their_gain(measured, fitted):
 
 
 def test_a_zero_error_of_the_load_cell_hides_no_effect(measured):
-    """An offset of the class, twenty times its standard error, is neither a faulty loop nor something without a name."""
+    """An offset of the class, many standard errors large, is neither a faulty loop nor something without a name."""
     campaign = measured({"inertia": {"mass": 0.2}}, plan=SHARED)
     first, second = campaign.loops
     shifted = replace(first, force=first.force + RIG.gain_error * np.ptp(first.force) / 2.0)
