@@ -109,7 +109,8 @@ def classify(
         roles["amplitude"] = replace(roles.pop("amplitude_reached"), role="amplitude")
     notes, unused = _add_by_unit(cells, roles, names, motion)
     if {"displacement", "force"} <= {*roles} and "displacement" not in columns:
-        _refuse_second_motion(cells, roles["displacement"], unused)
+        for column in (one for one in unused if _moves_along(cells, roles["displacement"], one)):
+            _preferred(cells, roles["displacement"], replace(column, role="displacement"))
     if {"force_amplitude", "stiffness"} & set(roles) and "amplitude" not in roles:
         notes += _add_motion_as_amplitude(cells, roles, stated_units)
     time = roles.get("time")
@@ -308,36 +309,17 @@ def _add_by_unit(
     return notes, list(free)
 
 
-def _refuse_second_motion(cells: Cells, known: Column, unused: Sequence[Column]) -> None:
-    """Refuse a displacement beside another channel of the same motion and of another size, such as an extensometer.
-
-    Args:
-        cells: header and rows of the table.
-        known: column of the displacement by its name.
-        unused: columns without a known name.
-
-    Raises:
-        MeasurementError: another channel moves along with the displacement.
-    """
-    for column in unused:
-        if not (known.unit and column.unit and units.is_compatible(column.unit, known.unit)):
-            continue
-        pairs = [[plainest_value(str(row[one.index])) for one in (known, column)] for row in cells.first_rows]
-        factors = [units.si_factor(unit, known.unit) for unit in (known.unit, column.unit)]
-        numbers = np.array(pairs)[~np.isnan(pairs).any(axis=1)] * factors
-        spans = [float(np.ptp(values)) for values in numbers.T] if len(numbers) else [0.0, 0.0]
-        if (
-            min(spans) > 0.0
-            and float(np.min(np.corrcoef(numbers.T))) > _ALONG
-            and abs(spans[1] / spans[0] - 1.0) > _AGREEMENT
-        ):
-            choices = " or ".join(f'columns = {{ displacement = "{one.header}" }}' for one in (known, column))
-            raise cells.header_error(
-                "two columns record this motion, and they differ",
-                found=f'"{known.header}" and "{column.header}", {spans[1] / spans[0]:.3g} times as large',
-                expected="one displacement: that of the part, without the frame of the machine",
-                hint=f"choose it in the campaign: {choices}",
-            )
+def _moves_along(cells: Cells, known: Column, column: Column) -> bool:
+    """Return True if a column records the motion of a displacement in another size, as an extensometer does."""
+    if not (known.unit and column.unit and units.is_compatible(column.unit, known.unit)):
+        return False
+    numbers = _first_numbers(cells, (known, column)) * [
+        units.si_factor(unit, known.unit) for unit in (known.unit, column.unit)
+    ]
+    spans = [float(np.ptp(values)) for values in numbers.T] if len(numbers) else [0.0, 0.0]
+    if min(spans) <= 0.0 or abs(spans[1] / spans[0] - 1.0) <= _AGREEMENT:
+        return False
+    return float(np.min(np.corrcoef(numbers.T))) > _ALONG
 
 
 def _add_motion_as_amplitude(cells: Cells, roles: dict[str, Column], stated_units: Mapping[str, str]) -> list[str]:

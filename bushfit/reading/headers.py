@@ -101,56 +101,27 @@ _ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesu
 _UNITS_NOT_F = {"force": ("Hz",), "frequency": ("N", "N m")}
 #: Units with which a short or ambiguous name means a role, by name and role.
 _UNITS_OF = {
-    ("a", "amplitude"): ("m", "rad"),
-    ("da", "amplitude"): ("m", "rad", "1"),
-    **dict.fromkeys((("k", "stiffness"), ("cdyn", "stiffness")), ("N/m", "N*m/rad")),
-    **dict.fromkeys((("k1", "storage_stiffness"), ("k2", "loss_stiffness")), ("N/m", "N*m/rad")),
-    **{
-        (name, "damping_coefficient"): ("N*s/m", "N*m*s/rad", "Pa*s")
-        for name in ("c", "cdyn", "damping", "dampfung", "amortissement", "damp")
-    },
-    **{(name, "force_amplitude"): ("N", "N*m", "Pa") for name in ("force", "load", "kraft", "torque", "moment")},
+    (name, role): si
+    for role, entries in WORDS["units_of"].items()
+    for name, *si in (entry.split() for entry in entries)
 }
 #: Names of an amplitude that imply peak-to-peak.
 PEAK_TO_PEAK_NAMES = frozenset(WORDS["counting"]["peak_to_peak"])
-#: One peak, in texts without accents; CJK characters need no blank before and after a word.
-_PEAK = r"(?:peak|pk|spitze|sp\.?|crete|cresta|picco|pico|pic)"
-_ONE_PEAK = (
-    rf"(?:(?:val(?:eur|or|ore)[\s_])?(?:d[ei][\s_])?{_PEAK}(?:[\s_]value)?|(?:scheitel|spitzen)(?:werte?)?(?:[\s_]der)?"
-    r"|szczyt|szczytowa|пик|пиковая|tepe|topp|vrchol|spicka)"
-)
-_START, _END = r"(?<![^\W_])", r"(?![^\W_])"
-#: End of a unit to which a convention may be joined without a blank: "mmpp".
-_AFTER_UNIT = r"(?:(?<=mm)|(?<=[u\u03bc]m)|(?<=deg)|(?<=rad))"
-#: Words for each convention, in the order in which they are tried.
-_CONVENTIONS: tuple[tuple[re.Pattern[str], AmplitudeConvention], ...] = (
-    (
-        re.compile(
-            rf"{_START}(?:(?:zero|null|cero|0)[\s_/-]*(?:(?:to|bis|zu|a|2)[\s_-]*)?(?:{_PEAK}|p))\.?{_END}"
-            rf"|{_START}(?:half[\s-]?amplitude|single[\s-]?(?:peak|amplitude))"
-        ),
-        "zero-to-peak",
-    ),
-    (
-        re.compile(
-            rf"{_START}(?:{_PEAK}[\s_/-]*(?:(?:to|zu|a|2)[\s_-]*)?{_PEAK}|p[\s_./-]?(?:t[\s_./-]?|2[\s_./-]?)?p"
-            rf"|v[\s_-]?pp|c[\s-](?:a[\s-])?c|s[.-]?s|max\.?[\s_./-]*(?:min|to[\s_-]*min)|\(?2\s?[ax](?:_?0)?\)?)\.?{_END}"
-            rf"|{_AFTER_UNIT}(?:pk?-?pk?|s-?s){_END}|\((?:total|double|full)\)|(?<=amplitude)[\s,_-]+total{_END}"
-            rf"|{_START}{_PEAK}[\s_/-]*(?:to[\s_-]*)?valley{_END}|[両全双](?=振幅)|峰-?峰值?"
-        ),
-        "peak-to-peak",
-    ),
-    (
-        re.compile(rf"{_START}(?:r\.?m\.?s\.?|eff(?:ektiv|icace|ective)?\.?){_END}|{_AFTER_UNIT}(?:rms|eff){_END}"),
-        "rms",
-    ),
-    (
-        re.compile(
-            rf"\u00b1|\+/?-|(?:{_START}|{_AFTER_UNIT}){_ONE_PEAK}\.?{_END}|[片半单單](?=振幅)|(?<=振幅)(?:峰值|\(?ヒーク値?\)?)"
-        ),
-        "zero-to-peak",
-    ),
-)
+#: Parts of the patterns of conventions: ends of words, and the end of a unit to which one may be joined ("mmpp").
+_PARTS = {
+    "start": r"(?<![^\W_])",
+    "end": r"(?![^\W_])",
+    "unit": r"(?:(?<=mm)|(?<=[uμ]m)|(?<=deg)|(?<=rad))",
+    "peak": "|".join(WORDS["conventions"]["peak"]),
+}
+#: Key in words.toml of the words for each convention, in the order in which they are tried.
+_CONVENTION_KEYS: dict[str, AmplitudeConvention] = {
+    "zero_to_peak": "zero-to-peak", "peak_to_peak": "peak-to-peak", "rms": "rms", "lone_peak": "zero-to-peak"
+}  # fmt: skip
+_CONVENTIONS = [
+    (re.compile("|".join(WORDS["conventions"][key]).format(**_PARTS)), convention)
+    for key, convention in _CONVENTION_KEYS.items()
+]
 #: Boundary of words in "AmpPkPk".
 _CAMEL = re.compile(r"(?<=[a-z]{2})(?=[A-Z])")
 #: Characters of the longest header that is compared; chosen: longer texts are not names.

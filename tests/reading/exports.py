@@ -430,8 +430,8 @@ EXPORTS: dict[str, Export] = {
             loop(f"time [s]|{first} [mm]|{second} [um]|force [N]", TIME, DISPLACEMENT, 1e3 * factor * DISPLACEMENT, FORCE), kind, words
         )
         for first, second, factor, kind, words in (
-            ("Crosshead travel", "Extensometer", 0.8, None, ["they differ", "0.8 times", "Extensometer [um]"]),
-            ("Weg Traverse", "Feinmesser", 0.9, None, ["they differ", "Feinmesser [um]"]),
+            ("Crosshead travel", "Extensometer", 0.8, None, ["more than one column", "Crosshead travel [mm]", "Extensometer [um]"]),
+            ("Weg Traverse", "Feinmesser", 0.9, None, ["more than one column", "Feinmesser [um]"]),
             ("Stroke", "LVDT", 1.01, "loop", []), ("Stroke", "command", 1.2, "loop", []),
         )
     },
