@@ -412,7 +412,7 @@ def measured_table(result: Result, sweeps: Sequence[MeasuredSweep]) -> pd.DataFr
 
 
 def joined_table(make: Callable[[Part], pd.DataFrame], parts: Sequence[Part]) -> pd.DataFrame:
-    """Table of the predictions or static curves of one direction at several preloads, one below the other."""
+    """Join the tables, made by `make`, of predictions or static curves at several preloads, one below the other."""
     return pd.concat([make(part) for part in parts], ignore_index=True)
 
 

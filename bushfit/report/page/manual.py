@@ -64,7 +64,7 @@ def _add_identifiers(tokens: Sequence[Token], name: str) -> str:
 
 
 def _redirect_links(parts: Sequence[Token], name: str, names: Sequence[str]) -> None:
-    """Change the links of a paragraph of page `name` in place, and replace images by their descriptions."""
+    """Redirect the links of a paragraph of page `name` into the HTML page, and replace images by their descriptions."""
     hidden = False
     for part in parts:
         if part.type == "link_open":

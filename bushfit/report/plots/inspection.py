@@ -17,7 +17,7 @@ from bushfit.reduction.result import Reduction
 from bushfit.report.plots import style
 from bushfit.report.plots.fits import stiffness_scale
 from bushfit.report.plots.measured import header_of
-from bushfit.report.plots.response import turning_rows
+from bushfit.report.plots.response import extreme_rows
 from bushfit.units import display_unit, format_range
 
 #: Colour of a history.
@@ -81,7 +81,7 @@ def _draw_history(figure: Figure, cell: SubplotSpec, history: Loop, loop: Axes |
     motion, load = to_length * history.displacement, to_force * history.force
     labels = f"{names[0]}\n[{length}]", f"{names[1]}\n[{force}]"
     for axes, values, label in zip(over_time, (motion, load), labels, strict=True):
-        rows = turning_rows(values, _MOST_OVER_TIME)
+        rows = extreme_rows(values, _MOST_OVER_TIME)
         axes.plot(history.time[rows], values[rows], lw=0.8, color=_COLOR)
         style.label_axes(axes, "time [s]" if history.has_recorded_time else "time rebuilt [s]", label)
     figure.align_ylabels(over_time)
@@ -123,7 +123,7 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
 
     Args:
         reduction: operating points of all histories.
-        histories: histories as recorded; the first four are drawn, with the cycles in use in colour.
+        histories: histories as recorded; the first four are drawn, with the cycles used in colour.
         title: title of the figure.
 
     Returns:
@@ -163,7 +163,7 @@ def _draw_strip(axes: Axes, history: Loop, reduction: Reduction, looks: dict[flo
         looks: colour and marker by amplitude level.
     """
     unit, factor = reduction.direction.display.displacement
-    rows = turning_rows(history.displacement, _MOST_OVER_TIME)
+    rows = extreme_rows(history.displacement, _MOST_OVER_TIME)
     time, motion = history.time[rows], factor * history.displacement[rows]
     axes.plot(time, motion, color="#c8c8c8", lw=0.4)
     for level, look in looks.items():

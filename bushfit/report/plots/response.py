@@ -45,14 +45,14 @@ def response_figure(title: str, table: pd.DataFrame, note: str = "") -> style.Ch
         motion = figure.add_subplot(grid[2 * row, :2])
         course = figure.add_subplot(grid[2 * row + 1, :2], sharex=motion)
         loop = figure.add_subplot(grid[2 * row : 2 * row + 2, 2])
-        rows = turning_rows(displacement, _MOST_OVER_TIME)
+        rows = extreme_rows(displacement, _MOST_OVER_TIME)
         motion.plot(time[rows], displacement[rows], color=style.GREY, lw=0.7)
-        rows = turning_rows(force, _MOST_OVER_TIME)
+        rows = extreme_rows(force, _MOST_OVER_TIME)
         course.fill_between(time[rows], low[rows], high[rows], color=PREDICTED, alpha=0.3, lw=0)
         for values, color in (*((values, MEASURED) for values in measured), (force, PREDICTED)):
-            rows = turning_rows(values, _MOST_OVER_TIME)
+            rows = extreme_rows(values, _MOST_OVER_TIME)
             course.plot(time[rows], values[rows], color=color, lw=0.7)
-            rows = turning_rows(values, _MOST_OVER_DISPLACEMENT)
+            rows = extreme_rows(values, _MOST_OVER_DISPLACEMENT)
             loop.plot(displacement[rows], values[rows], color=color, lw=0.5)
         style.label_axes(motion, "", moves)
         style.label_axes(course, "time [s]", resists)
@@ -60,11 +60,11 @@ def response_figure(title: str, table: pd.DataFrame, note: str = "") -> style.Ch
     return figure.explain("Blue: model; shaded: its 95 % band.", "Red: measured." * len(measured), note=note)
 
 
-def turning_rows(values: Array, most: int) -> Array:
-    """Rows to draw of a long curve: those with the lowest and the highest value of each of `most`/2 parts."""
-    if values.size <= most:
+def extreme_rows(values: Array, maximum: int) -> Array:
+    """Select rows of a long curve to draw: the lowest and the highest value of each of `maximum`/2 equal parts."""
+    if values.size <= maximum:
         return np.arange(values.size)
-    edges = np.linspace(0, values.size, most // 2 + 1).astype(int)[:-1]
+    edges = np.linspace(0, values.size, maximum // 2 + 1).astype(int)[:-1]
     parts = np.split(values, edges[1:])
     low, high = (edges + [choose(part) for part in parts] for choose in (np.argmin, np.argmax))
     return np.unique(np.concatenate(([0], low, high, [values.size - 1])))
