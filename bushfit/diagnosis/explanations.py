@@ -144,8 +144,8 @@ def is_pattern(faulty_parts: Sequence[FaultyPart]) -> bool:
         return True
     loops = [(part.direction, *part.frequency, *part.amplitude) for part in faulty_parts if part.family == "loop"]
     return any(
-        one[0] == other[0] and np.allclose(one[1:], other[1:], rtol=_SAME_LOOP, atol=0.0)
-        for one, other in combinations(loops, 2)
+        first[0] == second[0] and np.allclose(first[1:], second[1:], rtol=_SAME_LOOP, atol=0.0)
+        for first, second in combinations(loops, 2)
     )
 
 

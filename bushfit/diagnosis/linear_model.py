@@ -131,8 +131,8 @@ class LinearModel:
             results.append((chosen, arrays))
         order = np.argsort(np.concatenate([chosen for chosen, _ in results]))
         joined = [np.concatenate(kind)[order] for kind in zip(*(arrays for _, arrays in results), strict=True)]
-        base, misfit, changes, *others = joined
-        return _AtNodes(base, misfit, changes, others[: len(self._blocks)], others[len(self._blocks) :])
+        base, misfit, changes, *products = joined
+        return _AtNodes(base, misfit, changes, products[: len(self._blocks)], products[len(self._blocks) :])
 
     def _projected(
         self, chosen: Array, index: Array, gram: Array, grams: Sequence[Array], log_det: Array, by_noise: Array

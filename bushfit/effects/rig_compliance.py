@@ -114,8 +114,8 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         motion = np.clip(imposed - compliance * reached, -farthest, farthest)
         felt = below(history.with_value(motion, beneath)) - common
         if number == 0 and felt.ndim > imposed.ndim:  # many models, which start from the solution of the last
-            left = felt[-1] - reached
-            common = left * (np.max(np.abs(compliance)) * np.max(np.abs(left)) <= history.accuracy * size)
+            residue = felt[-1] - reached
+            common = residue * (np.max(np.abs(compliance)) * np.max(np.abs(residue)) <= history.accuracy * size)
             felt = felt - common
         missing = felt - reached
         error = np.max(np.abs(compliance * missing), axis=-1, keepdims=True)

@@ -88,7 +88,7 @@ def prony_series(request: ExportRequest) -> list[PronySeries]:
         def beyond_rest(omega: Array, strain: float = strain) -> Array:
             return model.stiffness(COMPOUND, omega / (2.0 * np.pi), strain, conditions=request.conditions) - long_term
 
-        arms = fitted_arms(beyond_rest, band, request.accuracy, spring=long_term, beyond=_BEYOND, closest=True)
+        arms = fitted_arms(beyond_rest, band, request.accuracy, spring=long_term, overhang_factor=_BEYOND, closest=True)
         exact = long_term + beyond_rest(2.0 * np.pi * frequency)
         total = long_term + float(arms.modulus.sum())
         series.append(PronySeries(float(amplitude), strain, long_term, arms, exact, total, arms.modulus / total))

@@ -253,19 +253,19 @@ def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUs
     rows = solution.jacobian[moving]
     linear = np.linalg.pinv(rows @ rows.T, hermitian=True)
     for prior in model.constraints.priors:
-        known = [name for name in prior.names if name in covariance.names]
-        if not names or not known:
+        uncertain = [name for name in prior.names if name in covariance.names]
+        if not names or not uncertain:
             continue
-        coordinates = Coordinates.of_parameters(model, known)
+        coordinates = Coordinates.of_parameters(model, uncertain)
         mean = dict(zip(prior.names, prior.mean.tolist(), strict=True))
         deviation = dict(zip(prior.names, np.sqrt(np.diag(prior.covariance)).tolist(), strict=True))
         before = np.diag(prior_covariance(prior, coordinates))
-        changes = coordinate_changes(model, names, known)
+        changes = coordinate_changes(model, names, uncertain)
         after = np.diag(changes.T @ linear @ changes)
         distances = coordinates.point(model.values) - coordinates.point(mean)
-        errors = np.array([covariance.stderr(name) for name in known]) / coordinates.slopes(model.values)
+        errors = np.array([covariance.stderr(name) for name in uncertain]) / coordinates.slopes(model.values)
         spread = np.sqrt(np.maximum(np.square(errors) + before - 2.0 * after, np.finfo(float).tiny))
-        for i, name in enumerate(known):
+        for i, name in enumerate(uncertain):
             share = float(after[i] / before[i])
             if np.any(changes[:, i]):
                 distance = float(distances[i] / spread[i]) if share < _ALL else 0.0

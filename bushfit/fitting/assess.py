@@ -284,8 +284,8 @@ def preload_ranges(data_sets: Sequence[MeasuredTest]) -> list[PreloadRange]:
     """
     ranges = []
     for place in dict.fromkeys(test.direction for test in data_sets):
-        stated = [test.test.preload for test in data_sets if test.direction == place and test.test.preload]
-        if len(distinct := distinct_preloads(stated)) > 1:
+        preloads = [test.test.preload for test in data_sets if test.direction == place and test.test.preload]
+        if len(distinct := distinct_preloads(preloads)) > 1:
             low, high = distinct[0], distinct[-1]
             ranges.append(PreloadRange(str(place), low.unit, low.value, high.value, len(distinct)))
     return ranges

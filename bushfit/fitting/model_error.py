@@ -222,10 +222,10 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
     log_size = sum(test.log_det_covariance for test in tests.data_sets) + float(
         np.linalg.slogdet(information + prior)[1]
     )
-    for known in solution.model.constraints.priors:
-        names = [name for name in known.names if name in solution.names]
+    for stated_prior in solution.model.constraints.priors:
+        names = [name for name in stated_prior.names if name in solution.names]
         log_size += float(
-            np.linalg.slogdet(prior_covariance(known, Coordinates.of_parameters(solution.model, names)))[1]
+            np.linalg.slogdet(prior_covariance(stated_prior, Coordinates.of_parameters(solution.model, names)))[1]
         )
     return gain - 0.5 * (float(residual @ residual) + log_size)
 

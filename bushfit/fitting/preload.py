@@ -47,26 +47,26 @@ def with_preload(data: PreparedCampaign) -> PreparedCampaign:
     ranges = preload_ranges(data.data_sets)
     if PRELOAD in data.effects or not ranges:
         return data
-    fit, notes, shown = data.campaign.fit, list[str](), False
-    fixed = _CURVATURES if max(stated.count for stated in ranges) == 2 else ()
-    for stated in ranges:
-        place = get_place(stated.place, data.campaign.specimens)
+    fit, notes, has_influence = data.campaign.fit, list[str](), False
+    fixed = _CURVATURES if max(tested.count for tested in ranges) == 2 else ()
+    for tested in ranges:
+        place = get_place(tested.place, data.campaign.specimens)
         tests = [test for test in data.data_sets if test.direction == place and test.conditions.preload]
         chance = _probability_of_chance(data, tests, fixed)
-        listed = f"{stated.place}: {stated.count} preloads, {stated.text(place)}"
+        listed = f"{tested.place}: {tested.count} preloads, {tested.text(place)}"
         if chance > _CHANCE / len(ranges):
             notes.append(
                 f"{listed}: these tests show no influence of the preload on stiffness and loss: noise explains "
                 f"their differences (p = {number(chance, 2)})"
             )
             continue
-        shown = True
-        if stated.count == 2:
+        has_influence = True
+        if tested.count == 2:
             notes.append(
                 f"{listed}: the model follows a straight line over two preloads, and no test shows whether it is "
                 "straight; add tests at a third preload between them"
             )
-    if not shown:
+    if not has_influence:
         return replace(data, preload_notes=tuple(notes))
     line = {name: ParameterSetting(value=0.0, vary=False) for name in fixed}
     fit = replace(fit, effects=(*fit.effects, PRELOAD), parameters={**line, **fit.parameters})

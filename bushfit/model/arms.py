@@ -82,7 +82,7 @@ def fitted_arms(
     stands_for: str = "",
     size: str = "",
     spring: float = 0.0,
-    beyond: float = _BEYOND,
+    overhang_factor: float = _BEYOND,
     closest: bool = False,
 ) -> Arms:
     """Fit the smallest number of Maxwell arms (spring and dashpot in series) that approximate a complex modulus.
@@ -94,7 +94,7 @@ def fitted_arms(
         stands_for: names of the effects that the arms replace.
         size: qualified name of the parameter that scales the modulus.
         spring: modulus of a spring in parallel [Pa]; errors are relative to the sum of spring and modulus.
-        beyond: factor by which relaxation times may lie outside the band.
+        overhang_factor: factor by which relaxation times may lie outside the band.
         closest: True to return the closest arms if no number of arms reaches the accuracy.
 
     Returns:
@@ -116,10 +116,10 @@ def fitted_arms(
     total = target + spring
     while arms < _MOST_ARMS and stalled < _PATIENCE:
         arms += 1
-        fits = [_fit(omega, target, total, beyond, *start) for start in _starts(omega, target, arms)]
+        fits = [_fit(omega, target, total, overhang_factor, *start) for start in _starts(omega, target, arms)]
         error, moduli, times = min(fits, key=itemgetter(0))
         if error <= _WORTHWHILE * accuracy:
-            error, moduli, times = _fit(omega, target, total, beyond, moduli, times, _ROUNDS)
+            error, moduli, times = _fit(omega, target, total, overhang_factor, moduli, times, _ROUNDS)
         stalled = 0 if error < _BETTER * best[0] else stalled + 1
         best = best if stalled else (error, moduli, times)
         if error <= accuracy:
@@ -241,7 +241,7 @@ def _starts(omega: Array, target: Array, arms: int) -> Iterator[tuple[Array, Arr
 
 
 def _fit(
-    omega: Array, target: Array, total: Array, beyond: float, moduli: Array, time: Array, rounds: int = 1
+    omega: Array, target: Array, total: Array, overhang_factor: float, moduli: Array, time: Array, rounds: int = 1
 ) -> tuple[float, Array, Array]:
     """Fit Maxwell arms to complex moduli from start values, for the smallest maximum error.
 
@@ -249,7 +249,7 @@ def _fit(
         omega: angular frequencies [rad/s], (n,).
         target: complex moduli [Pa], (n,).
         total: complex moduli that errors are relative to [Pa], (n,).
-        beyond: factor by which relaxation times may lie outside the band.
+        overhang_factor: factor by which relaxation times may lie outside the band.
         moduli: start moduli of the arms [Pa], (k,).
         time: start relaxation times [s], (k,).
         rounds: number of fits, each with weights multiplied by the error of the last.
@@ -282,7 +282,7 @@ def _fit(
         both = root[:, None] * np.concatenate(parts(x), axis=1)
         return np.concatenate((both.real, both.imag))
 
-    ends = np.log([1.0 / (beyond * omega[-1]), beyond / omega[0]])
+    ends = np.log([1.0 / (overhang_factor * omega[-1]), overhang_factor / omega[0]])
     low, high = (np.repeat([reach, end], count) for reach, end in zip((-np.inf, np.inf), ends, strict=True))
     x, best = np.concatenate((np.log(moduli / unit), np.log(time))), (np.inf, moduli, time)
     for _ in range(rounds):

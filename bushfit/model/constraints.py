@@ -100,14 +100,14 @@ class Tie:
         """
         try:
             with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-                given = {f"p{i}": values[name] for i, name in enumerate(self.names)}
+                symbols = {f"p{i}": values[name] for i, name in enumerate(self.names)}
                 ast.parse(self.code.strip(), mode="eval")  # asteval also takes several expressions
                 interpreter = _interpreter()
-                interpreter.symtable.update(given)
+                interpreter.symtable.update(symbols)
                 interpreter.error = []
                 # a text or a function is no number
                 value = interpreter(self.code, show_errors=False, raise_errors=True) + 0.0
-            if not any(isinstance(number, complex) for number in given.values()) and not np.isfinite(float(value)):
+            if not any(isinstance(number, complex) for number in symbols.values()) and not np.isfinite(float(value)):
                 raise ValueError(value)
         except Exception as error:
             raise ModelError(
@@ -169,8 +169,8 @@ class Constraints:
         slopes = np.zeros((len(names), len(tied)))
         for i, name in enumerate(names if tied else ()):
             step = _STEP * (abs(values[name]) or 1.0)
-            moved = self.tied_values({**values, name: values[name] + 1j * step})
-            slopes[i] = [np.imag(moved[tie]) / step for tie in tied]
+            stepped = self.tied_values({**values, name: values[name] + 1j * step})
+            slopes[i] = [np.imag(stepped[tie]) / step for tie in tied]
         return slopes
 
 

@@ -41,19 +41,19 @@ def with_factor(result: Result, places: Sequence[str], spread: float) -> Result:
     Returns:
         Result with the factors in its models and in its covariance.
     """
-    names, known = tuple(f"stiffness_factor.{place}" for place in places), result.covariance
+    names, covariance = tuple(f"stiffness_factor.{place}" for place in places), result.covariance
 
     def with_factors(model: Model) -> Model:
         effects = (*model.effects, *names)
         return Model.with_defaults(model.bushing, effects, model.values, model.unnamed, model.constraints)
 
     padding = (0, len(names))
-    variance = np.diag([0.0] * len(known.names) + [spread**2] * len(names))
-    spreads = tuple(np.pad(part, padding) for part in known.spread)
+    variance = np.diag([0.0] * len(covariance.names) + [spread**2] * len(names))
+    spreads = tuple(np.pad(part, padding) for part in covariance.spread)
     return replace(
         result,
         model=with_factors(result.model),
-        covariance=Covariance((*known.names, *names), np.pad(known.matrix, padding) + variance, spreads),
+        covariance=Covariance((*covariance.names, *names), np.pad(covariance.matrix, padding) + variance, spreads),
         alternatives=tuple(replace(record, model=with_factors(record.model)) for record in result.alternatives),
     )
 

@@ -61,8 +61,8 @@ def static_reach(result: Result, place: Place, amplitudes: Array, requested: Pre
     """
     tests = result.campaign.tests if result.campaign else ()
     loops = [test.amplitude[-1] for test in tests if test.kind == "loop" and test.place == str(place)]
-    stated = getattr(requested, _AMPLITUDE_KEYS[place.motion])
-    return max(float(amplitudes.max()), *(() if stated else loops), 0.0)
+    is_requested = getattr(requested, _AMPLITUDE_KEYS[place.motion])
+    return max(float(amplitudes.max()), *(() if is_requested else loops), 0.0)
 
 
 def grid_settings(requested: PredictSettings, campaign: Campaign | None) -> PredictSettings:

@@ -59,10 +59,10 @@ def predict_each_bushing(
     predicted = []
     for name in names if len(names) > 1 else ():
         left_out = [test for test in tests if test.direction.body == name]
-        others = list(dict.fromkeys(str(test.direction) for test in tests if test.direction.body != name))
+        fitted_places = list(dict.fromkeys(str(test.direction) for test in tests if test.direction.body != name))
         labels = {name, *(str(test.direction) for test in left_out)}
-        kept = [effect for effect in effects if place_suffix(effect) not in labels]
-        result = fit_joint(data, effects=kept, directions=others)
+        kept_effects = [effect for effect in effects if place_suffix(effect) not in labels]
+        result = fit_joint(data, effects=kept_effects, directions=fitted_places)
         misfits = [misfit for misfit in result.tests if misfit.held is None and misfit.place in labels]
         if f"stiffness_factor.{name}" in effects:
             result = with_factor(result, [name], factor_spread(result) or FACTOR_SPREAD)

@@ -190,12 +190,12 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
     if result.measured:
         largest = max(np.abs(history.value).max(), result.measured.strain[0] / response.unit_strain)
         warnings += extrapolations(result, place, np.array([history.frequency]), np.array([largest]), temperature)
-    if response.tested and (beyond := response.shares_beyond[1]):
+    if response.tested and (share := response.shares_beyond[1]):
         rate = (
             f"{number(np.abs(response.strain_rate).max(), 3)} 1/s, but fitted at up to {number(response.tested[1], 3)}"
         )
         warnings.append(
-            f"{place}: strain rates of up to {rate} 1/s only, in {number(100.0 * beyond, 2)} % of the time: {BEYOND}"
+            f"{place}: strain rates of up to {rate} 1/s only, in {number(100.0 * share, 2)} % of the time: {BEYOND}"
         )
     if left_out:
         warnings.append(f"{place}: {' and '.join(left_out)} left out, because no law describes this motion")

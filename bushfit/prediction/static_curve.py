@@ -68,22 +68,23 @@ class StaticCurve:
         return f"{number(60.0 * factor * self.rate, 3)} {unit}/min"
 
 
-def static_rate(result: Result, place: Place, stated: Mapping[str, float] | None = None) -> float:
+def static_rate(result: Result, place: Place, rates: Mapping[str, float] | None = None) -> float:
     """Choose the rate of a static curve.
 
-    The first available of: the stated rate; that of the slowest loop in this direction; that of the slowest loop in any
+    The first available of: the rate in `rates`; that of the slowest loop in this direction; that of the slowest loop in
+        any
     direction, at equal strain rate; 10 mm, 10 deg or 10 % of strain per minute.
 
     Args:
         result: fitted result, whose campaign lists the loops.
         place: direction or specimen.
-        stated: rates by SI unit of displacement (m, rad or 1) [unit/s]; rates of other units are ignored.
+        rates: rates by SI unit of displacement (m, rad or 1) [unit/s]; rates of other units are ignored.
 
     Returns:
         Rate [m/s, rad/s or 1/s].
     """
-    if stated and place.motion.displacement_unit in stated:
-        return stated[place.motion.displacement_unit]
+    if rates and place.motion.displacement_unit in rates:
+        return rates[place.motion.displacement_unit]
     loops = [test for test in result.campaign.tests if test.kind == "loop"] if result.campaign else []
     loops = [test for test in loops if test.place == str(place)] or loops
     if not loops:

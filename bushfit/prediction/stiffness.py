@@ -167,7 +167,7 @@ def tested_preload(result: Result, place: Place, preload: Preload | None) -> Pre
         ModelError: the tests of this direction do not have several preloads, or none as small or as large.
     """
     ranges = result.measured.preloads if result.measured else ()
-    tested = next((stated for stated in ranges if stated.place == str(place)), None)
+    tested = next((preload_range for preload_range in ranges if preload_range.place == str(place)), None)
     if preload is None:
         return Preload(float(np.clip(0.0, tested.low, tested.high)), tested.unit) if tested else None
     if result.measured is None and result.model.depends_on("preload"):  # of a simulation: exact, without a range

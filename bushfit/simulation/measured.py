@@ -99,8 +99,8 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
         displacement = record.displacement + plan.displacement_noise * largest * random.standard_normal(rows)
         noise = plan.force_noise * np.ptp(record.force) / 2.0 * _filtered_noise(rows, plan, random)
         name, force = f"loop_{loop.direction}_{number}", gains[loop] * record.force + noise
-        stated = Loop(name, loop.direction, record.time, displacement, force, temperature=loop.temperature)
-        loops.append(replace(stated, preload=loop.static))
+        noisy = Loop(name, loop.direction, record.time, displacement, force, temperature=loop.temperature)
+        loops.append(replace(noisy, preload=loop.static))
     named = zip(_names("sweep", [test for test, _ in clean.sweeps]), clean.sweeps, conditions, strict=False)
     sweeps = [_sweep(clean.truth, test, k, name, plan, random, conditions) for name, (test, k), conditions in named]
     shaken = [resonance for resonance in clean.resonances for _ in range(plan.repeats)]
