@@ -133,14 +133,11 @@ def command_seconds(*command: str) -> float:
 def test_whole_commands(benchmark, root, tmp_path, table):
     program = str(Path(sys.executable).with_name("bushfit"))
     campaign = str(root / "configs/cmp_15961.toml")
+    imported = "import bushfit.cli.fit, bushfit.commands.fit, pandas, scipy.optimize, scipy.ndimage"
     pairs = {
         ("bushfit fit --no-plots over what it imports", "<= 1.15"): (
             (program, "fit", campaign, "--no-plots", "-q", "--force", "-o", str(tmp_path / "fit")),
-            (
-                sys.executable,
-                "-c",
-                "import bushfit.cli.fit, bushfit.commands.fit, pandas, scipy.optimize, scipy.ndimage",
-            ),
+            (sys.executable, "-c", imported),
         ),
         ("bushfit --help over import click", "<= 3"): ((program, "--help"), (sys.executable, "-c", "import click")),
     }

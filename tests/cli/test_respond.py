@@ -83,11 +83,7 @@ def test_corrections_are_stated(bushfit, tmp_path, time, motion, options, warnin
         ({"time__s": TIME, "axial_displacement": MOTION}, (), "the axial has no unit"),
         ({"time__s": TIME, "axial_displacement__kg": MOTION}, (), "kg"),
         ({"time__s": TIME, "displacement__mm": MOTION}, (), "the direction of this displacement is not stated"),
-        (
-            {"time__s": TIME, "axial_displacement__mm": MOTION},
-            ("--direction", "radial"),
-            "no column for the displacement",
-        ),
+        ({"time__s": TIME, "axial_displacement__mm": MOTION}, ("--direction", "radial"), "no column for the disp"),
         ({"time__s": TIME, "axial_displacement__mm": MOTION}, ("--lowpass", "100 Hz"), "does not suit the history"),
         ({"time__s": TIME, "axial_displacement__mm": MOTION}, ("--lowpass", "1e-6 Hz"), "one cycle in the history"),
         ({"time__s": TIME, "axial_displacement__mm": 0.0 * MOTION}, (), "this is not a motion"),

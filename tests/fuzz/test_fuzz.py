@@ -25,10 +25,7 @@ CAMPAIGNS = {
 }
 #: The file that an input of the corpus becomes, and the commands that read it; of a report its first line names it.
 READ_BY = {
-    "readers": (
-        "table.csv",
-        ["inspect", "reduce --mass 1kg --direction axial", *(f"fit {name}" for name in CAMPAIGNS)],
-    ),
+    "readers": ("table.csv", ["inspect", "reduce --mass 1kg --direction axial", *map("fit {}".format, CAMPAIGNS)]),
     "campaign": ("campaign.toml", ["fit"]),
     "model": ("model.json", ["predict"]),
     "workbook": ("table.xlsx", ["inspect", "inspect --sheet S2 --direction axial"]),

@@ -132,13 +132,7 @@ def test_a_model_given_by_hand_has_no_bands_and_says_so(paper_model):
 @pytest.mark.parametrize(
     ("direction", "fitted", "inner", "shape", "said"),
     [
-        (
-            "radial",
-            "axial",
-            0.010,
-            "paper",
-            [f"agrees within its noise. {EXCLUDES} radial formula, for this shape {OFF}"],
-        ),
+        ("radial", "axial", 0.010, "paper", [f"within its noise. {EXCLUDES} radial formula, for this shape {OFF}"]),
         ("torsion", "axial radial", 0.010, "paper", [f"axial and radial tests. {EXCLUDES} torsion"]),
         ("radial", "axial radial", 0.010, "paper", [f"fitted with the paper's formula, for this shape {OFF}"]),
         ("axial", "axial", 0.010, "paper", []),

@@ -46,16 +46,11 @@ def from_rest(value: Array) -> History:
     return History(value, 1.0 / (value.size - 1), periodic=False, frequency=1.0)
 
 
-def springpot_step(alpha: float, time: Array) -> tuple[Array, Array]:
-    """Relaxation t^-alpha/Gamma(1 - alpha)."""
-    found = stress({"m": 1.0, "alpha": alpha}, from_rest(np.ones(time.size)))
-    return found[1:], time[1:] ** -alpha / float(mpmath.gamma(1.0 - alpha))
-
-
-def springpot_ramp(alpha: float, time: Array) -> tuple[Array, Array]:
-    """t^(1 - alpha)/Gamma(2 - alpha)."""
-    found = stress({"m": 1.0, "alpha": alpha}, from_rest(time))
-    return found[1:], time[1:] ** (1.0 - alpha) / float(mpmath.gamma(2.0 - alpha))
+def springpot(alpha: float, time: Array, *, ramp: bool) -> tuple[Array, Array]:
+    """Relaxation t^-alpha/Gamma(1 - alpha) after a step; t^(1 - alpha)/Gamma(2 - alpha) under a ramp."""
+    found = stress({"m": 1.0, "alpha": alpha}, from_rest(time if ramp else np.ones(time.size)))
+    power = float(ramp) - alpha
+    return found[1:], time[1:] ** power / float(mpmath.gamma(1.0 + power))
 
 
 def bushing_model(bushing: Bushing, alpha: float, compliance: float) -> tuple[Model, float, float]:
@@ -94,8 +89,8 @@ def zener(bushing: Bushing, *, ramp: bool) -> Response:
 
 
 RESPONSES = {
-    "springpot, step": lambda _: springpot_step,
-    "springpot, ramp": lambda _: springpot_ramp,
+    "springpot, step": lambda _: partial(springpot, ramp=False),
+    "springpot, ramp": lambda _: partial(springpot, ramp=True),
     "elastic + springpot, creep": creep,
     "elastic + springpot + series spring, step": lambda bushing: zener(bushing, ramp=False),
     "elastic + springpot + series spring, ramp": lambda bushing: zener(bushing, ramp=True),
