@@ -5,7 +5,7 @@ against the branches of Eq. 5, Berg's loop area and first harmonic.
 """
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 
 import mpmath
 import numpy as np
