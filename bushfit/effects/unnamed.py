@@ -5,7 +5,7 @@ process with a Matern 5/2 kernel (see `gaussian_process`). Outside the range of 
 deviations at the nodes are interpolated in the same way, because errors of neighbouring nodes are nearly equal.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +25,7 @@ from bushfit.effects.contract import (
 from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError
 from bushfit.gaussian_process import condition, coordinates, in_lengths, matern
+from bushfit.geometry import Direction, Place
 from bushfit.validation import Name, Number
 
 #: Name of the effect in files and reports.
@@ -128,6 +129,16 @@ class Unnamed:
     def far_deviation(self) -> float:
         """Standard deviation of the real and of the imaginary part of the relative correction, far from all nodes."""
         return self.largest / _DEVIATIONS
+
+    def with_untested(self, place: Place) -> "Unnamed":
+        """Extend an error of the rubber to an untested direction of the bushing: its rubber is the same.
+
+        Another body keeps the error of the gap's size, and so does a bushing whose directions have different errors.
+        """
+        patch, body = self.patches[0], {f"{place.body} {axis}".strip() for axis in Direction}
+        if len(self.patches) > 1 or str(place) in patch.directions or body.isdisjoint(patch.directions):
+            return self
+        return replace(self, patches=(replace(patch, directions=(*patch.directions, str(place))),))
 
     def evaluate(self, setting: Setting, omega: Array, amplitude: Array) -> tuple[Array, Array, Array]:
         """Evaluate the correction at operating points.

@@ -68,7 +68,7 @@ _MAXIMUM_ROUNDS, _SETTLED = 12, 0.02
 
 
 def with_model_error(
-    plain_fit: FitResult, bounds: Bounds, rig: RigSettings = UNSTATED, *, smooth: bool = False
+    plain_fit: FitResult, bounds: Bounds, rig: RigSettings = UNSTATED, *, smooth: bool = False, certain: bool = False
 ) -> tuple[FitResult, Unnamed | None]:
     """Refit a model that misses its tests with a model error added to the noise; a model that fits is unchanged.
 
@@ -77,12 +77,14 @@ def with_model_error(
         bounds: limits of parameters [SI], inside their default limits.
         rig: accuracy class of the rig, whose errors may explain a misfit.
         smooth: True to test for smooth discrepancies only.
+        certain: True if it is known already that the tests differ from the model by more than noise.
 
     Returns:
         The fit, and the discrepancy as a correction of the stiffness; `plain_fit` and None if the model fits, or if the
         misfit is too large to be an error of this model.
     """
-    if not plain_fit.names or not ((not smooth and _exceeds_noise(plain_fit, rig)) or _is_smooth(plain_fit, rig)):
+    missed = certain or (not smooth and _exceeds_noise(plain_fit, rig)) or _is_smooth(plain_fit, rig)
+    if not (plain_fit.names and missed):
         return plain_fit, None
     closest, size = closest_fit(plain_fit, bounds)
     if size >= SIZES[-1]:  # that is no error of a model, but another thing than it

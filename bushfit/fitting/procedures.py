@@ -43,8 +43,6 @@ from bushfit.units import display_unit, number
 STATIC = ("mu", "sigma_fmax", "eps_half")
 DYNAMIC = ("m", "alpha")
 
-#: Share of the largest level error of a rig from which on the error is attributed to the model: all but rounding.
-_AT_LIMIT = 0.99
 #: Passes of the two-step procedure agree when no parameter moves by more than this, relative.
 _AGREED = 1e-5
 _MOST_PASSES = 50
@@ -100,21 +98,21 @@ def fit_joint(
     unused = [test for test in data.data_sets if test not in tests]
     problem = _problem(data, tests, effects, {})
     found = estimate(problem, robust=data.robust)
-    largest = largest_error(data.campaign.rig)
-    errors = level_errors(found.minimised, found.residual, found.jacobian, largest)
-    # an error that would have to be larger is a gap of the model
-    at_limit = any(error >= _AT_LIMIT * limit for error, limit in zip(errors.error, largest, strict=True))
-    found, error = with_model_error(found, data.bounds, data.campaign.rig)
-    if errors.freedom and any(errors.error) and not at_limit and not error:
+    rig = data.campaign.rig
+    errors = level_errors(found.minimised, found.residual, found.jacobian, largest_error(rig))
+    found, error = with_model_error(found, data.bounds, rig)
+    notes = [model_error_warning(error) + NEXT] if error else []
+    if errors.freedom and any(errors.error) and not error:
         loops, sweeps = split_by_kind(tests)
         tests = [*loops, *with_level_errors(sweeps, errors.error, errors.freedom)]
         found = estimate(replace(problem, model=found.model, tests=tests), robust=data.robust)
-    notes = [model_error_warning(error) + NEXT] if error else []
-    if errors.significant and not at_limit and not error:
+    if errors.significant and found.names and not error:  # the rig or the model is the cause: the bands include both
+        found, error = with_model_error(found, data.bounds, certain=True)
         size = format_class_errors(errors.error)
-        notes.append(
-            f"levels disagree by more than their repeats: an error of {size} for each level is included in the noise"
-        )
+        notes += [
+            f"levels disagree by more than their repeats, as by an error of {size} for each level: parameters are the "
+            "closest fit, and their intervals include this error"
+        ] * bool(error)
     notes += unfitted(found.model, unused, NEXT)
     result = replace(
         _result(data, [found], notes=notes, unused=unused), usable=expected_errors(found, unused), model_error=error

@@ -144,11 +144,12 @@ def uncertainty(
 
     Returns:
         Errors. An unnamed correction or a model error adds an error of the real and one of the imaginary part; within
-        the measured range these replace the errors of the parameters.
+        the measured range these replace the errors of the parameters. An untested direction of a bushing has the model
+        error of the tested ones at equal strain.
     """
     names = [name for name in result.covariance.names if name in model.values]
     covariance = result.covariance.restricted(names)
-    correction = model.unnamed or result.model_error
+    correction = model.unnamed or (result.model_error and result.model_error.with_untested(place))
     if not correction:
         return Uncertainty(covariance, np.ones(frequency.size), np.empty((0, frequency.size)))
     share, error, weight = correction.evaluate(
