@@ -33,8 +33,6 @@ from bushfit.reading.times import clock
 
 #: Smallest similarity, from 0 to 1, of a header that is suggested for a missing one; chosen: one word of two suffices.
 _ALIKE = 0.4
-#: Number of first rows that are compared; chosen: a long record need not be read completely.
-_FIRST = 50
 #: Relative difference up to which two columns for one amplitude agree; chosen: some are rounded to few digits.
 _AGREEMENT = 0.02
 #: Smallest correlation of two channels that record the same motion; chosen: a force lags too far behind.
@@ -202,7 +200,7 @@ def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | No
 
 def _first_numbers(cells: Cells, columns: Sequence[Column]) -> NDArray[np.float64]:
     """Numbers in the first rows of columns, (rows, columns), in units of the file; no rows if a cell is no number."""
-    rows = [[plainest_value(str(row[column.index])) for column in columns] for row in cells.first_rows[:_FIRST]]
+    rows = [[plainest_value(str(row[column.index])) for column in columns] for row in cells.first_rows]
     return np.empty((0, len(columns))) if np.isnan(rows).any() else np.array(rows)
 
 

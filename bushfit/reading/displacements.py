@@ -15,23 +15,17 @@ from bushfit.reading.measurement import Floats
 from bushfit.reading.names import direction_of_file
 from bushfit.reading.table import Table
 
-#: Words for the directions in headers, such as "radial displacement"; `Table` ignores blanks and case.
-_WORDS = {
-    Direction.AXIAL: ("axial",),
-    Direction.RADIAL: ("radial",),
-    Direction.TORSION: ("torsion", "torsional"),
-}
 #: Names of the columns of a displacement history, by role: time, a displacement in each direction, or one in any.
-DISPLACEMENT_COLUMNS: Mapping[str, tuple[str, ...]] = {
-    "time": tuple(LOOP_COLUMNS["time"]),
+DISPLACEMENT_COLUMNS: Mapping[str, Sequence[str]] = {
+    "time": LOOP_COLUMNS["time"],
     **{
-        str(direction): (
+        str(direction): [
             *words,
             *(text for name in LOOP_COLUMNS["displacement"] for word in words for text in (word + name, name + word)),
-        )
-        for direction, words in _WORDS.items()
+        ]
+        for direction, words in zip(Direction, (["axial"], ["radial"], ["torsion", "torsional"]), strict=False)
     },
-    "displacement": tuple(LOOP_COLUMNS["displacement"]),
+    "displacement": LOOP_COLUMNS["displacement"],
 }
 #: Smallest number of rows of a history, and largest number of evenly sampled rows; chosen: their results take 2 GB.
 FEWEST_ROWS, _MOST_ROWS = 10, 10_000_000

@@ -25,11 +25,7 @@ from bushfit.reading.headers import (
 from bushfit.reading.layout import Line
 
 #: Usual spelling of the units in names, by their spelling in lower case.
-_UNITS = {
-    **{"mm": "mm", "um": "µm", "µm": "µm", "μm": "µm", "deg": "deg", "grad": "deg", "rad": "rad"},
-    **{"%": "%", "pct": "%", "mhz": "mHz", "hz": "Hz", "n": "N", "kn": "kN"},
-    **{"degc": "degC", "gradc": "degC", "grdc": "degC", "°c": "degC", "c": "degC"},
-}
+_UNITS = {spelling: unit for unit, spellings in WORDS["units_in_names"].items() for spelling in spellings}
 _UNIT_WORDS = "|".join(sorted(_UNITS, key=len, reverse=True))
 #: Quantity in a name, with its sign and the word before it: "0.5mm", "A0,5 mm", "0p5mm", "10Hz", "2deg"; but neither
 #: "20Hz" in "5-20Hz" nor "10mm_min".
@@ -62,13 +58,7 @@ _KEY_OF = {plain(name): key for key, names in WORDS["above"].items() for name in
 #: SI unit of the two keys for the time between rows.
 _SAMPLING = {"sampling_rate": "Hz", "sampling_interval": "s"}
 #: Usual names of amplitude and frequency above a table.
-_VOCABULARY = Vocabulary(
-    {
-        "frequency": SWEEP_COLUMNS["frequency"],
-        "amplitude": [*SWEEP_COLUMNS["amplitude"], "excitation", "excitation level", "level", "Anregung"],
-    },
-    {},
-)
+_VOCABULARY = Vocabulary({role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}, {})
 #: Separator between a name and its value above a table.
 _AFTER_KEY = re.compile(r"\t|;|:\s|:$|\s=\s|=|,(?!\d)|(?<=[^\W\d]),")
 #: Blank between a name and its value at the end of a line: "Sample rate 512 Hz".
@@ -86,20 +76,6 @@ _LONGEST_VALUE = 60
 _WORD_STARTS = {start: Direction(name) for name, starts in WORDS["direction"].items() for start in starts}
 #: Direction by its abbreviation in names; in headers rad is a unit.
 _SHORT = {"ax": Direction.AXIAL, "rad": Direction.RADIAL, "tors": Direction.TORSION, "tor": Direction.TORSION}
-#: Starts of words for a motion whose convention a line above a table may state.
-_OF_AMPLITUDES = (
-    "amplit",
-    "ampl",
-    "displ",
-    "stroke",
-    "deflect",
-    "schwing",
-    "weg",
-    "ausschlag",
-    "dehn",
-    "strain",
-    "deplac",
-)
 _LETTERS = re.compile(r"[^\W\d_]+")
 #: Word that is not a unit after a number.
 _WORD = re.compile(r"(?<![a-z\d.,])(?:[a-z]+)")
@@ -222,7 +198,7 @@ def _convention_in_line(line: Line) -> AmplitudeConvention | None:
     """Convention of amplitudes in a line such as "all amplitudes pk-pk"; None in a line on something else."""
     text = line.content if isinstance(line.content, str) else " ".join(map(str, line.content))
     words = set(map(plain, _LETTERS.findall(text)))
-    if not any(word.startswith(_OF_AMPLITUDES) for word in words) or words & _WORDS["force"]:
+    if words & _WORDS["force"] or not any(word.startswith(tuple(_WORDS["motion"])) for word in words):
         return None
     doubled = any(word.startswith(name) for word in words for name in PEAK_TO_PEAK_NAMES if len(name) > 3)
     return "peak-to-peak" if doubled else split_convention(text)[1]
