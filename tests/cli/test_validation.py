@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from commandline import typing
 from shell import BUSHING, RUBBER
 
 SIMULATED = f"""{BUSHING}
@@ -56,8 +57,6 @@ duration = "4 s"
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory) -> Path:
     """A simulated campaign with three validation records and a hidden mass."""
-    from shell import typing
-
     folder = tmp_path_factory.mktemp("validation")
     (folder / "plan.toml").write_text(SIMULATED)
     typing(folder)("simulate", "plan.toml", "-o", "tests")
