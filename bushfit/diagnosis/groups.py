@@ -31,7 +31,7 @@ class Group:
 
     @property
     def whole(self) -> Array:
-        """Columns of the explanation extended to all n residuals, (c, n), with 0 in rows that they do not cover."""
+        """Changes of all n residuals per unit amount of each column of the explanation, (c, n)."""
         if self.covered_rows is None:
             return self.columns
         rows, count = self.covered_rows

@@ -203,7 +203,7 @@ def _predict(
 
     Args:
         evidence: fit to all tests.
-        leave_out: leave-out formulas of this fit.
+        leave_out: linearisation of this fit, which predicts residuals without some rows.
         part: part that is held out.
         bounds: limits of parameters, for a fit to the remaining tests.
 

@@ -135,18 +135,17 @@ class Tests:
 
     @cached_property
     def compound(self) -> Group | None:
-        """Smooth deviation of the rubber from the model's laws, as columns of residuals in units of the scatter.
+        """Changes of the residuals (in units of the scatter) by a smooth deviation of the rubber from the model's laws.
 
-        The columns are used to compare hypotheses; None without tests.
+        They are used to compare hypotheses; None without tests.
         """
         return compound(self.bare)
 
     @cached_property
     def compound_in_fits(self) -> Group | None:
-        """Residual columns of the smooth deviation of the compound's modulus from the model's laws, for refits.
+        """Changes of the residuals (whitened as in a fit) by a smooth deviation of the rubber from the model's laws.
 
-        The columns are whitened as the residuals of a fit are. A refit with an effect also estimates their
-        coefficients, without a prior; None without tests.
+        A refit with an effect also estimates the amounts of these changes, without a prior; None without tests.
         """
         return compound(self.base)
 

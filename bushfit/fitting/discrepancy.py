@@ -121,7 +121,7 @@ class FittedTests:
         return np.concatenate(parts, axis=-1)
 
     def columns(self, shapes: Array) -> Array:
-        """Convert relative changes of the stiffness into changes of the d combinations of residuals of `project`.
+        """Convert relative changes of the stiffness into changes of the d combinations of residuals that they alter.
 
         Args:
             shapes: c relative changes of the stiffness at the operating points, complex (c, p).
@@ -226,12 +226,12 @@ class Discrepancy:
 
     @cached_property
     def best(self) -> tuple[float, float]:
-        """Largest gain of the log likelihood over no process, and the size (relative to |K|) at which it occurs."""
+        """Largest gain in log likelihood by an error of the model, and the size of this error relative to |K|."""
         gains = self.likelihood.gains(self.sizes)
         return float(gains.max()), float(self.sizes[gains.argmax()])
 
     def conditioned(self) -> tuple[Array, Array]:
-        """Condition the process, at its best size, on the tests.
+        """Condition the Gaussian process of the model's error, at its likeliest size, on the tests.
 
         Returns:
             Mean relative error of the model at the operating points, complex (p,), and the standard deviation of its

@@ -74,7 +74,7 @@ def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[Me
 
 
 def with_gain_weighting(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> list[MeasuredTest]:
-    """Return tests whose loops weight their residuals by noise with (`weigh`) or without the gain error of the rig."""
+    """Include (`weigh`) or exclude the gain error of the rig in the noise that weights the residuals of loops."""
     return [replace(test, gain_weighs=weigh) if isinstance(test, MeasuredLoop) else test for test in data_sets]
 
 

@@ -91,7 +91,7 @@ class TargetSensitivity:
 
     @classmethod
     def from_target(cls, target: Target, names: Sequence[str], wanted: WantedPoints | None) -> TargetSensitivity:
-        """Compute the derivatives and fixed errors of a target.
+        """Prepare a target: compute its derivatives by the parameters, and the errors that no test lowers.
 
         Args:
             target: a parameter, or the stiffness or loss factor of a direction.
@@ -99,7 +99,7 @@ class TargetSensitivity:
             wanted: sensitivities at the operating points of the direction; None for a parameter.
 
         Returns:
-            TargetSensitivity at all operating points of the direction.
+            The target with these data, at all operating points of the direction.
         """
         if wanted is None:
             row = np.array([[float(name == target.quantity) for name in names]])
