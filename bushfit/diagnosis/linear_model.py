@@ -295,7 +295,7 @@ class LinearModel:
         """Probability that tests of a complete model would have a larger misfit r^T P r than these tests.
 
         Args:
-            compound_deviates: True to average over nodes with a deviation of the compound; False for nodes without one.
+            compound_deviates: True to average over error sizes with a deviation of the compound; False without one.
 
         Notes: a posterior predictive check (Gelman, Meng and Stern, 1996), averaged over error sizes by probability. r
         are the whitened residuals, and P projects out the parameters.

@@ -75,7 +75,7 @@ class Patch:
 
     @cached_property
     def nodes(self) -> Array:
-        """Coordinates of the nodes in ln frequency and ln strain, (m, 2), or (m, 3) with temperature."""
+        """Coordinates of the tabulated points in ln frequency and ln strain, (m, 2), or (m, 3) with temperature."""
         kelvin = np.array(self.temperature_K) if self.temperature_K else None
         return coordinates(np.array(self.frequency_Hz), np.array(self.strain), kelvin)
 
@@ -121,7 +121,7 @@ class Unnamed:
 
     @property
     def uncertainty(self) -> float:
-        """Root mean square of the correction's standard deviations at the nodes, over that of the correction."""
+        """Relative uncertainty of the correction: rms of its standard deviations over rms of its values at the nodes."""
         values, errors = self._at_nodes
         return float(np.sqrt(errors.mean() / max(values.mean(), np.finfo(float).tiny)))
 
