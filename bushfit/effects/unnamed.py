@@ -121,7 +121,7 @@ class Unnamed:
 
     @property
     def uncertainty(self) -> float:
-        """Relative uncertainty of the correction: rms of its standard deviations over rms of its values at the nodes."""
+        """Relative uncertainty of the correction: rms of its standard deviations over rms of its values at nodes."""
         values, errors = self._at_nodes
         return float(np.sqrt(errors.mean() / max(values.mean(), np.finfo(float).tiny)))
 
