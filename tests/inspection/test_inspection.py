@@ -115,6 +115,13 @@ def test_each_fault_of_a_loop_is_told(loop, tmp_path, said):
     assert len(odd) <= 2
 
 
+@pytest.mark.parametrize(("offset", "unit"), [(1.5e-3, "mm"), (0.1253, "N")])
+def test_a_position_far_from_that_of_the_mean_force_is_no_preload(loop, tmp_path, offset, unit):
+    """A gauge counts from a zero of its own; a preload compresses by about what the loop's stiffness says."""
+    seen = look(tmp_path, replace(loop, displacement=loop.displacement + offset, force=loop.force + 820.0))
+    assert seen.entry["preload"].endswith(f" {unit}")
+
+
 def test_gaps_and_an_uneven_clock_are_described(loop, tmp_path):
     uneven = less(loop, slice(5, None, 10))
     assert look(tmp_path, uneven).facts["sampling"].startswith("uneven, every 0.01 to 0.02 s, mostly 0.01 s")
