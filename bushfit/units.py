@@ -106,7 +106,9 @@ def si_factor(text: str, expected: str) -> float:
     text = {"m/s^2": _OF_ACCELERATION, "m": _OF_LENGTH}.get(expected, {}).get(text.strip(), text)
     scale, base = _resolve(text)
     if base != _resolve(expected)[1]:
-        hint = 'a pound of force is "lbf"' if {"lb", "lbs"} & set(_WORD.findall(text)) else None
+        words = set(_WORD.findall(text))
+        hint = 'a pound of force is "lbf"' if {"lb", "lbs"} & words else None
+        hint = 'a kilogram of force is "kgf"' if {"kg", "g"} & words and "N" in expected else hint
         raise UnitError("the unit does not fit", found=f'"{text}"', expected=describe_unit(expected), hint=hint)
     return scale
 

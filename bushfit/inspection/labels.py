@@ -10,6 +10,7 @@ import numpy as np
 from bushfit.geometry import Place
 from bushfit.reading.headers import ZERO_TO_PEAK
 from bushfit.reading.names import Labels, StatedQuantity, labels_in_names
+from bushfit.reading.stiffness import hint_for_convertible_columns
 from bushfit.reading.sweeps import ONE_TEST
 from bushfit.reading.table import Table
 from bushfit.units import parse_quantity
@@ -135,11 +136,12 @@ def _held_quantity(table: Table, place: Place, key: str, sources: Mapping[str, L
     state = f'state {key} = "{example}" in the campaign'
     if "block" in table.headers:
         state = f'write a [[sweeps]] table for each block with rows = {{ block = "1" }} and {key} = "{example}"'
+    other_way = hint_for_convertible_columns(table, {"period" if role == "frequency" else "acceleration"})
     raise table.header_error(
         f"the {role} of this test is not stated",
         found=f"{label}: {' and '.join(quantity.text for quantity in found)}" if found else None,
         expected=f"a column for the {role}, or one number with its unit in the name of the file",
-        hint=f"{state}, or name the column: {table.columns_key(role, expected)}",
+        hint=other_way or f"{state}, or name the column: {table.columns_key(role, expected)}",
     )
 
 

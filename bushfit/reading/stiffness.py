@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
@@ -27,6 +27,7 @@ _WAYS_ON = {
     "decrement": 'divide the logarithmic decrement by pi, and write the quotient as "loss factor [-]" into the file',
     "acceleration": "divide the amplitude of the acceleration by (2 pi f)^2, turn its phase by 180 deg, and write the "
     "displacement into the file",
+    "period": 'write the reciprocal of the period as "frequency [Hz]" into the file',
     "quality": 'write the reciprocal of the quality factor as "loss factor [-]" into the file',
 }
 _DERIVED = Vocabulary(WORDS["derived"], {})
@@ -55,10 +56,10 @@ def stiffness_pair(table: Table) -> tuple[str, str]:
     )
 
 
-def hint_for_convertible_columns(table: Table) -> str | None:
-    """Return the next step if a stiffness or loss can be computed from, say, a compliance in the table; else None."""
+def hint_for_convertible_columns(table: Table, kinds: Collection[str] = _WAYS_ON) -> str | None:
+    """Return the next step if a column can be computed from, say, a compliance in the table; else None."""
     headings = (_DERIVED.heading(header) for header in table.headers if header)
-    return next((_WAYS_ON[heading.role] for heading in headings if heading), None)
+    return next((_WAYS_ON[heading.role] for heading in headings if heading and heading.role in kinds), None)
 
 
 def refuse_ambiguous_damping(table: Table) -> None:

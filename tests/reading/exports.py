@@ -478,6 +478,13 @@ EXPORTS: dict[str, Export] = {
         for unit, factor in (("s", 1.0), ("ms", 1e-3), ("min", 60.0))
     },
     "a time without unit beside another rate": Export("Messrate: 30 Hz\n" + loop("Zeit|Weg [mm]|Kraft [N]"), None, ['time = "s"', 'time = "ms"']),
+    "a period": Export(sweep("Periodendauer [ms]|A [mm]|K* [N/mm]|tan delta", 1e3 / F, A, K, ETA), None, ["reciprocal of the period"]),
+    "kilograms of force": Export(loop("t [s]|x [mm]|Load [kg]", TIME, DISPLACEMENT, FORCE / 9.80665), None, ['"kgf"']),
+    "a double amplitude above": Export(
+        "Amplitude 0.2 mm (double amplitude)\n" + sweep("f [Hz]|K* [N/mm]|tan delta", F[:5], K[:5], ETA[:5]),
+        reference={"frequency": F[:5], "amplitude": 1e-3 * A[:5], "stiffness": 1e3 * STIFFNESS[:5]},
+    ),
+    "a complex compliance": Export(sweep("f [Hz]|A [mm]|Compliance real [mm/kN]|Compliance imag [mm/kN]", F, A, K, K), None, ["K* = 1 / J*"]),
     "a receptance": Export(sweep("f [Hz]|Receptance x/F [mm/kN]|Phase x/F [deg]", F, 1e3 / K, -PHASE), None, ["K* = 1 / J*"]),
     "an acceleration": Export(sweep("f [Hz]|Accel amplitude (g pk)|Force amplitude (N pk)|Phase (deg)", F, A, A * K, PHASE - 180), None, ["(2 pi f)^2"]),
     **{
