@@ -66,17 +66,11 @@ def cut(sweep: Sweep, kept: Array) -> Sweep:
     return replace(sweep, **{name: getattr(sweep, name)[kept] for name in columns})
 
 
-def with_sweep(campaign: Campaign, number: int, sweep: Sweep) -> Campaign:
-    """A campaign with one of its sweeps replaced."""
-    sweeps = list(campaign.sweeps)
-    sweeps[number] = sweep
-    return replace(campaign, sweeps=tuple(sweeps))
-
-
 def changed(campaign: Campaign, number: int, factor: Array | complex) -> Campaign:
     """A campaign with the stiffness of one sweep multiplied."""
-    sweep = campaign.sweeps[number]
-    return with_sweep(campaign, number, replace(sweep, stiffness=sweep.stiffness * np.asarray(factor)))
+    sweeps = list(campaign.sweeps)
+    sweeps[number] = replace(sweeps[number], stiffness=sweeps[number].stiffness * np.asarray(factor))
+    return replace(campaign, sweeps=tuple(sweeps))
 
 
 def off(number: int, factor: complex, **where: float | tuple[float, ...]) -> Tamper:
@@ -111,34 +105,27 @@ def names(diagnosis: Diagnosis) -> set[str]:
     return {effect.name for effect in diagnosis.effects}
 
 
-def no_loops(c: Campaign) -> Campaign:
-    return replace(c, loops=())
-
-
-def no_sweeps(c: Campaign) -> Campaign:
-    return replace(c, sweeps=())
-
-
-def one_direction(c: Campaign) -> Campaign:
-    return replace(c, sweeps=c.sweeps[:1])
-
-
-def one_loop(c: Campaign) -> Campaign:
-    return replace(c, sweeps=(), loops=c.loops[:1])
-
-
-def no_repeats(c: Campaign) -> Campaign:
-    return replace(c, sweeps=tuple(cut(sweep, sweep.repeat == 1) for sweep in c.sweeps))
+def of_sweeps(chosen: Callable[[Sweep], Array]) -> Tamper:
+    """The chosen points of each sweep."""
+    return lambda c: replace(c, sweeps=tuple(cut(sweep, chosen(sweep)) for sweep in c.sweeps))
 
 
 def missing_points(c: Campaign) -> Campaign:
     random = np.random.default_rng(3)
-    return replace(c, sweeps=tuple(cut(sweep, random.random(sweep.frequency.size) < 0.7) for sweep in c.sweeps))
+    return of_sweeps(lambda sweep: random.random(sweep.frequency.size) < 0.7)(c)
 
 
-def one_level(c: Campaign) -> Campaign:
-    return replace(c, sweeps=tuple(cut(sweep, sweep.amplitude == LEVELS[0]) for sweep in c.sweeps))
-
-
-def one_frequency(c: Campaign) -> Campaign:
-    return replace(c, sweeps=tuple(cut(sweep, sweep.frequency == 25.0) for sweep in c.sweeps))
+#: Smaller campaigns. Sweeps of several frequencies show a mass; loops at 0.1 Hz and sweeps at 25 Hz do not.
+SHOW_MASS: dict[str, Tamper] = {
+    "no loops": lambda c: replace(c, loops=()),
+    "one direction": lambda c: replace(c, sweeps=c.sweeps[:1]),
+    "no repeats": of_sweeps(lambda sweep: sweep.repeat == 1),
+    "missing points": missing_points,
+    "one level": of_sweeps(lambda sweep: sweep.amplitude == LEVELS[0]),
+}
+SMALLER: dict[str, Tamper] = {
+    **SHOW_MASS,
+    "no sweeps": lambda c: replace(c, sweeps=()),
+    "one loop": lambda c: replace(c, sweeps=(), loops=c.loops[:1]),
+    "one frequency": of_sweeps(lambda sweep: sweep.frequency == 25.0),
+}

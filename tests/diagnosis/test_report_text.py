@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rigged import SHARED, asked, no_repeats, said
+from rigged import SHARED, SMALLER, asked, said
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.hypotheses import Hypothesis
@@ -36,7 +36,7 @@ TOLERANCE = 0.01
 
 
 def test_the_class_of_a_rig_that_is_assumed_is_said(measured):
-    campaign = no_repeats(measured({}, SHARED))
+    campaign = SMALLER["no repeats"](measured({}, SHARED))
     for rig, words in (
         (RigSettings(), "0.5 % gain and 0.25 deg phase, gain and phase assumed"),
         (RigSettings(gain_error=4e-3), "0.4 % gain and 0.25 deg phase, phase assumed"),

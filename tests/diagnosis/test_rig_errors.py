@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigged import LEVELS, SHARED, no_sweeps
+from rigged import LEVELS, SHARED, SMALLER
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
@@ -59,7 +59,7 @@ def test_waves_are_independent_of_what_the_run_shares(bare):
 
 
 def test_repeated_loops_share_their_gain(measured, fitted):
-    campaign = no_sweeps(measured(plan=SHARED))
+    campaign = SMALLER["no sweeps"](measured(plan=SHARED))
     first, second = campaign.loops
     bare = in_scatter_units(fitted(replace(campaign, loops=(first, second, replace(first, name="again")))))
     assert sorted(block.rows.size for block in blocks(bare, RIG)) == [second.time.size, 2 * first.time.size]

@@ -13,21 +13,15 @@ from rigged import (
     LEVELS,
     PLAN,
     SHARED,
+    SHOW_MASS,
     SLIP,
+    SMALLER,
     TWO,
     asked,
     changed,
     loop_too_strong,
-    missing_points,
     names,
-    no_loops,
-    no_repeats,
-    no_sweeps,
     off,
-    one_direction,
-    one_frequency,
-    one_level,
-    one_loop,
     said,
 )
 
@@ -44,9 +38,6 @@ from bushfit.simulation.undisturbed import undisturbed
 
 #: The axial level of 0.2 mm.
 level_too_stiff = off(0, 1.05, amplitude=LEVELS[1])
-#: Sweeps of several frequencies show a mass; loops at 0.1 Hz and sweeps at 25 Hz do not.
-SHOW_MASS = (no_loops, one_direction, no_repeats, missing_points, one_level)
-CUTS = (*SHOW_MASS, no_sweeps, one_loop, one_frequency)
 
 
 @pytest.mark.parametrize(
@@ -196,10 +187,13 @@ def test_a_branch_of_the_paper_that_a_model_lacks_is_named(measured, fitted):
 
 @pytest.mark.parametrize(
     ("part", "effects"),
-    [(one_direction, {}), (one_frequency, {}), *(pytest.param(part, INERTIA, marks=pytest.mark.slow) for part in CUTS)],
+    [
+        *(("one direction", {}), ("one frequency", {})),
+        *(pytest.param(part, INERTIA, marks=pytest.mark.slow) for part in SMALLER),
+    ],
 )
 def test_with_less_no_bolder_name(measured, part, effects):
-    found = asked(part(measured(effects, SHARED)))
+    found = asked(SMALLER[part](measured(effects, SHARED)))
     if effects and part in SHOW_MASS:  # with less, what has a mass as its limit is as likely
         assert said(found) == "named inertia" or found.verdict == "ambiguous"
         assert "inertia" in {*found.odds.labels}
