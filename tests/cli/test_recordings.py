@@ -75,18 +75,6 @@ def of_two_rates(file: Path) -> None:
         book.save(file)
 
 
-def without_unit(file: Path) -> None:
-    recordings.tdms(LOOP.rename(columns={"force [N]": "force"}), file)
-
-
-def with_wrong_unit(file: Path) -> None:
-    recordings.parquet(LOOP.rename(columns={"force [N]": "force [mm]"}), file)
-
-
-def with_a_gap(file: Path) -> None:
-    recordings.feather(LOOP.where(LOOP.index.to_series() != 16), file)
-
-
 def cut(ending: str) -> Callable[[Path], None]:
     def write(file: Path) -> None:
         recordings.WRITERS[ending](LOOP, file)
@@ -110,9 +98,12 @@ def of_compliances(file: Path) -> None:
 #: Files that cannot be used, and what their error says.
 SPOILED: list[tuple[str, Callable[[Path], object], tuple[str, ...]]] = [
     ("rates.mf4", of_two_rates, ("no group holds such a table", '"at 100 Hz", "at 20 Hz"', "resample")),
-    ("unit.tdms", without_unit, ('group "Run 1", column "force": the force has no unit', 'units = { force = "N" }')),
-    ("wrong.parquet", with_wrong_unit, ('column "force": the unit does not fit', '"mm"')),
-    ("gap.feather", with_a_gap, ('row 17, column "displacement"', "not a finite number")),
+    ("unit.tdms", lambda file: recordings.tdms(LOOP.rename(columns={"force [N]": "force"}), file),
+     ('group "Run 1", column "force": the force has no unit', 'units = { force = "N" }')),
+    ("wrong.parquet", lambda file: recordings.parquet(LOOP.rename(columns={"force [N]": "force [mm]"}), file),
+     ('column "force": the unit does not fit', '"mm"')),
+    ("gap.feather", lambda file: recordings.feather(LOOP.where(LOOP.index.to_series() != 16), file),
+     ('row 17, column "displacement"', "not a finite number")),
     ("text.mat", lambda file: LOOP.to_csv(file), ("this is not a MATLAB file", "a MATLAB file, according to")),
     ("text.uff", lambda file: LOOP.to_csv(file), ("this is not a UFF file",)),
     ("empty.mf4", lambda file: file.write_bytes(b""), ("the file is empty",)),
