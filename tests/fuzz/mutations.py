@@ -226,8 +226,8 @@ def wrong_end(words: list[str], folder: Path, files: dict[str, bytes]) -> str:
         return "an error that nobody reads to its end"
     if any(sign in said for sign in "\x1b\x9b\u202e\x00"):
         return "a character that steers the terminal"
-    kept = {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
-    lost = [name for name, content in files.items() if kept.get(name) != content]
+    kept = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    lost = [name for name, content in files.items() if kept.get(folder / name) != content]
     return f"lost: {lost}" if lost else ""
 
 
