@@ -78,6 +78,7 @@ def command(
     from bushfit.commands.fit import prepare_tests
     from bushfit.commands.loading import load_model
     from bushfit.commands.provenance import input_files
+    from bushfit.effects.mistakes import get_candidate
 
     start = load_model(model) if model else None
     with error_location(place="--tolerance"):
@@ -85,6 +86,8 @@ def command(
         if not 0.0 <= share <= 1.0:
             raise BushfitError("this is not a share of |K|", found=f'"{tolerance}"', expected="0 % to 100 %")
     campaign = open_campaign(campaigns)
+    for name in (*settings["adopt"], *settings["without"]):
+        get_candidate(name)
     folder = output.folder(campaign.name, "diagnosis.json", "model.json")
     data = prepare_tests(campaign, loss)
     output.warn(data.notes)

@@ -201,7 +201,7 @@ def _print_static(output: Output, curve: StaticCurve) -> None:
     secant, slope = (number(factor * value, 4) for value in (curve.secant.value[0], curve.slope.value[middle]))
     output.print(
         f"{curve.label}: static {curve.direction.motion.words[2]} {secant} {name} from -{reach} to {reach} at "
-        f"{curve.rate_text}, {slope} {name} about zero"
+        f"{curve.rate_text}, {slope} {name} at zero displacement"
     )
 
 

@@ -13,6 +13,7 @@ from bushfit.cli.file_options import metadata_options, options_named
 from bushfit.cli.options import FILE, command_called, direction_option, flag, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import TEMPERATURE, parse_positive, parse_temperature
+from bushfit.errors import MeasurementError
 
 if TYPE_CHECKING:
     from bushfit.commands.respond import ResponseOutput
@@ -57,6 +58,7 @@ def command(
     """
     from bushfit.commands.loading import load_model, model_file
     from bushfit.commands.respond import respond
+    from bushfit.reading.files import view_bytes
     from bushfit.reading.layout import FileFormat
 
     if len(directions) > 1:
@@ -64,6 +66,8 @@ def command(
             "'--direction' takes one direction; a file with several directions states them in its headers."
         )
     result = load_model(model)
+    if not history.exists():
+        view_bytes(history, MeasurementError)
     folder = output.folder(result.name, output.formats.table("response"), form="{} response")
     file_format = FileFormat(**{key.name: test_options.get(key.name) for key in fields(FileFormat)})
     with options_named():
