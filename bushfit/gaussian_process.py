@@ -8,7 +8,7 @@ Notes:
     4.17. Restricted likelihood: H. D. Patterson, R. Thompson, Biometrika 58 (1971) 545-554.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -118,7 +118,11 @@ def spread_nodes(points: Array, count: int) -> Array:
 
 
 def patterns(
-    points: Array, nodes: int = MAXIMUM_NODES, count: int = _MAXIMUM_PATTERNS, minimum: float = _MINIMUM_VARIANCE
+    points: Array,
+    nodes: int = MAXIMUM_NODES,
+    count: int = _MAXIMUM_PATTERNS,
+    minimum: float = _MINIMUM_VARIANCE,
+    correlate: Callable[[Array, Array], Array] = matern,
 ) -> tuple[Array, Array]:
     """Principal components of a Gaussian process of unit variance.
 
@@ -129,6 +133,7 @@ def patterns(
         nodes: maximum number of points from which the patterns are computed.
         count: maximum number of patterns.
         minimum: variance, relative to the largest pattern's, at or below which a pattern is left out.
+        correlate: correlation of points (n, d) with nodes (m, d), of shape (n, m).
 
     Returns:
         Indices of the nodes among the points, (m,), and the patterns at all points, (q, n).
@@ -138,10 +143,10 @@ def patterns(
         if len(distinct) <= _MANY:
             break
     chosen = np.arange(len(distinct)) if len(distinct) <= nodes else spread_nodes(distinct, nodes)
-    correlation = matern(distinct[chosen], distinct[chosen]) + _JITTER * np.eye(chosen.size)
+    correlation = correlate(distinct[chosen], distinct[chosen]) + _JITTER * np.eye(chosen.size)
     variance, vectors = np.linalg.eigh(correlation)  # the largest last
     significant = (variance > minimum * variance[-1]) & (np.arange(variance.size) >= variance.size - count)
-    shapes = matern(distinct, distinct[chosen]) @ vectors[:, significant] / np.sqrt(variance[significant])
+    shapes = correlate(distinct, distinct[chosen]) @ vectors[:, significant] / np.sqrt(variance[significant])
     return first[chosen], shapes.T[:, inverse.ravel()]
 
 

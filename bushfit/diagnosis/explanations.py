@@ -13,6 +13,7 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from math import log
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -23,7 +24,7 @@ from bushfit.diagnosis.groups import Group
 from bushfit.effects.contract import Array
 from bushfit.fitting.loop_harmonics import smooth_waves
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, group_repeats, split_by_kind
-from bushfit.gaussian_process import coordinates, in_lengths, patterns
+from bushfit.gaussian_process import coordinates, in_lengths, matern, patterns
 from bushfit.geometry import Place
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
@@ -34,6 +35,9 @@ COMPOUND = "compound"
 #: Correlation lengths of the compound's deviation in ln frequency and ln strain: relaxation takes decades of frequency,
 #: and breakdown more than one of strain. Number of its patterns: with three to five levels more improve nothing.
 _COMPOUND_LENGTHS, _COMPOUND_PATTERNS = (8.0, 3.0), 12
+#: Share of the compound's deviation that changes over the shorter lengths of a smooth curve: yield and breakdown set in
+#: within a factor of 2 or 3 of the strain.
+_COMPOUND_ROUGHNESS = 0.25
 #: Correlation lengths of a curve without a name in ln frequency and ln strain: smooth, and rough.
 _CURVE_LENGTHS = {"smooth": (1.5, 1.2), "rough": (0.5, 0.5)}
 #: Limits of a curve: number of its nodes and patterns, and least variance of a pattern relative to the largest.
@@ -212,12 +216,19 @@ def compound(evidence: Evidence) -> Group | None:
     """
     if not evidence.data_sets:
         return None
-    columns, share = _process(evidence, evidence.data_sets, _COMPOUND_LENGTHS, count=_COMPOUND_PATTERNS)
+    limits = {"count": _COMPOUND_PATTERNS, "correlate": _compound_correlation}
+    columns, share = _process(evidence, evidence.data_sets, _COMPOUND_LENGTHS, **limits)
     for loops in group_repeats(split_by_kind(evidence.data_sets)[0]):
         columns = np.concatenate((columns, _shared_by(evidence, loops, compound_shapes)))
     unit = np.zeros((len(columns), share.shape[-1]), dtype=complex)
     unit[: len(share)] = share
     return Group(columns, unit, act_together=True)
+
+
+def _compound_correlation(points: Array, nodes: Array) -> Array:
+    """Correlation of the compound's deviation at points (n, 2) and nodes (m, 2) in units of its lengths, (n, m)."""
+    ratio, share = np.divide(_COMPOUND_LENGTHS, _CURVE_LENGTHS["smooth"]), _COMPOUND_ROUGHNESS**2
+    return (matern(points, nodes) + share * matern(points * ratio, nodes * ratio)) / (1.0 + share)
 
 
 def compound_shapes(loop: MeasuredLoop) -> Array:
@@ -280,7 +291,7 @@ def unnamed_curves(evidence: Evidence) -> list[Explanation]:
 
 
 def _process(
-    evidence: Evidence, tests: Sequence[MeasuredTest], lengths: tuple[float, float], **limits: float
+    evidence: Evidence, tests: Sequence[MeasuredTest], lengths: tuple[float, float], **limits: Any
 ) -> tuple[Array, Array]:
     """Build a smooth relative change of the stiffness (Gaussian process of unit variance) over the points of tests.
 
@@ -296,7 +307,7 @@ def _process(
     """
     model = evidence.model
     points = [coordinates(test.frequency, test.amplitude * model.unit_strain(test.direction)) for test in tests]
-    _, shapes = patterns(in_lengths(np.concatenate(points), lengths), **limits)  # type: ignore[arg-type]
+    _, shapes = patterns(in_lengths(np.concatenate(points), lengths), **limits)
     share = (shapes[:, None] * np.array([[1.0], [1.0j]])).reshape(-1, shapes.shape[-1])
     columns = np.zeros((len(share), evidence.residual.size))
     for test, change in zip(tests, np.split(share, np.cumsum([*map(len, points)])[:-1], axis=1), strict=True):

@@ -11,10 +11,12 @@ from bushfit.diagnosis.explanations import FaultyPart
 from bushfit.diagnosis.groups import Group
 from bushfit.effects.contract import Array
 from bushfit.fitting.measured_test import shown_amplitude
-from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
+from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, split_by_kind
 
 #: Maximum number of neighbouring frequencies that one disturbance covers: mains hum and its sidebands.
 _WIDEST = 3
+#: Ratio of frequencies or of amplitudes up to which they are the same.
+_SAME = 1.05
 #: Minimum number of frequencies in a campaign for one of them to be a suspect.
 _FEWEST_FREQUENCIES = 5
 #: Maximum number of single-frequency suspects; neighbours of more frequencies are joined. Chosen for time.
@@ -41,9 +43,17 @@ def find_faulty_parts(evidence: Evidence) -> list[FaultyPart]:
             act_together=True,
             covered_rows=(evidence.residual_rows[loop], evidence.residual.size),
         )
-        ends = (loop.prepared.frequency,) * 2, (loop.prepared.amplitude,) * 2
-        faulty_parts.append(FaultyPart("part", "loop", f"the loop {loop.name}", group, loop.direction, *ends))
+        point = loop.prepared.frequency, loop.prepared.amplitude
+        others = (test for test in evidence.data_sets if test is not loop and test.direction == loop.direction)
+        part = FaultyPart("part", "loop", f"the loop {loop.name}", group, loop.direction, point[:1] * 2, point[1:] * 2)
+        faulty_parts.append(replace(part, extreme=not any(_covers(test, *point) for test in others)))
     return faulty_parts
+
+
+def _covers(test: MeasuredTest, frequency: float, amplitude: float) -> bool:
+    """True if an operating point [Hz; m or rad] lies within the range of a test."""
+    pairs = (frequency, test.frequency), (amplitude, test.amplitude)
+    return all(values.min() / _SAME <= value <= values.max() * _SAME for value, values in pairs)
 
 
 def _line_label(sweep: MeasuredSweep, point: int) -> str:
@@ -64,7 +74,7 @@ def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fau
             mask = sweep.held_value == level
             label = _line_label(sweep, int(np.argmax(mask)))
             if levels.size > 1:  # in this file or in others
-                part = _shifted(evidence, "level", label, [sweep], [mask], sloping=True)
+                part = _shifted(evidence, "level", label, [sweep], [mask])
                 yield replace(part, extreme=levels.size > 2 and level in (levels.min(), levels.max()))
             numbers = np.unique(sweep.repeat[mask])
             for number in numbers if numbers.size > 2 else ():
@@ -80,7 +90,7 @@ def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fa
         for number in sorted({int(repeat) for sweep in members for repeat in sweep.repeat}):
             chosen = [sweep.repeat == number for sweep in members]
             if all(mask.any() for mask in chosen):
-                yield _shifted(evidence, "repeat", f"repeat {number} of {label}", members, chosen, sloping=True)
+                yield _shifted(evidence, "repeat", f"repeat {number} of {label}", members, chosen)
 
 
 def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
@@ -132,10 +142,8 @@ def _shifted(
     name: str,
     sweeps: Sequence[MeasuredSweep],
     chosen: Sequence[Array],
-    *,
-    sloping: bool = False,
 ) -> FaultyPart:
-    """Suspected fault of sweep points: a common error of gain and phase, and of their slopes if `sloping`.
+    """Suspected fault of sweep points: a common error of gain and phase, and of their slopes.
 
     Args:
         evidence: the fitted model and the tests.
@@ -143,11 +151,9 @@ def _shifted(
         name: name of the fault for reports.
         sweeps: sweeps that have the fault.
         chosen: mask of the faulty points of each sweep, (n,) each.
-        sloping: True to add errors that grow along the stepped quantity.
     """
-    ends = np.array([[1.0, 1.0], [1.0, -1.0]])[: 1 + sloping]
-    unit = np.kron(ends, np.array([[1.0], [1.0j]]))
-    return _part(evidence, family, name, sweeps, chosen, _shift_columns(evidence, sweeps, chosen, sloping), unit)
+    unit = np.kron([[1.0, 1.0], [1.0, -1.0]], np.array([[1.0], [1.0j]]))
+    return _part(evidence, family, name, sweeps, chosen, _shift_columns(evidence, sweeps, chosen, sloping=True), unit)
 
 
 def _part(

@@ -89,8 +89,15 @@ def both(one: Tamper, other: Tamper) -> Tamper:
 
 
 def loop_too_strong(campaign: Campaign) -> Campaign:
+    """The largest loop off by a factor."""
     first, second = campaign.loops
     return replace(campaign, loops=(first, replace(second, force=1.06 * second.force)))
+
+
+def repeated_loop_too_strong(campaign: Campaign) -> Campaign:
+    """A repeat of the largest loop off by a factor."""
+    *_, repeat = loop_too_strong(campaign).loops
+    return replace(campaign, loops=(*campaign.loops, replace(repeat, name="loop_axial_3")))
 
 
 def asked(campaign: Campaign, model: Model | None = None, **settings: object) -> Diagnosis:

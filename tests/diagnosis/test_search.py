@@ -22,6 +22,7 @@ from rigged import (
     loop_too_strong,
     names,
     off,
+    repeated_loop_too_strong,
     said,
 )
 
@@ -57,7 +58,7 @@ def test_what_is_there_is_all_but_sure(diagnosed, truth):
 
 @pytest.mark.parametrize(
     ("tamper", "place"),
-    [(level_too_stiff, "the axial level 0.2 mm"), (loop_too_strong, "the loop loop_axial_2")],
+    [(level_too_stiff, "the axial level 0.2 mm"), (repeated_loop_too_strong, "the loop loop_axial_3")],
     ids=["level", "loop"],
 )
 def test_what_one_place_alone_shows_is_to_be_measured_again(measured, tamper, place):
@@ -69,6 +70,12 @@ def test_what_one_place_alone_shows_is_to_be_measured_again(measured, tamper, pl
     assert place in diagnosis.where[0].reading
     assert diagnosis.next_test == f"measure again: {place}"
     assert diagnosis.odds.labels[0] == f"fault: {place}"
+
+
+def test_a_loop_at_an_amplitude_of_its_own_may_deviate_by_a_law(measured):
+    diagnosis = asked(loop_too_strong(measured(plan=SHARED)))
+    assert said(diagnosis) == "described unnamed"
+    assert diagnosis.summary.endswith("it is largest at the loop loop_axial_2")
 
 
 @pytest.mark.slow

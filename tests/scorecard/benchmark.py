@@ -38,7 +38,9 @@ _ANSWERS, _VOCABULARY = "answers.json", "vocabulary.csv"
 #: What a tool answers of a campaign: `sees`, `claims` and `where`.
 ToolAnswer = dict[str, Any]
 #: Places at fault, by the words in which bushfit reports them.
-_PLACES = {"level": "level", "frequency": " Hz", "repeat": "repeat", "loop": "loop", "direction": ""}
+_PLACES = {"repeat": "repeat", "loop": "loop", "level": "level", "frequency": " Hz", "direction": ""}
+#: Advice of bushfit where a place is surely at fault.
+_AGAIN = "measure again: "
 FOLDER = click.argument("folder", type=click.Path(path_type=Path))
 
 
@@ -97,12 +99,19 @@ def _vocabulary_name(name: str) -> str:
 
 def ask_bushfit(folder: Path) -> ToolAnswer:
     """The answer of `bushfit diagnose`."""
-    document = json.loads(json.dumps(diagnose(load_campaign(folder / "bushing.toml")).document, default=float))
-    verdict, claims = document["verdict"], []
-    for effect in document["effects"] if verdict in ("named", "partly", "ambiguous") else ():
-        if effect["name"] != "unnamed":
-            names = [effect["name"], *effect["alternatives"]] if verdict == "ambiguous" else [effect["name"]]
-            claims.append([" + ".join(map(_vocabulary_name, name.split(" + "))) for name in names])
+    diagnosed = diagnose(load_campaign(folder / "bushing.toml"))
+    document = json.loads(json.dumps(diagnosed.document, default=float))
+    verdict, effects = document["verdict"], [effect for effect in document["effects"] if effect["name"] != "unnamed"]
+    claims = list[list[str]]()
+    if verdict in ("named", "partly"):
+        claims = [[effect["name"]] for effect in effects]
+    elif verdict == "ambiguous":
+        claims = [[effect["name"], *effect["alternatives"]] for effect in effects] or [
+            [*diagnosed.diagnosis.odds.labels]
+        ]
+    elif document["next_test"].startswith(_AGAIN):
+        claims = [[f"fault: {document['next_test'].removeprefix(_AGAIN)}"]]
+    claims = [[" + ".join(map(_vocabulary_name, name.split(" + "))) for name in claim] for claim in claims]
     where = [
         {key: region[key] for key in ("direction", "frequency_Hz", "amplitude_mm")}
         for region in document["where"]
