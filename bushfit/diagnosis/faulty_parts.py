@@ -17,6 +17,8 @@ from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, split_by_ki
 _WIDEST = 3
 #: Ratio of frequencies or of amplitudes up to which they are the same.
 _SAME = 1.05
+#: Relative changes of the stiffness at both ends of a part by errors of gain and phase, and by their slopes.
+_SLOPING = np.kron([[1.0, 1.0], [1.0, -1.0]], [[1.0], [1.0j]])
 #: Minimum number of frequencies in a campaign for one of them to be a suspect.
 _FEWEST_FREQUENCIES = 5
 #: Maximum number of single-frequency suspects; neighbours of more frequencies are joined. Chosen for time.
@@ -74,12 +76,12 @@ def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fau
             mask = sweep.held_value == level
             label = _line_label(sweep, int(np.argmax(mask)))
             if levels.size > 1:  # in this file or in others
-                part = _shifted(evidence, "level", label, [sweep], [mask])
+                part = _part(evidence, "level", label, [sweep], [mask])
                 yield replace(part, extreme=levels.size > 2 and level in (levels.min(), levels.max()))
             numbers = np.unique(sweep.repeat[mask])
             for number in numbers if numbers.size > 2 else ():
                 repeat = mask & (sweep.repeat == number)
-                yield _shifted(evidence, "repeat", f"repeat {number} of {label}", [sweep], [repeat])
+                yield _part(evidence, "repeat", f"repeat {number} of {label}", [sweep], [repeat])
 
 
 def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
@@ -90,7 +92,7 @@ def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fa
         for number in sorted({int(repeat) for sweep in members for repeat in sweep.repeat}):
             chosen = [sweep.repeat == number for sweep in members]
             if all(mask.any() for mask in chosen):
-                yield _shifted(evidence, "repeat", f"repeat {number} of {label}", members, chosen)
+                yield _part(evidence, "repeat", f"repeat {number} of {label}", members, chosen)
 
 
 def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
@@ -136,36 +138,16 @@ def _scopes(sweeps: Sequence[MeasuredSweep]) -> Iterator[tuple[str, str, Sequenc
         yield "all directions", "every sweep", sweeps
 
 
-def _shifted(
-    evidence: Evidence,
-    family: str,
-    name: str,
-    sweeps: Sequence[MeasuredSweep],
-    chosen: Sequence[Array],
-) -> FaultyPart:
-    """Suspected fault of sweep points: a common error of gain and phase, and of their slopes.
-
-    Args:
-        evidence: the fitted model and the tests.
-        family: kind of the fault, such as "level" or "repeat".
-        name: name of the fault for reports.
-        sweeps: sweeps that have the fault.
-        chosen: mask of the faulty points of each sweep, (n,) each.
-    """
-    unit = np.kron([[1.0, 1.0], [1.0, -1.0]], np.array([[1.0], [1.0j]]))
-    return _part(evidence, family, name, sweeps, chosen, _shift_columns(evidence, sweeps, chosen, sloping=True), unit)
-
-
 def _part(
     evidence: Evidence,
     family: str,
     name: str,
     sweeps: Sequence[MeasuredSweep],
     chosen: Sequence[Array],
-    columns: Array,
-    unit: Array,
+    columns: Array | None = None,
+    unit: Array = _SLOPING,
 ) -> FaultyPart:
-    """Build a suspected fault of sweep points from its effect on the residuals.
+    """Build a suspected fault of sweep points: a common error of gain and phase, and of their slopes.
 
     Args:
         evidence: the fitted model and the tests.
@@ -173,9 +155,10 @@ def _part(
         name: name of the fault for reports.
         sweeps: sweeps that have the fault.
         chosen: mask of the faulty points of each sweep, (n,) each.
-        columns: change of the whitened residuals by a unit of each of c errors, (c, rows).
+        columns: change of the whitened residuals by a unit of each of c other errors, (c, rows).
         unit: complex relative change of the stiffness by a unit of each error, at the p ends of the part, (c, p).
     """
+    columns = _shift_columns(evidence, sweeps, chosen, sloping=True) if columns is None else columns
     frequency, amplitude = (
         np.concatenate([getattr(sweep, axis)[mask] for sweep, mask in zip(sweeps, chosen, strict=True)])
         for axis in ("frequency", "amplitude")
