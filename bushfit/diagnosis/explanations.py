@@ -226,7 +226,11 @@ def compound(evidence: Evidence) -> Group | None:
 
 
 def _compound_correlation(points: Array, nodes: Array) -> Array:
-    """Correlation of the compound's deviation at points (n, 2) and nodes (m, 2) in units of its lengths, (n, m)."""
+    """Correlation of the compound's deviation at points (n, 2) and nodes (m, 2) in units of its lengths, (n, m).
+
+    >>> _compound_correlation(np.zeros((1, 2)), np.array([[0.0, 0.0], [0.0, 0.4]])).round(3)
+    array([[1.   , 0.862]])
+    """
     ratio, share = np.divide(_COMPOUND_LENGTHS, _CURVE_LENGTHS["smooth"]), _COMPOUND_ROUGHNESS**2
     return (matern(points, nodes) + share * matern(points * ratio, nodes * ratio)) / (1.0 + share)
 
