@@ -49,19 +49,15 @@ def test_the_paper_s_order_by_hand(bushfit, tmp_path):
     assert "left out" not in again.stderr
 
 
-def second_off(own: Path, off: float, tilted: bool = False) -> None:
+@pytest.mark.parametrize(
+    ("off", "tilted", "told"), [(0.0, False, []), (0.05, False, [REPEATS_OFF]), (0.13, True, [ROWS_APART, REPEATS_OFF])]
+)
+def test_repeats_that_disagree_do_not_excuse_themselves(own, off, tilted, told):
     """The second of two repeats is off, at all frequencies or more and more along them."""
     table = pd.read_csv(own / SWEEP).query("repeat <= 2")
     share = np.log(table["frequency [Hz]"] / 5.0) / np.log(31.0) if tilted else 1.0
     table["stiffness [N/mm]"] *= 1.0 + off * share * (table["repeat"] == 2)
     table.to_csv(own / SWEEP, index=False)
-
-
-@pytest.mark.parametrize(
-    ("off", "tilted", "told"), [(0.0, False, []), (0.05, False, [REPEATS_OFF]), (0.13, True, [ROWS_APART, REPEATS_OFF])]
-)
-def test_repeats_that_disagree_do_not_excuse_themselves(own, off, tilted, told):
-    second_off(own, off, tilted)
     for command in ("fit", "diagnose"):
         done = typing(own)(command, CAMPAIGN, "-o", command, "--no-plots", "-v")
         warnings = [line for line in done.stderr.splitlines() if line.startswith("warning:")]

@@ -120,13 +120,10 @@ def written(tests: Path, writer: str, folder: Path) -> list[Path]:
             assert not (folder / "out").exists()
             return []
         assert done.returncode == 0, done.stderr
-    found = [file for file in (folder / "out").rglob("*.json") if is_model(file)]
+    documents = (folder / "out").rglob("*.json")
+    found = [file for file in documents if str(read(file).get("schema")).startswith("bushfit/model/")]
     assert any(file.stem == WRITERS[writer] for file in found)
     return sorted(found)
-
-
-def is_model(file: Path) -> bool:
-    return str(read(file).get("schema")).startswith("bushfit/model/")
 
 
 def taken(tests: Path, model: Path, folder: Path, more: str) -> None:
