@@ -307,12 +307,12 @@ def _add_by_unit(
     return notes, list(free)
 
 
-def _moves_along(cells: Cells, known: Column, column: Column) -> bool:
-    """Return True if a column records the motion of a displacement in another size, as an extensometer does."""
-    if not (known.unit and column.unit and units.is_compatible(column.unit, known.unit)):
+def _moves_along(cells: Cells, first: Column, second: Column) -> bool:
+    """Return True if a second column records the motion of a displacement in another size, as an extensometer does."""
+    if not (first.unit and second.unit and units.is_compatible(second.unit, first.unit)):
         return False
-    numbers = _first_numbers(cells, (known, column)) * [
-        units.si_factor(unit, known.unit) for unit in (known.unit, column.unit)
+    numbers = _first_numbers(cells, (first, second)) * [
+        units.si_factor(unit, first.unit) for unit in (first.unit, second.unit)
     ]
     spans = [float(np.ptp(values)) for values in numbers.T] if len(numbers) else [0.0, 0.0]
     if min(spans) <= 0.0 or abs(spans[1] / spans[0] - 1.0) <= _AGREEMENT:

@@ -28,7 +28,7 @@ def with_hum(amplitude: float) -> Export:
 
 
 #: Exports that once were read wrongly: further columns, statements of headers, damping coefficients, rows and blocks,
-#: phases, times, delimiters, columns, and contradictions.
+#: phases, times, delimiters, columns, contradictions, and symbols, multiples and lines above.
 NAMES = """\
 displacement and force of the points; mean position and load
 omega with the unit of the hint; log10 f; Amplitude RMS [mm]; AmpPkPk(mm); amplitudes stated as rms
@@ -41,7 +41,10 @@ clock; ISO; date and time; AM and PM; day numbers; day numbers as days; no time 
 columns of one width with a units row; carets
 columns by unit: t [s]|LVDT 2 [mm]|Load Cell [N]; unit N.mm-1; real and imaginary; F and x; LabVIEW
 no header, columns by number; unnamed last column; complex numbers; encoding cp932
-amplitudes that agree"""
+amplitudes that agree
+the symbol decides: Kd'; multiples: Amp (1/100 mm)|K* (x1000 N/m); a reference behind: /dB re. 1 N/m
+counted above: All amplitudes pk-pk
+blocks of fixed width, a ratio without a unit; s over its unit; a time in ms beside its rate; a second motion, chosen"""
 
 
 def fitted(folder: Path, *exports: Export) -> dict[str, float]:
