@@ -108,11 +108,12 @@ def fit_joint(
         found = estimate(replace(problem, model=found.model, tests=tests), robust=data.robust)
     if errors.significant and found.names and not error:  # the rig or the model is the cause: the bands include both
         found, error = with_model_error(found, data.bounds, certain=True)
-        size = format_class_errors(errors.error)
-        notes += [
-            f"levels disagree by more than their repeats, as by an error of {size} for each level: parameters are the "
-            "closest fit, and their intervals include this error"
-        ] * bool(error)
+        if error:
+            size = format_class_errors(errors.error)
+            notes.append(
+                f"levels disagree by more than their repeats, as by an error of {size} for each level: parameters are "
+                "the closest fit, and their intervals include this error"
+            )
     notes += unfitted(found.model, unused, NEXT)
     result = replace(
         _result(data, [found], notes=notes, unused=unused), usable=expected_errors(found, unused), model_error=error
