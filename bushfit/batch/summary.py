@@ -101,7 +101,7 @@ class BatchResult:
 
     @cached_property
     def quantities(self) -> dict[str, PartQuantity]:
-        """All quantities of the batch, with their display units, by name."""
+        """Parameters, and stiffness and loss factor at stated points, by name: what is compared between the parts."""
         return list_quantities(self.estimates, self.plan.task.points)
 
     @cached_property

@@ -50,7 +50,7 @@ from bushfit.cli.shared_options import (
         "CONSTANTS",
         'Stiffness and loss factor for rotation about x and y in solver files, such as "60 N m/rad, 0.1" [0].',
     ),
-    static_rate_option("Rate of the curves of adams"),
+    static_rate_option("Rate of the static curves for Adams"),
     option("--accuracy", "ERROR", "Largest permitted error of the modulus in an FMU or prony [1 %].", default="1 %"),
 )
 @prediction_options("Use the frequencies and amplitudes of this campaign.")

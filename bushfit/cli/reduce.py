@@ -72,8 +72,8 @@ def command(
     """Reduce raw stepped-sine histories or a resonance test to a sweep.
 
     A raw history contains time, displacement and force, with many steps of at least five cycles. Several files of one
-    direction make one sweep. A resonance test, given by one FILE and --mass, contains the accelerations and phases of
-    a shaken base and of a mass on the mount, or their ratio (transmissibility). Each point gets a standard error.
+    direction make one sweep. A resonance test is one FILE with --mass: the accelerations and phases of a shaken base
+    and of a mass on the mount, or their ratio (transmissibility). Each point gets a standard error.
 
     Writes reduce.png and sweep.csv, which init and campaigns read as a sweep.
     """

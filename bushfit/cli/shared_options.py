@@ -178,7 +178,7 @@ def parse_temperature(text: str | None) -> float | None:
 
 
 def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | None:
-    """Parse a grid option such as "5:155:10 Hz" or "0.1, 0.2, 0.5 mm" to values in SI; None if it was not given.
+    """Parse a list "0.1, 0.2, 0.5 mm" or a range start:stop:step "5:155:10 Hz" to values in SI; None if not given.
 
     Args:
         text: text of the option.

@@ -29,7 +29,7 @@ from bushfit.report.results import ResultFile, table_with_figure
 
 
 class ResponseDocument(TypedDict):
-    """Figures of a response for each direction, as `bushfit respond --json` prints them."""
+    """Peak force, energy and other values of the force over time, by direction, printed by `bushfit respond --json`."""
 
     directions: Annotated[
         dict[str, dict[str, float | None]],

@@ -111,7 +111,7 @@ class Unnamed:
 
     @property
     def largest(self) -> float:
-        """Largest magnitude of the correction at a node, relative to the stiffness."""
+        """Largest magnitude of the correction of the stiffness over the operating points of the grid, relative to |K|."""
         return float(np.sqrt(self._at_nodes[0].max()))
 
     @property

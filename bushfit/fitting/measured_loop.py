@@ -312,7 +312,7 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def _unit_offset(self) -> Array:
-        """Change of the uncorrelated rows by an offset of the force of half its range, (size,)."""
+        """Change of the whitened rows if half the force range is added to the force of every row, (size,)."""
         return self._whiten_rows(self._per_noise * self.prepared.half_range)
 
     @cached_property

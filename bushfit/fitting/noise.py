@@ -101,11 +101,12 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
     """Estimate the noise of the sweeps of one rig from their repeats.
 
     Without repeats the scatter is estimated about a smooth curve over the logarithm of the stepped quantity, and the
-    shared error is that of the rig's class, stated or assumed. With repeats, a stated class is an error of each level,
-    which repeats cannot reveal. A noise stated in the campaign, or for each point in the file, replaces the scatter.
+    shared error is that of the rig's class, stated or assumed. With repeats, a stated class is an error that all runs
+    at one held value (amplitude or frequency) share, which repeats cannot reveal. A noise stated in the campaign, or
+    for each point in the file, replaces the scatter.
 
     Returns:
-        Noise of all sweeps together.
+        Standard deviations of gain and phase (of ln K) of all sweeps: scatter of the points, and shared errors.
 
     Notes:
         Let D be the difference of ln K between two repeats at one step. The mean square of the change of D from one

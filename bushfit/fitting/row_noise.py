@@ -104,13 +104,14 @@ class RowNoise:
         return white
 
     def noise_sensitivity(self, influence: Array) -> list[Array]:
-        """Sensitivity of k parameter estimates to the error of each parameter of the noise, see `MeasuredLoop`.
+        """Change of the influence of the rows on k parameter estimates by an error of each parameter of the noise.
 
         Args:
             influence: weight of each whitened row in the estimates, (k, n).
 
         Returns:
-            One array (k, n) for each parameter of the noise; empty if their errors are not estimated.
+            For each parameter of the noise, the change by one of its standard errors, (k, n), which times the whitened
+            residuals is the change of the estimates; empty if these errors are not estimated.
 
         Notes:
             For V = L^-1 L^-T with the filter L, the whitened derivative is -(G + G^T) with G = dL L^-1.

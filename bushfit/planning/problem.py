@@ -40,10 +40,10 @@ class PlanningProblem:
         request: aim of the plan and limits of the rig.
         tests: candidate tests, then tests that only the standard programme has.
         effects: effect of each further column of `models[0]`.
-        models: information of the tests on the likeliest model and the effects that it lacks, then on each rival model
-            and its differences from the other rivals.
-        wanted: sensitivity of the stiffness at the wanted operating points of each direction of the request.
-        goals: derivatives and fixed errors of each target of the request.
+        models: Fisher information of each test on the parameters of the likeliest model and on the effects that it
+            lacks, then on each rival model and its differences from the other rivals.
+        wanted: derivatives, by parameter, of the stiffness at the operating points of each direction of the request.
+        goals: for each target of the request, its derivatives by parameter, and the variance that no test reduces.
         budget: durations of the tests, without a limit of hours.
     """
 
@@ -97,7 +97,7 @@ class PlanningProblem:
 
     @cached_property
     def weight(self) -> Array | None:
-        """Weight of the parameter covariance in the criterion, (k, k); None if the aim is to separate rival models."""
+        """Matrix W of the criterion trace(W C) for the parameters' covariance C, (k, k); None if the aim is rivals."""
         if self.request.aim == "rivals":
             return None
         if self.request.aim == "targets":

@@ -133,7 +133,7 @@ def untimed_effects(model: Model) -> list[str]:
 def timed_candidates(
     result: Result, subject: str, *, rig: bool = False
 ) -> tuple[list[tuple[Result, Model]], list[str]]:
-    """List the models that agree with the tests and have laws in time, the predicted one first.
+    """List the model of a result, then the alternatives that fit the tests as well, if they give a force over time.
 
     Args:
         result: fitted result.

@@ -57,7 +57,7 @@ def stiffness_pair(table: Table) -> tuple[str, str]:
 
 
 def hint_for_convertible_columns(table: Table, kinds: Collection[str] = _WAYS_ON) -> str | None:
-    """Return the next step if a column can be computed from, say, a compliance in the table; else None."""
+    """Advice on how to obtain a stiffness from a compliance or another column; None without such a column."""
     headings = (_DERIVED.heading(header) for header in table.headers if header)
     return next((_WAYS_ON[heading.role] for heading in headings if heading and heading.role in kinds), None)
 

@@ -79,7 +79,7 @@ def least_squares(columns: Floats, values: Floats, weight: NDArray[Any] | None =
 
 
 def as_complex(real: Floats) -> Complex:
-    """Convert real Fourier coefficients (mean, cosines, negative sines), (2 m + 1,), to complex ones, (m + 1,)."""
+    """Convert [mean, a_1 .. a_m, -b_1 .. -b_m] of a_k cos + b_k sin, (2 m + 1,), to mean and a_k - i b_k, (m + 1,)."""
     order = real.size // 2
     return np.concatenate((real[:1], real[1 : order + 1] + 1j * real[order + 1 :]))
 

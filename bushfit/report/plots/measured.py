@@ -80,8 +80,8 @@ def sweep_groups(table: pd.DataFrame, result: Result) -> list[SweepGroup]:
         result: model, which gives the specimens by their names.
 
     Returns:
-        Groups in the order of the table. The curves of a group differ in level, and in part, temperature or preload if
-        tests differ in these.
+        Groups in the order of the table. The curves of a group differ in the held amplitude or frequency, and in part,
+        temperature or preload if tests differ in these.
     """
     groups, order = [], [*dict.fromkeys(table["direction"])]
     for (name, stepped), rows in table.rename(columns={"sweep": "test"}).groupby(["direction", "stepped"], sort=False):
