@@ -111,7 +111,7 @@ class Unnamed:
 
     @property
     def largest(self) -> float:
-        """Largest magnitude of the correction of the stiffness over the operating points of the grid, relative to |K|."""
+        """Largest magnitude of the correction of the stiffness, relative to |K|, over the points of its grid."""
         return float(np.sqrt(self._at_nodes[0].max()))
 
     @property

@@ -82,7 +82,7 @@ class PreparedCampaign:
         return with_preload(data.with_rubber_conditions())
 
     def with_rubber_conditions(self) -> "PreparedCampaign":
-        """Return the campaign with the stated temperature and earlier strains of the session at each point of a test."""
+        """Return the campaign with the stated temperature and earlier strains of the session at every test point."""
         conditions = iter(measured_session(self.campaign.bushing, [data_set.test for data_set in self.data_sets]))
         loops = tuple(replace(loop, test_conditions=next(conditions).select(0)) for loop in self.loops)
         return replace(
