@@ -107,13 +107,17 @@ class DiagnosisWriter:
         summary = f"{' and '.join(names)} {'explains' if len(names) == 1 else 'explain'} {share} % of the gap"
         rest = [part.name for part in first.faulty_parts] + [_LEVELS] * first.best.levels
         gap = self._described(after) if not first.best.levels else None
+        final = gap.after if gap else after
+        if zero := [name for name in names if _is_at_neutral_bound(name, final)]:  # the model does without these
+            left, leads = tuple(name for name in names if name not in zero), (*zero, *self.finding.leads)
+            finding = replace(self.finding, verdict="partly" if left else "described", names=left, leads=leads)
+            return replace(self, finding=finding).diagnosis()
         if gap:
             entries.append(NamedCause(UNNAMED, gap.evidence))
             rest.append(f"{_NAMELESS} ({gap.sentence})")
         elif first.unnamed:
             rest.append(_NAMELESS)
-        after, remainder = gap.after if gap else after, " and ".join(rest)
-        return self._finished("partly", summary, after, entries, remainder, places=first.best, gap=gap)
+        return self._finished("partly", summary, final, entries, " and ".join(rest), places=first.best, gap=gap)
 
     def _described(self, evidence: Evidence) -> GapDescription | None:
         """Describe the gap of a fit by a smooth correction; None if effects are excluded or no correction is valid."""
@@ -376,6 +380,13 @@ def _gap_stays(holdout: HoldOut, after: Evidence, names: Sequence[str], bounds: 
         if effect.amount.neutral is not None and low <= effect.amount.neutral <= high:
             return True
     return False
+
+
+def _is_at_neutral_bound(name: str, fitted: Evidence) -> bool:
+    """True if the amount of an effect ended at the bound at which the effect does nothing, such as a mass of zero."""
+    effect = get_effect(name)
+    end = fitted.solution.at_bound.get(qualified_name(effect, effect.amount))
+    return end is not None and effect.amount.neutral == effect.amount.bounds[end == "max"]
 
 
 def _format_amount(name: str, result: Result) -> str:

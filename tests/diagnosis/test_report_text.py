@@ -15,6 +15,7 @@ from rigged import SHARED, SMALLER, asked, said
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.next_test import BUSHING_TESTS, FIXTURE_TESTS, deciding_test, remaining_entropy
+from bushfit.diagnosis.report_text import _is_at_neutral_bound
 from bushfit.diagnosis.verdict import Finding, decide_verdict
 from bushfit.effects import BASE
 from bushfit.effects.mistakes import MISTAKES
@@ -44,6 +45,19 @@ def test_the_class_of_a_rig_that_is_assumed_is_said(measured):
     ):
         assumed = PreparedCampaign.from_campaign(replace(campaign, rig=rig)).assumed
         assert [note.partition(" class of the rig, ")[2] for note in assumed] == [words] * bool(words)
+
+
+@pytest.mark.parametrize(
+    ("name", "at_bound", "does_nothing"),
+    [
+        ("inertia", {"inertia.mass": "min"}, True),
+        ("inertia", {"inertia.mass": "max"}, False),
+        ("inertia", {"mu": "min"}, False),
+        ("delay", {"delay.tau": "min"}, False),
+    ],
+)
+def test_an_effect_that_ends_at_no_amount_has_no_name(name, at_bound, does_nothing):
+    assert _is_at_neutral_bound(name, SimpleNamespace(solution=SimpleNamespace(at_bound=at_bound))) is does_nothing
 
 
 @pytest.mark.slow
