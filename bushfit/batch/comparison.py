@@ -50,13 +50,27 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
         outliers[name][removed[:count]] = True
     named = np.any([*outliers.values()], axis=0)
     for name, (values, errors) in quantities.items():
-        usual = np.isfinite(values) & ~named
-        if usual.sum() < FEWEST - 1:
-            usual = np.isfinite(values) & ~outliers[name]
+        usual = usual_parts(values, name, outliers)
         deviations[name] = _studentised(values, errors, usual)
         limit = smallest_deviation(int(usual.sum()) + 1, len(quantities)) or math.inf
         outliers[name] |= named & (np.abs(deviations[name]) > limit)
     return deviations, outliers
+
+
+def usual_parts(values: Array, name: str, outliers: Mapping[str, Array]) -> Array:
+    """Mask of the parts with which the others are compared in one quantity: those that are outliers in no quantity.
+
+    Args:
+        values: values of the quantity, (n,); NaN if unknown.
+        name: name of the quantity.
+        outliers: masks of outliers by name of the quantity, (n,) each.
+
+    Returns:
+        Mask, (n,); if too few parts remain, that of the parts that are no outliers in this quantity.
+    """
+    finite = np.isfinite(values)
+    usual = finite & ~np.any([*outliers.values()], axis=0)
+    return usual if usual.sum() >= FEWEST - 1 else finite & ~outliers[name]
 
 
 def _studentised(values: Array, errors: Array, usual: Array) -> Array:

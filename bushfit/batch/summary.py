@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from bushfit.batch.comparison import FEWEST, capability, find_outliers, smallest_deviation
+from bushfit.batch.comparison import FEWEST, capability, find_outliers, smallest_deviation, usual_parts
 from bushfit.batch.document import RowFile
 from bushfit.batch.limits import Limits, describe_poor_fit, judge_part, resolve_limits
 from bushfit.batch.manifest import Row
@@ -212,10 +212,9 @@ class BatchResult:
         is_usable = is_known & ~self.is_poor if name not in FIT_NAMES else is_known
         known_values, detectable = values[is_usable if is_usable.any() else is_known], None
         if name in self.compared_values:
-            is_compared = np.isfinite(self.compared_values[name][0])
-            limit = smallest_deviation(int(is_compared.sum()), len(self.compared_values))
-            usual = is_compared & ~np.any([*self.outliers[1].values()], axis=0)
-            usual = usual if usual.sum() >= FEWEST - 1 else is_compared & ~self.outliers[1][name]
+            compared = self.compared_values[name][0]
+            limit = smallest_deviation(int(np.isfinite(compared).sum()), len(self.compared_values))
+            usual = usual_parts(compared, name, self.outliers[1])
             detectable = limit and limit * float(values[usual].std(ddof=1))
         low, high = self.allowed[0].get(name, (-np.inf, np.inf))
         fixed = (-np.inf, np.inf)

@@ -23,7 +23,14 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.groups import Group
 from bushfit.effects.contract import Array
 from bushfit.fitting.loop_harmonics import smooth_waves
-from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, MeasuredTest, group_repeats, split_by_kind
+from bushfit.fitting.preparation import (
+    SAME_LOOP,
+    MeasuredLoop,
+    MeasuredSweep,
+    MeasuredTest,
+    group_repeats,
+    split_by_kind,
+)
 from bushfit.gaussian_process import coordinates, in_lengths, matern, patterns
 from bushfit.geometry import Place
 from bushfit.model.model import Model
@@ -44,9 +51,6 @@ _CURVE_LENGTHS = {"smooth": (1.5, 1.2), "rough": (0.5, 0.5)}
 _CURVE_PATTERNS = {"nodes": 150, "count": 16, "minimum": 1e-4}
 #: Last overtone of a compound's deviation in a steady cycle, and number of waves of its deviation in the first cycle.
 _LAST_OVERTONE, _TRANSIENT_WAVES = 13, 6
-#: Relative difference in frequency and in amplitude up to which two loops repeat each other: rigs miss their set points
-#: by less.
-_SAME_LOOP = 0.02
 #: Number of phases of a cycle at which harmonics are summed: about six per period of the highest harmonic.
 _PHASES = 32
 
@@ -148,7 +152,7 @@ def is_pattern(faulty_parts: Sequence[FaultyPart]) -> bool:
         return True
     loops = [(part.direction, *part.frequency, *part.amplitude) for part in faulty_parts if part.family == "loop"]
     return any(
-        first[0] == second[0] and np.allclose(first[1:], second[1:], rtol=_SAME_LOOP, atol=0.0)
+        first[0] == second[0] and np.allclose(first[1:], second[1:], rtol=SAME_LOOP, atol=0.0)
         for first, second in combinations(loops, 2)
     )
 

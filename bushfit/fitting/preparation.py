@@ -33,7 +33,7 @@ __all__ = [
 
 #: Relative difference of two loops' amplitudes, or frequencies, up to which one repeats the other; chosen: rigs come
 #: back to an amplitude within it.
-_SAME_LOOP = 0.02
+SAME_LOOP = 0.02
 #: Step in temperature [K] up to which tests belong to the same temperature.
 _SAME_KELVIN = 1.0
 
@@ -82,7 +82,7 @@ def repeats_of(loops: Sequence[MeasuredLoop]) -> Array:
     """Mask of the pairs of loops that are repeats (same direction, preload, amplitude and frequency), (n, n)."""
     conditions = np.log([(loop.prepared.amplitude, loop.prepared.frequency) for loop in loops]).reshape(-1, 2)
     place = np.array([f"{loop.direction} {loop.test.preload}" for loop in loops])
-    return np.all(np.abs(conditions[:, None] - conditions) <= _SAME_LOOP, axis=-1) & (place[:, None] == place)
+    return np.all(np.abs(conditions[:, None] - conditions) <= SAME_LOOP, axis=-1) & (place[:, None] == place)
 
 
 def group_repeats(loops: Sequence[MeasuredLoop]) -> list[list[MeasuredLoop]]:

@@ -272,10 +272,8 @@ def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> F
     """
     prepared_loops = [prepare_loop(loop) for loop in loops]
     unit, factor = record.direction.display.displacement
-    amplitudes, frequencies = (
-        [prepared.amplitude for prepared in prepared_loops],
-        [prepared.frequency for prepared in prepared_loops],
-    )
+    amplitudes = [prepared.amplitude for prepared in prepared_loops]
+    frequencies = [prepared.frequency for prepared in prepared_loops]
     cycles = sorted(prepared.cycles for prepared in prepared_loops)
     left_out = 1 - sum(prepared.loop.displacement.size for prepared in prepared_loops) / record.displacement.size
     sizes, rates, ends = (
@@ -322,9 +320,8 @@ def changing_cycles(prepared: PreparedLoop) -> list[str]:
     # the first cycle from rest has another mean, by the memory of the rubber
     means = np.array([mean for mean, *_ in fitted])[int(prepared.from_rest) :]
     amplitude = np.array([abs(first[0]) for _, first, _ in fitted])
-    error = max(prepared.noise, *(scatter[0] for *_, scatter in fitted)) * np.sqrt(
-        1.0 / rows
-    )  # of the force [N or N m]
+    noise = max(prepared.noise, *(scatter[0] for *_, scatter in fitted))
+    error = noise * np.sqrt(1.0 / rows)  # of the force [N or N m]
     (motion, force, _), units = loop.direction.motion.words, loop.direction.display
     smallest = _SMALLEST_CHANGE * np.ptp(loop.force) / 2.0
     # the standard error of an amplitude is sqrt(2) `error`, that of a difference of two is 2 `error`

@@ -72,8 +72,7 @@ def static_rate(result: Result, place: Place, rates: Mapping[str, float] | None 
     """Choose the rate of a static curve.
 
     The first available of: the rate in `rates`; that of the slowest loop in this direction; that of the slowest loop in
-        any
-    direction, at equal strain rate; 10 mm, 10 deg or 10 % of strain per minute.
+    any direction, at equal strain rate; 10 mm, 10 deg or 10 % of strain per minute.
 
     Args:
         result: fitted result, whose campaign lists the loops.

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commandline import typing
-from exports import EXPORTS, Export, loop
+from export_tables import Export, loop
+from exports import EXPORTS
 from test_exports import options
 
 GEOMETRY = ("--inner-diameter", "20 mm", "--outer-diameter", "36 mm", "--length", "34 mm", "--direction", "axial")

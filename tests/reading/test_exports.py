@@ -11,7 +11,8 @@ import openpyxl
 import pytest
 import scipy.io
 from commandline import typing
-from exports import AMPLITUDE, DISPLACEMENT, EXPORTS, FORCE, FREQUENCY, STIFFNESS, TIME
+from export_tables import AMPLITUDE, DISPLACEMENT, FORCE, FREQUENCY, STIFFNESS, TIME
+from exports import EXPORTS
 
 from bushfit.campaign.campaign import load_campaign
 from bushfit.reading.measurement import Loop, Sweep
