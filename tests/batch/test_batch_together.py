@@ -106,3 +106,10 @@ def test_the_interval_of_cpk_covers():
         assert cpk
         covered += cpk[1] <= 4.0 / 3.0 <= cpk[2]
     assert 0.92 <= covered / 500 <= 0.985
+
+
+def test_the_interval_of_cpk_is_that_of_bissell():
+    """Of five parts: Cpk = 1.5, and 1.96 sqrt(1/45 + 1.5^2/8) = 1.0794 on either side."""
+    values = np.array([-2.0, -1.0, 0.0, 1.0, 2.0]) / math.sqrt(2.5)
+    _, cpk = capability(values, -math.inf, 4.5)
+    assert cpk == pytest.approx((1.5, 0.4206, 2.5794), abs=1e-4)
