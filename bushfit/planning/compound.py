@@ -69,7 +69,7 @@ def guess_parameters(bushing: Bushing, compound: Compound) -> Knowledge:
             phi = (n/1.8) / (n/1.8 + 100/density)            volume share of n phr of carbon black
             X   = 1 + 2.5 phi + 14.1 phi^2                   strain of the rubber between particles   (Guth 1945)
             q   = m/2 omega_0^alpha / mu = 0.25, alpha = 0.24               omega_0 = 2 pi 10 Hz
-            r   = sigma_fmax/(2 eps_half mu) = 0.51 (phi/phi_0)^3.5 X_0/X                             (Payne effect)
+            r   = sigma_fmax/(2 eps_half mu) = 0.515 (phi/phi_0)^3.5 X_0/X                             (Payne effect)
             eps_half = 0.013 X_0/X
 
         The numbers are those of the paper's bushing (natural rubber, phi_0 of 27 phr, Table 1). Three laws apply them

@@ -109,7 +109,7 @@ def test_the_interval_of_cpk_covers():
 
 
 def test_the_interval_of_cpk_is_that_of_bissell():
-    """Of five parts: Cpk = 1.5, and 1.96 sqrt(1/45 + 1.5^2/8) = 1.0794 on either side."""
+    """Of five parts: Cpk = 1.5, and 1.96 sqrt(1/45 + 1.5^2/8) = 1.0797 on either side."""
     values = np.array([-2.0, -1.0, 0.0, 1.0, 2.0]) / math.sqrt(2.5)
     _, cpk = capability(values, -math.inf, 4.5)
-    assert cpk == pytest.approx((1.5, 0.4206, 2.5794), abs=1e-4)
+    assert cpk == pytest.approx((1.5, 0.4203, 2.5797), abs=1e-4)
