@@ -10,6 +10,12 @@ from typing import Literal, NamedTuple
 
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.geometry import tube
+from bushfit.geometry.motion import ROTATION as ROTATION
+from bushfit.geometry.motion import STRAINING as STRAINING
+from bushfit.geometry.motion import TRANSLATION as TRANSLATION
+from bushfit.geometry.motion import Display as Display
+from bushfit.geometry.motion import Motion as Motion
+from bushfit.geometry.motion import Unit as Unit
 from bushfit.geometry.shape import NO_CORRECTION, Correction, radial_correction
 
 #: Radial formulas of a bushing: those of the paper, or corrected by finite elements.
@@ -25,62 +31,6 @@ StatedStrain = Literal["engineering", "tensor", "tension"]
 #: Shortest and longest plausible side of a body of rubber [m].
 _SHORTEST = 1e-6
 _LONGEST = 100.0
-
-
-class Unit(NamedTuple):
-    """Unit of a quantity with its factor from SI: a value in this unit is the SI value times `factor`."""
-
-    name: str
-    factor: float
-
-
-class Display(NamedTuple):
-    """Units in which displacement, force and stiffness are printed, each with its factor from SI."""
-
-    displacement: Unit
-    force: Unit
-    stiffness: Unit
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Kind of motion in a test (translation, rotation or strain), with the names and units of displacement and force.
-
-    Args:
-        words: names of displacement, force and stiffness, such as "rotation", "moment" and "stiffness".
-        displacement_unit, force_unit, stiffness_unit: SI units.
-        display: display units of displacement, force and stiffness.
-    """
-
-    words: tuple[str, str, str]
-    displacement_unit: str
-    force_unit: str
-    stiffness_unit: str
-    display: Display
-
-
-TRANSLATION = Motion(
-    words=("displacement", "force", "stiffness"),
-    displacement_unit="m",
-    force_unit="N",
-    stiffness_unit="N/m",
-    display=Display(Unit("mm", 1e3), Unit("N", 1.0), Unit("N/mm", 1e-3)),
-)
-ROTATION = Motion(
-    words=("rotation", "moment", "stiffness"),
-    displacement_unit="rad",
-    force_unit="N*m",
-    stiffness_unit="N*m/rad",
-    display=Display(Unit("deg", math.degrees(1.0)), Unit("N m", 1.0), Unit("N m/rad", 1.0)),
-)
-#: Motion of a material test, in terms of strain and stress, whatever the shape of the specimen.
-STRAINING = Motion(
-    words=("strain", "stress", "modulus"),
-    displacement_unit="1",
-    force_unit="Pa",
-    stiffness_unit="Pa",
-    display=Display(Unit("%", 100.0), Unit("kPa", 1e-3), Unit("MPa", 1e-6)),
-)
 
 
 class _TestObject:
@@ -304,7 +254,7 @@ def get_place(name: str, specimens: Iterable[Specimen]) -> Place:
 
 
 def get_places(name: str, specimens: Sequence[Specimen]) -> list[Place]:
-    """Return the directions and specimens with a name; the name of a bushing or direction may stand for several.
+    """Return the directions and specimens with a name; of several bushings, a bushing or a direction names several.
 
     Raises:
         ModelError: no direction, specimen or bushing has this name.
@@ -317,16 +267,16 @@ def get_places(name: str, specimens: Sequence[Specimen]) -> list[Place]:
 
 
 def default_places(bushing: Bushing | None, specimens: Sequence[Specimen]) -> list[Place]:
-    """List what is predicted without a request: the axial and radial directions of all bushings, and all coupons."""
+    """List the directions and specimens that are predicted by default: axial, radial, and all coupons."""
     directions = [Direction.AXIAL, Direction.RADIAL] if bushing or not specimens else []
     return [*directions, *(place for place in specimens if place.axis is not Direction.TORSION)]
 
 
 def shared_labels(places: Iterable[Place]) -> list[str]:
-    """List the names to which a search for missing effects may restrict an effect.
+    """List the names to which a search for missing effects may restrict an effect, without redundant ones.
 
-    A body that is tested in one direction is not listed in addition to this direction, nor is the first of two bodies,
-    because its error is that of the second with the opposite sign.
+    Redundant are a body (bushing) tested in one direction only, beside this direction, and the first of two bodies: an
+    effect on it cannot be distinguished from the opposite effect on the second.
 
     Args:
         places: tested directions and specimens.
@@ -344,9 +294,11 @@ def shared_labels(places: Iterable[Place]) -> list[str]:
 
 
 def unit_strain(bushing: Bushing | None, place: Place) -> float:
-    """Equivalent strain of the rubber per displacement [1/m], rotation [1/rad] or stated strain [1] of a test.
+    """Equivalent strain of the rubber per displacement [1/m], rotation [1/rad] or strain [1] that a test prescribes.
 
-    The test is in a direction of the bushing, or of a specimen (`place`).
+    Args:
+        bushing: the one bushing of the campaign; None without a bushing, or with several.
+        place: direction of this bushing, or specimen.
 
     Raises:
         ModelError: `place` is a direction, but there is no bushing.
@@ -354,7 +306,7 @@ def unit_strain(bushing: Bushing | None, place: Place) -> float:
     >>> unit_strain(None, Specimen("coupon", "modulus"))
     0.5
     """
-    if not isinstance(place, Specimen) or place.axis:
+    if isinstance(place, Direction) or place.axis:
         return _present(bushing, place).unit_strain(_axis_of(place))
     if place.thickness is not None:
         return 0.5 / place.thickness
@@ -362,9 +314,11 @@ def unit_strain(bushing: Bushing | None, place: Place) -> float:
 
 
 def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
-    """Stiffness per equivalent shear modulus: [m], [m^3/rad] in torsion, [1] for a modulus test.
+    """Measured stiffness per equivalent shear modulus: [m], [m^3/rad] in torsion, [1] for a modulus test.
 
-    The stiffness is that of a direction of the bushing, or of a specimen (`place`).
+    Args:
+        bushing: the one bushing of the campaign; None without a bushing, or with several.
+        place: direction of this bushing, or specimen.
 
     Raises:
         ModelError: `place` is a direction, but there is no bushing.
@@ -372,7 +326,7 @@ def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
     >>> stiffness_per_modulus(None, Specimen("mount", "shear", area=1e-3, thickness=0.01, elements=2))
     0.2
     """
-    if not isinstance(place, Specimen) or place.axis:
+    if isinstance(place, Direction) or place.axis:
         return _present(bushing, place).stiffness_per_modulus(_axis_of(place))
     if place.area is not None and place.thickness is not None:
         return place.elements * place.area / place.thickness
@@ -389,7 +343,7 @@ def strain_factor_of_files(place: Place) -> float:
 
 
 def bushing_at(bushing: Bushing | None, place: Place) -> Bushing | None:
-    """Bushing whose tests `place` denotes: of several bushings its own, else the given one; None for a coupon."""
+    """Bushing to which a direction or specimen belongs: `bushing` for a plain direction; None for a coupon."""
     return place.bushing if isinstance(place, Specimen) else bushing
 
 
