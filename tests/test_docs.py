@@ -179,6 +179,7 @@ def test_the_steps_before_a_merge_are_the_same_wherever_they_stand(root):
     hooks = yaml.safe_load((root / ".pre-commit-config.yaml").read_text(encoding="utf-8"))["repos"]
     entries = [hook["entry"] for repository in hooks for hook in repository["hooks"]]
     assert shown == merged
+    assert blocks(root / "README.md", "sh")[1].rstrip().endswith(f"--editable . --group dev && {merged[4]}")
     assert entries == [step for step in merged if not step.startswith("pytest")]
     assert all(repository["repo"] == "local" for repository in hooks)
 
