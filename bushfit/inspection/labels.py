@@ -17,8 +17,8 @@ from bushfit.units import parse_quantity
 
 #: Conditions of a test that a campaign states, with their names in sentences.
 _CONDITIONS = {key: key for key in ("temperature", "preload", "date", "operator")} | {"specimen_number": "specimen"}
-#: Constant quantity of a sweep, by the campaign key that states its value.
-_HELD_ROLES = {"at_amplitude": "amplitude", "at_frequency": "frequency"}
+#: Role of the quantity that a sweep keeps constant, by the campaign key that states its value.
+_CONSTANT_ROLES = {"at_amplitude": "amplitude", "at_frequency": "frequency"}
 
 #: Relative difference up to which a measured value agrees with the name of the file; chosen: rigs miss levels by it.
 _AGREEMENT = 0.03
@@ -28,28 +28,25 @@ def count_temperatures(table: Table) -> int:
     """Number of temperatures in a table: 0 without a temperature column, 1 for one temperature, 2 for several."""
     if (column := table.roles.get("temperature")) is None:
         return 0
-    found = table.read({"temperature": column}, fewest_rows=1)[0]["temperature"]
-    return 1 if np.ptp(found) <= ONE_TEST else 2
+    temperatures = table.read({"temperature": column}, fewest_rows=1)[0]["temperature"]
+    return 1 if np.ptp(temperatures) <= ONE_TEST else 2
 
 
 def labels_of_file(file: Path, sheet: str, test_options: Mapping[str, Any]) -> Labels:
-    """Labels in the names of a file and its sheet: quantities and conditions, such as "25 Hz".
+    """Quantities and conditions in the names of a file and its sheet, such as "25 Hz"; the sheet takes precedence.
 
     Args:
         file: test file.
         sheet: name of the sheet, or "".
         test_options: options of the test; `amplitude` states whether amplitudes are zero-to-peak or peak-to-peak.
-
-    Returns:
-        The labels; the name of the sheet takes precedence.
     """
     labels = labels_in_names(sheet, file.stem)
-    counting = test_options.get("amplitude")
-    if counting is None:
+    convention = test_options.get("amplitude")
+    if convention is None:
         return labels
     frequencies = labels.of_dimension("Hz")
     quantities = tuple(
-        quantity if quantity in frequencies else quantity._replace(convention=counting)
+        quantity if quantity in frequencies else quantity._replace(convention=convention)
         for quantity in labels.quantities
     )
     return replace(labels, quantities=quantities)
@@ -58,7 +55,7 @@ def labels_of_file(file: Path, sheet: str, test_options: Mapping[str, Any]) -> L
 def keys_from_labels(
     table: Table, place: Place, test_options: Mapping[str, Any], by_name: Labels, of_book: Labels, *, is_sweep: bool
 ) -> tuple[dict[str, Any], dict[str, str], bool]:
-    """Find campaign keys of a test, such as temperature, in its labels: texts in names and above the table.
+    """Find values for the campaign keys of a test, such as temperature, in the texts beside its columns (labels).
 
     An option takes precedence, then a column, the names, the lines above the table, and the other sheets.
 
@@ -71,8 +68,8 @@ def keys_from_labels(
         is_sweep: True for a sweep, whose frequency and amplitude have to be known.
 
     Returns:
-        The keys with their values; the labels as facts by their origin; and False if a label states an amplitude
-        without saying whether it is zero-to-peak or peak-to-peak.
+        The values by campaign key; sentences on their origin by the origin ("from the name"); and False if a label
+        states an amplitude but not whether the amplitude is zero-to-peak or peak-to-peak.
 
     Raises:
         MeasurementError: a sweep without an amplitude or a frequency.
@@ -81,56 +78,57 @@ def keys_from_labels(
     sources = {"from the name": by_name, written: table.labels_above, "from the other sheets": of_book}
     keys: dict[str, Any] = {}
     facts: dict[str, list[str]] = {}
-    is_counted = True
-    for key in _HELD_ROLES if is_sweep else ():
-        role = _HELD_ROLES[key]
+    has_convention = True
+    for key, role in _CONSTANT_ROLES.items() if is_sweep else ():
         if role not in table.roles and key not in test_options:
-            label, found = _held_quantity(table, place, key, sources)
-            counted = test_options.get("amplitude") or found.convention
-            keys[key] = words = found.text
-            if role == "amplitude" and counted in ("peak-to-peak", "rms"):
-                number, _, unit = found.text.partition(" ")
-                keys[key] = f"{float(number) * ZERO_TO_PEAK[counted]:.6g} {unit}"
-                share = "half of" if counted == "peak-to-peak" else "the square root of two times the rms of"
-                words = f"{keys[key]}, {share} {found.text}"
-            facts.setdefault(label, []).append(f"{role} {words}")
-            is_counted &= role != "amplitude" or counted is not None
+            origin, stated = _constant_quantity(table, place, key, sources)
+            convention = test_options.get("amplitude") or stated.convention
+            keys[key] = sentence = stated.text
+            if role == "amplitude" and convention in ("peak-to-peak", "rms"):
+                number, _, unit = stated.text.partition(" ")
+                keys[key] = f"{float(number) * ZERO_TO_PEAK[convention]:.6g} {unit}"
+                factor = "half of" if convention == "peak-to-peak" else "the square root of two times the rms of"
+                sentence = f"{keys[key]}, {factor} {stated.text}"
+            facts.setdefault(origin, []).append(f"{role} {sentence}")
+            has_convention &= role != "amplitude" or convention is not None
     amplitude = table.roles.get("amplitude")
-    for label, labels in sources.items() if is_sweep and amplitude and "amplitude" not in test_options else ():
+    for origin, labels in sources.items() if is_sweep and amplitude and "amplitude" not in test_options else ():
         if amplitude and labels.convention and not amplitude.convention:
             keys["amplitude"] = labels.convention
-            facts.setdefault(label, []).append(f"amplitudes {labels.convention}")
+            facts.setdefault(origin, []).append(f"amplitudes {labels.convention}")
             break
-    for key, word in _CONDITIONS.items():
-        label, text = next(
-            ((label, text) for label, labels in sources.items() if (text := getattr(labels, key))), ("", "")
-        )
+    for key, name in _CONDITIONS.items():
+        texts = ((origin, text) for origin, labels in sources.items() if (text := getattr(labels, key)))
+        origin, text = next(texts, ("", ""))
         if text and key not in table.roles and key not in test_options:
             keys[key] = text
-            facts.setdefault(label, []).append(f"{word} {text}")
-    return keys, {label: ", ".join(words) for label, words in facts.items()}, is_counted
+            facts.setdefault(origin, []).append(f"{name} {text}")
+    return keys, {origin: ", ".join(sentences) for origin, sentences in facts.items()}, has_convention
 
 
-def _held_quantity(table: Table, place: Place, key: str, sources: Mapping[str, Labels]) -> tuple[str, StatedQuantity]:
-    """Find the constant amplitude or frequency of a sweep in its labels.
+def _constant_quantity(
+    table: Table, place: Place, key: str, sources: Mapping[str, Labels]
+) -> tuple[str, StatedQuantity]:
+    """Find the amplitude or frequency that a sweep keeps constant in the texts beside its columns (labels).
 
     Args:
         table: table of the sweep.
         place: direction or specimen, which determines the unit of an amplitude.
-        key: campaign key of the quantity.
-        sources: labels by their origin, such as the name of the file.
+        key: campaign key of the quantity: "at_amplitude" or "at_frequency".
+        sources: labels by their origin, such as "from the name".
 
     Returns:
         Origin of the label, and the stated quantity.
+
+    Raises:
+        MeasurementError: no label states one such quantity.
     """
-    role = _HELD_ROLES[key]
+    role = _CONSTANT_ROLES[key]
     expected = place.motion.displacement_unit if role == "amplitude" else "Hz"
-    label, found = next(
-        ((label, quantities) for label, labels in sources.items() if (quantities := labels.of_dimension(expected))),
-        ("", []),
-    )
+    quantities = {origin: stated for origin, labels in sources.items() if (stated := labels.of_dimension(expected))}
+    origin, found = next(iter(quantities.items()), ("", []))
     if len(found) == 1:
-        return label, found[0]
+        return origin, found[0]
     usual = {"m": "0.1 mm", "Hz": "10 Hz", "1": "0.1 %"}
     example = found[0].text if found else usual.get(expected, "1 deg")
     state = f'state {key} = "{example}" in the campaign'
@@ -139,7 +137,7 @@ def _held_quantity(table: Table, place: Place, key: str, sources: Mapping[str, L
     other_way = hint_for_convertible_columns(table, {"period" if role == "frequency" else "acceleration"})
     raise table.header_error(
         f"the {role} of this test is not stated",
-        found=f"{label}: {' and '.join(quantity.text for quantity in found)}" if found else None,
+        found=f"{origin}: {' and '.join(quantity.text for quantity in found)}" if found else None,
         expected=f"a column for the {role}, or one number with its unit in the name of the file",
         hint=other_way or f"{state}, or name the column: {table.columns_key(role, expected)}",
     )
@@ -151,8 +149,9 @@ def wrong_labels(
     """Warn where the name of a file states an amplitude or a frequency that the file does not contain.
 
     Args:
-        labels: labels in the names of file and sheet.
+        labels: quantities stated in the names of file and sheet.
         direction: direction or specimen.
+
         amplitudes: zero-to-peak amplitudes in the file [m, rad or strain].
         frequencies: frequencies in the file [Hz].
 

@@ -131,7 +131,7 @@ def tested_body(file: Path, table: Table, test_options: Mapping[str, Any]) -> Pl
 
 
 def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) -> Direction | None:
-    """Determine the direction of a test of the bushing from an option, or else from the file.
+    """Determine the direction of a test of the bushing from the option --direction, or else from the file.
 
     Args:
         file: test file.
@@ -144,25 +144,25 @@ def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) ->
     Raises:
         MeasurementError: the file states another direction than the option, or several directions.
     """
-    turns = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
+    is_torsion = any(table.agrees(role, "rad") for role in ("displacement", "amplitude"))
     headers = table.layout.written or table.headers
     in_column = dict.fromkeys(table.row_labels.get("direction", (0, ()))[1])
-    named = direction_of_file(file, headers, turns=turns, sheet=table.source.sheet)
+    named = direction_of_file(file, headers, turns=is_torsion, sheet=table.source.sheet)
     found = Direction(*in_column) if len(in_column) == 1 else named
-    if "direction" not in test_options:
+    if (stated := test_options.get("direction")) is None:
         if len(in_column) > 1:
             problem, hint = "this file contains tests in several directions", "state one: --direction axial"
             raise table.header_error(problem, found=", ".join(in_column), expected="one direction", hint=hint)
         return found
-    if found and found != test_options["direction"] and len(in_column) < 2:
+    if found and found != stated and len(in_column) < 2:
         raise table.header_error(
-            f"{'the units say' if turns else 'the file says'} {found}, and --direction {test_options['direction']}",
+            f"{'the units say' if is_torsion else 'the file says'} {found}, but --direction says {stated}",
             found=", ".join([*filter(None, [file.name, table.source.sheet]), *headers]),
             expected="one direction",
             hint="leave --direction out; or state the direction in the file name, which takes precedence over "
             "the header",
         )
-    return Direction(test_options["direction"])
+    return Direction(stated)
 
 
 def open_content(file: Path, test_options: Mapping[str, Any]) -> OpenedFile:

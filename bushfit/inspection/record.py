@@ -85,9 +85,13 @@ class Inspection:
         file: test file.
         kind: loop, sweep or raw history.
         direction: direction or specimen of the test; None if neither file nor options state it.
-        written, columns, facts, odd: format of the file, its columns, facts and oddities, see `InspectedFile`.
+        written: format of the file by label, such as "encoding".
+        columns: all columns of the file, in order.
+        facts: properties of the test as texts, by label, such as "frequencies".
+        odd: one sentence for each oddity, such as an outlier.
         entry: further keys of the test's table in a campaign, with values as TOML gives them.
         measured: the test in SI.
+
         states_convention: True if the header of a sweep states zero-to-peak or peak-to-peak.
     """
 
@@ -136,19 +140,15 @@ class Inspection:
                 "[[specimens]]"
             )
         if self.amplitude_convention_unknown:
-            missing = "nothing says" if "at_amplitude" in self.entry else "the header does not state"
+            place = "file" if "at_amplitude" in self.entry else "header"
             assumptions.append(
-                f"{missing} how amplitudes are counted: zero-to-peak is assumed; if they are peak-to-peak, add "
-                "--amplitude peak-to-peak"
+                f"the {place} does not state whether amplitudes are zero-to-peak or peak-to-peak: zero-to-peak is "
+                "assumed; if they are peak-to-peak, add --amplitude peak-to-peak"
             )
         return "; ".join(assumptions) or None
 
     def to_document(self) -> InspectedFile:
-        """Document of the inspection for JSON.
-
-        Returns:
-            Entries by key; the measured data are left out.
-        """
+        """Document of the inspection for JSON, without the measured data."""
         return {
             "file": str(self.file),
             "sheet": self.entry.get("sheet"),

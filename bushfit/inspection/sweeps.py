@@ -79,7 +79,7 @@ def describe_sweep(sweep: Sweep, labels: Labels) -> Findings:
 
 
 def copied_rows(sweep: Sweep, noise: SweepNoise) -> Iterator[str]:
-    """Warn of rows equal to others at the same frequency and amplitude.
+    """Warn of rows with exactly the stiffness of another row at the same frequency and amplitude.
 
     Returns:
         One sentence, if noise is unlikely to make this number of rows equal in the digits of the file.
@@ -169,6 +169,8 @@ def distance_from_repeats(sweep: Sweep) -> Array:
 def distance_from_curve(sweep: Sweep) -> Array:
     """Complex difference of ln K (gain + i phase [rad]) of each point from a smooth curve through its run.
 
+    A run is one pass of a sweep over the frequencies at one amplitude, or over the amplitudes at one frequency.
+
     Returns:
         Difference of the points that deviate far more than the scatter of their run; 0 for the others, (n,).
 
@@ -211,10 +213,8 @@ def outlying_points(sweep: Sweep, noise: SweepNoise, from_repeats: Array) -> Ite
     distance = np.nan_to_num(from_repeats)
     for rows in group_rows(sweep.repeat.astype(float), sweep.amplitude):  # what a block has in common is no outlier
         distance[rows] -= complex_median(distance[rows])
-    random, curve = (
-        np.array([noise.random[sweep.name, float(level)] for level in sweep.held_value]),
-        distance_from_curve(sweep),
-    )
+    random = np.array([noise.random[sweep.name, float(level)] for level in sweep.held_value])
+    curve = distance_from_curve(sweep)
     parts = np.stack((distance.real, distance.imag), axis=1)
     far = np.any((np.abs(parts) > _FAR * random) & (np.abs(parts) > _SMALLEST_OUTLIER), axis=1)
     alone = np.isnan(from_repeats) & (np.abs(curve) > _SMALLEST_FROM_CURVE)
@@ -225,8 +225,8 @@ def outlying_points(sweep: Sweep, noise: SweepNoise, from_repeats: Array) -> Ite
         repeat = "" if alone[row] else f", repeat {sweep.repeat[row]}"
         reference = "the smooth curve through the others" if alone[row] else "its repeats"
         yield (
-            f"data row {row + 1} ({sweep.frequency[row]:.4g} Hz, {level}{repeat}) is "
-            f"{number(100 * np.expm1(parts[row, 0]), 2, '+')} % in |K| and {np.degrees(parts[row, 1]):+.2g} deg off "
+            f"data row {row + 1} ({sweep.frequency[row]:.4g} Hz, {level}{repeat}) deviates by "
+            f"{number(100 * np.expm1(parts[row, 0]), 2, '+')} % in |K| and {np.degrees(parts[row, 1]):+.2g} deg from "
             f"{reference}"
         )
     if outliers.size > _MOST_LISTED:
@@ -252,8 +252,8 @@ def outlying_blocks(sweep: Sweep, from_repeats: Array) -> Iterator[str]:
     for rows, block_gain in zip(blocks, gain, strict=True):
         if abs(block_gain) > max(_FAR * usual, _SMALLEST_BLOCK_OFFSET):
             yield (
-                f"{shown_amplitude(sweep.direction, sweep.amplitude[rows[0]])}, repeat {sweep.repeat[rows[0]]} lies "
-                f"{number(100 * np.expm1(block_gain), 2, '+')} % from the other repeats as a whole: "
+                f"{shown_amplitude(sweep.direction, sweep.amplitude[rows[0]])}, repeat {sweep.repeat[rows[0]]} differs "
+                f"by {number(100 * np.expm1(block_gain), 2, '+')} % in |K| from the other repeats at all frequencies: "
                 "other amplitude, temperature or mounting?"
             )
     repeat = np.array([sweep.repeat[rows[0]] for rows in blocks], dtype=float)
@@ -267,11 +267,7 @@ def outlying_blocks(sweep: Sweep, from_repeats: Array) -> Iterator[str]:
 
 
 def odd_losses(sweep: Sweep) -> Iterator[str]:
-    """Warn of negative loss factors, and of a median loss factor that is unusual for rubber.
-
-    Returns:
-        A sentence for each, with possible causes.
-    """
+    """Warn of negative loss factors, and of a median loss factor that is unusual for rubber, with possible causes."""
     negative = np.flatnonzero(sweep.stiffness.imag < 0.0)
     if negative.size:
         level = shown_amplitude(sweep.direction, sweep.amplitude[negative[0]])
@@ -287,5 +283,5 @@ def odd_losses(sweep: Sweep) -> Iterator[str]:
 
 
 def complex_median(values: Array) -> complex:
-    """Complex number of the median real part and the median imaginary part."""
+    """Median of the real parts and median of the imaginary parts of complex values, as one complex number."""
     return complex(np.median(values.real), np.median(values.imag))

@@ -137,7 +137,7 @@ def test_an_outlier_without_repeats_is_found(typed, tmp_path, row, factor):
     stiffness[row] *= factor
     (sentence,) = odd(typed, tmp_path, SWEEP_HEADER, stiffness)
     assert sentence.startswith(f"data row {row + 1} (")
-    assert "off the smooth curve through the others" in sentence
+    assert "from the smooth curve through the others" in sentence
 
 
 def test_a_bent_curve_is_no_outlier(typed, tmp_path):

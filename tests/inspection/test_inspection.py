@@ -156,8 +156,8 @@ SWEEP_FAULTS: dict[str, Callable[[Sweep], Sweep]] = {
     "0.2 mm, repeat 1, lacks 45, 55 Hz, which most others have": lambda x: without(
         x, (x.amplitude == 2e-4) & np.isin(x.frequency, (45.0, 55.0))
     ),
-    "data row 21 (45 Hz, 0.1 mm, repeat 2) is +1": lambda x: spoiled(x, np.arange(x.repeat.size) == 20, 1.15),
-    "0.5 mm, repeat 3 lies +": lambda x: spoiled(x, (x.amplitude == 5e-4) & (x.repeat == 3), 1.08),
+    "data row 21 (45 Hz, 0.1 mm, repeat 2) deviates by +1": lambda x: spoiled(x, np.arange(x.repeat.size) == 20, 1.15),
+    "0.5 mm, repeat 3 differs by +": lambda x: spoiled(x, (x.amplitude == 5e-4) & (x.repeat == 3), 1.08),
     "|K| drifts by -4": lambda x: replace(x, stiffness=x.stiffness * (1.0 - 0.02 * x.repeat)),
     "9 points with a loss factor below zero, the first at 155 Hz, 0.1 mm: is the force channel late?": (
         lambda x: spoiled(x, x.frequency == 155.0, np.exp(-0.4j))
