@@ -19,7 +19,6 @@ from bushfit.reading.headers import (
     Column,
     Heading,
     Vocabulary,
-    fits,
     is_angular,
     of_motion,
     parse_unit,
@@ -85,7 +84,7 @@ def classify(
     rejected: set[str] = set()
     role_by_index = _stated_indices(cells, vocabulary, columns)
     for index, header in sorted(enumerate(cells.headers), key=lambda column: _name(column[1]) == "k"):  # after K*
-        heading = vocabulary.heading(header) if header else None
+        heading = vocabulary.heading(header, cells.layout.units[index]) if header else None
         if index in role_by_index:
             meaning = Vocabulary({"": [units.split_header(header)[0]]}, {"": header}).heading(header)
             heading = replace(meaning or Heading(""), role=role_by_index[index])
@@ -94,8 +93,6 @@ def classify(
         if heading is None or (_name(header) == "k" and heading.role in roles):
             continue
         role, column = heading.role, _column_of(cells, heading, index, stated_units.get(heading.role))
-        if role not in columns and not _is_fitting(column, stated=role in stated_units):
-            continue
         if role not in roles:
             roles[role] = column
         elif role in _REPLACEABLE:
@@ -119,15 +116,6 @@ def classify(
 def _name(header: str) -> str:
     """Name in a header without its unit and convention, in the spelling that `plain` returns."""
     return plain(units.split_header(split_convention(header)[0])[0])
-
-
-def _is_fitting(column: Column, *, stated: bool) -> bool:
-    """Return False if the unit of a column contradicts its role; a header that the user stated is trusted."""
-    role, unit, name = column.role, column.unit, _name(column.header)
-    if plain(column.header) == "t" and role == "temperature":
-        return bool(units.kelvin_scale(unit or ""))  # else a time, or another quantity
-    needs_unit = role in ("damping_coefficient", "force_amplitude") or name == "k"
-    return (unit is not None or not needs_unit) and (stated or fits(name, role, unit))
 
 
 def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, str]) -> dict[int, str]:
@@ -267,7 +255,7 @@ def _add_by_unit(
     """
     if len(roles) + len(cells.headers) < 3:
         return [], []
-    usual = Vocabulary.shared(of_motion({**LOOP_COLUMNS, **SWEEP_COLUMNS}, motion), {})
+    usual = Vocabulary.shared(of_motion({**LOOP_COLUMNS, **SWEEP_COLUMNS}, motion), {}, {})
     free: dict[Column, set[str]] = {}
     for index, header in enumerate(cells.headers):
         if not header or usual.heading(header) is not None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import Literal
 
 from bushfit import units
@@ -99,6 +100,8 @@ _TWO_PRIMES = re.compile(r"(?<![^\W_])([A-Za-z])\"")
 _ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesure|medido|ist)\b")
 #: Units with which the symbol f cannot mean a role, by role.
 _UNITS_NOT_F = {"force": ("Hz",), "frequency": ("N", "N m")}
+#: Roles that a column without a unit does not have, whatever its name.
+_NEEDING_UNITS = ("damping_coefficient", "force_amplitude")
 #: Units with which a short or ambiguous name means a role, by name and role.
 _UNITS_OF = {
     (name, role): si
@@ -230,28 +233,47 @@ class Vocabulary:
     Args:
         names: usual column names, by role.
         columns: column name given by the user, by role; it replaces the usual names of the role.
+        stated_units: unit given by the user, by role; it replaces the unit of the header.
     """
 
-    def __init__(self, names: Mapping[str, Sequence[str]], columns: Mapping[str, str]) -> None:
+    def __init__(
+        self,
+        names: Mapping[str, Sequence[str]],
+        columns: Mapping[str, str] = MappingProxyType({}),
+        stated_units: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
+        self._stated_units = stated_units
         self._stated = {plain(name): role for role, name in columns.items() if role in names}
         usual = ((plain(name), role) for role, usual in names.items() if role not in columns for name in usual)
         self._roles: dict[str, list[str]] = {name: [role] for name, role in self._stated.items()}
         for name, role in usual:
             if name not in self._stated and role not in self._roles.setdefault(name, []):
                 self._roles[name].append(role)
-        self._known: dict[str, Heading | None] = {}
+        self._known: dict[tuple[str, str | None], Heading | None] = {}
         self._names = {role: usual[0] for role, usual in names.items()} | dict(columns)
 
     @classmethod
-    def shared(cls, names: Mapping[str, Sequence[str]], columns: Mapping[str, str]) -> "Vocabulary":
-        """Return the cached vocabulary of usual names and the user's `columns`, both by role."""
-        return _shared(tuple((role, tuple(usual)) for role, usual in names.items()), tuple(columns.items()))
+    def shared(
+        cls, names: Mapping[str, Sequence[str]], columns: Mapping[str, str], stated_units: Mapping[str, str]
+    ) -> "Vocabulary":
+        """Return the cached vocabulary of usual names and the user's columns and units, all by role."""
+        usual = tuple((role, tuple(words)) for role, words in names.items())
+        return _shared(usual, tuple(columns.items()), tuple(stated_units.items()))
 
-    def heading(self, header: str) -> Heading | None:
-        """Return the meaning of a header cell; None if the header names no known role."""
-        if header not in self._known:
-            self._known[header] = self._read(header) if len(header) <= _LONGEST_HEADER else None
-        return self._known[header]
+    def heading(self, header: str, unit_below: str | None = None) -> Heading | None:
+        """Return the meaning of a header cell by its name and unit together.
+
+        Args:
+            header: text of the cell.
+            unit_below: unit of the column in a units row, "" without one; None if it is not known yet.
+
+        Returns:
+            Meaning of the header, with the unit that it contains; None if it names no known role with this unit.
+        """
+        key = header, unit_below
+        if key not in self._known:
+            self._known[key] = self._read(*key) if len(header) <= _LONGEST_HEADER else None
+        return self._known[key]
 
     def name_of(self, role: str) -> str:
         """Return the column name that the user gave for a role, or else its first usual name."""
@@ -261,7 +283,7 @@ class Vocabulary:
         """Return the roles, such as "force", of the columns with these header cells."""
         return {heading.role for cell in cells if (heading := self.heading(cell))}
 
-    def _read(self, header: str) -> Heading | None:
+    def _read(self, header: str, unit_below: str | None) -> Heading | None:
         text = _TWO_PRIMES.sub(r"\1''", _TAN.sub("tan delta", _CHANNEL.sub("", header))).translate(_SPELLINGS)
         text = _DECIBELS.sub(r" [dB \1]", text)
         logarithm = 0.0
@@ -289,7 +311,9 @@ class Vocabulary:
             ):
                 for role in self._roles.get(word, ()):
                     is_unit = units.is_unit if role != "temperature" else units.kelvin_scale
-                    if (certain or is_unit(unit or "")) and fits(word, role, unit):
+                    known = unit or (unit_below and parse_unit(unit_below)[0]) or unit_below
+                    fitting = role in self._stated_units or fits(word, role, known)
+                    if (certain or is_unit(unit or "")) and fitting:
                         return Heading(role, unit, implied, logarithm)
         return None
 
@@ -307,8 +331,12 @@ class Vocabulary:
 
 
 @lru_cache(maxsize=64)
-def _shared(names: tuple[tuple[str, tuple[str, ...]], ...], columns: tuple[tuple[str, str], ...]) -> Vocabulary:
-    return Vocabulary(dict(names), dict(columns))
+def _shared(
+    names: tuple[tuple[str, tuple[str, ...]], ...],
+    columns: tuple[tuple[str, str], ...],
+    stated_units: tuple[tuple[str, str], ...],
+) -> Vocabulary:
+    return Vocabulary(dict(names), dict(columns), dict(stated_units))
 
 
 def fits(word: str, role: str, unit: str | None) -> bool:
@@ -317,8 +345,12 @@ def fits(word: str, role: str, unit: str | None) -> bool:
     Args:
         word: column name, in the spelling that `plain` returns.
         role: role that the name may mean.
-        unit: unit of the column; None if it is not known.
+        unit: unit of the column, "" if it has none; None if it is not known.
     """
+    if unit == "" and (role in _NEEDING_UNITS or word == "k"):
+        return False
+    if word == "t" and role == "temperature" and unit is not None:
+        return bool(units.kelvin_scale(unit))  # else a time, or another quantity
     if unit and (expected := _UNITS_OF.get((word, role))):
         return any(units.is_compatible(unit, si) for si in expected)
     return not (word == "f" and unit and any(units.is_compatible(unit, si) for si in _UNITS_NOT_F.get(role, ())))

@@ -15,7 +15,7 @@ from bushfit.reading.runs import group_rows
 #: Smallest mean number of rows per distinct text in a column that assigns rows to tests; chosen: a row counter has one.
 _FEWEST_ROWS = 3
 #: Known names of columns that assign rows to tests.
-_LABELS = Vocabulary(ROW_COLUMNS, {})
+_LABELS = Vocabulary(ROW_COLUMNS)
 
 
 class Rows(NamedTuple):

@@ -30,9 +30,9 @@ _WAYS_ON = {
     "period": 'write the reciprocal of the period as "frequency [Hz]" into the file',
     "quality": 'write the reciprocal of the quality factor as "loss factor [-]" into the file',
 }
-_DERIVED = Vocabulary(WORDS["derived"], {})
+_DERIVED = Vocabulary(WORDS["derived"])
 #: Names of a damping that can be a loss factor or a damping ratio.
-_DAMPING = Vocabulary({"damping": ["damping", "damp", "Dämpfung", "amortissement", "amortiguamiento", "阻尼"]}, {})
+_DAMPING = Vocabulary({"damping": ["damping", "damp", "Dämpfung", "amortissement", "amortiguamiento", "阻尼"]})
 
 
 def stiffness_pair(table: Table) -> tuple[str, str]:

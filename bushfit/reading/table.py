@@ -91,7 +91,7 @@ class Table(Cells):
         opened = file if isinstance(file, OpenedFile) else open_file(file, file_format or FileFormat())
         file_format, columns = opened.stated, dict(columns or {})
         numbered = {role: "\0" if text.isdecimal() else text for role, text in columns.items()}
-        vocabulary = Vocabulary.shared(of_motion(names, motion), numbered)
+        vocabulary = Vocabulary.shared(of_motion(names, motion), numbered, stated_units or {})
 
         def lay_out(source: RowSource) -> tuple[RowSource, Layout]:
             """Return rows and layout of the table in a part of the file; blocks and wide tables become long."""
