@@ -106,6 +106,10 @@ def classify(
     if {"displacement", "force"} <= {*roles} and "displacement" not in columns:
         for column in (one for one in unused if _moves_along(cells, roles["displacement"], one)):
             _preferred(cells, roles["displacement"], replace(column, role="displacement"))
+    for column in (roles[role] for role in stated_units if role in roles):
+        written = parse_unit(split_unit(column.header)[1] or cells.layout.units[column.index])[0]
+        if written != column.unit and units.is_compatible(written, column.unit or ""):
+            notes.append(f'"{column.header}" is read in {column.unit}, as stated, and not in {written}')
     if {"force_amplitude", "stiffness"} & set(roles) and "amplitude" not in roles:
         notes += _add_motion_as_amplitude(cells, roles, stated_units)
     time = roles.get("time")
@@ -161,7 +165,7 @@ def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, 
 
 
 def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | None = None) -> Column:
-    """Make the column of a header, with the unit on which header, units row and user agree.
+    """Make the column of a header, with the unit that the user states, or else that of header and units row.
 
     Args:
         cells: header and rows of the table.
@@ -169,10 +173,11 @@ def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | No
         index: index of the column.
         stated_unit: unit that the user states; None without one.
     """
-    parsed = [parse_unit(text) for text in (heading.unit, cells.layout.units[index], stated_unit) if text]
-    texts = sorted({text for text, *_ in parsed if text})
-    conventions = {convention for convention in (heading.convention, *(part[1] for part in parsed)) if convention}
-    logarithm = next((base for *_, base in reversed(parsed) if base), heading.logarithm)
+    stated, in_row = (parse_unit(text) for text in (stated_unit or "", cells.layout.units[index]))
+    in_header = parse_unit(heading.unit or "")
+    texts = [stated[0]] if stated_unit else sorted({in_header[0], in_row[0]} - {""})
+    conventions = {stated[1] or part for part in (heading.convention, in_header[1], in_row[1], stated[1]) if part}
+    logarithm = stated[2] or in_row[2] or in_header[2] or heading.logarithm
     unit, convention = next(iter(texts), None), next(iter(conventions), None)
     column = Column(heading.role, unit, convention, logarithm, header=cells.headers[index], index=index)
     if len(texts) > 1 or len(conventions) > 1:
@@ -181,7 +186,8 @@ def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | No
             file=cells.file,
             place=cells.place(cells.layout.header_line, column),
             found=" and ".join(texts if len(texts) > 1 else sorted(conventions)),
-            expected="one unit, from the header, the units row or the campaign",
+            expected="one unit, from the header or the units row",
+            hint=f'state the right one in the campaign: units = {{ {heading.role} = "{texts[0]}" }}',
         )
     return column
 

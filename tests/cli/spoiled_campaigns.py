@@ -32,7 +32,7 @@ IN_CAMPAIGN = [
     ('"loop.csv"', '"loop.csv"\nnoise = "200 %"', "campaign.toml, loops #1.noise: this value is not understood", "less than 1"),
     ('"loop.csv"', '"loop.csv"\ncolumns = {force = "Kraft" }', 'loop.csv, line 1: there is no column "Kraft"', "the header that was stated for the force"),
     ('"loop.csv"', '"loop.csv"\ncolumns = {force = "forse" }', 'loop.csv, line 1: there is no column "forse"', 'did you mean "force [N]"?'),
-    ('"loop.csv"', '"loop.csv"\nunits = {force = "mm" }', 'loop.csv, line 1, column "force [N]": two units for the force', "one unit, from the header, the units row or the campaign"),
+    ('"loop.csv"', '"loop.csv"\nunits = {force = "mm" }', 'loop.csv, line 1, column "force [N]": the unit does not fit', 'found: "mm"'),
     ('"loop.csv"', '"loop.csv"\nencoding = "klingon"', "loop.csv: unknown encoding", 'a name such as "utf-8", "utf-16", "cp1252", "latin-1" or "gb18030"'),
     ('"loop.csv"', '"loop.csv"\nheader_line = 0', "loop.csv: there is no header on this line", "lines count from 1"),
     ('"loop.csv"', '"loop.csv"\nsheet = "Tabelle1"', "loop.csv: this is not a workbook", "a file with groups"),
