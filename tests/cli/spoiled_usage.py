@@ -79,7 +79,7 @@ USAGE = [
     ("reduce|model.json", "model.json: a test file is needed", "found: a model"),
     ("inspect|loop.csv|--direction|up", "Invalid value for '--direction': 'up' is not one of 'axial', 'radial', 'torsion'"),
     ("inspect|loop.csv|--unit|force", "--unit: not a column's role with a value", 'such as "force=kN"; roles: time, displacement, force, frequency, amplitude,'),
-    ("inspect|loop.csv|--unit|force=furlong", 'loop.csv, line 1, column "force [N]": the unit XX),
+    ("inspect|loop.csv|--unit|force=furlong", 'loop.csv, line 1, column "force [N]": unknown unit', 'found: "furlong"'),
     ("inspect|loop.csv|--column|kraft=force [N]", "--column: not a column's role with a value", 'such as "force=Kraft"; roles: time, displacement, force, frequency, amplitude,'),
     ("init|loop.csv|--amplitude|0.1 mm",  "'0.1 mm' is not one of 'zero-to-peak', 'peak-to-peak'"),
     ("inspect|loop.csv|--area|7 mm|--thickness|6 mm", "--area: the unit does not fit"),
