@@ -21,7 +21,6 @@ from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Composition, Finding, decide_verdict
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.unnamed import NAME as UNNAMED
-from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
 from bushfit.model.result import Result
 from bushfit.units import display_unit, format_aligned, number
@@ -92,32 +91,41 @@ class DiagnosisWriter:
         company = " with the other named effects" if len(names) > 1 else ""
         why = f"lowers chi-square by {base.chi_square - plain.chi_square:.0f}{company}; {self._probability(first)}"
         entries = [NamedCause(name, why) for name in names]
+        gap, rest, holdout = None, list[str](), None
         if self.finding.verdict == "named":
             holdout = hold_out(base, plain, request.bounds)
-            if _gap_stays(holdout, plain, names, request.bounds):
-                finding = decide_verdict(self.hypotheses, request.tolerance, gap_stays=True)
-                return replace(self, finding=finding).diagnosis()
             summary = f"{' and '.join(names)} {'closes' if len(names) == 1 else 'close'} the gap"
-            return self._finished("named", summary, after, entries, places=first.best, holdout=holdout)
-        excess = [
-            max(fitted.chi_square / sum(test.residual_count for test in fitted.data_sets) - 1.0, 0.0)
-            for fitted in (base, plain)
-        ]
-        share = number(100.0 * (1.0 - excess[1] / excess[0] if excess[0] else 1.0), 2)
-        summary = f"{' and '.join(names)} {'explains' if len(names) == 1 else 'explain'} {share} % of the gap"
-        rest = [part.name for part in first.faulty_parts] + [_LEVELS] * first.best.levels
-        gap = self._described(after) if not first.best.levels else None
-        final = gap.after if gap else after
-        if zero := [name for name in names if _is_at_neutral_bound(name, final)]:  # the model does without these
-            left, leads = tuple(name for name in names if name not in zero), (*zero, *self.finding.leads)
-            finding = replace(self.finding, verdict="partly" if left else "described", names=left, leads=leads)
+        else:
+            excess = [
+                max(fitted.chi_square / sum(test.residual_count for test in fitted.data_sets) - 1.0, 0.0)
+                for fitted in (base, plain)
+            ]
+            share = number(100.0 * (1.0 - excess[1] / excess[0] if excess[0] else 1.0), 2)
+            summary = f"{' and '.join(names)} {'explains' if len(names) == 1 else 'explain'} {share} % of the gap"
+            rest = [part.name for part in first.faulty_parts] + [_LEVELS] * first.best.levels
+            if not first.best.levels and (gap := self._described(after)):
+                entries.append(NamedCause(UNNAMED, gap.evidence))
+                rest.append(f"{_NAMELESS} ({gap.sentence})")
+            elif first.unnamed:
+                rest.append(_NAMELESS)
+        diagnosis = self._finished(
+            self.finding.verdict,
+            summary,
+            gap.after if gap else after,
+            entries,
+            " and ".join(rest),
+            places=first.best,
+            gap=gap,
+            holdout=holdout,
+        )
+        absent = tuple(name for name in names if _may_be_absent(name, diagnosis.result))
+        if holdout and (absent or (holdout.after or 0.0) > LARGEST_CLOSED_GAP):
+            return replace(self, finding=decide_verdict(self.hypotheses, request.tolerance, gap_stays=True)).diagnosis()
+        if absent:  # the model does without these effects
+            kept, leads = tuple(name for name in names if name not in absent), (*absent, *self.finding.leads)
+            finding = replace(self.finding, verdict="partly" if kept else "described", names=kept, leads=leads)
             return replace(self, finding=finding).diagnosis()
-        if gap:
-            entries.append(NamedCause(UNNAMED, gap.evidence))
-            rest.append(f"{_NAMELESS} ({gap.sentence})")
-        elif first.unnamed:
-            rest.append(_NAMELESS)
-        return self._finished("partly", summary, final, entries, " and ".join(rest), places=first.best, gap=gap)
+        return diagnosis
 
     def _described(self, evidence: Evidence) -> GapDescription | None:
         """Describe the gap of a fit by a smooth correction; None if effects are excluded or no correction is valid."""
@@ -361,32 +369,14 @@ class DiagnosisWriter:
         return [*notes, *([_ONE_DIRECTION] if self.first and self.first.unnamed and len(directions) == 1 else [])]
 
 
-def _gap_stays(holdout: HoldOut, after: Evidence, names: Sequence[str], bounds: Bounds) -> bool:
-    """True if held-out tests show a gap beside the named effects, or if one of the effects may be absent.
-
-    Args:
-        holdout: residuals of held-out tests without and with the effects.
-        after: fit with the effects.
-        names: names of the effects.
-        bounds: limits of parameters inside their general limits.
-    """
-    if holdout.after is not None and holdout.after > LARGEST_CLOSED_GAP:
-        return True
-    result = result_of(after, bounds, after.model.effects, lacking=False)
-    for name in names:
-        effect = get_effect(name)
-        amount = qualified_name(effect, effect.amount) if effect.replaces is None else ""
-        low, high = (result.interval(amount) if amount in result.model.values else None) or (1.0, 1.0)
-        if effect.amount.neutral is not None and low <= effect.amount.neutral <= high:
-            return True
-    return False
-
-
-def _is_at_neutral_bound(name: str, fitted: Evidence) -> bool:
-    """True if the amount of an effect ended at the bound at which the effect does nothing, such as a mass of zero."""
+def _may_be_absent(name: str, result: Result) -> bool:
+    """True if an effect may do nothing: its amount is neutral, or its 95 % interval contains the neutral amount."""
     effect = get_effect(name)
-    end = fitted.solution.at_bound.get(qualified_name(effect, effect.amount))
-    return end is not None and effect.amount.neutral == effect.amount.bounds[end == "max"]
+    amount, neutral = qualified_name(effect, effect.amount), effect.amount.neutral
+    if neutral is None or effect.replaces is not None or amount not in result.model.values:
+        return False
+    low, high = result.interval(amount) or (result.model.values[amount],) * 2
+    return low <= neutral <= high
 
 
 def _format_amount(name: str, result: Result) -> str:

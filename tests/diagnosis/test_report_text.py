@@ -15,7 +15,7 @@ from rigged import SHARED, SMALLER, asked, said
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.next_test import BUSHING_TESTS, FIXTURE_TESTS, deciding_test, remaining_entropy
-from bushfit.diagnosis.report_text import _is_at_neutral_bound
+from bushfit.diagnosis.report_text import _may_be_absent
 from bushfit.diagnosis.verdict import Finding, decide_verdict
 from bushfit.effects import BASE
 from bushfit.effects.mistakes import MISTAKES
@@ -48,16 +48,20 @@ def test_the_class_of_a_rig_that_is_assumed_is_said(measured):
 
 
 @pytest.mark.parametrize(
-    ("name", "at_bound", "does_nothing"),
+    ("parameter", "value", "interval", "absent"),
     [
-        ("inertia", {"inertia.mass": "min"}, True),
-        ("inertia", {"inertia.mass": "max"}, False),
-        ("inertia", {"mu": "min"}, False),
-        ("delay", {"delay.tau": "min"}, False),
+        ("inertia.mass", 0.0, None, True),
+        ("inertia.mass", 0.1, None, False),
+        ("inertia.mass", 0.1, (-0.01, 0.21), True),
+        ("delay.tau", 1e-4, (0.5e-4, 1.5e-4), False),
+        ("delay.tau", -1e-4, (-3e-4, 1e-4), True),
+        ("stiffness_factor.radial", 1.02, (0.99, 1.05), True),
+        ("stiffness_factor.radial", 0.93, (0.91, 0.95), False),
     ],
 )
-def test_an_effect_that_ends_at_no_amount_has_no_name(name, at_bound, does_nothing):
-    assert _is_at_neutral_bound(name, SimpleNamespace(solution=SimpleNamespace(at_bound=at_bound))) is does_nothing
+def test_an_effect_whose_amount_may_be_neutral_has_no_name(parameter, value, interval, absent):
+    result = SimpleNamespace(model=SimpleNamespace(values={parameter: value}), interval=lambda _: interval)
+    assert _may_be_absent(parameter.removesuffix(".mass").removesuffix(".tau"), result) is absent
 
 
 @pytest.mark.slow
