@@ -77,11 +77,11 @@ def _record(name: str, entry: dict[str, Any], module: ModuleType) -> Effect | Fa
 _ENTRIES = {name: _entry(name) for name in _TABLE}
 _RECORDS = [_record(name, entry, import_module(f"{__name__}.{entry.pop('law')}")) for name, entry in _ENTRIES.items()]
 #: Families of effects (one effect per direction or specimen), by name.
-FAMILIES = {each.name: each for each in _RECORDS if isinstance(each, Family)}
+FAMILIES = {family.record.name.partition(".")[0]: family for family in _RECORDS if isinstance(family, Family)}
 #: All effects by name, from the rubber outward; a family is represented by its effect for the radial direction.
 LIBRARY = {
     effect.name: effect
-    for effect in (each.of_place(Direction.RADIAL) if isinstance(each, Family) else each for each in _RECORDS)
+    for effect in (entry.of_place(Direction.RADIAL) if isinstance(entry, Family) else entry for entry in _RECORDS)
 }
 
 

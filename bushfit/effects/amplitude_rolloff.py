@@ -18,7 +18,7 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a rig that does not reach the requested amplitude at high frequency.
 
     Args:
-        p: parameter values by name: c [1].
+        p: parameter values by name: c [1], share of the amplitude that is lost at 155 Hz.
         below: complex stiffness K without this effect, as a function of omega and amplitude.
         omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -27,7 +27,8 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
         Complex stiffness with the effect [N/m or N m/rad], (..., n).
 
     Notes:
-        K at the amplitude X (1 - c (f/155 Hz)^2).
+        K at the true amplitude X (1 - c (f/155 Hz)^2), at least 0.05 X, with f = omega/(2 pi): first term of the series
+        of a second-order low-pass, as a servo-hydraulic rig has it.
 
     >>> reached = stiffness({"c": 0.05}, lambda omega, amplitude: amplitude, 2.0 * np.pi * 155.0, 1e-3, sweep)
     >>> float(reached)
@@ -40,7 +41,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a rig that does not reach the requested amplitude at high frequency.
 
     Args:
-        p: parameter values by name: c [1].
+        p: parameter values by name: c [1], share of the amplitude that is lost at 155 Hz.
         below: force F without this effect, as a function of the displacement history.
         history: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -49,7 +50,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         Force with the effect at each sample [N or N m], (..., n).
 
     Notes:
-        Force F of the smaller, true motion, divided by the ratio of the true to the requested amplitude.
+        F of the true motion over the ratio of true to requested amplitude, so that force over displacement is K.
     """
     share = _share(p, history.omega)
     return below(history.with_value(history.value * share)) / share

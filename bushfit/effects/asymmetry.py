@@ -6,10 +6,10 @@ from bushfit.effects.contract import Array, History, Values
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """Complex modulus of the asymmetric elastic term.
+    """Complex modulus of the elastic stress that differs between the two senses of motion; it is zero.
 
     Args:
-        p: parameter values by name: c2 [1], and of the base model mu [Pa].
+        p: parameter values by name: c2 [1], quadratic stress coefficient over mu, and static shear modulus mu [Pa].
         omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
@@ -22,17 +22,17 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """Stress of the asymmetric elastic term.
+    """Elastic stress that differs between the two senses of motion.
 
     Args:
-        p: parameter values by name: c2 [1], and of the base model mu [Pa].
+        p: parameter values by name: c2 [1], quadratic stress coefficient over mu, and static shear modulus mu [Pa].
         history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
         Stress at each sample [Pa], (..., n).
 
     Notes:
-        s = 2 mu c2 e^2.
+        s = 2 mu c2 e^2, the quadratic term of a power series (A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations, 1979).
 
     >>> stress({"mu": 1e6, "c2": 1.0}, History.steady(np.array([0.01, -0.01]), 1.0))
     array([200., 200.])

@@ -8,7 +8,7 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a stop on both sides beyond a gap.
 
     Args:
-        p: parameter values by name: gap [m], stiffness [N/m].
+        p: parameter values by name: gap [m], free travel to each stop, and stiffness k [N/m] of the stops.
         below: complex stiffness K without this effect, as a function of omega and amplitude.
         omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -17,7 +17,8 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
         Complex stiffness with the effect [N/m or N m/rad], (..., n).
 
     Notes:
-        K + k N(gap/X) [N/m], N of `dead_zone.first_harmonic`; exactly K up to the gap, and in torsion.
+        K + k N(gap/X), with the describing function N of a dead zone (`dead_zone.first_harmonic`; A. Gelb, W. E. Vander
+        Velde, Multiple-Input Describing Functions, 1968, app. B); exactly K up to the gap. Does not act in torsion.
 
     >>> stiffness({"gap": 1e-3, "stiffness": 1e6}, spring, 1.0, np.array([1e-3, 2e-3, 1.0]), sweep).round()
     array([ 500000.,  891002., 1498727.])
@@ -29,7 +30,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a stop on both sides beyond a gap.
 
     Args:
-        p: parameter values by name: gap [m], stiffness [N/m].
+        p: parameter values by name: gap [m], free travel to each stop, and stiffness k [N/m] of the stops.
         below: force F without this effect, as a function of the displacement history.
         history: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -38,6 +39,6 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         Force with the effect at each sample [N or N m], (..., n).
 
     Notes:
-        F + k (x - gap) above the gap, k (x + gap) below -gap.
+        F + k (x - gap) for displacements x above gap, and F + k (x + gap) below -gap.
     """
     return below(history) + p["stiffness"] * dead_zone(history.value, p["gap"])

@@ -16,7 +16,7 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with play between the bushing and its drive.
 
     Args:
-        p: parameter values by name: delta [m].
+        p: parameter values by name: delta [m], play in each sense.
         below: complex stiffness K without this effect, as a function of omega and amplitude.
         omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -27,8 +27,9 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     Notes:
         K(omega, X - delta) N(delta/X) + correction of friction for the distorted waveform; 0 within the play.
 
-        The motion of the bushing is the excess of a sine over the play, with first harmonic X N (N of
-        `dead_zone.first_harmonic`) and peak X - delta. The first term is exact if the bushing is linear. Friction
+        The motion of the bushing is the excess of a sine over the play, with peak X - delta and first harmonic X N,
+        where N is the describing function of a dead zone (`dead_zone.first_harmonic`; A. Gelb, W. E. Vander Velde,
+        Multiple-Input Describing Functions, 1968, app. B). The first term is exact if the bushing is linear. Friction
         depends on the path, not on its first harmonic (0.5 to 3 % of K at delta/X = 0.2). The second term is this
         difference: the first harmonic of one steady cycle minus the first term computed from the same samples.
     """
@@ -52,7 +53,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with play between the bushing and its drive.
 
     Args:
-        p: parameter values by name: delta [m].
+        p: parameter values by name: delta [m], play in each sense.
         below: force F without this effect, as a function of the displacement history.
         history: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -61,7 +62,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         Force with the effect at each sample [N or N m], (..., n).
 
     Notes:
-        Force of the bushing, whose displacement is the excess over +-delta.
+        F of the bushing's displacement: the excess of the imposed displacement over +-delta, 0 within the play.
 
     >>> motion = History.steady(np.array([0.2, 1.0, -1.0]), 1.0)
     >>> force({"delta": 0.25}, lambda history: 2.0 * history.value, motion, loop)

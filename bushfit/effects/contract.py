@@ -102,7 +102,7 @@ class Parameter:
     scale: Literal["period", "frequency", "displacement", "strain", "force", "order", "session"] | None = None
 
     def value_at_share(self, share: float) -> float:
-        """Parameter value at a share (1 = typical) of the typical distance from the neutral value (0 if None).
+        """Value whose distance from the neutral value (0 if None) is a share of the typical distance.
 
         >>> Parameter("c3", "1", (0.0, 1e5), 0.0, 20.0, "cubic stress coefficient over mu").value_at_share(0.5)
         10.0
@@ -203,7 +203,7 @@ class Effect:
         in_place_of: function from the values of the replaced branch to start values for a fit, the most probable
             first; None if the effect replaces no branch.
         harmonic_only: True if the effect has no equation in time: in loops it contributes to the first harmonic alone
-            (see `harmonic_response`), and the virtual rig refuses it.
+            (see `harmonic_stress`), and the virtual rig refuses it.
         after: effect that must be in the model before this effect is searched.
         never_with: effects with which this effect is not combined in a search, because together they fit any data.
         limit: simpler effect that this effect becomes at a bound of its parameters; None without such a limit.
@@ -323,11 +323,6 @@ class Family:
     places: Callable[[Sequence[str]], Sequence[str]]
     radial: Mapping[str, Any]
 
-    @property
-    def name(self) -> str:
-        """Name of the family: the name of the effects without the direction or specimen."""
-        return self.record.name.partition(".")[0]
-
     @cache  # noqa: B019  # the families live as long as the program
     def of_place(self, place: str) -> Effect:
         """Return the family's effect for one direction or specimen; cached."""
@@ -359,12 +354,12 @@ def scaled_values(p: Values, names: tuple[str, ...], factor: Value) -> dict[str,
 def scaled_response(
     factor: Callable[[Values, Setting], Value], p: Values, below: Callable[..., Array], *motion_and_setting: Any
 ) -> Array:
-    """Multiply the stiffness or force of the bushing and the inner layers by a factor.
+    """Stiffness, or force over time, of an effect that multiplies both by one factor, such as the gain of a load cell.
 
     Args:
-        factor: function of the values and the setting that gives the factor.
-        p: parameter values of the layer.
-        below: function that returns the stiffness or force without this effect.
+        factor: function of the parameter values and the setting that gives the factor.
+        p: parameter values of the effect by name.
+        below: function that gives the stiffness [N/m or N m/rad] or force [N or N m] without this effect.
         motion_and_setting: arguments of `below` (omega and amplitude, or history), then the setting.
     """
     *motion, setting = motion_and_setting
@@ -382,26 +377,16 @@ def linear_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, h
     return history.response(lambda omega: 2.0 * modulus(p, omega, history.amplitude))
 
 
-def harmonic_response(transfer: Value, history: History) -> Array:
-    """First-harmonic response over time of an effect that has no equation in time, same shape as the motion.
-
-    Args:
-        transfer: complex ratio of response to motion: stress over tensor shear strain (2 mu^ [Pa]), or force over
-            displacement (K [N/m or N m/rad]), (..., 1).
-        history: strain or displacement over time, (..., n).
-
-    >>> harmonic_response(2.0, History.steady(np.array([3.0, 2.0, -1.0, 0.0]), 1.0)).round(6)
-    array([ 4.,  2., -4., -2.])
-    """
-    return np.real(np.asarray(transfer) * history.fundamental)
-
-
 def harmonic_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:
     """Stress [Pa] of a branch that has no equation in time: s_1 = 2 mu^(omega, e0) e_1, without mean and overtones.
 
     Args:
-        modulus: complex modulus of the branch [Pa].
+        modulus: complex modulus mu^ of the branch [Pa].
         p: parameter values by name.
-        history: tensor shear strain e = gamma/2 over time [1], (..., n).
+        history: tensor shear strain e = gamma/2 over time [1], (..., n), with amplitude e0 and first harmonic e_1.
+
+    >>> harmonic_stress(lambda p, omega, strain: 1.0, {}, History.steady(np.array([3.0, 2.0, -1.0, 0.0]), 1.0)).round(6)
+    array([ 4.,  2., -4., -2.])
     """
-    return harmonic_response(2.0 * modulus(p, np.atleast_1d(history.omega), history.amplitude), history)
+    transfer = 2.0 * modulus(p, np.atleast_1d(history.omega), history.amplitude)
+    return np.real(np.asarray(transfer) * history.fundamental)

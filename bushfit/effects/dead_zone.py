@@ -11,7 +11,7 @@ _SERIES = np.array([(-1.0) ** k / math.factorial(2 * k + 3) for k in range(12)])
 
 
 def dead_zone(value: Array, half_width: Value) -> Array:
-    """Excess of values over +-half_width; 0 inside this interval.
+    """Excess of values beyond the interval from -half_width to half_width; 0 inside, the unit of the values.
 
     >>> dead_zone(np.array([-2.0, 0.5, 3.0]), 1.0)
     array([-1.,  0.,  2.])
@@ -23,11 +23,11 @@ def first_harmonic(amplitude: Array, half_width: Value) -> Array:
     """Describing function N of a dead zone: first harmonic of the output over the amplitude of a sine.
 
     Args:
-        amplitude: amplitude of the sine, any shape.
+        amplitude: amplitude of the input, a sine, any unit and shape.
         half_width: half width of the dead zone, in the same unit.
 
     Returns:
-        N between 0 and 1, in the broadcast shape of the two.
+        N [1] between 0 and 1, in the broadcast shape of the two.
 
     Notes:
         A. Gelb, W. E. Vander Velde, Multiple-Input Describing Functions, 1968, app. B.

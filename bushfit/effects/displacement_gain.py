@@ -11,7 +11,7 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a wrong gain of the displacement transducer.
 
     Args:
-        p: parameter values by name: scale [1].
+        p: parameter values by name: scale [1], true over recorded displacement.
         below: complex stiffness K without this effect, as a function of omega and amplitude.
         omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -20,7 +20,8 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
         Complex stiffness with the effect [N/m or N m/rad], (..., n).
 
     Notes:
-        scale K(scale X): ratio of the force, at the true amplitude scale X, to the recorded amplitude X.
+        scale K(scale X): the force at the true amplitude, scale X, over the recorded amplitude X (sensitivity error of
+        a displacement transducer, ISO 9513:2012).
 
     >>> stiffness({"scale": 1.02}, spring, 1.0, 1e-4, sweep)
     510000.0
@@ -32,7 +33,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a wrong gain of the displacement transducer.
 
     Args:
-        p: parameter values by name: scale [1].
+        p: parameter values by name: scale [1], true over recorded displacement.
         below: force F without this effect, as a function of the displacement history.
         history: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -41,6 +42,6 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         Force with the effect at each sample [N or N m], (..., n).
 
     Notes:
-        F of scale times the recorded motion.
+        F of the true motion, which is scale times the recorded motion.
     """
     return below(history.with_value(p["scale"] * history.value))

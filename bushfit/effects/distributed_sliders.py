@@ -25,7 +25,7 @@ _WEIGHTS, _STRAINS = 2.0 / (_NODES + 1) * np.sin(_ANGLES) ** 2, np.sin(0.5 * _AN
 
 
 def _standardised(strain: Value, e_s: Value, spread: Value) -> Array:
-    """Return z = ln(strain/e_s)/spread, the argument of the normal distribution of the log yield strains.
+    """Return z = ln(strain/e_s)/spread: a share Phi(z) of the elements yields below this strain, (..., n).
 
     Args:
         strain: tensor shear strain [1], (..., n); its ratio to e_s is raised to at least 1e-30.
@@ -36,21 +36,24 @@ def _standardised(strain: Value, e_s: Value, spread: Value) -> Array:
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """Complex modulus of the sliders.
+    """Complex modulus of equal springs, each in series with a dry slider, whose yield strains are log-normal.
 
     Args:
-        p: parameter values by name: delta [Pa], e_s [1], spread [1].
+        p: parameter values by name: modulus delta [Pa] of all springs at rest, median yield strain e_s [1], and spread
+            [1], the standard deviation of the natural log of the yield strain.
         omega: not used, because the branch does not depend on the rate.
-        strain: strain amplitude e0, (..., n).
+        strain: amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
-        Complex modulus [Pa], (..., n).
+        Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
-        With the tangent modulus delta Phi(-z) of the first loading, Masing's loop has the storage modulus
-        delta (2/pi) int_0^pi sin^2(t) Phi(-z(e0 sin^2(t/2))) dt (Gauss-Chebyshev rule of the second kind). An element
-        of stiffness k that yields at y < e0 loses 4 k y (e0 - y) per cycle; in the mean over the distribution the loss
-        modulus is (4 delta/pi) (g1 - g2), g_j = (e_s/e0)^j exp(j^2 spread^2/2) Phi(z(e0) - j spread).
+        Jenkins elements in parallel (W. D. Iwan, J. Appl. Mech. 34 (1967) 612), with the normal distribution function
+        Phi and z(e) = ln(e/e_s)/spread. The tangent modulus of the first loading is delta Phi(-z), so Masing's loop has
+        the storage modulus delta (2/pi) int_0^pi sin^2(t) Phi(-z(e0 sin^2(t/2))) dt, here by a Gauss-Chebyshev rule of
+        the second kind. An element of stiffness k that yields at y < e0 loses 4 k y (e0 - y) per cycle; the mean over
+        the distribution is a loss modulus (4 delta/pi) (g1 - g2), g_j = (e_s/e0)^j exp(j^2 spread^2/2) Phi(z(e0) -
+        j spread).
 
     >>> modulus({"delta": 1e6, "e_s": 0.01, "spread": 1.0}, 1.0, np.array([1e-4, 0.01, 1.0])).round(-3)
     array([1000000.     +0.j,  762000.+119000.j,    5000. +20000.j])
@@ -64,7 +67,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def _first_loading(strain: Array, e_s: Value, spread: Value) -> Array:
-    """Mean elastic strain of the elements, whose yield strains are log-normal, on first loading to `strain` [1].
+    """Mean elastic strain of all elements, whose yield strains are log-normal, on first loading from rest.
 
     Args:
         strain: tensor shear strain reached from rest [1], (..., n).
@@ -79,14 +82,15 @@ def _first_loading(strain: Array, e_s: Value, spread: Value) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """Stress of all elements, from rest or over a steady cycle.
+    """Stress of equal springs, each in series with a dry slider, whose yield strains are log-normal.
 
     Args:
-        p: parameter values by name: delta [Pa], e_s [1], spread [1].
+        p: parameter values by name: modulus delta [Pa] of all springs at rest, median yield strain e_s [1], and spread
+            [1], the standard deviation of the natural log of the yield strain.
         history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
-        Stress [Pa], (..., n).
+        Stress at each sample [Pa], (..., n).
 
     Notes:
         In a steady cycle with two turning points, each half of the loop is the first loading at twice its size (G.

@@ -12,9 +12,14 @@ from bushfit.effects.contract import Setting, Value, Values, scaled_response
 
 
 def _gain(p: Values, setting: Setting) -> Value:
-    """Relative gain 1 + gain ln(1 + t/onset)/ln(1 + 1/onset) of the force channel at the time t of a test.
+    """Ratio of recorded to true force, which drifts over the session: 1 + gain ln(1 + t/onset)/ln(1 + 1/onset).
 
-    t is a share of the session, from 0 at the first point to 1 at the last; if t is unknown, the gain is 1.
+    Args:
+        p: parameter values by name: gain [1] of the last point relative to the first, and onset [1], the share of the
+            session after which the drift follows the logarithm of time; above 1 the drift is even.
+        setting: the test, with its time t as a share of the session (0 first, 1 last point); the ratio is 1 without t.
+
+    Notes: sensitivity drift of a force transducer, ISO 376:2011, or of a rig or bushing that warms up.
 
     >>> from bushfit.effects.contract import RubberConditions
     >>> halfway = Setting(None, "axial", "sweep", RubberConditions(session_time=0.5))

@@ -9,14 +9,14 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """Complex modulus of the elastic branch.
 
     Args:
-        p: parameter values by name: mu [Pa].
+        p: parameter values by name: static shear modulus mu [Pa].
         omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
         Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
-        mu^ = mu [Pa] at all frequencies and amplitudes.
+        mu^ = mu at all frequencies and amplitudes (Garcia Tarrago et al. 2007, Eq. 1).
 
     >>> float(modulus({"mu": 1.09e6}, 100.0, 0.01))
     1090000.0
@@ -28,7 +28,7 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
     """Derivatives of the complex modulus of the elastic branch by its parameters.
 
     Args:
-        p: parameter values by name: mu [Pa].
+        p: parameter values by name: static shear modulus mu [Pa].
         omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
@@ -44,14 +44,14 @@ def stress(p: Values, history: History) -> Array:
     """Stress of the elastic branch.
 
     Args:
-        p: parameter values by name: mu [Pa].
+        p: parameter values by name: static shear modulus mu [Pa].
         history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
         Stress at each sample [Pa], (..., n).
 
     Notes:
-        s_e = 2 mu e (Eq. 1).
+        s = 2 mu e (Garcia Tarrago et al. 2007, Eq. 1).
     """
     return 2.0 * p["mu"] * history.value
 
@@ -60,7 +60,7 @@ def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
     """Derivatives of the stress of the elastic branch by its parameters.
 
     Args:
-        p: parameter values by name: mu [Pa].
+        p: parameter values by name: static shear modulus mu [Pa].
         history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:

@@ -6,19 +6,20 @@ from bushfit.effects.contract import Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """Friction stress sigma_fmax [Pa], reduced after a larger strain amplitude and recovering with time.
+    """Reduce the friction stress after a larger strain amplitude, from which the filler network recovers with time.
 
     Args:
-        p: parameter values by name, with sigma_fmax [Pa], share [1], tau (share of the session).
-        condition: operating condition, with the strain amplitude e0 and the history of the test.
+        p: parameter values by name: largest friction stress sigma_fmax [Pa]; share [1] of it that is lost right after
+            a much larger amplitude; and recovery time tau [1] over the duration of the session.
+        condition: operating condition, with the strain amplitude e0 and the strain history of the test.
 
     Returns:
-        sigma_fmax (1 - share (1 - (e0/e_l)^2) exp(-t/tau)), t the time since the last strain amplitude e_l larger than
-        e0; empty if the history of the test is unknown.
+        The changed value by name: sigma_fmax (1 - share (1 - (e0/e_l)^2) exp(-t/tau)) [Pa], with the time t [1] since
+        the last strain amplitude e_l larger than e0; empty if the history is unknown.
 
     Notes:
         Solution of lambda' = (lambda_inf(e0) - lambda)/tau for the intact share lambda of the network at the constant
-        amplitude e0, after equilibrium at e_l.
+        amplitude e0, after equilibrium at e_l (A. Lion, J. Mech. Phys. Solids 46 (1998) 895).
 
     >>> from bushfit.effects.contract import RubberConditions
     >>> model = paper.with_effect("filler_recovery", {"filler_recovery.share": 0.2})

@@ -12,7 +12,11 @@ _UNDER = 1.0 - 1e-9
 
 
 def fixture(p: Values, omega: Array) -> Array:
-    """Dynamic stiffness of the fixture [N/m]: -M omega^2 wr^2/(wr^2 - omega^2 + 2 i zeta omega wr), wr = 2 pi f.
+    """Stiffness [N/m] that a resonant fixture adds: -M omega^2 wr^2/(wr^2 - omega^2 + 2 i zeta omega wr), wr = 2 pi f.
+
+    Args:
+        p: parameter values by name: mass M [kg], frequency f [Hz] and damping ratio zeta [1] of the mode.
+        omega: angular frequency [rad/s], any shape.
 
     >>> mode = {"mass": 0.1, "frequency": 300.0, "damping": 0.0}
     >>> fixture(mode, 2.0 * np.pi * np.array([100.0, 200.0])).real.round()
@@ -26,7 +30,7 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a resonant fixture between bushing and load cell.
 
     Args:
-        p: parameter values by name: mass [kg], frequency [Hz], damping [1].
+        p: parameter values by name: mass M [kg], frequency f [Hz] and damping ratio zeta [1] of the fixture's mode.
         below: complex stiffness K without this effect, as a function of omega and amplitude.
         omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -35,7 +39,8 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
         Complex stiffness with the effect [N/m or N m/rad], (..., n).
 
     Notes:
-        K - M omega^2 wr^2/(wr^2 - omega^2 + 2 i zeta omega wr); does not act in torsion.
+        K - M omega^2 wr^2/(wr^2 - omega^2 + 2 i zeta omega wr), wr = 2 pi f: one mode, driven at its base (D. J. Ewins,
+        Modal Testing, 2nd ed., 2000, ch. 2). Does not act in torsion.
     """
     return below(omega, amplitude) + fixture(p, omega)
 
@@ -44,7 +49,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a resonant fixture between bushing and load cell.
 
     Args:
-        p: parameter values by name: mass [kg], frequency [Hz], damping [1].
+        p: parameter values by name: mass M [kg], frequency f [Hz] and damping ratio zeta [1] of the fixture's mode.
         below: force F without this effect, as a function of the displacement history.
         history: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -53,9 +58,9 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         Force with the effect at each sample [N or N m], (..., n).
 
     Notes:
-        F + the fixture's force y: y'' + 2 zeta wr y' + wr^2 y = wr^2 M x''.
+        F + y, where y'' + 2 zeta wr y' + wr^2 y = wr^2 M x'', wr = 2 pi f, for the displacement x.
 
-        From rest the free vibration decays to 37 % within 1/(2 pi zeta frequency) seconds.
+        From rest the free vibration decays to 37 % within 1/(2 pi zeta f) seconds.
     """
     if history.periodic:
         return below(history) + history.response(partial(fixture, p))

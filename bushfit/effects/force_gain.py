@@ -1,4 +1,6 @@
-"""Force gain: the loop's force chain and the sweep's do not agree; loops are 1 + gain times what they should be.
+"""Force gain: the force channels of loops and sweeps disagree; stiffness and force in loops are 1 + gain times larger.
+
+Parameter: gain [1]. Source: sensitivity error of a force transducer, ISO 376:2011.
 
 >>> stiffness({"gain": 0.02}, spring, 1.0, 1e-4, loop), stiffness({"gain": 0.02}, spring, 1.0, 1e-4, sweep)
 (510000.0, 500000.0)

@@ -17,7 +17,8 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a saturating force channel.
 
     Args:
-        p: parameter values by name: level [N], share [1].
+        p: parameter values by name: level [N] above which the channel saturates, and share [1] of the excess force that
+            is lost; 1 if the force is clipped.
         below: complex stiffness K without this effect, as a function of omega and amplitude.
         omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -28,8 +29,10 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     Notes:
         K - share (K N(level/(|K| X)) + correction for the distorted waveform of the force).
 
-        The first term is exact for a sinusoidal force (N of `dead_zone.first_harmonic`). The correction is the first
-        harmonic of the excess over the level in one steady cycle, minus the first term from the same samples.
+        N is the describing function of a dead zone (`dead_zone.first_harmonic`; A. Gelb, W. E. Vander Velde,
+        Multiple-Input Describing Functions, 1968, app. B), exact for a sinusoidal force. The correction is the first
+        harmonic of the excess over the level in one steady cycle, minus the first term from the same samples. K is
+        unchanged in loops.
     """
     inside = below(omega, amplitude)
     if setting.kind != "sweep" or not np.any(p["share"]):
@@ -55,7 +58,8 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a saturating force channel.
 
     Args:
-        p: parameter values by name: level [N], share [1].
+        p: parameter values by name: level [N] above which the channel saturates, and share [1] of the excess force that
+            is lost; 1 if the force is clipped.
         below: force F without this effect, as a function of the displacement history.
         history: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -64,7 +68,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         Force with the effect at each sample [N or N m], (..., n).
 
     Notes:
-        F minus a share of its excess over +-level; not in torsion, which has a torque cell.
+        F minus the share of its excess over +-level in sweeps, F in loops; not in torsion, which has a torque cell.
 
     >>> motion = History.steady(np.array([1.0, -3.0]), 1.0)
     >>> force({"level": 2.0, "share": 1.0}, lambda history: history.value, motion, sweep)

@@ -13,22 +13,24 @@ _ECHO = 1e-8
 
 
 def _scaled(p: Values) -> Array:
-    """Relaxation time to the power alpha, tau^alpha = c/(2 pi 25 Hz)^alpha [s^alpha]."""
+    """Relaxation time tau of springpot and spring, to the power alpha: tau^alpha = c/(2 pi 25 Hz)^alpha [s^alpha]."""
     return np.asarray(p["c"]) / np.power(2.0 * np.pi * REFERENCE_FREQUENCY, p["alpha"])
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """Complex modulus of the spring in series with the springpot.
+    """Change of the springpot's complex modulus by a spring in series, which limits it at high frequency.
 
     Args:
-        p: parameter values by name: c [1], and of the base model m [Pa s^alpha], alpha [1].
+        p: parameter values by name: c [1], modulus of the springpot over that of the spring at 25 Hz; and of the
+            springpot m [Pa s^alpha], alpha [1].
         omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
         Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
-        Reduction of the springpot's modulus by the spring: -m/2 w z/(1 + z), w = (i omega)^alpha, z = tau^alpha w.
+        -m/2 w z/(1 + z), w = (i omega)^alpha, z = tau^alpha w, tau^alpha = c/(2 pi 25 Hz)^alpha: the fractional Zener
+        model (M. Caputo, F. Mainardi, Riv. Nuovo Cimento 1 (1971) 161) minus the springpot m/2 w.
 
     >>> modulus({"m": 2.0, "alpha": 0.5, "c": 1.0}, 2.0 * np.pi * np.array([1.0, 25.0]), 0.01).round(1)
     array([-0.1-0.4j, -2.6-6.3j])
@@ -40,24 +42,26 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def _circle(length: int) -> tuple[Array, Array]:
-    """ln(1 - z) on a half circle |z| = radius < 1, (length // 2 + 1,), and powers of the radius, (length,)."""
+    """Evaluate ln(1 - z) on a half circle |z| = r < 1, (length // 2 + 1,), and the powers r^0, r^1, ..., (length,)."""
     radius = _ECHO ** (1.0 / length)
     turn = np.exp(-2.0j * np.pi * np.arange(length // 2 + 1) / length)
     return np.log(1.0 - radius * turn), radius ** np.arange(length)
 
 
 def stress(p: Values, history: History) -> Array:
-    """Stress of the spring in series with the springpot.
+    """Change of the springpot's stress by a spring in series.
 
     Args:
-        p: parameter values by name: c [1], and of the base model m [Pa s^alpha], alpha [1].
+        p: parameter values by name: c [1], modulus of the springpot over that of the spring at 25 Hz; and of the
+            springpot m [Pa s^alpha], alpha [1].
         history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
         Stress at each sample [Pa], (..., n).
 
     Notes:
-        s + tau^alpha D^alpha s = m D^alpha e, less the springpot's own m D^alpha e (Eqs. 1, 3).
+        Solution s of s + tau^alpha D^alpha s = m D^alpha e, minus the stress m D^alpha e of the springpot alone, with
+        tau^alpha = c/(2 pi 25 Hz)^alpha and the fractional derivative D^alpha (Garcia Tarrago et al. 2007, Eq. 3).
 
         The weights of past strains are the coefficients of the power series in z of -k v^2/(1 + k v)/step^alpha, with
         v = (1 - z)^alpha and k = tau^alpha/step^alpha, from its values on a circle |z| < 1 (C. Lubich, Numer. Math. 52

@@ -1,4 +1,4 @@
-"""Friction branch: friction between filler particles, of whatever rate, which depends on where the motion last turned.
+"""Friction branch: friction between filler particles, independent of rate, counted from the last turning point.
 
 Source: Garcia Tarrago et al. 2007, Eq. 5; M. Berg, Vehicle System Dynamics 30 (1998) 197-212.
 
@@ -30,7 +30,7 @@ _SERIES_SLOPE = np.array([(k + 1) * (-1.0) ** (k + 1) / (k + 4.0) for k in range
 
 
 def harmonic_shape(x: Array) -> Array:
-    """Complex first harmonic h of the steady friction loop, dimensionless.
+    """Complex first harmonic h of the steady friction loop over its strain amplitude, dimensionless.
 
     Args:
         x: strain amplitude over eps_half, not negative, any shape.
@@ -114,7 +114,10 @@ def _roots(x: Array) -> tuple[Array, Array, Array, Array, Array]:
 
 
 def mean_stress_decay(x: Array) -> Array:
-    """Decay of a mean friction stress per cycle, ln(before/after), at the relative strain amplitude x = e0/eps_half.
+    """Decay per cycle of a mean friction stress that the motion began with: ln(stress before/stress after).
+
+    Args:
+        x: strain amplitude over eps_half, e0/eps_half, any shape.
 
     Notes: each of the two strokes multiplies the stress by 1 - (z/(1 + z))^2, with z of `harmonic_shape`.
 
@@ -126,18 +129,18 @@ def mean_stress_decay(x: Array) -> Array:
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """Complex modulus of the friction branch.
+    """Complex modulus of the filler friction, which falls with the strain amplitude and is independent of frequency.
 
     Args:
-        p: parameter values by name: sigma_fmax [Pa], eps_half [1].
+        p: parameter values by name: largest friction stress sigma_fmax [Pa], strain eps_half [1] that develops half.
         omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
         Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
-        (A + iB)/(2 e0), with the in-phase and quadrature amplitudes A and B of the stress in the first harmonic of the
-        steady loop of Eq. 5, in which the stress approaches sigma_fmax and is half of it at the strain eps_half.
+        mu^ = (A + iB)/(2 e0) = sigma_fmax/eps_half h(e0/eps_half), with the in-phase and quadrature amplitudes A and B
+        of the stress in the steady loop, and h of `harmonic_shape` (Garcia Tarrago et al. 2007, Eq. 5; Berg 1998).
 
     >>> modulus({"sigma_fmax": 2e4, "eps_half": 0.01}, 1.0, np.array([0.0, 0.01])).round()
     array([1000000.     +0.j,  394736.+151040.j])
@@ -149,14 +152,15 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
     """Derivatives of the complex modulus of the friction branch by its parameters.
 
     Args:
-        p: parameter values by name: sigma_fmax [Pa], eps_half [1].
+        p: parameter values by name: largest friction stress sigma_fmax [Pa], strain eps_half [1] that develops half.
         omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
         Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
 
     Notes:
-        d/dsigma_fmax = h/eps_half and d/deps_half = -sigma_fmax/eps_half^2 (h + x h').
+        d/dsigma_fmax = h/eps_half and d/deps_half = -sigma_fmax/eps_half^2 (h + x h'), x = e0/eps_half, h of
+        `harmonic_shape`.
     """
     x = strain / p["eps_half"]
     shape = harmonic_shape(x)
@@ -167,7 +171,7 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
 
 
 def _stroke(start: Any, sign: Any, distance: Any) -> tuple[Any, Any, Any]:
-    """Friction stress u, relative to sigma_fmax, along one stroke of the motion (Eq. 5).
+    """Friction stress u, relative to sigma_fmax, along one stroke, the motion between two turning points (Eq. 5).
 
     Args:
         start: relative stress u_s at the turning point where the stroke begins.
@@ -271,14 +275,16 @@ def stress(p: Values, history: History) -> Array:
     """Stress of the friction branch.
 
     Args:
-        p: parameter values by name: sigma_fmax [Pa], eps_half [1].
+        p: parameter values by name: largest friction stress sigma_fmax [Pa], strain eps_half [1] that develops half.
         history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
         Stress at each sample [Pa], (..., n).
 
     Notes:
-        s_f over time (Eq. 5), from (0, 0) at rest or on the steady loop.
+        u = u_s + sgn d v/(v + d), v = 1 - sgn u_s, with the stress u over sigma_fmax, its value u_s at the last turning
+        point, the direction sgn of the motion, and the strain d since this point over eps_half (Garcia Tarrago et al.
+        2007, Eq. 5; Berg 1998). From rest, or on the steady loop.
 
     >>> stress({"sigma_fmax": 2e4, "eps_half": 0.01}, History(np.array([0.01, 0.0, 0.01]), 1.0, False, 1.0)).round()
     array([10000., -2000.,  8476.])
@@ -291,14 +297,14 @@ def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
     """Derivatives of the stress of the friction branch by its parameters.
 
     Args:
-        p: parameter values by name: sigma_fmax [Pa], eps_half [1].
+        p: parameter values by name: largest friction stress sigma_fmax [Pa], strain eps_half [1] that develops half.
         history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
         Derivatives by parameter name, each (..., n) [Pa per unit of the parameter].
 
     Notes:
-        d/dsigma_fmax = u and d/deps_half = sigma_fmax du/deps_half.
+        d/dsigma_fmax = u, the stress over sigma_fmax, and d/deps_half = sigma_fmax du/deps_half.
     """
     start, slope, sense, distance = _at_samples(p["eps_half"], history)
     u, *room_and_reach = _stroke(history.turning.at_samples(start), sense, distance)

@@ -12,7 +12,7 @@ from bushfit.effects.maxwell import relax
 
 
 def _leak(p: Values, omega: Array) -> Value:
-    """Relative change of the force by the leak: -1/(1 + i omega T), 1/T = 2 pi corner; 0 if the corner is 0."""
+    """Relative change [1] of the force by the leak: -1/(1 + i omega T), 1/T = 2 pi corner; 0 if the corner is 0 Hz."""
     rate = 2.0 * np.pi * p["corner"] + 0j
     total = rate + 1j * np.asarray(omega)
     return -rate / np.where(total == 0.0, 1.0, total)
@@ -22,7 +22,7 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a leaking charge amplifier.
 
     Args:
-        p: parameter values by name: corner [Hz].
+        p: parameter values by name: corner [Hz], frequency at which half of the power is lost.
         below: complex stiffness K without this effect, as a function of omega and amplitude.
         omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -31,7 +31,8 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
         Complex stiffness with the effect [N/m or N m/rad], (..., n).
 
     Notes:
-        K i omega T/(1 + i omega T) in sweeps, K in loops.
+        K i omega T/(1 + i omega T), T = 1/(2 pi corner), in sweeps, K in loops: first-order high-pass (G. Gautschi,
+        Piezoelectric Sensorics, 2002, ch. 11).
 
     >>> round(abs(stiffness({"corner": 1.0}, spring, 2.0 * np.pi, 1e-4, sweep)))
     353553
@@ -43,7 +44,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a leaking charge amplifier.
 
     Args:
-        p: parameter values by name: corner [Hz].
+        p: parameter values by name: corner [Hz], frequency at which half of the power is lost.
         below: force F without this effect, as a function of the displacement history.
         history: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -52,7 +53,8 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         Force with the effect at each sample [N or N m], (..., n).
 
     Notes:
-        Solution y of T dy/dt + y = T dF/dt in sweeps: exact for a steady cycle; from rest, F is linear between samples.
+        Solution y of T dy/dt + y = T dF/dt, T = 1/(2 pi corner), in sweeps, F in loops. Exact for a steady cycle; from
+        rest, F is linear between samples.
     """
     felt = below(history)
     if setting.kind != "sweep":

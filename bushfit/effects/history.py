@@ -17,7 +17,7 @@ _SAMPLED_ACCURACY = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """A displacement or strain over time, evenly sampled.
+    """Displacement or strain over time, evenly sampled: input of the laws that compute a stress or force over time.
 
     Args:
         value: samples [m, rad or 1], (..., n); leading axes are different motions or parameter values.
@@ -26,7 +26,8 @@ class History:
             the first sample.
         frequency: frequency of the excitation [Hz]; like the step, it may differ between motions, (..., 1).
         driver: motion imposed by the rig, if a compliance lies between it and this motion; None if they are equal.
-        solved: previous solutions of implicit equations for this motion, by name; start values for the next solution.
+        solved: previous solutions of implicit equations (of a compliance) for this motion, by name; start values for
+            the next solution.
         accuracy: tolerance of implicit equations for this motion, relative to its maximum.
         second_order: True for fractional derivatives of second order in the step, False for the paper's sum (Eq. 3),
             which is of first order. A steady state has neither error.
@@ -92,16 +93,23 @@ class History:
 
     @cached_property
     def harmonics(self) -> Array:
-        """Angular frequencies of the entries of the motion's Fourier transform [rad/s]."""
+        """Angular frequencies of the entries of `spectrum` [rad/s], (n // 2 + 1,)."""
         return 2.0 * np.pi * np.fft.rfftfreq(self.value.shape[-1], self.step)
 
     @cached_property
     def spectrum(self) -> Array:
-        """Fourier transform of the samples of the motion, as numpy.fft.rfft gives it."""
+        """Fourier transform of the samples, by numpy.fft.rfft, (..., n // 2 + 1)."""
         return np.fft.rfft(self.value)
 
     def response(self, transfer: Callable[[Array], Array]) -> Array:
-        """Steady response of a linear system, (..., n): y_h = H(h omega) x_h per harmonic h; H(0) must be finite."""
+        """Steady response over time of a linear system to this motion, y_h = H(h omega) x_h for every harmonic h.
+
+        Args:
+            transfer: function H of angular frequencies [rad/s] that gives output over input; finite at 0.
+
+        Returns:
+            Response at each sample, (..., n).
+        """
         return np.fft.irfft(transfer(self.harmonics) * self.spectrum, n=self.value.shape[-1])
 
     @cached_property
@@ -148,7 +156,7 @@ class History:
 
     @property
     def sense(self) -> Array:
-        """Sign of the rate (0 at rest), or of the driver's rate if there is a driver, (..., n)."""
+        """Sign of the rate (-1, 0 or 1), (..., n): of the motion imposed by the rig if it differs from this motion."""
         leading = self if self.driver is None else self.with_value(self.driver)
         return np.sign(leading.rate)
 
@@ -159,15 +167,20 @@ class History:
         return np.concatenate([inner[..., :1], inner, inner[..., -1:]], axis=-1)
 
     def with_value(self, value: Array, solved: dict[str, Any] | None = None) -> History:
-        """Create a history of other values at the same times; `solved` gives start values of implicit equations."""
+        """Create a history of other values, (..., n), at the same times.
+
+        Args:
+            value: samples [m, rad or 1].
+            solved: start values of implicit equations, see `History`.
+        """
         return replace(self, value=value, solved={} if solved is None else solved)
 
     def faster(self, factor: Any) -> History:
-        """Create a history of the same motion at a speed multiplied by a factor: a number, or (..., 1)."""
+        """Create a history of the same motion at a higher speed, multiplied by a factor: a number, or (..., 1)."""
         return replace(self, step=self.step / factor, frequency=self.frequency * factor, solved={})
 
     def as_driver(self) -> History:
-        """Copy the history and mark its motion as the motion imposed by the rig, for all histories derived from it."""
+        """Copy the history and mark its motion as imposed by the rig, for this and all histories made from it."""
         return replace(self, driver=self.value, solved={})
 
     def scaled(self, factor: float) -> History:
@@ -184,14 +197,14 @@ class History:
 
 @dataclass(frozen=True, eq=False)
 class Turning:
-    """Strokes of a motion between its turning points.
+    """Strokes of a motion between its turning points, by which friction and slider laws compute their stress.
 
     A motion from rest begins at 0, before its first sample; a steady cycle begins and ends at its maximum.
 
     Args:
         strides: change of the value over each of the k strokes, (..., k); 0 for motions with fewer strokes.
         travel: change of the value between the previous turning point and each sample, (..., n).
-        piece: index of the stroke of each sample, (..., n), or (n,) if all motions turn at the same samples.
+        piece: index (0 to k - 1) of the stroke of each sample, (..., n), or (n,) if all motions turn at equal samples.
     """
 
     strides: Array

@@ -7,7 +7,7 @@ from bushfit.geometry import bushing_at
 
 
 def _force(p: Values, setting: Setting) -> Value:
-    """Slip force [N], or in torsion its moment [N m] at the outer radius of the bushing."""
+    """Friction force Fc at the sleeve [N], or in torsion its moment [N m] about the axis, at the outer radius."""
     bushing = bushing_at(setting.bushing, setting.direction)
     return p["force"] * (bushing.outer_radius if bushing and setting.direction.is_rotation else 1.0)
 
@@ -16,7 +16,7 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with dry friction at the sleeve.
 
     Args:
-        p: parameter values by name: force [N].
+        p: parameter values by name: force Fc [N], Coulomb friction at the sleeve.
         below: complex stiffness K without this effect, as a function of omega and amplitude.
         omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -25,7 +25,8 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
         Complex stiffness with the effect [N/m or N m/rad], (..., n).
 
     Notes:
-        K + i 4 Fc/(pi X).
+        K + i 4 Fc/(pi X), in torsion with the moment of Fc: describing function of Coulomb friction (A. Gelb, W. E.
+        Vander Velde, Multiple-Input Describing Functions, 1968, app. B).
 
     >>> stiffness({"force": np.pi}, spring, 1.0, np.array([1e-4, 1e-3]), sweep).round()
     array([500000.+40000.j, 500000. +4000.j])
@@ -38,7 +39,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with dry friction at the sleeve.
 
     Args:
-        p: parameter values by name: force [N].
+        p: parameter values by name: force Fc [N], Coulomb friction at the sleeve.
         below: force F without this effect, as a function of the displacement history.
         history: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -47,6 +48,6 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         Force with the effect at each sample [N or N m], (..., n).
 
     Notes:
-        F + Fc sgn(dx/dt).
+        F + Fc sgn(dx/dt), x the displacement; in torsion with the moment of Fc at the outer radius.
     """
     return below(history) + _force(p, setting) * history.sense

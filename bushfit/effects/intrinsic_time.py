@@ -6,16 +6,18 @@ from bushfit.effects.contract import REFERENCE_STRAIN, Condition, Value, Values,
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """Springpot coefficient m (1 + d e0/0.01)^(-alpha) [Pa s^alpha] at the strain amplitude e0.
+    """Reduce the springpot constant, because relaxation is faster at larger strain amplitude.
 
     Args:
-        p: parameter values by name, with m [Pa s^alpha], alpha [1], d [1].
-        condition: operating condition, with the strain amplitude.
+        p: parameter values by name: springpot constant m [Pa s^alpha] and order alpha [1]; and d [1], relative increase
+            of the relaxation rate at 1 % strain amplitude.
+        condition: operating condition, with the strain amplitude e0.
 
     Returns:
-        The changed values by parameter name.
+        The changed value by name: m (1 + d e0/0.01)^(-alpha) [Pa s^alpha].
 
-    Notes: the rate is relative to an intrinsic time z with dz/dt = 1 + d e0/0.01.
+    Notes: the springpot's time is an intrinsic time z with dz/dt = 1 + d e0/0.01 (A. Lion, C. Kardelky, Int. J.
+    Plasticity 20 (2004) 1313, in the steady state).
 
     >>> model = paper.with_effect("intrinsic_time", {"intrinsic_time.d": 1.0})
     >>> [round(model.values_at("axial", 25.0, x)["m"]) for x in (1e-4, 1e-3)]

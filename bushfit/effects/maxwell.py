@@ -6,17 +6,17 @@ from bushfit.effects.contract import Array, History, Value, Values, linear_stres
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """Complex modulus of a Maxwell arm.
+    """Complex modulus of a Maxwell arm, a spring and a dashpot in series.
 
     Args:
-        p: parameter values by name: mu1 [Pa], tau [s].
+        p: parameter values by name: modulus mu1 [Pa] of the spring, and relaxation time tau [s].
         omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
         Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
-        mu^ = mu1 i omega tau / (1 + i omega tau).
+        mu^ = mu1 i omega tau/(1 + i omega tau) (J. D. Ferry, Viscoelastic Properties of Polymers, 1980, ch. 3).
 
     >>> complex(modulus({"mu1": 5e4, "tau": 0.01}, 100.0, 0.01))
     (25000+25000j)
@@ -67,17 +67,17 @@ def recursion(ratio: complex, added: Array) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """Stress of a Maxwell arm.
+    """Stress of a Maxwell arm, a spring and a dashpot in series.
 
     Args:
-        p: parameter values by name: mu1 [Pa], tau [s].
+        p: parameter values by name: modulus mu1 [Pa] of the spring, and relaxation time tau [s].
         history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
         Stress at each sample [Pa], (..., n).
 
     Notes:
-        s + tau ds/dt = 2 mu1 tau de/dt.
+        Solution s of s + tau ds/dt = 2 mu1 tau de/dt.
     """
     if history.periodic:
         return linear_stress(modulus, p, history)

@@ -1,7 +1,7 @@
 """Mistakes in the record: a file or campaign does not state what was measured. See mistakes.toml.
 
-A mistake is an effect of the level `record` without parameters. A test is corrected only if the user adopts the
-mistake.
+A mistake is an effect of the level `record` without parameters. `diagnose` proposes it; a test is corrected only if the
+user adopts the mistake.
 """
 
 import tomllib
@@ -157,7 +157,7 @@ def other_direction(place: Place) -> Direction | None:
 
 
 def _is_of_rubber(modulus: float, strain: float) -> bool:
-    """Return True if the shear modulus [Pa] and the strain amplitude are possible in a test of rubber."""
+    """Return True if the shear modulus [Pa] and the strain amplitude [1] are possible in a test of rubber."""
     return _MODULI[0] < modulus < _MODULI[1] and _STRAINS[0] < strain < _STRAINS[1]
 
 

@@ -7,14 +7,18 @@ from bushfit.effects.contract import Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """Moduli and stresses [Pa] times 1 - share erf(1 - (e0/e_max)^2), with e_max the largest strain amplitude so far.
+    """Reduce all moduli and stresses of rubber that was strained further before (Mullins effect).
 
     Args:
-        p: parameter values by name, with all moduli and stresses [Pa], share [1].
-        condition: operating condition, with the strain amplitude e0 and the history of the test.
+        p: parameter values by name: all moduli and stresses [Pa]; and share [1] of them that is lost after a much
+            larger amplitude, divided by 0.84.
+        condition: operating condition, with the strain amplitude e0 and the strain history of the test.
 
     Returns:
-        The changed values by name; empty if the history of the test is unknown.
+        The changed values by name: those in Pa times 1 - share erf(1 - (e0/e_max)^2), with the largest strain amplitude
+        e_max so far; empty if the history is unknown.
+
+    Notes: after R. W. Ogden, D. G. Roxburgh, Proc. R. Soc. Lond. A 455 (1999) 2861, with energies for strains.
 
     >>> from bushfit.effects.contract import RubberConditions
     >>> model = paper.with_effect("mullins_levels", {"mullins_levels.share": 0.2})

@@ -6,10 +6,11 @@ from bushfit.effects.contract import Array, History, Values
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """Complex modulus of the stiffening of the first cycles.
+    """Complex modulus of the additional stiffness in the first cycles of rested rubber; it is zero.
 
     Args:
-        p: parameter values by name: share [1], cycles [1], and of the base model mu [Pa].
+        p: parameter values by name: share [1], extra modulus of the first cycle over mu; number of cycles [1] in which
+            it falls to 37 %; and static shear modulus mu [Pa].
         omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
@@ -22,17 +23,19 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """Stress of the stiffening of the first cycles.
+    """Additional stress in the first cycles of rested rubber (Mullins effect).
 
     Args:
-        p: parameter values by name: share [1], cycles [1], and of the base model mu [Pa].
+        p: parameter values by name: share [1], extra modulus of the first cycle over mu; number of cycles [1] in which
+            it falls to 37 %; and static shear modulus mu [Pa].
         history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
         Stress at each sample [Pa], (..., n).
 
     Notes:
-        s = 2 mu share exp(-N/cycles) e [Pa], N = f t the number of cycles since the start.
+        s = 2 mu share exp(-N/cycles) e, with N = f t cycles since the start (L. Mullins, Rubber Chem. Technol. 42
+        (1969) 339).
 
         A single steady cycle has no such stress.
 

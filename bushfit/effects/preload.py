@@ -14,21 +14,24 @@ _STEPS = 12
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """Moduli and stresses [Pa] about the preload of the test.
+    """Change the moduli and stresses of rubber that moves about a static preload.
 
     Args:
-        p: parameter values by name, with all moduli and stresses [Pa], and the six parameters of the effect [1].
-        condition: operating condition, with the preload as a displacement or force.
+        p: parameter values by name: all moduli and stresses [Pa]; quadratic and cubic coefficients c2, c3 [1] of the
+            elastic stress over mu; and coefficients [1] of the static strain and its square in the logarithm of
+            friction (friction, friction_square) and of rate-dependent moduli (rate, rate_square).
+        condition: operating condition, with the preload as a displacement or force, and the strain amplitude e0.
 
     Returns:
-        mu times the slope, the stresses and moduli of friction times one factor, and those that depend on the rate
-        times another; the cubic term of `strain_stiffening`, which is relative to mu, remains as it is. Empty if the
+        The changed values by name: mu times the slope of the elastic law, stresses and moduli of friction times
+        exp(friction e + friction_square e^2), rate-dependent ones times exp(rate e + rate_square e^2), with the static
+        strain e. The cubic term of `strain_stiffening`, which is relative to mu, keeps its value in Pa. Empty if the
         preload is unknown.
 
     Notes:
-        The elastic law s = 2 mu (e + c2 e^2 + c3 e^3) has the tangent 2 mu (1 + 2 c2 e + 3 c3 e^2) at the static
-        strain e; a strain amplitude e0 about it adds 2 mu 3/4 c3 e0^2 to the first harmonic. The factors are
-        exp(friction e + friction_square e^2) and exp(rate e + rate_square e^2).
+        The elastic law s = 2 mu (e + c2 e^2 + c3 e^3) has the slope 2 mu (1 + 2 c2 e + 3 c3 e^2) at the static strain
+        e; a strain amplitude e0 about it adds 2 mu 3/4 c3 e0^2 to the first harmonic (small motion on a large one:
+        K. N. Morman, J. C. Nagtegaal, Int. J. Numer. Meth. Eng. 19 (1983) 1079).
     """
     if condition.setting.conditions.preload is None:
         return {}
@@ -45,10 +48,10 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
 
 
 def stress(p: Values, history: History, setting: Setting) -> Array:
-    """Curvature of the elastic law about the preload, which a straight line of the slope of `adjust` leaves out.
+    """Stress by the curvature of the elastic law about a preload, in addition to the straight line by `adjust`.
 
     Args:
-        p: parameter values by name, with mu [Pa], c2, c3 [1].
+        p: parameter values by name: static shear modulus mu [Pa], coefficients c2, c3 [1] of the elastic law.
         history: tensor shear strain e about the preload over time [1], (..., n).
         setting: the test, with its preload.
 
@@ -67,7 +70,11 @@ def stress(p: Values, history: History, setting: Setting) -> Array:
 
 
 def tangent(p: Values, strain: Value) -> Array:
-    """Slope of the elastic law at a static strain, relative to that without preload, of the shape of the strain.
+    """Slope [1] of the elastic law at a static strain over that at zero strain: 1 + 2 c2 e + 3 c3 e^2, at least 0.05.
+
+    Args:
+        p: parameter values by name: coefficients c2, c3 [1] of the elastic law.
+        strain: static strain e [1], any shape.
 
     >>> tangent({"c2": 0.0, "c3": 20.0}, 0.1).round(6)
     np.float64(1.6)
@@ -76,14 +83,14 @@ def tangent(p: Values, strain: Value) -> Array:
 
 
 def static_strain(p: Values, setting: Setting) -> Value:
-    """Static strain of the test's preload: that of a displacement, or that at which the elastic law has the force.
+    """Static strain of the rubber under the preload of a test, by Newton's method if the preload is a force.
 
     Args:
-        p: parameter values by name, with mu [Pa], c2, c3 [1].
+        p: parameter values by name: static shear modulus mu [Pa], coefficients c2, c3 [1] of the elastic law.
         setting: test with a known preload.
 
     Returns:
-        Equivalent strain [1], a number, or an array of the shape of the values.
+        Equivalent strain [1]: a number, or an array of the shape of the parameter values.
     """
     preload, place = setting.conditions.preload, setting.direction
     assert preload is not None

@@ -6,14 +6,14 @@ from bushfit.effects.contract import REFERENCE_FREQUENCY, Condition, Value, Valu
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """Friction stress sigma_fmax (f/25 Hz)^n [Pa] at the frequency f.
+    """Increase the friction stress with a power of the frequency.
 
     Args:
-        p: parameter values by name, with sigma_fmax [Pa], n [1].
-        condition: operating condition, with the frequency.
+        p: parameter values by name: largest friction stress sigma_fmax [Pa], and exponent n [1].
+        condition: operating condition, with the frequency f = omega/(2 pi).
 
     Returns:
-        The changed values by parameter name.
+        The changed value by name: sigma_fmax (f/25 Hz)^n [Pa].
 
     >>> model = paper.with_effect("rate_dependent_friction", {"rate_dependent_friction.n": 0.05})
     >>> [round(model.values_at("axial", f, 1e-3)["sigma_fmax"]) for f in (25.0, 155.0)]

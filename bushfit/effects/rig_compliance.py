@@ -24,7 +24,7 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness with a compliance in series.
 
     Args:
-        p: parameter values by name: compliance [m/N].
+        p: parameter values by name: compliance c [m/N] in series with the bushing.
         below: complex stiffness K without this effect, as a function of omega and amplitude.
         omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -33,9 +33,8 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
         Complex stiffness with the effect [N/m or N m/rad], (..., n).
 
     Notes:
-        K/(1 + c K) [N/m] with K at the amplitude X e^v that reaches the bushing; does not act in torsion.
-
-        v + ln|1 + c K(X e^v)| = 0 by the secant method; the last secant also extrapolates K to the solution.
+        K/(1 + c K), springs in series (ISO 10846-2:2008), with K at the amplitude X e^v that reaches the bushing. Does
+        not act in torsion. Solves v + ln|1 + c K(X e^v)| = 0 by the secant method; the last secant also extrapolates K.
 
     >>> spring = lambda omega, amplitude: np.full(1, 1e6 + 0j)
     >>> stiffness({"compliance": 1e-6}, spring, np.ones(1), np.full(1, 1e-4), sweep).round()
@@ -74,7 +73,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force with a compliance in series.
 
     Args:
-        p: parameter values by name: compliance [m/N].
+        p: parameter values by name: compliance c [m/N] in series with the bushing.
         below: force F without this effect, as a function of the displacement history.
         history: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).

@@ -6,16 +6,15 @@ from bushfit.effects.contract import Condition, Value, Values, scaled_values
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """Moduli and stresses [Pa] divided by 1 + beta P, with the loss P = pi f X^2 K'' [W] of the unheated bushing.
-
-    In torsion X is the rotation [rad] and K'' the loss stiffness [N m/rad].
+    """Reduce all moduli and stresses, because the bushing warms up by the power that it dissipates.
 
     Args:
-        p: parameter values by name, with all moduli and stresses [Pa], beta [1/W].
-        condition: operating condition, with frequency, displacement amplitude and stiffness.
+        p: parameter values by name: all moduli and stresses [Pa], and softening beta [1/W] per watt.
+        condition: operating condition, with frequency f, amplitude X [m or rad] and the loss stiffness K'' [N/m or
+            N m/rad] of the unheated bushing.
 
     Returns:
-        The changed values by parameter name.
+        The changed values by name: those in Pa over 1 + beta P, with the dissipated power P = pi f X^2 K'' [W].
 
     >>> model = paper.with_effect("self_heating", {"self_heating.beta": 0.01})
     >>> [round(model.values_at("axial", 100.0, x)["mu"]) for x in (1e-4, 1e-3)]

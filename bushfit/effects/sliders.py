@@ -20,27 +20,29 @@ _PLACES = (2.0 * np.arange(_COUNT) + 1.0) / _COUNT - 1.0
 
 
 def _ends(p: Values) -> tuple[Array, Array]:
-    """Smallest and largest slip strain of the sliders [1]."""
+    """Smallest and largest slip strain of the sliders [1]: e_s/exp(spread) and e_s exp(spread)."""
     middle, factor = np.atleast_1d(p["e_s"]), np.exp(np.asarray(p["spread"]))
     return middle / factor, middle * factor
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """Complex modulus of the springs with sliders.
+    """Complex modulus of springs in series with dry sliders, whose slip strains are log-uniform.
 
     Args:
-        p: parameter values by name: sigma [Pa], e_s [1], spread [1].
+        p: parameter values by name: largest stress sigma [Pa] of all sliders, slip strain e_s [1] of the middle slider,
+            and spread [1], natural log of the largest over the middle slip strain.
         omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
         Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
-        (A + iB)/(2 e0) [Pa] of the steady loop of strain amplitude e0.
+        mu^ = (A + iB)/(2 e0), with the in-phase and quadrature amplitudes A and B of the stress in the steady loop (L.
+        Prandtl 1928, W. D. Iwan 1966).
 
-        A slider that slips, r = e_y/e0 < 1 and cos t = 1 - 2r, gives A = s (t - sin(2t)/2)/(pi r) and B = 4 s (1 -
-        r)/pi; one that does not gives A = s/r. Of these over e_y the integrals over ln e_y are (4 (t + sin t) - (t -
-        sin(2t)/2)/r + 4i (ln r - r))/(pi e0) and -1/e_y.
+        A slider of largest stress s that slips at the strain e_y, with r = e_y/e0 < 1 and cos t = 1 - 2r, has
+        A = s (t - sin(2t)/2)/(pi r) and B = 4 s (1 - r)/pi; one that does not slip has A = s/r. The integrals of these,
+        divided by e_y, over ln e_y are (4 (t + sin t) - (t - sin(2t)/2)/r + 4i (ln r - r))/(pi e0) and -1/e_y.
 
     >>> modulus({"sigma": 2e4, "e_s": 0.01, "spread": 1.0}, 1.0, np.array([1e-3, 0.01, 0.1])).round(-3)
     array([1175000.     +0.j,  826000.+234000.j,   54000.+112000.j])
@@ -60,7 +62,7 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def _loaded(strain: Array, low: Value, high: Value) -> Array:
-    """Stress of the sliders on first loading over its maximum: mean of min(strain/e_y, 1) over slip strains e_y.
+    """Stress of the sliders on first loading from rest, over their largest stress: mean of min(strain/e_y, 1).
 
     Args:
         strain: tensor shear strain reached from rest [1], (..., n).
@@ -71,10 +73,11 @@ def _loaded(strain: Array, low: Value, high: Value) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """Stress of the springs with sliders.
+    """Stress of springs in series with dry sliders, whose slip strains are log-uniform.
 
     Args:
-        p: parameter values by name: sigma [Pa], e_s [1], spread [1].
+        p: parameter values by name: largest stress sigma [Pa] of all sliders, slip strain e_s [1] of the middle slider,
+            and spread [1], natural log of the largest over the middle slip strain.
         history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
@@ -151,9 +154,9 @@ def parallel_elements(history: History, yield_strain: Array, weights: Array) -> 
 
 
 def in_place_of(p: Values) -> list[dict[str, float]]:
-    """Derive two start values from the friction branch: a wide and a narrow range of slip strains.
+    """Derive start values of two fits from the friction branch: a wide and a narrow range of slip strains.
 
-    Two, because the fit has a second local minimum in which the range extends beyond the tested strains.
+    One start may lead to a local minimum in which the range extends beyond the tested strains.
 
     Args:
         p: parameter values by name, with sigma_fmax [Pa] and eps_half [1] of the friction branch.

@@ -12,7 +12,7 @@ _ORDER_STEP = 1e-5
 
 
 def power_of_rate(alpha: Array, omega: Array) -> Array:
-    """Transfer function (i omega)^alpha of a fractional derivative of order alpha, at omega [rad/s]; 0 at omega = 0."""
+    """Compute (i omega)^alpha, the transfer function of a fractional derivative of order alpha at omega [rad/s]."""
     return np.power(omega, alpha) * np.exp(0.5j * np.pi * alpha)
 
 
@@ -20,14 +20,14 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
     """Complex modulus of the springpot.
 
     Args:
-        p: parameter values by name: m [Pa*s^alpha], alpha [1].
+        p: parameter values by name: springpot constant m [Pa s^alpha], order alpha [1].
         omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
         Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
-        mu^ = m/2 (i omega)^alpha.
+        mu^ = m/2 (i omega)^alpha (Garcia Tarrago et al. 2007, Eqs. 1 to 3).
 
     >>> abs(modulus({"m": 2e5, "alpha": 0.24}, np.array([1.0, 2.0 * np.pi * 100.0]), 0.01)).round()
     array([100000., 469422.])
@@ -39,7 +39,7 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
     """Derivatives of the complex modulus of the springpot by its parameters.
 
     Args:
-        p: parameter values by name: m [Pa*s^alpha], alpha [1].
+        p: parameter values by name: springpot constant m [Pa s^alpha], order alpha [1].
         omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
@@ -54,19 +54,19 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
 
 
 def fractional_derivative(alpha: Value, history: History) -> Array:
-    """Fractional derivative by the Gruenwald-Letnikov sum with full memory, from rest before the first sample.
+    """Fractional derivative of a motion by the Gruenwald-Letnikov sum with full memory, from rest before its start.
 
     Args:
-        alpha: order of the derivative.
+        alpha: order of the derivative [1], a number or (..., 1).
         history: motion over time, (..., n).
 
     Returns:
         D^alpha of the values, (..., n) [unit of the values per s^alpha].
 
     Notes:
-        Eq. 3. First order in the step: (1 - z)^alpha, z = exp(-i omega step), replaces (i omega step)^alpha, which
-        delays by alpha/2 steps. The history's second order multiplies by 1 + alpha/2 (1 - z) against the delay
-        (W. Tian, H. Zhou, W. Deng, Math. Comp. 84 (2015) 1703).
+        Eq. 3 of Garcia Tarrago et al. 2007. It is of first order in the step: (1 - z)^alpha, z = exp(-i omega step),
+        replaces (i omega step)^alpha, which delays by alpha/2 steps. With `history.second_order`, the factor
+        1 + alpha/2 (1 - z) removes the delay (W. Tian, H. Zhou, W. Deng, Math. Comp. 84 (2015) 1703).
 
     >>> fractional_derivative(1.0, History(np.array([0.5, 2.0, 3.0]), 0.5, False, 1.0)).round(6)
     array([1., 3., 2.])
@@ -103,14 +103,14 @@ def stress(p: Values, history: History) -> Array:
     """Stress of the springpot.
 
     Args:
-        p: parameter values by name: m [Pa*s^alpha], alpha [1].
+        p: parameter values by name: springpot constant m [Pa s^alpha], order alpha [1].
         history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
         Stress at each sample [Pa], (..., n).
 
     Notes:
-        s_v = m D^alpha e (Eqs. 1, 3).
+        s = m D^alpha e, with the fractional derivative D^alpha (Garcia Tarrago et al. 2007, Eqs. 1 and 3).
     """
     if history.periodic:
         return linear_stress(modulus, p, history)
@@ -121,7 +121,7 @@ def stress_sensitivities(p: Values, history: History) -> dict[str, Array]:
     """Derivatives of the stress of the springpot by its parameters.
 
     Args:
-        p: parameter values by name: m [Pa*s^alpha], alpha [1].
+        p: parameter values by name: springpot constant m [Pa s^alpha], order alpha [1].
         history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:

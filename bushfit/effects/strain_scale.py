@@ -7,7 +7,7 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
     """Complex stiffness if the strain is `scale` times the strain of the formula.
 
     Args:
-        p: parameter values by name: scale [1].
+        p: parameter values by name: scale [1], strain over that of the formula.
         below: complex stiffness K without this effect, as a function of omega and amplitude.
         omega, amplitude: angular frequency [rad/s] and displacement amplitude X [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -16,7 +16,7 @@ def stiffness(p: Values, below: StiffnessBelow, omega: Array, amplitude: Array, 
         Complex stiffness with the effect [N/m or N m/rad], (..., n).
 
     Notes:
-        K at the amplitude scale X.
+        K at the amplitude scale X: one strain represents an uneven strain field (Garcia Tarrago et al. 2007, Eq. 8).
 
     >>> stiffness({"scale": 2.0}, lambda omega, amplitude: amplitude, 1.0, 1e-4, sweep)  # the amplitude counted
     0.0002
@@ -28,7 +28,7 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     """Force if the strain is `scale` times the strain of the formula.
 
     Args:
-        p: parameter values by name: scale [1].
+        p: parameter values by name: scale [1], strain over that of the formula.
         below: force F without this effect, as a function of the displacement history.
         history: displacement over time [m or rad], (..., n).
         setting: the test: bushing, direction and kind (sweep or loop).
@@ -37,6 +37,6 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
         Force with the effect at each sample [N or N m], (..., n).
 
     Notes:
-        F(scale x)/scale: the stiffness formula is unchanged, but the strain amplitude is scaled.
+        F(scale x)/scale for the displacement x: the strain is scaled, and the stiffness formula is unchanged.
     """
     return below(history.with_value(p["scale"] * history.value)) / p["scale"]

@@ -6,10 +6,10 @@ from bushfit.effects.contract import Array, History, Values
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """Complex modulus of the cubic elastic term.
+    """Complex modulus of the elastic stress that grows with the cube of the strain.
 
     Args:
-        p: parameter values by name: c3 [1], and of the base model mu [Pa].
+        p: parameter values by name: c3 [1], cubic stress coefficient over mu, and static shear modulus mu [Pa].
         omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
@@ -25,16 +25,16 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """Stress of the cubic elastic term.
+    """Elastic stress that grows with the cube of the strain.
 
     Args:
-        p: parameter values by name: c3 [1], and of the base model mu [Pa].
+        p: parameter values by name: c3 [1], cubic stress coefficient over mu, and static shear modulus mu [Pa].
         history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:
         Stress at each sample [Pa], (..., n).
 
     Notes:
-        s = 2 mu c3 e^3.
+        s = 2 mu c3 e^3: second term of O. H. Yeoh, Rubber Chem. Technol. 66 (1993) 754, in simple shear.
     """
     return 2.0 * p["mu"] * p["c3"] * np.square(history.value) * history.value  # a general power takes 20 times as long

@@ -12,15 +12,16 @@ _C1, _C2 = 17.44, 51.6
 
 
 def adjust(p: Values, condition: Condition) -> dict[str, Value]:
-    """Moduli and stresses [Pa] at the temperature of the test.
+    """Change the moduli and stresses from the reference temperature of 23 degC to the temperature of the test.
 
     Args:
-        p: parameter values by name, with all moduli and stresses [Pa], softening [1/K].
-        condition: operating condition, with the temperature T.
+        p: parameter values by name: all moduli and stresses [Pa], and their softening [1/K], relative decrease per
+            kelvin of all but the static shear modulus mu.
+        condition: operating condition, with the temperature T [K].
 
     Returns:
-        mu times T/T0, and all other moduli and stresses times exp(-softening dT), with dT = T - T0 and T0 = 23 degC;
-        empty if the temperature is unknown.
+        The changed values by name: mu times T/T0 (entropy elasticity), all other moduli and stresses times
+        exp(-softening (T - T0)), T0 = 296 K; empty if the temperature is unknown.
     """
     temperature = condition.setting.conditions.temperature
     if temperature is None:
@@ -32,9 +33,14 @@ def adjust(p: Values, condition: Condition) -> dict[str, Value]:
 
 
 def shift_factor(p: Values, conditions: RubberConditions) -> Value:
-    """Time-temperature shift factor a_T; 1 if the temperature is unknown.
+    """Time-temperature shift factor a_T: rubber at angular frequency w responds as at 23 degC and w a_T.
 
-    Rubber at the temperature T and angular frequency w responds as at 23 degC and w a_T.
+    Args:
+        p: parameter values by name: shift [1/K], relative decrease of the relaxation times per kelvin at 23 degC.
+        conditions: conditions of the test, with the temperature [K], a number or (n,).
+
+    Returns:
+        a_T [1], a number or (n,); 1 if the temperature is unknown.
 
     >>> shift_factor({"shift": 0.03}, RubberConditions(temperature=np.array([286.15, 296.15, 306.15]))).round(3)
     array([1.366, 1.   , 0.749])

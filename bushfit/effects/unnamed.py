@@ -20,7 +20,6 @@ from bushfit.effects.contract import (
     Setting,
     StiffnessBelow,
     Values,
-    harmonic_response,
 )
 from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import ModelError
@@ -214,7 +213,7 @@ def first_harmonic(values: Values, below: ForceBelow, displacement: History, set
     """
     force = below(displacement)
     share = _correction(setting, np.atleast_1d(displacement.omega), displacement.amplitude)
-    return force + harmonic_response(share, displacement.with_value(force))
+    return force + np.real(share * displacement.with_value(force).fundamental)
 
 
 EFFECT = Layer(

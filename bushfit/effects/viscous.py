@@ -6,17 +6,17 @@ from bushfit.effects.contract import Array, History, Values, linear_stress
 
 
 def modulus(p: Values, omega: Array, strain: Array) -> Array:
-    """Complex modulus of the dashpot.
+    """Complex modulus of a Newtonian dashpot.
 
     Args:
-        p: parameter values by name: eta [Pa*s].
+        p: parameter values by name: viscosity eta [Pa s].
         omega, strain: angular frequency [rad/s] and amplitude e0 of the tensor shear strain e = gamma/2 [1], (..., n).
 
     Returns:
         Complex modulus of the first harmonic [Pa], (..., n).
 
     Notes:
-        mu^ = i omega eta.
+        mu^ = i omega eta (J. D. Ferry, Viscoelastic Properties of Polymers, 3rd ed., 1980, ch. 1).
 
     >>> complex(modulus({"eta": 100.0}, 10.0, 0.01))
     1000j
@@ -25,10 +25,10 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 
 def stress(p: Values, history: History) -> Array:
-    """Stress of the dashpot.
+    """Stress of a Newtonian dashpot.
 
     Args:
-        p: parameter values by name: eta [Pa*s].
+        p: parameter values by name: viscosity eta [Pa s].
         history: tensor shear strain e = gamma/2 over time [1], (..., n).
 
     Returns:

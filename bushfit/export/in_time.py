@@ -155,7 +155,8 @@ def _values(
         model.values_at(prediction.direction, *middle_point(prediction), request.conditions)
         for prediction in request.predictions
     ]
-    fitted_sizes, sizes = {part.size for part in arms}, {qualified_size(branch) for branch in model.viscoelastic}
+    fitted_sizes = {part.size for part in arms}
+    sizes = {qualified_size(branch) for branch in model.structure.viscoelastic}
     values: dict[FmuValue, None] = {}
     names = [dict[str, str]() for _ in places]
     for effect in model.records:

@@ -132,9 +132,7 @@ def profile95(best: FitResult, covariance: Covariance) -> Mapping[str, Interval]
         )
     start, limits = best.coordinates.point(best.model.values), np.transpose(best.problem.limits)
     linear = linear_errors(best.jacobian)
-    half = np.array(
-        [covariance.half_width_of(name) if name in covariance.names else 0.0 for name in names]
-    )  # 0 of one at a bound
+    half = np.array([covariance.half_widths.get(name, 0.0) for name in names])  # 0 of one at a bound
     # how far a model error, or a gain of a loop that the weights do not contain, bends parameters, no weight tells
     loops, _ = split_by_kind(best.minimised)
     missed = any(test.model_error for test in best.minimised) or not all(loop.gain_weighs for loop in loops)

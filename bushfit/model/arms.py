@@ -155,7 +155,7 @@ def model_arms(
         Arms of each part.
     """
     parts: dict[str, list[str]] = {}
-    for branch in model.viscoelastic:
+    for branch in model.structure.viscoelastic:
         parts.setdefault(qualified_size(branch), []).append(branch.name)
     found = (
         fitted_arms(
@@ -172,7 +172,9 @@ def model_arms(
 
 
 def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float]]:
-    """Rows of a table of Maxwell arms: effect name, modulus [Pa], relaxation time [s]; first the elastic spring (nan).
+    """Rows of a table of Maxwell arms: name of the replaced effect, modulus [Pa] and relaxation time [s] of each arm.
+
+    The first row is the elastic branch, if the model has one, with the relaxation time nan.
 
     >>> [row[0] for row in arm_rows(paper, model_arms(paper, (5.0, 155.0)))]
     ['elastic', 'springpot', 'springpot', 'springpot', 'springpot']
@@ -207,7 +209,7 @@ def part_modulus(model: Model, size: str, omega: Array, conditions: RubberCondit
         values_under(model, conditions),
         omega * model.shift_factor(conditions),
     )
-    branches = (branch for branch in model.viscoelastic if qualified_size(branch) == size)
+    branches = (branch for branch in model.structure.viscoelastic if qualified_size(branch) == size)
     return np.asarray(sum(branch.modulus(values_for_effect(branch, values), reduced, still) for branch in branches))
 
 

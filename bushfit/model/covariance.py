@@ -29,7 +29,7 @@ class Covariance:
             matrix per figure.
 
     >>> known = Covariance(("mu", "m"), np.array([[4.0, 3.0], [3.0, 9.0]]))
-    >>> known.stderr("m"), known.correlations(), round(known.half_width_of("mu"), 2)
+    >>> known.stderr("m"), known.correlations(), round(known.half_widths["mu"], 2)
     (3.0, [('mu', 'm', 0.5)], 3.92)
     """
 
@@ -64,12 +64,9 @@ class Covariance:
         """
         return stdtrit(self.freedom(slopes), 0.975) * np.linalg.norm(self.root.T @ slopes, axis=0)
 
-    def half_width_of(self, name: str) -> float:
-        """Half width of the 95 % interval of the named parameter [its SI unit]."""
-        return self._halves[name]
-
     @cached_property
-    def _halves(self) -> dict[str, float]:
+    def half_widths(self) -> dict[str, float]:
+        """Half width of the 95 % interval of each parameter [its SI unit], by name."""
         return dict(zip(self.names, self.half_width(np.eye(len(self.names))).tolist(), strict=True))
 
     def describe_unknown(self, values: Mapping[str, float]) -> str:
@@ -78,7 +75,7 @@ class Covariance:
         Parameters of the effect `preload` are not named: they are coefficients of one curve, and have no meaning alone.
         """
         names = [name for name in self.names if not name.startswith("preload.")]
-        unknown = ", ".join(name for name in names if self.half_width_of(name) >= abs(values[name]))
+        unknown = ", ".join(name for name in names if self.half_widths[name] >= abs(values[name]))
         return unknown and f"the tests leave {unknown} open (unknown by 100 % or more)"
 
     def freedom(self, slopes: Array) -> Array:

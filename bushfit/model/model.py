@@ -18,7 +18,7 @@ from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
 from bushfit.geometry import STRAINING, Bushing, Direction, Place
 from bushfit.model.constraints import UNCONSTRAINED, Constraints
-from bushfit.model.stack import adjusted_values, branch_stiffness, layered_stiffness, rubber_stiffness, stack_force
+from bushfit.model.stack import adjusted_values, stack_force, stack_stiffness
 from bushfit.model.structure import Structure, values_for_effect
 from bushfit.units import display_unit
 
@@ -93,6 +93,7 @@ class Model:
 
     @cached_property
     def structure(self) -> Structure:
+        """Effects of the model sorted by kind (branches, modifiers, layers), with their parameters; cached."""
         return Structure.from_names(self.effects)
 
     @property
@@ -104,11 +105,6 @@ class Model:
     def parameters(self) -> Mapping[str, Parameter]:
         """Definitions (unit, bounds, meaning) of all parameters, by name in files and reports."""
         return self.structure.parameters
-
-    @property
-    def viscoelastic(self) -> tuple[Branch, ...]:
-        """Linear viscoelastic branches, such as the springpot, which Maxwell arms can replace."""
-        return self.structure.viscoelastic
 
     @property
     def without_time_law(self) -> list[str]:
@@ -150,7 +146,7 @@ class Model:
         return any(effect.is_transient for effect in self.records)
 
     def depends_on(self, condition: str) -> bool:
-        """True if the response depends on a condition of the test: "temperature", "preload" or a strain history."""
+        """True if the response depends on a condition of the test, named as in `RubberConditions`: "temperature"."""
         return any(condition in effect.depends_on for effect in self.records)
 
     @property
@@ -315,14 +311,7 @@ class Model:
             omega, amplitude = np.broadcast_arrays(omega, amplitude)
         points, setting = np.atleast_1d(omega), self.setting(direction, kind, conditions)
         values = self.values if values is None else values
-        amplitude = np.atleast_1d(amplitude)
-        if layers := self.layers(setting):
-            stiffness = layered_stiffness(self, setting, values, layers, points, amplitude)
-        elif self.structure.modifiers:
-            stiffness = rubber_stiffness(self, setting, values, points, amplitude)
-        else:
-            strain = amplitude * self.unit_strain(setting.direction)
-            stiffness = branch_stiffness(self, setting, values, points, strain, values)
+        stiffness = stack_stiffness(self, setting, values, self.layers(setting), points, np.atleast_1d(amplitude))
         if stiffness.shape[-points.ndim :] != points.shape:
             stiffness = stiffness + np.zeros(points.shape)
         return stiffness if omega.ndim else stiffness[..., 0]

@@ -374,7 +374,7 @@ class Result:
         if stderr is None:
             return None
         parameter = self.model.parameters[name]
-        half = self.covariance.half_width_of(name)
+        half = self.covariance.half_widths[name]
         low, high = value - half, value + half
         if parameter.log and value > 0.0:
             factor = float(np.exp(min(half / value, _LARGEST_EXPONENT)))

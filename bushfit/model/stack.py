@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from bushfit.model.model import Model
 
 
-def layered_stiffness(
+def stack_stiffness(
     model: Model, setting: Setting, values: Values, layers: Sequence[Layer], omega: Array, amplitude: Array
 ) -> Array:
     """Complex stiffness in a test of the rubber and the layers around it, such as the rig.
@@ -35,9 +35,6 @@ def layered_stiffness(
         Complex stiffness [N/m or N m/rad], (..., n).
     """
     groups = in_groups(layers)
-    per_sample = {
-        name: value if np.ndim(value) == 0 else np.asarray(value)[..., None] for name, value in values.items()
-    }
 
     def below(count: int) -> StiffnessBelow:
         """Build the functions for the steady response of the rubber and its `count` innermost groups of layers.
@@ -57,6 +54,9 @@ def layered_stiffness(
                 motion: displacement [m] or rotation [rad] over a cycle, (..., k, n).
                 points: numpy index of these k operating points in the test.
             """
+            per_sample = {
+                name: value if np.ndim(value) == 0 else np.asarray(value)[..., None] for name, value in values.items()
+            }
             cycles = replace(setting, conditions=setting.conditions.select(points).select((..., None)))
             force = stack_force(model, cycles, per_sample, [layer for group in groups[:count] for layer in group])
             return force(History.steady(motion, cast(float, omega[..., None] / (2.0 * np.pi))))
