@@ -156,18 +156,26 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
         for place, row in document["stiffness"].items()
     )
     runs = f"{len(document['tests'])} runs in {hours} h"
-    output.print(f"{runs} reduce the standard error of the stiffness: {', '.join(gains)}")
+    result = outcome.plan.knowledge.result
+    misses = result is not None and result.model_error is not None
+    condition, included = (", if the model were right", ", model error included") if misses else ("", "")
+    output.print(f"{runs} reduce the standard error of the stiffness{included}: {', '.join(gains)}")
     output.print(f"starting point: {document['source']}")
     _print_tests(output, outcome)
     standard = f"standard, {number(document['hours_standard'], 3)} h"
     error_columns = ("quantity", "before", f"plan, {number(document['hours_planned'], 3)} h", standard)
-    rows = {**document["parameters"], **{f"stiffness, {place}": row for place, row in document["stiffness"].items()}}
-    rows |= {f"loss factor, {place} [0.01]": row for place, row in document["loss_factor"].items()}
+    rows = {f"{name}{condition}": row for name, row in document["parameters"].items()}
+    rows |= {f"stiffness, {place}{included}": row for place, row in document["stiffness"].items()}
+    rows |= {f"loss factor, {place} [0.01]{included}": row for place, row in document["loss_factor"].items()}
     title = "standard errors [%]: before these tests, after the plan, and after the standard programme"
     output.print_table(title, error_columns, _percents(rows, ("before", "planned", "standard")))
     if targets := document["targets"]:
         sizes = _percents(targets, ("asked", "before", "planned", "standard"))
-        met = ("met" if target["met"] else "not met" for target in targets.values())
+        parameters = document["parameters"]
+        met = (
+            ("met" if target["met"] else "not met") + (condition if name in parameters else "")
+            for name, target in targets.items()
+        )
         columns = ("quantity", "asked for", "before", "plan", "standard", "")
         title = "targets: half width of the 95 % interval at the widest point [%]"
         output.print_table(title, columns, [(*row, verdict) for row, verdict in zip(sizes, met, strict=True)])
@@ -190,12 +198,12 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
 def _print_tests(output: Output, outcome: PlanOutput) -> None:
     """Print a table of the planned tests with the number of runs of each."""
     from bushfit.campaign.simulated import SimulatedLoop
-    from bushfit.planning.contract import motions
+    from bushfit.planning.contract import amplitudes_and_frequencies
 
     programme, rows = outcome.plan.planned, []
     for test, runs in Counter(programme.tests).items():
         unit, factor = test.direction.display.displacement
-        sizes, rates = motions(test)
+        sizes, rates = amplitudes_and_frequencies(test)
         kind = f"loop, {test.cycles} cycles" if isinstance(test, SimulatedLoop) else f"sweep over {test.stepped}"
         motion = f"{_listed(sizes, factor)} {unit}", _listed(rates, 1.0)
         rows.append((str(test.direction), kind, *motion, str(runs)))
@@ -220,7 +228,10 @@ def _print_effects(output: Output, document: PlanFile) -> None:
     ratios = {name: (row["standard"] or math.inf) / (row["planned"] or math.inf) for name, row in amounts_of.items()}
     ranked = sorted(amounts_of.items(), key=lambda item: ratios[item[0]])
     printed = ranked if output.verbose else ranked[:_MOST_EFFECTS]
-    title = f"smallest amount that is detected in nine of ten cases, for {len(printed)} of {len(ranked)} effects"
+    title = (
+        "smallest amount that is detected in nine of ten cases and exceeds the accuracy class of the rig, for "
+        f"{len(printed)} of {len(ranked)} effects"
+    )
     rows = []
     for name, amounts in printed:
         sizes = [amounts["planned"], amounts["standard"]]

@@ -19,7 +19,7 @@ from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import NEXT
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.planning.knowledge import look_alikes
+from bushfit.planning.knowledge import undecided_effects
 from bushfit.prediction.validation import Validation, validate
 from bushfit.report import diagnosed, plots
 from bushfit.report.page.report import report_page
@@ -176,7 +176,7 @@ def _with_plan(diagnosis: Diagnosis, campaign: Campaign) -> Diagnosis:
         campaign: campaign of the diagnosis.
     """
     path = campaign.path
-    if diagnosis.verdict != "ambiguous" or path.suffix != ".toml" or not (sets := look_alikes(diagnosis)):
+    if diagnosis.verdict != "ambiguous" or path.suffix != ".toml" or not (sets := undecided_effects(diagnosis)):
         return diagnosis
     printed_path = Path(path.name) if path.is_absolute() else path  # results hold no path of a machine
     command = f"bushfit plan {quote_path(printed_path)} --rivals {','.join(sets[0])}"

@@ -22,7 +22,7 @@ from bushfit.planning.campaign import campaign_toml
 from bushfit.planning.compound import guess_parameters
 from bushfit.planning.contract import Aim, Knowledge, Plan, PlanRequest, Points, Target, Test, operating_points
 from bushfit.planning.document import PlanFile, plan_document
-from bushfit.planning.knowledge import from_campaign, from_result, rig_of
+from bushfit.planning.knowledge import from_campaign, from_result, with_rig_class
 from bushfit.planning.plan import plan as choose_tests
 from bushfit.prediction.grid import default_grid, grid_settings, requested_grid
 from bushfit.report.results import ResultFile
@@ -112,7 +112,7 @@ def plan(
     places = tuple(place for name in test_directions for place in get_places(name, specimens)) or tuple(default)
     grid = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
     points = tuple(_wanted_points(Result(knowledge.model, specimens=knowledge.specimens), grid, campaign, default))
-    rig = rig_of(campaign.rig if campaign else RigSettings(), knowledge.noise)
+    rig = with_rig_class(campaign.rig if campaign else RigSettings(), knowledge.noise)
     named = (_targets(name, half, knowledge, points) for name, half in (targets or {}).items())
     wanted = tuple(chain.from_iterable(named))
     request = PlanRequest(aim, hours, rig, places, points, tuple(parameters) or knowledge.names, wanted)

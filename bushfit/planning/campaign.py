@@ -1,4 +1,4 @@
-"""A plan on the virtual rig: the campaign that `bushfit simulate` runs."""
+"""Campaign file of a plan, with which `bushfit simulate` computes the planned tests."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -29,11 +29,11 @@ _UNITS: Mapping[str, str | None] = {
 }
 
 
-def settings_of(tests: Sequence[Test], noise: Noise, seed: int = 0) -> SimulateSettings:
-    """Convert planned tests to the settings of `bushfit simulate`; repeated sweeps become one sweep with repeats.
+def simulation_settings(tests: Sequence[Test], noise: Noise, seed: int = 0) -> SimulateSettings:
+    """Convert planned tests to the settings of `bushfit simulate`.
 
     Args:
-        tests: runs of the plan.
+        tests: runs of the plan; equal sweeps become one sweep with repeats.
         noise: measurement errors of the rig.
         seed: seed of the random numbers.
 
@@ -60,7 +60,7 @@ def settings_of(tests: Sequence[Test], noise: Noise, seed: int = 0) -> SimulateS
 
 
 def campaign_toml(plan: Plan, seed: int = 0) -> str:
-    """Write the planned tests as a campaign file for `bushfit simulate`.
+    """Format the planned tests as a campaign file for `bushfit simulate`.
 
     Args:
         plan: planned tests, and the model that the simulation uses.
@@ -69,19 +69,19 @@ def campaign_toml(plan: Plan, seed: int = 0) -> str:
     Returns:
         Text of the TOML file.
     """
-    knowledge, settings = plan.knowledge, settings_of(plan.planned.tests, plan.knowledge.noise, seed)
+    knowledge, settings = plan.knowledge, simulation_settings(plan.planned.tests, plan.knowledge.noise, seed)
     tested = [test.direction for test in plan.planned.tests]
     lines = [
         "# Planned by bushfit plan; bushfit simulate computes these tests from the model below. No rubber was tested.",
         "# All repeats of a sweep follow each other here; the order on the rig is that of the sheet.",
         *body_lines(knowledge.model.bushing, dict.fromkeys(place for place in tested if isinstance(place, Specimen))),
-        *("", "[simulate]", *(_line(key, getattr(settings, key)) for key in _SETTINGS)),
+        *("", "[simulate]", *(_toml_line(key, getattr(settings, key)) for key in _SETTINGS)),
         *("", "[simulate.parameters]"),
     ]
     for record in knowledge.model.records:
         lines += [] if record.name in BASE else ["", f"[simulate.effects.{toml_value(record.name)}]"]
         for parameter in record.parameters:
-            value = _number(knowledge.model.values[qualified_name(record, parameter)])
+            value = _twelve_digits(knowledge.model.values[qualified_name(record, parameter)])
             text = value if parameter.unit == "1" else toml_value(f"{value} {parameter.unit}")
             lines.append(f"{parameter.name} = {text}")
     for kind, tests in (("loops", settings.loops), ("sweeps", settings.sweeps)):
@@ -90,12 +90,12 @@ def campaign_toml(plan: Plan, seed: int = 0) -> str:
             for key in fields(test):  # values other than the default
                 value = getattr(test, key.name)
                 if key.name not in ("direction", "temperature") and value != key.default:
-                    lines.append(_line(key.name, value, test))
+                    lines.append(_toml_line(key.name, value, test))
     return "\n".join(lines) + "\n"
 
 
-def _line(key: str, value: Any, test: Test | None = None) -> str:
-    """Write one TOML line of a campaign file, with a unit if the key needs one.
+def _toml_line(key: str, value: Any, test: Test | None = None) -> str:
+    """Format one line of a campaign file, with a unit if the key needs one.
 
     Args:
         key: key of the line.
@@ -104,15 +104,15 @@ def _line(key: str, value: Any, test: Test | None = None) -> str:
     """
     if key not in _UNITS:
         share = isinstance(value, float)
-        return f"{key} = {toml_value(f'{_number(100.0 * value)} %') if share else toml_value(value)}"
+        return f"{key} = {toml_value(f'{_twelve_digits(100.0 * value)} %') if share else toml_value(value)}"
     unit, factor = _UNITS[key], 1.0
     if unit is None and test:
         unit, factor = test.direction.display.displacement
     values: Iterable[float] = value if isinstance(value, tuple) else (value,)
-    texts = [toml_value(f"{_number(factor * number)} {unit}") for number in values]
+    texts = [toml_value(f"{_twelve_digits(factor * number)} {unit}") for number in values]
     return f"{key} = [{', '.join(texts)}]" if isinstance(value, tuple) else f"{key} = {texts[0]}"
 
 
-def _number(value: float) -> str:
+def _twelve_digits(value: float) -> str:
     """Format a number with twelve digits, which hides the rounding errors of unit conversions."""
     return f"{value:.12g}"

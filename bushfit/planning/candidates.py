@@ -14,8 +14,6 @@ from bushfit.planning.contract import Knowledge, PlanRequest, Test, operating_po
 from bushfit.simulation.undisturbed import PAPER_LOOPS, PAPER_SWEEPS
 from bushfit.units import number
 
-#: Time to bring the rig to another run, for its control to settle [s]; chosen.
-_RUN_SECONDS = 120.0
 #: Cycles of the candidate loops: few, and enough to make the noise of the rows negligible.
 _LOOP_CYCLES = (3, 20)
 #: Indices of the frequencies of candidate sweeps among ten, which are six in equal ratios, three near the top, and the
@@ -36,23 +34,16 @@ _FREQUENCY_CHOICES = (
 _PAPER_STRAIN = float(1.0 / np.sqrt(2.0 * (0.018**2 - 0.010**2) * np.log(1.8)))
 
 
-def run_minutes(test: Test, rig: RigSettings) -> float:
-    """Duration of one run [min] without a change of direction before it."""
-    if isinstance(test, SimulatedLoop):
-        return (_RUN_SECONDS + test.cycles / test.frequency) / 60.0
-    per_point = rig.minutes_per_point or 30.0  # [s], chosen: some cycles to settle, and some to average
-    return (_RUN_SECONDS + per_point * test.points[0].size) / 60.0
-
-
 def standard_tests(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
-    """List the runs of the standard programme: the tests of the paper, scaled to the bushing or specimens.
+    """List the runs of the standard programme, with which a plan is compared: the paper's tests of its bushing.
 
     Args:
         knowledge: model of the bushing or specimens.
         request: limits of the rig, and the specimens if there is no bushing.
 
     Returns:
-        Each run once: axial loops and sweeps and radial sweeps of a bushing, or loops and sweeps of each specimen.
+        Each run once, at the strains of the paper: axial loops and sweeps and radial sweeps of a bushing, or loops and
+        sweeps of each specimen.
     """
     if knowledge.model.bushing is None:
         return [test for place in request.places for test in paper_tests(knowledge, request.rig, place)]
@@ -61,7 +52,7 @@ def standard_tests(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
 
 
 def paper_tests(knowledge: Knowledge, rig: RigSettings, place: Place) -> list[Test]:
-    """List the paper's loops and axial sweeps in a direction, with one run for each amplitude.
+    """List the paper's axial loops and sweeps, converted to another direction, with one run for each amplitude.
 
     Args:
         knowledge: model of the bushing or specimens.
@@ -77,21 +68,24 @@ def paper_tests(knowledge: Knowledge, rig: RigSettings, place: Place) -> list[Te
         scale = _PAPER_STRAIN / tube.unit_strain(Direction.AXIAL)
     sweep = PAPER_SWEEPS[0]
     tests: list[Test] = [
-        *(replace(loop, direction=place, amplitude=_set_point(loop.amplitude * scale)) for loop in PAPER_LOOPS),
-        *(replace(sweep, direction=place, amplitudes=(_set_point(x * scale),)) for x in sweep.amplitudes),
+        *(
+            replace(loop, direction=place, amplitude=_round_to_set_point(loop.amplitude * scale))
+            for loop in PAPER_LOOPS
+        ),
+        *(replace(sweep, direction=place, amplitudes=(_round_to_set_point(x * scale),)) for x in sweep.amplitudes),
     ]
-    return _possible_tests(knowledge, rig, tests)
+    return _tests_within_limits(knowledge, rig, tests)
 
 
 def candidates(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
-    """List the candidate tests: the standard programme, and sweeps and loops of few points over a wider range.
+    """List the runs from which a plan chooses: the standard programme, and sweeps of few points and loops.
 
     If [rig] states a sufficient max_frequency, frequencies reach twice those of the standard programme: a few points
     near the highest frequency reveal masses, delays and resonances.
 
     Args:
         knowledge: model that predicts forces and strains.
-        request: limits of the rig, directions and wanted operating points.
+        request: limits of the rig, directions, and operating points of the predictions.
 
     Returns:
         Candidate runs, each once.
@@ -109,16 +103,16 @@ def candidates(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
         wanted = [points for points in request.points if points.place == place]
         sizes = np.concatenate([*(points.amplitude for points in wanted), *(test.amplitudes for test in standard)])
         rates = np.concatenate([*(points.frequency for points in wanted), *(test.frequencies for test in standard)])
-        amplitudes = [_set_point(x) for x in np.geomspace(sizes.min(), 2.0 * sizes.max(), 6)]
+        amplitudes = [_round_to_set_point(x) for x in np.geomspace(sizes.min(), 2.0 * sizes.max(), 6)]
         top = min(2.0 * float(rates.max()), rig.max_frequency or float(rates.max()))
         even = np.geomspace(0.2 * rates.min(), top, 7)
-        frequencies = [min(_set_point(f), top) for f in (*even[:-1], 0.7 * top, 0.8 * top, 0.9 * top, top)]
+        frequencies = [min(_round_to_set_point(f), top) for f in (*even[:-1], 0.7 * top, 0.8 * top, 0.9 * top, top)]
         steps = [tuple(sorted({frequencies[i] for i in chosen})) for chosen in _FREQUENCY_CHOICES]
         further: list[Test] = [SimulatedSweep(place, (x,), stepped) for x in amplitudes for stepped in steps]
         further += [SimulatedSweep(place, tuple(amplitudes), (frequencies[i],), "amplitude") for i in (0, 2, 4, 9)]
         # quasi-static loops, and as fast as most rigs still record
         further += [SimulatedLoop(place, x, f, n) for x in amplitudes for f in (0.1, 1.0) for n in _LOOP_CYCLES]
-        runs += _possible_tests(knowledge, rig, further)
+        runs += _tests_within_limits(knowledge, rig, further)
     if not runs:
         places = " and ".join(map(str, request.places))
         raise ModelError(
@@ -130,13 +124,16 @@ def candidates(knowledge: Knowledge, request: PlanRequest) -> list[Test]:
     return list(dict.fromkeys(runs))
 
 
-def _possible_tests(knowledge: Knowledge, rig: RigSettings, tests: Sequence[Test]) -> list[Test]:
-    """Remove loops and sweep steps beyond the limits of the rig or the rubber, then sweeps of fewer than two steps.
+def _tests_within_limits(knowledge: Knowledge, rig: RigSettings, tests: Sequence[Test]) -> list[Test]:
+    """Select the loops and the steps of sweeps within the limits of rig and rubber.
 
     Args:
         knowledge: model that predicts forces and strains.
         rig: limits of the rig.
         tests: runs to check.
+
+    Returns:
+        Loops, and sweeps of at least two steps.
     """
     possible: list[Test] = []
     for test in tests:
@@ -153,13 +150,13 @@ def _possible_tests(knowledge: Knowledge, rig: RigSettings, tests: Sequence[Test
     return possible
 
 
-def _set_point(value: float) -> float:
+def _round_to_set_point(value: float) -> float:
     """Round a value to two significant digits."""
     return float(f"{value:.2g}")
 
 
 def unlimited_rig_warning(knowledge: Knowledge, rig: RigSettings, tests: Sequence[Test]) -> str | None:
-    """Write a warning with the velocity, acceleration and force that a plan reaches if [rig] states no limits.
+    """Warning on the velocity, acceleration and force that a plan reaches if [rig] states no limits.
 
     Args:
         knowledge: model that predicts the forces.
@@ -167,7 +164,7 @@ def unlimited_rig_warning(knowledge: Knowledge, rig: RigSettings, tests: Sequenc
         tests: runs of the plan.
 
     Returns:
-        The sentence; None if [rig] states a limit, or the plan has no test with a displacement.
+        Sentence; None if [rig] states a limit, or the plan has no test with a displacement.
     """
     points = [(test.direction, *operating_points(test)) for test in tests if test.direction.motion is TRANSLATION]
     if not points or any((rig.max_force, rig.max_displacement, rig.max_velocity, rig.max_frequency)):

@@ -16,7 +16,7 @@ _BLACK_DENSITY = 1.8
 _DENSITY = {"natural": 0.92, "SBR": 0.94, "EPDM": 0.86, "NBR": 1.0, "CR": 1.23, "IIR": 0.92}
 #: Filler of the paper's compound [phr].
 _PAPER_FILLER = 27.0
-#: Angular frequency that a reading of a durometer after 3 s stands for [rad/s]: its inverse.
+#: Angular frequency that corresponds to a durometer reading after 3 s [rad/s]: the inverse of the time.
 _READING = 1.0 / 3.0
 #: Angular frequency at which springpot and spring are compared, 10 Hz [rad/s]: the middle of usual sweeps.
 _MIDDLE = 2.0 * np.pi * 10.0
@@ -28,10 +28,10 @@ _ORDER = 0.24
 _FRICTION = 0.515
 #: Strain at half of the friction, from Table 1.
 _HALF_STRAIN = 0.013
-#: Power of the filler's volume share with which its network stiffens; Heinrich and Klueppel 2002: 3.5.
+#: Exponent of the filler's volume fraction in the stiffness of the filler network; Heinrich and Klueppel 2002: 3.5.
 _NETWORK = 3.5
-#: Volume share of filler at least: the little friction of rubber without filler.
-_LEAST_SHARE = 0.02
+#: Smallest volume fraction of filler, for the slight friction of rubber without filler.
+_MINIMUM_FRACTION = 0.02
 #: Standard deviation of a stated hardness [Shore A]: compounds are sold within 5 degrees, which is taken for 95 %.
 _HARDNESS_ERROR = 2.5
 #: Standard deviation of ln G at a known hardness; chosen: relations between hardness and modulus differ by some 20 %,
@@ -42,31 +42,31 @@ _MODULUS_ERROR = 0.2
 _SHAPE_ERRORS = np.array([0.45, 0.27, 0.5, 0.4])
 #: The same in other rubbers, larger because the numbers come from natural rubber; a measured EPDM has alpha below 0.1.
 _OTHER_ERRORS = np.array([0.7, 0.5, 0.7, 0.5])
-#: Standard deviation of the power `_NETWORK`: carbon blacks differ in it.
+#: Standard deviation of the exponent `_NETWORK`, which differs between carbon blacks.
 _NETWORK_ERROR = 1.0
 
 
 def gent_modulus(shore: float) -> float:
-    """Shear modulus [Pa] of a rubber from its Shore A hardness: a third of Young's modulus by Gent (1958)."""
+    """Shear modulus [Pa] of a rubber of Shore A hardness `shore`: a third of Young's modulus by Gent (1958)."""
     return 1e6 * 0.0981 * (56.0 + 7.66 * shore) / (0.137505 * (254.0 - 2.54 * shore)) / 3.0
 
 
 def guess_parameters(bushing: Bushing, compound: Compound) -> Knowledge:
-    """Guess the parameters of a rubber that was not tested, with their uncertainty, from hardness and filler.
+    """Estimate the parameters of a rubber that was not tested, with their uncertainty, from hardness and filler.
 
     Args:
         bushing: geometry of the bushing.
         compound: hardness [Shore A], carbon black [phr] and polymer.
 
     Returns:
-        Knowledge with the estimates of the five parameters (mu, m, alpha, sigma_fmax, eps_half) and their covariance.
+        Starting point of a plan: estimates of mu, m, alpha, sigma_fmax and eps_half, and their covariance.
 
     Notes:
-        The laws of the guess:
+        The laws of the estimate:
 
             E   = 0.0981 (56 + 7.66 S) / (0.137505 (254 - 2.54 S)) MPa, S in Shore A               (Gent 1958)
-            G   = E/3 = mu + Re m/2 (i omega_S)^alpha        a durometer is read some seconds after it is put down
-            phi = (n/1.8) / (n/1.8 + 100/density)            volume share of n phr of carbon black
+            G   = E/3 = mu + Re m/2 (i omega_S)^alpha        omega_S = 1/(3 s): reading time of a durometer
+            phi = (n/1.8) / (n/1.8 + 100/density)            volume fraction of n phr of carbon black
             X   = 1 + 2.5 phi + 14.1 phi^2                   strain of the rubber between particles   (Guth 1945)
             q   = m/2 omega_0^alpha / mu = 0.25, alpha = 0.24               omega_0 = 2 pi 10 Hz
             r   = sigma_fmax/(2 eps_half mu) = 0.515 (phi/phi_0)^3.5 X_0/X                             (Payne effect)
@@ -87,7 +87,7 @@ def guess_parameters(bushing: Bushing, compound: Compound) -> Knowledge:
     """
     filler = np.array([compound.filler, _PAPER_FILLER]) / _BLACK_DENSITY  # of the compound and of the paper's
     polymer = 100.0 / np.array([_DENSITY[compound.rubber], _DENSITY["natural"]])
-    share, paper_share = phi = np.maximum(filler / (filler + polymer), _LEAST_SHARE)
+    share, paper_share = phi = np.maximum(filler / (filler + polymer), _MINIMUM_FRACTION)
     amplified, paper_amplified = 1.0 + 2.5 * phi + 14.1 * phi**2
     strained = float(paper_amplified / amplified)
     modulus, more = gent_modulus(compound.hardness), float(np.log(share / paper_share))

@@ -1,8 +1,8 @@
 """Records of a plan: the knowledge before it, its aim, and the expected results of tests.
 
-A test is one run of the rig: a stepped sine that holds one amplitude or one frequency (`SimulatedSweep`), or a loop
-(`SimulatedLoop`). A repeated test is listed again: the points of each run share their own errors. Standard errors
-are of relative changes of parameters, as `fitting.information` counts them.
+A test is one run of the rig: a stepped sine at one amplitude or one frequency (`SimulatedSweep`), or a hysteresis loop
+(`SimulatedLoop`). A repeated test is listed again. Standard errors of parameters are those of relative changes (ln of
+the value). A place is a direction of the bushing or a specimen of its compound.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from bushfit.model.result import Result
 
 #: What a plan is for.
 Aim = Literal["parameters", "predictions", "rivals", "targets"]
-#: One run of the rig: a sweep has one amplitude and several frequencies, or one frequency and several amplitudes.
+#: One run of the rig.
 Test = SimulatedLoop | SimulatedSweep
 
 
 def operating_points(test: Test) -> tuple[Array, Array]:
-    """Frequency [Hz] and zero-to-peak amplitude [m, rad or strain] of each of the n points of a test, (n,) each."""
+    """Frequency [Hz] and zero-to-peak amplitude [m, rad or strain] at each of the n points of a test, (n,) each."""
     if isinstance(test, SimulatedLoop):
         frequency, amplitude = np.array(test.parts).T
         return frequency, amplitude
@@ -36,7 +36,7 @@ def operating_points(test: Test) -> tuple[Array, Array]:
     return frequency.ravel(), amplitude.ravel()
 
 
-def motions(test: Test) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def amplitudes_and_frequencies(test: Test) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Distinct zero-to-peak amplitudes [m, rad or strain] and frequencies [Hz] of a test, in that order."""
     if isinstance(test, SimulatedLoop):
         return (test.amplitude,), (test.frequency,)
@@ -51,9 +51,9 @@ class Noise:
 
     Args:
         scatter: independent error of each point of a sweep, (gain, phase).
-        shared: error shared by all points of one run, (gain, phase).
-        level: error shared by all runs of one test, (gain, phase): the accuracy class of the rig. A loop has its gain
-            only. A fit takes this error from [rig] and treats it as noise of loops and repeated sweeps.
+        shared: error that all points of one run have in common, (gain, phase).
+        level: error that all repeats of a test have in common, (gain, phase): the accuracy class of the rig, as stated
+            in [rig]. Of a loop, only the gain is used.
         force: error of one recorded row of a loop over half the force range, at 1000 rows per cycle as in `simulate`.
             The default is chosen: that of most force sensors.
         rows_as_one: number of correlated rows of a loop with the information of one independent row. The default is
@@ -69,7 +69,7 @@ class Noise:
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """Knowledge of the model and its parameters before the planned tests: the prior of the plan.
+    """Model, parameter covariance and rig noise before the planned tests: the prior of a plan.
 
     Args:
         model: model with its likeliest parameter values.
@@ -77,12 +77,12 @@ class Knowledge:
         covariance: covariance of the relative changes of the k parameters and of the b bounded ones, (k + b, k + b).
         source: origin of the knowledge, as a phrase.
         noise: measurement errors of the rig.
-        rivals: knowledge for each rival model, this model first. Rival models explain the tests so far equally well,
-            each by another effect; empty if there is no doubt.
+        rivals: the same for each rival model, this model first; empty if there is no doubt. Rival models explain the
+            tests so far equally well, each by another effect.
         probability: probability of this model among its rivals.
         strain: largest equivalent strain amplitude measured so far [1]; None if there are no tests.
         specimens: specimens of the compound that can be tested in place of the bushing.
-        tests: tests of the campaign so far.
+        tests: runs of the campaign so far.
         bounded: names of the b parameters that the fit has at a bound; their changes are in units of typical values.
         warnings: warnings of the fit.
         result: result of the fit; None for an estimate without tests.
@@ -103,16 +103,11 @@ class Knowledge:
     result: Result | None = None
 
     @property
-    def errors(self) -> Array:
-        """Standard error of each parameter's relative change, (k,)."""
-        return np.sqrt(np.diag(self.covariance))[: len(self.names)]
-
-    @property
     def precision(self) -> Array:
-        """Information matrix of the prior: inverse of `covariance` plus a weak prior (a factor of 20), (k + b, k + b).
+        """Fisher information before the planned tests: inverse of `covariance` plus a weak prior, (k + b, k + b).
 
-        Notes: parameters that the tests do not determine have errors of a thousand times their value; without the weak
-        prior, rounding errors would swamp all other parameters.
+        Notes: the weak prior allows a factor of 20 of each parameter. Parameters that the tests do not determine have
+        errors of a thousand times their value, and rounding errors would swamp all other parameters.
         """
         size = np.sqrt(np.diag(self.covariance))
         values, vectors = np.linalg.eigh(self.covariance / np.outer(size, size))
@@ -122,7 +117,7 @@ class Knowledge:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Operating points of one direction at which the plan shall predict the stiffness.
+    """Operating points at which a plan reports the standard error of the predicted stiffness, in one direction.
 
     Args:
         place: direction of the bushing, or specimen.
@@ -137,12 +132,12 @@ class Points:
 
 @dataclass(frozen=True)
 class Target:
-    """Accuracy that a plan shall reach: largest allowed 95 % interval of a parameter or of a prediction.
+    """Accuracy that a user asks a plan to reach: largest 95 % interval of a parameter or of a prediction.
 
     Args:
         quantity: name of a parameter, or "stiffness" or "loss_factor".
-        half_width: largest allowed half width of the 95 % interval, relative to the value; for a prediction, at every
-            operating point of the request.
+        half_width: largest half width of the 95 % interval, relative to the value; for a prediction, at every operating
+            point of the request.
         place: direction or specimen of the prediction; None for a parameter.
     """
 
@@ -159,7 +154,7 @@ class PlanRequest:
     """Aim of a plan, with the hours and limits of the rig.
 
     Args:
-        aim: quantity whose errors the plan minimises, or "rivals" to separate models.
+        aim: quantity whose errors the plan minimises, or "rivals" to separate rival models.
         hours: largest duration on the rig [h].
         rig: limits of the rig, and its time for a point and for a set-up.
         places: directions or specimens that the rig can test.
@@ -177,37 +172,22 @@ class PlanRequest:
     targets: tuple[Target, ...] = ()
 
 
-@dataclass(frozen=True)
-class DetectableAmount:
-    """Smallest amount of an effect that a programme detects in 90 % of the cases, by a test at the 5 % level.
-
-    Args:
-        effect: name of an effect that the model lacks.
-        parameter: qualified name of the effect's parameter that measures the amount.
-        unit: SI unit of the amount.
-        amount: smallest detectable amount, in `unit`; infinite if no amount is detected.
-    """
-
-    effect: str
-    parameter: str
-    unit: str
-    amount: float
-
-
 @dataclass(frozen=True, eq=False)
 class Programme:
-    """Sequence of tests with their durations and the accuracy expected from them and the knowledge before them.
+    """Sequence of tests with their durations, and the accuracy expected from these tests and those so far.
 
     Args:
         tests: runs of the rig, in the order in which they are made.
         minutes: duration of each test with the change of direction before it [min], (tests,).
         errors: standard error of each parameter's relative change, (k,).
-        stiffness: relative standard error of |K| at the wanted operating points of all directions, (n,).
-        loss: standard error of the loss factor at these points, absolute, (n,).
+        stiffness: relative standard error of |K| at the operating points of the request, one direction after the other,
+            (n,).
+        loss: absolute standard error of the loss factor at these points, (n,).
         rival_chi_square: expected chi-square between the two nearest rivals that can be separated, after the best
             refit of either; None without rivals.
         half_widths: half width of the 95 % interval of each target, relative to the value, at its worst point.
-        detectable: smallest detectable amount of each effect that the standard programme can show.
+        detectable: smallest amount of each missing effect that these tests detect in 90 % of the cases [SI], by the
+            effect's name; infinite if they detect none.
     """
 
     tests: tuple[Test, ...]
@@ -217,7 +197,7 @@ class Programme:
     loss: Array
     rival_chi_square: float | None
     half_widths: tuple[float, ...]
-    detectable: tuple[DetectableAmount, ...]
+    detectable: Mapping[str, float]
 
     @property
     def hours(self) -> float:
@@ -227,15 +207,15 @@ class Programme:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Result of planning: tests chosen for an aim, compared with the standard programme of as many hours.
+    """Tests chosen for an aim with their expected results, compared with the standard programme of as many hours.
 
     Args:
-        knowledge: knowledge before the tests.
+        knowledge: model, covariance and noise before the planned tests.
         request: aim of the plan, with the hours and limits of the rig.
         before: programme without tests, for comparison.
         planned: programme of the chosen tests.
         standard: programme of the paper's tests, repeated as often as the same hours allow.
-        purposes: sentence on the loss of accuracy without a test and all its repeats, by test.
+        purposes: sentence on the accuracy lost without a test and all its repeats, by test.
         missed: reason why the planned tests miss each target; None for a target that they meet.
         enough: reason why hours remain free; None if the hours are used.
         notes: warnings and limits of the plan.

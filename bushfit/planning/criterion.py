@@ -1,4 +1,4 @@
-"""Criterion for a choice of tests, search for the best choice within the hours, and order of its runs."""
+"""Criterion for a choice of tests, search for the best choice within the hours, and order of the runs."""
 
 from __future__ import annotations
 
@@ -7,26 +7,33 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bushfit.campaign.simulated import SimulatedLoop
 from bushfit.diagnosis.next_test import remaining_entropy
 from bushfit.effects.contract import Array
+from bushfit.planning.contract import PlanRequest, Test
 from bushfit.planning.information import Information, ModelInformation, rival_chi_squares
 from bushfit.progress import track
 
 #: Smallest useful decrease of the logarithm of the variance by a run or an exchange; chosen: 0.25 % of the error.
 _USEFUL_DECREASE = 5e-3
+#: Time to bring the rig to another run, for its control to settle [s]; chosen.
+_RUN_SECONDS = 120.0
+#: Time for a point of a sweep [s] and to mount the bushing [min] if [rig] states none; chosen: some cycles to settle
+#: and some to average.
+_POINT_SECONDS, _SETUP_MINUTES = 30.0, 30.0
 
 
 @dataclass(frozen=True, eq=False)
 class Criterion:
-    """Objective function that a plan minimises over the number of runs of each candidate test.
+    """Objective that a plan minimises over the number of runs of each candidate test.
 
     The objective is the logarithm of a weighted parameter variance, or of the entropy of the rival models, plus a
     penalty for each missing effect that the tests would detect too weakly.
 
     Args:
-        models: information of the tests on the likeliest model, whose further columns are effects that the model lacks;
-            then on each rival model.
-        weight: weight of the parameter covariance in the variance to minimise, (k, k); None to separate rival models.
+        models: information of the tests on the likeliest model and the effects that it lacks, then on each rival model.
+        weight: matrix W of the variance to minimise, trace(W C) with the parameters' covariance C, (k, k); None to
+            separate rival models.
         probabilities: present probabilities of the rival models, (rivals,).
         minimum_noncentrality: smallest wanted noncentrality (expected chi-square) of each effect, (e,); 0 for none.
         penalty: weight of the logarithm of each shortfall in noncentrality.
@@ -39,7 +46,7 @@ class Criterion:
     penalty: float
 
     def value(self, counts: Array) -> float:
-        """Value of the objective that a plan minimises, for the number of runs of each test in `counts`, (tests,)."""
+        """Value of the objective for the number of runs of each test in `counts`, (tests,)."""
         return float(self.values([model.total(counts) for model in self.models])[0])
 
     def values_with_one_more(self, counts: Array) -> Array:
@@ -67,13 +74,13 @@ class Criterion:
 
 @dataclass(frozen=True, eq=False)
 class Budget:
-    """Durations and limits of the candidate tests.
+    """Durations of the candidate tests, and limits on their number and total duration.
 
     Args:
         minutes: duration of one run of each test [min], (tests,).
         place: index of the direction or specimen of each test, (tests,).
-        line: index of the line of each test, (tests,). A line is the set of tests of one direction with the same
-            constant amplitude or frequency; a plan chooses at most one test of a line.
+        alternative: index shared by the tests of one direction with the same constant amplitude or frequency, (tests,).
+            A plan chooses at most one of them.
         maximum_runs: largest number of runs of each test, (tests,); 0 for a test that may not be chosen.
         setup_minutes: time to mount the bushing [min], spent once for each direction or specimen.
         maximum_minutes: largest total duration [min].
@@ -81,24 +88,56 @@ class Budget:
 
     minutes: Array
     place: Array
-    line: Array
+    alternative: Array
     maximum_runs: Array
     setup_minutes: float
     maximum_minutes: float
 
+    @classmethod
+    def from_tests(cls, tests: Sequence[Test], request: PlanRequest) -> Budget:
+        """Compute the durations of tests, without a limit of hours.
+
+        Args:
+            tests: candidate tests; tests in directions that the request excludes get no runs.
+            request: directions that the rig can test, and its durations.
+
+        Returns:
+            Durations and limits of the tests.
+        """
+        places = list(dict.fromkeys([*request.places, *(test.direction for test in tests)]))
+        alternatives, minutes, setup = list[object](), list[float](), request.rig.minutes_per_setup
+        for test in tests:
+            if isinstance(test, SimulatedLoop):
+                seconds = test.cycles / test.frequency
+                alternatives.append((test.direction, test.amplitude, test.frequency))
+            else:
+                seconds = (request.rig.minutes_per_point or _POINT_SECONDS) * test.points[0].size
+                alternatives.append((test.direction, test.stepped, test.levels))
+            minutes.append((_RUN_SECONDS + seconds) / 60.0)
+        distinct = list(dict.fromkeys(alternatives))
+        return cls(
+            np.array(minutes),
+            np.array([places.index(test.direction) for test in tests]),
+            np.array([distinct.index(alternative) for alternative in alternatives]),
+            np.array([1000 * (test.direction in request.places) for test in tests]),
+            _SETUP_MINUTES if setup is None else setup / 60.0,
+            np.inf,
+        )
+
     def spent(self, counts: Array) -> float:
-        """Total duration [min], with set-ups, of the number of runs of each test in `counts`, (tests,)."""
+        """Total duration [min], with set-ups, of `counts` runs of each test, (tests,)."""
         return float(self.minutes @ counts) + self.setup_minutes * np.unique(self.place[counts > 0]).size
 
     def minutes_of_one_more(self, counts: Array) -> Array:
-        """Minutes that one more run of each test adds to `counts`, (tests,); infinite if the run is not allowed."""
+        """Duration of one more run of each test after `counts` runs [min], (tests,); infinite if it is not allowed."""
         more = self.minutes + self.setup_minutes * ~np.isin(self.place, self.place[counts > 0])
-        barred = np.isin(self.line, self.line[counts > 0]) & (counts == 0) | (counts >= self.maximum_runs)
+        has_run = np.isin(self.alternative, self.alternative[counts > 0])
+        barred = has_run & (counts == 0) | (counts >= self.maximum_runs)
         return np.where(barred | (self.spent(counts) + more > self.maximum_minutes), np.inf, more)
 
 
 def best_runs(criterion: Criterion, budget: Budget, start: Array, minimum_runs: Array) -> Array:
-    """Search for the number of runs of each test that minimises the criterion within the budget.
+    """Find the number of runs of each test that minimises the criterion within the budget.
 
     Args:
         criterion: objective to minimise.
@@ -140,7 +179,7 @@ def add_runs(
         criterion: objective to minimise.
         budget: durations and limits of the tests.
         counts: number of runs of each test to start from, (tests,).
-        enough: function of the number of runs of each test that returns true to stop adding runs.
+        enough: function that returns true to stop adding runs, of the number of runs of each test, (tests,).
 
     Returns:
         Number of runs of each test with the added runs, (tests,).

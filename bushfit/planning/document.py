@@ -8,7 +8,8 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from bushfit.campaign.simulated import SimulatedLoop
-from bushfit.planning.contract import Aim, Plan, motions
+from bushfit.effects import get_effect, qualified_name
+from bushfit.planning.contract import Aim, Plan, amplitudes_and_frequencies
 from bushfit.planning.problem import RIVALS_APART
 
 
@@ -47,7 +48,7 @@ class TargetEntry(ErrorComparison):
 
 
 class DetectableEntry(TypedDict):
-    """Smallest amount of an effect that a test at the 5 % level detects in 90 % of the cases."""
+    """Smallest amount of an effect that tests detect in 90 % of the cases, and that the rig's errors do not hide."""
 
     parameter: Annotated[str, Field(description="Parameter of the effect that measures the amount.")]
     unit: Annotated[str, Field(description='SI unit of the amount; "1" for a ratio.')]
@@ -92,7 +93,10 @@ class PlanFile(TypedDict):
     hours_left: Annotated[float, Field(description="Available time that the plan does not use [h].")]
     enough: Annotated[str | None, Field(description="Reason why hours are left; null if they are used.")]
     targets: Annotated[dict[str, TargetEntry], Field(description="Targets by name; empty if none was given.")]
-    parameters: Annotated[dict[str, ErrorComparison], Field(description="Relative standard error of each parameter.")]
+    parameters: Annotated[
+        dict[str, ErrorComparison],
+        Field(description="Relative standard error of each parameter if the model is right."),
+    ]
     stiffness: Annotated[
         dict[str, ErrorComparison],
         Field(description="Root mean square relative standard error of the stiffness, by direction or specimen."),
@@ -124,28 +128,34 @@ def plan_document(plan: Plan) -> PlanFile:
     targets: dict[str, TargetEntry] = {}
     halves = zip(*(programme.half_widths for programme in programmes), strict=True)
     for target, reason, half in zip(request.targets, plan.missed, halves, strict=True):
-        targets[str(target)] = {"asked": target.half_width, **_reached(half), "met": reason is None, "why": reason}
+        targets[str(target)] = {
+            "asked": target.half_width,
+            **_error_comparison(half),
+            "met": reason is None,
+            "why": reason,
+        }
     predicted: dict[str, dict[str, ErrorComparison]] = {"stiffness": {}, "loss": {}}
     ends = np.cumsum([points.frequency.size for points in request.points])[:-1]
     for quantity, by_place in predicted.items():
         by_programme = (np.split(getattr(programme, quantity), ends) for programme in programmes)
         for points, *errors in zip(request.points, *by_programme, strict=True):
-            by_place[str(points.place)] = _reached(np.sqrt(np.mean(np.square(error))) for error in errors)
+            by_place[str(points.place)] = _error_comparison(np.sqrt(np.mean(np.square(error))) for error in errors)
     visible: dict[str, DetectableEntry] = {}
-    for amount, standard_amount in zip(planned.detectable, standard.detectable, strict=True):
-        visible[amount.effect] = {
-            "parameter": amount.parameter,
-            "unit": amount.unit,
-            "planned": amount.amount if np.isfinite(amount.amount) else None,
-            "standard": standard_amount.amount if np.isfinite(standard_amount.amount) else None,
+    for name, amount in planned.detectable.items():
+        effect, standard_amount = get_effect(name), standard.detectable[name]
+        visible[name] = {
+            "parameter": qualified_name(effect, effect.amount),
+            "unit": effect.amount.unit,
+            "planned": amount if np.isfinite(amount) else None,
+            "standard": standard_amount if np.isfinite(standard_amount) else None,
         }
     tests: list[PlannedRun] = []
     for test, minutes in zip(planned.tests, planned.minutes.tolist(), strict=True):
-        (amplitudes, frequencies), is_loop = motions(test), isinstance(test, SimulatedLoop)
+        amplitudes, frequencies = amplitudes_and_frequencies(test)
         tests.append(
             {
                 "place": str(test.direction),
-                "kind": "loop" if is_loop else "sweep",
+                "kind": "loop" if isinstance(test, SimulatedLoop) else "sweep",
                 "stepped": None if isinstance(test, SimulatedLoop) else test.stepped,
                 "amplitudes": list(amplitudes),
                 "unit": test.direction.motion.displacement_unit,
@@ -166,7 +176,7 @@ def plan_document(plan: Plan) -> PlanFile:
         "hours_left": request.hours - planned.hours,
         "enough": plan.enough,
         "targets": targets,
-        "parameters": {name: _reached(errors) for name, *errors in parameter_errors},
+        "parameters": {name: _error_comparison(errors) for name, *errors in parameter_errors},
         "stiffness": predicted["stiffness"],
         "loss_factor": predicted["loss"],
         "visible": visible,
@@ -175,6 +185,7 @@ def plan_document(plan: Plan) -> PlanFile:
     }
 
 
-def _reached(errors: Iterable[float]) -> ErrorComparison:
+def _error_comparison(errors: Iterable[float]) -> ErrorComparison:
+    """Entry with three relative errors: before further tests, with the plan, with the standard programme."""
     before, planned, standard = map(float, errors)
     return {"before": before, "planned": planned, "standard": standard}

@@ -1,8 +1,8 @@
-"""Information of tests on the parameters of a model: inner products of whitened columns, which add up over tests.
+"""Fisher information of tests on the parameters of a model: inner products that add up over tests.
 
 Notes:
-    A column holds the derivatives of the residuals by a parameter, or their change by an effect; whitened means divided
-    by the noise. The stiffness is computed once at all operating points of a direction. Each run then takes its points,
+    A column is the derivative of all residuals by a parameter, or their change by an effect; whitened means divided by
+    the noise. The stiffness is computed once at all operating points of a direction. Each run then takes its points,
     whitened as in a fit, which treats errors shared by all points of a run as noise. Errors shared by all runs of a
     test remain as columns of unit gain and unit phase until the runs of the test are added up.
 """
@@ -25,21 +25,21 @@ from bushfit.fitting.preparation import MeasuredTest, planned_loop, planned_swee
 from bushfit.geometry import Place, shared_labels
 from bushfit.planning.contract import Knowledge, Test, operating_points
 
-#: Rows of a loop's cycle that its sensitivities are taken at; chosen: its force is smooth over them.
+#: Rows per cycle at which the force of a loop is differentiated; chosen: the force is smooth over them.
 _ROWS = 128
-#: Rows of a cycle as rigs, and `simulate`, record it.
+#: Rows per cycle that rigs, and `simulate`, record.
 ROWS_PER_CYCLE = 1000
 
 
 class Information(NamedTuple):
-    """Fisher information of one or several choices of tests: inner products of whitened columns.
+    """Fisher information of alternative choices of tests on k parameters and e departures from the model.
 
-    The columns are the derivatives of the residuals by k parameters, and e further columns: changes of the residuals by
-    a missing effect or by a rival model.
+    A departure is the change of the residuals by a missing effect of typical amount, or by a rival model.
 
     Args:
-        products: inner products of the parameter columns with all columns, (choices, k, k + e).
-        squares: inner product of each further column with itself, (choices, e).
+        products: inner products of the parameter columns with the columns of parameters and departures, (choices, k,
+            k + e).
+        squares: inner product of the column of each departure with itself, (choices, e).
     """
 
     products: Array
@@ -47,15 +47,11 @@ class Information(NamedTuple):
 
     @property
     def parameters(self) -> Array:
-        """Fisher information of relative changes of the k parameters, a matrix per choice of tests, (choices, k, k)."""
+        """Fisher information on relative changes of the k parameters, a matrix per choice of tests, (choices, k, k)."""
         return self.products[..., : self.products.shape[-2]]
 
     def noncentralities(self) -> Array:
-        """Chi-square expected in excess of noise if an effect that the model lacks, or a rival model, is true.
-
-        Array of a row for each choice of tests and a column for each effect or rival, (choices, e). The parameters of
-        the model are refitted.
-        """
+        """Chi-square expected in excess of noise after a refit of the model if a departure is true, (choices, e)."""
         cross = self.products[..., self.products.shape[-2] :]
         fitted = np.linalg.solve(self.parameters, cross)
         return np.maximum(self.squares - np.sum(cross * fitted, axis=-2), 0.0)
@@ -63,13 +59,16 @@ class Information(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ModelInformation:
-    """Fisher information of one run of each candidate test on the k parameters of one model and on e further columns.
+    """Fisher information of one run of each candidate test on the k parameters of a model and on e departures from it.
 
     Args:
         products: inner products of the first 2 + k columns with all columns, (tests, 2 + k, 2 + k + e). The columns
-            are unit gain error, unit phase error, k parameters, and e effects or rival models.
-        squares: inner product of each further column with itself, (tests, e).
-        level: standard deviations of the gain [1] and phase [rad] errors that all runs of a test share, (tests, 2).
+            are unit gain error, unit phase error, k parameters, and e departures (missing effects or rival models).
+        squares: inner product of the column of each departure with itself, (tests, e).
+        level: standard deviations of the gain [1] and phase [rad] errors that all runs of a test share, the accuracy
+            class of the rig, (tests, 2).
+        class_ratios: largest change of the response by each departure at any point of a test, relative to the accuracy
+            class, (tests, e).
         prior: information matrix of the parameters' relative changes before the tests, (k, k).
         bounded: number of parameters at a bound; these are the last of the k parameters.
     """
@@ -77,34 +76,42 @@ class ModelInformation:
     products: Array
     squares: Array
     level: Array
+    class_ratios: Array
     prior: Array
     bounded: int = 0
 
     def of_runs(self, counts: Array) -> Information:
-        """Fisher information of each test separately, (tests, ...), made `counts` times, (tests,); without the prior.
+        """Compute the Fisher information of each test separately, without that of the tests so far.
+
+        Args:
+            counts: number of runs of each test, (tests,).
+
+        Returns:
+            Information with one choice for each test.
 
         Notes:
             The gain and phase errors that all runs of a test share are eliminated: with their columns U and standard
             deviations T, an inner product a^T b becomes a^T b - a^T U T (1 + T U^T U T)^-1 T U^T b.
         """
         products, k = self.products * counts[:, None, None], len(self.prior)
-        line = self.level[..., None] * products[..., :2, :]
-        solved = np.linalg.solve(np.eye(2) + line[..., :2] * self.level[..., None, :], line)
-        remaining = products[..., 2:, 2:] - line[..., 2 : 2 + k].mT @ solved[..., 2:]
-        decrease = np.sum(line[..., 2 + k :] * solved[..., 2 + k :], axis=-2)
+        shared = self.level[..., None] * products[..., :2, :]
+        solved = np.linalg.solve(np.eye(2) + shared[..., :2] * self.level[..., None, :], shared)
+        remaining = products[..., 2:, 2:] - shared[..., 2 : 2 + k].mT @ solved[..., 2:]
+        decrease = np.sum(shared[..., 2 + k :] * solved[..., 2 + k :], axis=-2)
         return Information(remaining, self.squares * counts[:, None] - decrease)
 
     def total(self, counts: Array) -> Information:
-        """Fisher information of the prior and all tests together, (1, ...), each made `counts` times, (tests,)."""
+        """Fisher information of the prior and all tests together, one choice; `counts`: runs of each test, (tests,)."""
         tests = self.of_runs(counts)
         products, k = tests.products.sum(axis=0, keepdims=True), len(self.prior)
         products[..., :k] += self.prior
         return Information(products, tests.squares.sum(axis=0, keepdims=True))
 
     def with_one_more(self, counts: Array) -> Information:
-        """Fisher information of the prior and all tests after one more run of each test in turn, (tests, ...).
+        """Fisher information of the prior and all tests if one test is run once more, one choice for each test.
 
-        Before this run, each test is made `counts` times, (tests,).
+        Args:
+            counts: number of runs of each test before this run, (tests,).
         """
         total, now, more = self.total(counts), self.of_runs(counts), self.of_runs(counts + 1)
         return Information(
@@ -112,13 +119,13 @@ class ModelInformation:
         )
 
     def error_covariance(self, information: Information) -> Array:
-        """Compute the covariance of the parameters' errors, with the effect of bounds.
+        """Compute the covariance of the parameters' relative errors that a fit of the tests will have.
 
         Args:
             information: information of the tests and the prior.
 
         Returns:
-            Covariance of the parameters' relative changes, (..., k, k).
+            Covariance with the effect of bounds, (choices, k, k).
 
         Notes:
             If the true value of a parameter is at its bound, noise pushes half of the fits against the bound. In these
@@ -133,15 +140,15 @@ class ModelInformation:
 
 @dataclass(frozen=True, eq=False)
 class CandidateGrid:
-    """Candidate tests with simulated data sets that several tests share, so that each point is computed once.
+    """Responses of all candidate tests to changes of the model, with each operating point computed once.
 
     Args:
         knowledge: model whose stiffness the tests would measure, and noise of the rig.
         tests: candidate runs of the rig.
         data_sets: one cycle of each distinct loop, in units of its noise, then one sweep with all points of each
             direction, in ln K. All assume the largest strain that the rubber has borne so far.
-        rows: indices of each test's residuals among the residuals of all data sets: (rows,) for a loop; (2, points) for
-            a sweep, gain and phase.
+        rows: indices of each test's residuals among the n residuals of all data sets: (rows,) for a loop; (2, points)
+            for a sweep, gain and phase.
     """
 
     knowledge: Knowledge
@@ -187,47 +194,50 @@ class CandidateGrid:
         strained = tuple(replace(data_set, test_conditions=conditions) for data_set in data_sets)
         return cls(knowledge, tests, strained, tuple(rows[test] for test in tests))
 
-    def information(self, knowledge: Knowledge, further: Array) -> ModelInformation:
-        """Compute the information of one run of each test.
+    def information(self, knowledge: Knowledge, departures: Array) -> ModelInformation:
+        """Compute the Fisher information of one run of each test on a model.
 
         Args:
             knowledge: model, names of its parameters, and prior covariance.
-            further: changes of all n residuals by e effects or rival models, (e, n).
+            departures: changes of the n residuals by e missing effects or rival models, (e, n).
 
         Returns:
-            Information of each test on the parameters and the further columns.
+            Information of each test on the parameters and the departures.
         """
         slopes = relative_slopes(knowledge, self.data_sets)
-        columns, k = np.concatenate((slopes, further)), len(slopes)
+        columns, k = np.concatenate((slopes, departures)), len(slopes)
         noise, loops = self.knowledge.noise, split_by_kind(self.data_sets)[0]
         scatter, shared = np.array(noise.scatter)[:, None], np.array(noise.shared)[:, None]
-        products, squares, level = [], [], []
+        class_errors = np.maximum(noise.level, np.finfo(float).tiny)[:, None]  # of gain and phase
+        products, squares, level, class_ratios = [], [], [], []
         for test, rows in zip(self.tests, self.rows, strict=True):
             if isinstance(test, SimulatedLoop):
                 unit_gain = loops[rows[0] // _ROWS].gain_and_offset()[0]
-                line = np.stack((unit_gain, np.zeros(_ROWS)))
-                whitened = np.sqrt(test.cycles) * np.concatenate((line, columns[:, rows]))
+                unit_errors = np.stack((unit_gain, np.zeros(_ROWS)))
+                whitened = np.sqrt(test.cycles) * np.concatenate((unit_errors, columns[:, rows]))
+                unit = np.abs(unit_gain).max() * class_errors[0]
             else:
                 count = rows.shape[1]
-                line = np.eye(2)[:, :, None] * np.ones(count)  # of gain and of phase
-                parts = np.concatenate((line, columns[:, rows]))
+                unit_errors = np.eye(2)[:, :, None] * np.ones(count)  # of gain and of phase
+                parts = np.concatenate((unit_errors, columns[:, rows]))
                 share = 1.0 - 1.0 / np.sqrt(1.0 + count * (shared / scatter) ** 2)
+                unit = class_errors
                 whitened = ((parts - share * parts.mean(axis=-1, keepdims=True)) / scatter).reshape(len(parts), -1)
             products.append(whitened[: 2 + k] @ whitened.T)
             squares.append(np.square(whitened[2 + k :]).sum(axis=1))
+            class_ratios.append((np.abs(departures[:, rows]) / unit).reshape(len(departures), -1).max(axis=1))
             level.append((noise.level[0], 0.0 if isinstance(test, SimulatedLoop) else noise.level[1]))
-        prior, bounded = knowledge.precision, len(knowledge.bounded)
-        return ModelInformation(np.array(products), np.array(squares), np.array(level), prior, bounded)
+        tests = (np.array(products), np.array(squares), np.array(level), np.array(class_ratios))
+        return ModelInformation(*tests, knowledge.precision, len(knowledge.bounded))
 
     def effect_columns(self) -> tuple[list[Effect], Array]:
-        """Compute the changes of the residuals by the effects that the model lacks and these tests might detect.
+        """Compute the changes of the residuals by effects of the library that the model lacks.
 
-        Excluded are effects that depend on the order of the tests or on their temperature, and effects that replace a
-        branch of the model, which have no small amount.
+        An effect occurs once for each shape: a choice of its other parameters, such as the frequency of a resonance.
+        Effects of the order or temperature of tests, and effects without a small amount, are left out.
 
         Returns:
-            Effect of each column, repeated for each of its shapes, and the changes of the n whitened residuals by a
-            typical amount of the effect, (e, n).
+            The e effects, and the change of the n residuals by a typical amount of each, (e, n).
         """
         model, places = self.knowledge.model, shared_labels(test.direction for test in self.tests)
         effects, columns = list[Effect](), [np.empty((0, sum(data_set.size for data_set in self.data_sets)))]
@@ -239,7 +249,7 @@ class CandidateGrid:
 
 
 def relative_slopes(knowledge: Knowledge, data_sets: Sequence[MeasuredTest]) -> Array:
-    """Differentiate whitened residuals by the relative change of each parameter.
+    """Differentiate the whitened residuals of tests by the relative change of each parameter.
 
     Args:
         knowledge: model, and the names of its k free parameters and its b parameters at a bound.
@@ -258,7 +268,7 @@ def rival_chi_squares(rivals: Sequence[Information]) -> Array:
     """Compute the expected chi-square between any two rival models after the best refit of either.
 
     Args:
-        rivals: information on each rival, whose further columns are the differences from the other rivals in order.
+        rivals: information on each rival, whose departures are the other rivals in order.
 
     Returns:
         Expected chi-square for each choice of tests, (choices, rivals, rivals).

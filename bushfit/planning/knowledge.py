@@ -1,4 +1,4 @@
-"""Knowledge before the tests of a plan: from a campaign and its diagnosis, or from a model."""
+"""Knowledge before the tests of a plan (model, covariance, noise): from a campaign, or from a model."""
 
 from collections import defaultdict
 from collections.abc import Container, Iterable, Iterator, Sequence
@@ -27,7 +27,7 @@ from bushfit.planning.information import ROWS_PER_CYCLE, relative_slopes
 
 
 def from_result(result: Result, noise: Noise | None = None, source: str = "") -> Knowledge:
-    """Convert a model with its covariance to knowledge for a plan.
+    """Convert a model with its covariance to the starting point of a plan.
 
     Values of a model that was not fitted are assumed to be known within a factor of 2.7.
 
@@ -37,7 +37,7 @@ def from_result(result: Result, noise: Noise | None = None, source: str = "") ->
         source: origin of the knowledge, as a phrase; empty for a standard phrase.
 
     Returns:
-        Knowledge of the parameters that have a standard error, or of all parameters if the model was not fitted.
+        Knowledge on the parameters that have a standard error, or on all parameters if the model was not fitted.
     """
     model, fitted = result.model, result.covariance
     names = tuple(name for name in fitted.names if fitted.stderr(name)) or tuple(model.parameters)
@@ -60,11 +60,11 @@ def from_result(result: Result, noise: Noise | None = None, source: str = "") ->
 
 
 def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -> Knowledge:
-    """Fit the tests of a campaign to obtain the knowledge for a plan; with rivals, one fit for each rival effect.
+    """Fit the tests of a campaign as the starting point of a plan; with rivals, one fit for each rival effect.
 
     The fits treat the errors of the accuracy class of the rig as noise, whether [rig] states them or not, as in the
-    planned tests. With rivals, the model also has the effects that a diagnosis found for certain, and the first effect
-    of each other set that the diagnosis cannot separate.
+    planned tests. With rivals, the model also has the effects that a diagnosis names, and the first effect of each
+    other set that the diagnosis cannot separate.
 
     Args:
         data: tests of the campaign.
@@ -80,8 +80,8 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
     """
     _check_rivals(rivals or (), LIBRARY)
     diagnosis = None if rivals is None else diagnose(data)
-    noise = noise_of(data)
-    data = PreparedCampaign.from_campaign(replace(data.campaign, rig=rig_of(data.campaign.rig, noise)))
+    noise = estimate_noise(data)
+    data = PreparedCampaign.from_campaign(replace(data.campaign, rig=with_rig_class(data.campaign.rig, noise)))
     data_sets = data.require_tests(data.data_sets, "there is nothing to fit", "add measured tests to the campaign")
     model = data.starting_model(data.effects, data_sets, {})
     fixed = [name for name in model.parameters if name not in data.free(tuple(model.parameters))]
@@ -90,13 +90,13 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
     def knowledge(evidence: Evidence) -> Knowledge:
         result = replace(result_of(evidence, data.bounds, ()), specimens=data.campaign.specimens)
         strain = max(float(np.max(tests.amplitude)) * model.unit_strain(tests.direction) for tests in data_sets)
-        plain = replace(from_result(result, noise, source), strain=strain, tests=tuple(_tests(data)))
+        plain = replace(from_result(result, noise, source), strain=strain, tests=tuple(_campaign_runs(data)))
         bounded = tuple(evidence.solution.at_bound)
-        return _with_bounded(plain, bounded, data_sets) if bounded else plain
+        return _with_bounded_parameters(plain, bounded, data_sets) if bounded else plain
 
     if diagnosis is None or rivals is None:
         return knowledge(fit(model, data_sets, fixed, data.bounds))
-    sets = look_alikes(diagnosis)
+    sets = undecided_effects(diagnosis)
     names = list(dict.fromkeys(twins_of(name)[0] for name in rivals or next(iter(sets), ())))
     if not names:
         raise ModelError(
@@ -135,11 +135,13 @@ def _check_rivals(names: Iterable[str], possible: Container[str]) -> None:
         )
 
 
-def _with_bounded(knowledge: Knowledge, bounded: tuple[str, ...], data_sets: Sequence[MeasuredTest]) -> Knowledge:
-    """Extend knowledge by the parameters at a bound, with the covariance that they would have if they were free.
+def _with_bounded_parameters(
+    knowledge: Knowledge, bounded: tuple[str, ...], data_sets: Sequence[MeasuredTest]
+) -> Knowledge:
+    """Add the parameters at a bound to knowledge, with the covariance that they would have if they were free.
 
-    Parameters without effect on these tests are omitted. The excess of the noise over the assumed noise follows from
-    the errors of the other parameters.
+    Parameters without effect on these tests are omitted. The noise exceeds the assumed noise as it does in the errors
+    of the other parameters.
 
     Args:
         knowledge: knowledge of the parameters that are not at a bound.
@@ -180,8 +182,8 @@ def _add_effects(plain: Evidence, names: Sequence[str], fixed: Sequence[str], bo
     return refitted(plain, proposed, {}, fixed, bounds)
 
 
-def look_alikes(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
-    """List the sets of effects that a diagnosis cannot separate and that a further test may separate.
+def undecided_effects(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
+    """List the sets of effects that explain the tests of a diagnosis alike and that a further test may separate.
 
     Mistakes in the campaign and faults of the rig are excluded, because no planned test separates them.
 
@@ -189,7 +191,7 @@ def look_alikes(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
         diagnosis: diagnosis of a campaign.
 
     Returns:
-        Names of the effects of each set, without the effects that all explanations of the set share.
+        Names of the effects of each set, without the effects that all explanations of the set have.
     """
     sets, all_named = [], [effect.name for effect in diagnosis.effects]
     for effect in diagnosis.effects:
@@ -201,14 +203,11 @@ def look_alikes(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
     return [names for names in sets if len(names) > 1]
 
 
-def noise_of(data: PreparedCampaign) -> Noise:
+def estimate_noise(data: PreparedCampaign) -> Noise:
     """Estimate the measurement errors of the rig from the tests of a campaign.
 
-    Args:
-        data: tests of the campaign.
-
     Returns:
-        Estimated standard deviations; typical values for errors that the tests do not determine.
+        Standard deviations; typical values for errors that the tests do not determine.
     """
     loops, sweeps = split_by_kind(data.data_sets)
     estimate = replace(Noise(), level=class_errors(data.campaign.rig))
@@ -227,13 +226,13 @@ def noise_of(data: PreparedCampaign) -> Noise:
     return estimate
 
 
-def rig_of(rig: RigSettings, noise: Noise) -> RigSettings:
-    """Return the settings [rig] with the accuracy class (gain and phase errors) that a plan assumes."""
+def with_rig_class(rig: RigSettings, noise: Noise) -> RigSettings:
+    """Settings [rig] with the accuracy class (gain and phase errors) that a plan assumes."""
     return replace(rig, gain_error=noise.level[0], phase_error=noise.level[1], displacement_error=None)
 
 
-def _tests(data: PreparedCampaign) -> Iterator[Test]:
-    """Convert the loops and sweeps of a campaign to runs of a plan; free oscillations are omitted."""
+def _campaign_runs(data: PreparedCampaign) -> Iterator[Test]:
+    """Generate the runs of a campaign's loops and sweeps as tests of a plan; free oscillations are omitted."""
     for loop in data.loops:
         yield SimulatedLoop(
             loop.direction, loop.prepared.amplitude, loop.prepared.frequency, max(round(loop.prepared.cycles), 1)

@@ -1,4 +1,4 @@
-"""The plan: tests chosen for an aim, in their order, with the standard programme of as many hours, and explanations."""
+"""The plan: tests chosen for an aim, in their order, with explanations and warnings."""
 
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
@@ -12,10 +12,10 @@ from bushfit.planning.contract import Knowledge, Plan, PlanRequest, Programme
 from bushfit.planning.criterion import add_runs, order_runs
 from bushfit.planning.problem import RIVALS_APART, PlanningProblem
 from bushfit.planning.search import PlanSearch
-from bushfit.planning.targets import UNLIMITED_RUNS, TargetSensitivity, percent
+from bushfit.planning.targets import UNLIMITED_RUNS, TargetSensitivity, format_half_width
 from bushfit.units import number
 
-#: Shares of the hours that are tried before all of them: for rivals, and within a tenth for targets.
+#: Fractions of the hours that are tried before all of them: for rivals, and in steps of a tenth for targets.
 _SHARES = {"rivals": (0.125, 0.1875, 0.25, 0.375, 0.5), "targets": tuple((2.0 ** (np.arange(-40, 0) / 8)).tolist())}
 #: Smallest ratio of errors without and with a test that is worth a sentence; chosen.
 _NOTABLE_RATIO = 1.005
@@ -29,7 +29,7 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
     The plan separates rival models, or meets targets, in as few hours as possible.
 
     Args:
-        knowledge: knowledge before the tests.
+        knowledge: model, covariance and noise before the planned tests.
         request: aim, hours and limits of the rig.
 
     Returns:
@@ -48,8 +48,8 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
     problem = PlanningProblem.from_request(knowledge, request)
     search = PlanSearch(problem, request.hours)
     shorter = [PlanSearch(problem, share * request.hours) for share in _SHARES.get(request.aim, ())]
-    for soundly in (True, False) if problem.goals else (False,):  # unsound plans only if no sound one reaches
-        first = bisect_left(shorter, True, key=lambda search: search.reaches_aim(soundly=soundly))
+    for with_checks in (True, False) if problem.goals else (False,):  # without checks only if no other plan reaches
+        first = bisect_left(shorter, True, key=lambda search: search.reaches_aim(with_checks=with_checks))
         if first < len(shorter):
             search = shorter[first]
             break
@@ -79,28 +79,28 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
 
 
 def explain_miss(search: PlanSearch, goal: TargetSensitivity) -> str | None:
-    """Write a sentence on the reason why the chosen tests miss a target, and on the hours that would meet the target.
+    """Sentence on the reason why the chosen tests miss a target, and on the hours that would meet the target.
 
     Args:
-        search: completed search with the chosen tests.
+        search: search with the chosen tests.
         goal: target with its operating points.
 
     Returns:
-        The sentence; None if the tests meet the target.
+        Sentence; None if the tests meet the target.
     """
     problem, counts = search.problem, search.counts
     limit, covariance = problem.limit_covariance, problem.error_covariance
-    if sentence := search.untested(goal, counts):
+    if sentence := search.untested_warning(goal, counts):
         origin = "in the plan" if goal.target.place in problem.request.places else "on offer"
         return f"no test so far or {origin} covers this: {sentence}"
     if not goal.met(limit):
-        reached, reason = percent(goal.half_width(limit)), goal.explain_limit(problem.knowledge, limit)
+        reached, reason = format_half_width(goal.half_width(limit)), goal.explain_limit(problem.knowledge, limit)
         return f"no available test meets it, {UNLIMITED_RUNS} runs of each would reach {reached}: {reason}"
     if goal.met(covariance(counts)):
         return None
 
     more = add_runs(
-        replace(search.strict, weight=goal.weight(limit)),
+        replace(search.strict_criterion, weight=goal.weight(limit)),
         problem.budget,
         counts,
         enough=lambda runs: goal.met(covariance(runs)) or problem.budget.spent(runs) > _LONGEST_MINUTES,
@@ -108,19 +108,19 @@ def explain_miss(search: PlanSearch, goal: TargetSensitivity) -> str | None:
     hours = number(problem.budget.spent(more) / 60.0, 2)
     if goal.met(covariance(more)):
         return f"{number(search.hours, 3)} h are too few, about {hours} h would do"
-    reached = percent(goal.half_width(covariance(more)))
+    reached = format_half_width(goal.half_width(covariance(more)))
     return f"{hours} h would reach {reached}, and no further run would reduce that by a quarter per cent"
 
 
 def describe_purpose(search: PlanSearch, test: int) -> str:
-    """Write a sentence on the purpose of a test: the largest loss of accuracy without the test and all its repeats.
+    """Sentence on the purpose of a test: the largest loss of accuracy without the test and all its repeats.
 
     Args:
-        search: completed search with the chosen tests.
-        test: index of the test.
+        search: search with the chosen tests.
+        test: index of the test among those of the search.
 
     Returns:
-        The sentence.
+        Sentence for the sheet of the rig operator.
     """
     problem, counts = search.problem, search.counts
     request, reduced = problem.request, np.where(np.arange(counts.size) == test, 0, counts)
@@ -135,7 +135,7 @@ def describe_purpose(search: PlanSearch, test: int) -> str:
         ]
         if widened:
             goal = max(widened, key=lambda goal: goal.half_width(wider) / goal.target.half_width)
-            without, planned = (percent(goal.half_width(errors), 3) for errors in (wider, covariance))
+            without, planned = (format_half_width(goal.half_width(errors), 3) for errors in (wider, covariance))
             return f"{goal.target}: {without} without this run, {planned} with this run"
     else:
         if request.aim == "predictions":
@@ -149,15 +149,15 @@ def describe_purpose(search: PlanSearch, test: int) -> str:
 
 
 def explain_free_hours(search: PlanSearch, planned: Programme, missed: Sequence[str | None]) -> str | None:
-    """Write a sentence on the reason why the plan leaves hours of the rig free.
+    """Sentence on the reason why the plan leaves hours of the rig free.
 
     Args:
-        search: completed search with the chosen tests.
+        search: search with the chosen tests.
         planned: programme of the chosen tests.
         missed: reason why each target is missed; None for a target that is met.
 
     Returns:
-        The sentence; None if the hours are used.
+        Sentence; None if the hours are used.
     """
     request, budget = search.problem.request, search.budget
     hours, free = request.hours, request.hours - planned.hours
@@ -180,7 +180,7 @@ def plan_warnings(search: PlanSearch, planned: Programme, missed: Sequence[str |
     """Generate the warnings of a plan, the most important first.
 
     Args:
-        search: completed search with the chosen tests.
+        search: search with the chosen tests.
         planned: programme of the chosen tests.
         missed: reason why each target is missed; None for a target that is met.
 
@@ -199,7 +199,8 @@ def plan_warnings(search: PlanSearch, planned: Programme, missed: Sequence[str |
     yield from knowledge.warnings
     for target, half, reason in zip(request.targets, planned.half_widths, missed, strict=True):
         if reason:
-            yield f"{target}: {percent(target.half_width)} asked for, {percent(half)} planned: {reason}"
+            sizes = f"{format_half_width(target.half_width)} asked for, {format_half_width(half)} planned"
+            yield f"{target}: {sizes}: {reason}"
     if knowledge.bounded:
         yield (
             f"{' and '.join(knowledge.bounded)} ended at a bound: the planned errors of the other parameters "

@@ -1,4 +1,4 @@
-"""The planning problem: candidate tests with their duration and their information on the aim, whatever the hours."""
+"""The planning problem: candidate tests with their durations and their information on the aim, for any hours."""
 
 from __future__ import annotations
 
@@ -7,17 +7,16 @@ from functools import cached_property
 
 import numpy as np
 
-from bushfit.campaign.simulated import SimulatedLoop
 from bushfit.diagnosis.priors import DECISIVE_CHI_SQUARE
 from bushfit.effects import Effect
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import residual
 from bushfit.model.covariance import Z95
-from bushfit.planning.candidates import candidates, run_minutes, standard_tests
+from bushfit.planning.candidates import candidates, standard_tests
 from bushfit.planning.contract import Knowledge, PlanRequest, Test
 from bushfit.planning.criterion import Budget
 from bushfit.planning.information import CandidateGrid, ModelInformation, rival_chi_squares
-from bushfit.planning.targets import UNLIMITED_RUNS, TargetSensitivity, WantedPoints
+from bushfit.planning.targets import UNLIMITED_RUNS, PointSensitivity, TargetSensitivity
 
 #: The 90 % quantile of the normal distribution.
 _NINE_OF_TEN = 1.2815515655446004
@@ -31,17 +30,17 @@ RIVALS_APART = (_NINE_OF_TEN + float(np.sqrt(_NINE_OF_TEN**2 + DECISIVE_CHI_SQUA
 
 @dataclass(frozen=True, eq=False)
 class PlanningProblem:
-    """Data of the search for tests: candidate tests with their durations and information, and the aim.
+    """Candidate tests with their durations and their information, and the aim of the plan: data of the search.
 
     The k parameters include the parameters at a bound.
 
     Args:
-        knowledge: knowledge before the tests.
+        knowledge: model, covariance and noise before the planned tests.
         request: aim of the plan and limits of the rig.
         tests: candidate tests, then tests that only the standard programme has.
-        effects: effect of each further column of `models[0]`.
-        models: Fisher information of each test on the parameters of the likeliest model and on the effects that it
-            lacks, then on each rival model and its differences from the other rivals.
+        effects: the e missing effects, each repeated for its shapes (such as frequencies of a resonance).
+        models: Fisher information of each test on the likeliest model and the missing effects, then on each rival model
+            and its differences from the other rivals.
         wanted: derivatives, by parameter, of the stiffness at the operating points of each direction of the request.
         goals: for each target of the request, its derivatives by parameter, and the variance that no test reduces.
         budget: durations of the tests, without a limit of hours.
@@ -52,16 +51,16 @@ class PlanningProblem:
     tests: tuple[Test, ...]
     effects: list[Effect]
     models: list[ModelInformation]
-    wanted: list[WantedPoints]
+    wanted: list[PointSensitivity]
     goals: list[TargetSensitivity]
     budget: Budget
 
     @classmethod
     def from_request(cls, knowledge: Knowledge, request: PlanRequest) -> PlanningProblem:
-        """Compute the information of all candidate tests.
+        """Compute the durations and the information of all candidate tests.
 
         Args:
-            knowledge: knowledge before the tests.
+            knowledge: model, covariance and noise before the planned tests.
             request: aim of the plan and limits of the rig.
 
         Returns:
@@ -77,27 +76,27 @@ class PlanningProblem:
         residuals = np.array([residual(rival.model, grid.data_sets) for rival in knowledge.rivals])
         for index, rival in enumerate(knowledge.rivals):
             models.append(grid.information(rival, np.delete(residuals, index, axis=0) - residuals[index]))
-        wanted = {points.place: WantedPoints.from_knowledge(knowledge, points) for points in request.points}
+        wanted = {points.place: PointSensitivity.from_knowledge(knowledge, points) for points in request.points}
         names = (*knowledge.names, *knowledge.bounded)
         goals = [
             TargetSensitivity.from_target(target, names, wanted[target.place] if target.place else None)
             for target in request.targets
         ]
-        budget = _budget(request, tests)
+        budget = Budget.from_tests(tests, request)
         return cls(knowledge, request, tests, effects, models, list(wanted.values()), goals, budget)
 
     def error_covariance(self, counts: Array) -> Array:
-        """Covariance of the parameters, (k, k), with the number of runs of each test in `counts`, (tests,)."""
+        """Covariance of the parameters' relative errors, (k, k), after `counts` runs of each test, (tests,)."""
         return np.asarray(self.models[0].error_covariance(self.models[0].total(counts))[0])
 
     @cached_property
     def limit_covariance(self) -> Array:
-        """Covariance of the parameters with unlimited repeats of all candidates, (k, k)."""
+        """Covariance of the parameters' relative errors after unlimited repeats of all candidates, (k, k)."""
         return self.error_covariance(UNLIMITED_RUNS * (self.budget.maximum_runs > 0))
 
     @cached_property
     def weight(self) -> Array | None:
-        """Matrix W of the criterion trace(W C) for the parameters' covariance C, (k, k); None if the aim is rivals."""
+        """Matrix W, (k, k), of the search criterion trace(W C) with the parameters' covariance C; None for rivals."""
         if self.request.aim == "rivals":
             return None
         if self.request.aim == "targets":
@@ -109,10 +108,7 @@ class PlanningProblem:
         return np.diag(np.isin(names, self.request.parameters).astype(float))
 
     def rival_distances(self, counts: Array) -> Array:
-        """Expected chi-square between any two rival models, (rivals, rivals), for `counts` runs of each test, (tests,).
-
-        Rival models explain the tests so far equally well; the planned tests shall separate them.
-        """
+        """Expected chi-square between any two rival models, (rivals, rivals), for runs `counts`, (tests,)."""
         return np.asarray(rival_chi_squares([model.total(counts) for model in self.models[1:]])[0])
 
     @cached_property
@@ -129,25 +125,5 @@ class PlanningProblem:
         return separable if separable.any() else pairs
 
     def nearest_rivals(self, counts: Array) -> float:
-        """Smallest expected chi-square between separable rival models, for `counts` runs of each test, (tests,)."""
+        """Smallest expected chi-square between separable rival models, for runs `counts`, (tests,)."""
         return float(self.rival_distances(counts)[self.separable_rivals].min())
-
-
-def _budget(request: PlanRequest, tests: tuple[Test, ...]) -> Budget:
-    """Durations of the tests without a limit of hours; tests in directions that the request excludes get no runs."""
-    places = list(dict.fromkeys([*request.places, *(test.direction for test in tests)]))
-    lines = [
-        (test.direction, test.amplitude, test.frequency)
-        if isinstance(test, SimulatedLoop)
-        else (test.direction, test.stepped, test.levels)
-        for test in tests
-    ]
-    distinct, setup = list(dict.fromkeys(lines)), request.rig.minutes_per_setup
-    return Budget(
-        np.array([run_minutes(test, request.rig) for test in tests]),
-        np.array([places.index(test.direction) for test in tests]),
-        np.array([distinct.index(line) for line in lines]),
-        np.array([1000 * (test.direction in request.places) for test in tests]),
-        30.0 if setup is None else setup / 60.0,  # half an hour if [rig] states none (chosen)
-        np.inf,
-    )

@@ -24,11 +24,11 @@ _NEARLY = 1.1
 
 
 @dataclass(frozen=True, eq=False)
-class WantedPoints:
-    """Sensitivity of the stiffness at the n wanted points of a direction, and the errors that no further test lowers.
+class PointSensitivity:
+    """Sensitivity of the stiffness at n operating points of a direction, and the errors that no further test lowers.
 
     Args:
-        points: operating points.
+        points: operating points of the request in one direction.
         loss_factor: loss factor at each point, (n,).
         slopes: derivatives of ln|K| and of the phase [rad] by the relative change of each parameter, (2, n, k).
         model_error: standard error due to the model error, of |K| (relative) and of the loss factor (absolute), (2, n).
@@ -43,11 +43,11 @@ class WantedPoints:
     undecided: Array
 
     @classmethod
-    def from_knowledge(cls, knowledge: Knowledge, points: Points) -> WantedPoints:
-        """Compute the sensitivities and errors at operating points.
+    def from_knowledge(cls, knowledge: Knowledge, points: Points) -> PointSensitivity:
+        """Compute the sensitivities and errors from the model and covariance before the planned tests.
 
         Args:
-            knowledge: knowledge before the tests.
+            knowledge: model, covariance and noise before the planned tests.
             points: operating points of one direction.
 
         Returns:
@@ -71,12 +71,12 @@ class WantedPoints:
 
 @dataclass(frozen=True, eq=False)
 class TargetSensitivity:
-    """Target with the data that give its interval for any covariance of the parameters.
+    """Target with the data from which its 95 % interval follows for any covariance of the parameters.
 
     The target has n operating points (one for a parameter); the k parameters include the parameters at a bound.
 
     Args:
-        target: quantity and wanted half width.
+        target: quantity and half width that the user asks for.
         rows: derivative of the relative change of the quantity by the relative change of each parameter, (n, k).
         model_error: relative standard error due to the model error, which no test lowers, (n,).
         undecided: relative half width due to explanations that the tests cannot distinguish, (n,).
@@ -90,8 +90,8 @@ class TargetSensitivity:
     points: Points | None = None
 
     @classmethod
-    def from_target(cls, target: Target, names: Sequence[str], wanted: WantedPoints | None) -> TargetSensitivity:
-        """Prepare a target: compute its derivatives by the parameters, and the errors that no test lowers.
+    def from_target(cls, target: Target, names: Sequence[str], wanted: PointSensitivity | None) -> TargetSensitivity:
+        """Compute the derivatives of a target's quantity by the parameters, and the errors that no test lowers.
 
         Args:
             target: a parameter, or the stiffness or loss factor of a direction.
@@ -99,7 +99,7 @@ class TargetSensitivity:
             wanted: sensitivities at the operating points of the direction; None for a parameter.
 
         Returns:
-            The target with these data, at all operating points of the direction.
+            The target with these data at all operating points of the direction.
         """
         if wanted is None:
             row = np.array([[float(name == target.quantity) for name in names]])
@@ -115,11 +115,7 @@ class TargetSensitivity:
         return np.asarray(np.einsum("nk,kl,nl->n", self.rows, error_covariance, self.rows))
 
     def half_widths(self, error_covariance: Array) -> Array:
-        """Relative half width of the target's 95 % interval at each point, (n,).
-
-        The interval follows from the covariance of the parameters, (k, k), the error of the model, and explanations
-        of earlier tests that are undecided.
-        """
+        """Relative half width of the 95 % interval at each point, (n,), from the parameters' covariance, (k, k)."""
         return self.undecided + Z95 * np.sqrt(self.variances(error_covariance) + self.model_error**2)
 
     def half_width(self, error_covariance: Array) -> float:
@@ -127,30 +123,29 @@ class TargetSensitivity:
         return float(self.half_widths(error_covariance).max())
 
     def met(self, error_covariance: Array) -> bool:
-        """True if the intervals are as narrow as the target for this covariance of the parameters, (k, k)."""
+        """True if this covariance of the parameters, (k, k), makes all intervals as narrow as the target."""
         return self.half_width(error_covariance) <= self.target.half_width * (1.0 + 1e-9)
 
     def reached(self, error_covariance: Array, limit: Array) -> bool:
-        """True if the target is met, or nearly as well as unlimited tests would.
+        """True if tests meet the target, or miss it by nearly as little as unlimited tests would.
 
         Args:
-            error_covariance: covariance of the parameters with the tests in question, (k, k).
+            error_covariance: covariance of the parameters with the tests, (k, k).
             limit: covariance of the parameters with unlimited tests, (k, k).
         """
         nearly = self.half_width(error_covariance) <= _NEARLY * self.half_width(limit)
         return self.met(error_covariance) or (not self.met(limit) and nearly)
 
     def weight(self, limit: Array) -> Array:
-        """Compute the weight of the parameter covariance in the search criterion for this target.
-
-        The criterion is the variance of the quantity over the variance that the target allows, averaged over points.
+        """Compute the weight matrix of the search criterion for this target.
 
         Args:
-            limit: covariance with unlimited tests, (k, k). If unlimited tests miss the target, the allowed variance is
-                set slightly above the variance that unlimited tests reach.
+            limit: covariance of the parameters with unlimited tests, (k, k).
 
         Returns:
-            Weight matrix W, (k, k): trace(W covariance) is the mean ratio of variances.
+            Matrix W, (k, k): trace(W covariance) is the variance of the quantity over the variance that the target
+            allows, averaged over points. If unlimited tests miss the target, the allowed variance is slightly above
+            theirs.
         """
         if self.met(limit):
             allowed = np.square(np.maximum(self.target.half_width - self.undecided, 0.0) / Z95) - self.model_error**2
@@ -163,7 +158,7 @@ class TargetSensitivity:
         """Write a sentence on the largest error that remains with unlimited tests, at the point of the widest interval.
 
         Args:
-            knowledge: knowledge before the tests.
+            knowledge: model, covariance and noise before the planned tests.
             limit: covariance of the parameters with unlimited tests, (k, k).
 
         Returns:
@@ -192,9 +187,9 @@ class TargetSensitivity:
             unit, factor = self.points.place.display.displacement
             frequency, amplitude = float(self.points.frequency[worst]), float(self.points.amplitude[worst])
             location = f" at {format_range('Hz', frequency)} and {format_range(unit, factor * amplitude)}"
-        return f"{percent(size)}{location} is {cause}"
+        return f"{format_half_width(size)}{location} is {cause}"
 
 
-def percent(half_width: float, digits: int = 2) -> str:
+def format_half_width(half_width: float, digits: int = 2) -> str:
     """Format a relative half width as a percentage: 0.015 becomes "+/-1.5 %"."""
     return f"+/-{number(100.0 * half_width, digits)} %"

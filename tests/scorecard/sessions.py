@@ -18,7 +18,7 @@ from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import LIBRARY, twins_of
 from bushfit.errors import ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.planning.campaign import settings_of
+from bushfit.planning.campaign import simulation_settings
 from bushfit.planning.contract import Noise, Test
 from bushfit.planning.problem import RIVALS_APART
 from bushfit.simulation.measured import Simulated, simulate
@@ -92,7 +92,7 @@ def with_session(campaign: Campaign, hidden: Simulated, tests: tuple[Test, ...])
 
     What depends on the order of the tests is measured anew as a whole, all in one session.
     """
-    before, further = hidden.plan, settings_of(tests, Noise())
+    before, further = hidden.plan, simulation_settings(tests, Noise())
     loops, sweeps, anew = further.loops, further.sweeps, hidden.truth.depends_on_conditions
     if anew:
         repeated = (replace(sweep, repeats=sweep.repeats or before.repeats) for sweep in before.sweeps)
