@@ -23,7 +23,7 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
 
     Returns:
         Two mappings by name of the quantity, (n,) each: deviation from the mean of the parts that are outliers in no
-        quantity, in their standard deviations, NaN where not known; and True for the outliers.
+        quantity, in their standard deviations, NaN where not known; and a mask of the outliers.
 
     Notes:
         Generalised extreme studentised deviate procedure (Rosner, Technometrics 25 (1983) 165) for up to a fifth of
@@ -34,31 +34,29 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
     """
     deviations, outliers = dict[str, Array](), dict[str, Array]()
     for name, (values, errors) in quantities.items():
-        finite = np.isfinite(values)
-        removed = list[int]()
-        count, usual = 0, finite.copy()
-        for step in range(int(finite.sum()) // FEWEST):
+        usual = np.isfinite(values)
+        removed, outlier_count = list[int](), 0
+        for step in range(int(usual.sum()) // FEWEST):
             z = _studentised(values, errors, usual)
             if not np.isfinite(z[usual]).any():  # the others agree to the digit
                 break
             worst = int(np.nanargmax(np.where(usual, np.abs(z), np.nan)))
-            chance = 2.0 * float(stdtr(usual.sum() - 2.0, -abs(z[worst]))) * usual.sum() * len(quantities)
+            p_value = 2.0 * float(stdtr(usual.sum() - 2.0, -abs(z[worst]))) * usual.sum() * len(quantities)
             usual[worst] = False
             removed.append(worst)
-            count = step + 1 if chance < _LEVEL else count
-        outliers[name] = np.zeros(values.size, dtype=bool)
-        outliers[name][removed[:count]] = True
-    named = np.any([*outliers.values()], axis=0)
+            outlier_count = step + 1 if p_value < _LEVEL else outlier_count
+        outliers[name] = np.isin(np.arange(values.size), removed[:outlier_count])
+    outlying_parts = np.any([*outliers.values()], axis=0)
     for name, (values, errors) in quantities.items():
         usual = usual_parts(values, name, outliers)
         deviations[name] = _studentised(values, errors, usual)
         limit = smallest_deviation(int(usual.sum()) + 1, len(quantities)) or math.inf
-        outliers[name] |= named & (np.abs(deviations[name]) > limit)
+        outliers[name] |= outlying_parts & (np.abs(deviations[name]) > limit)
     return deviations, outliers
 
 
 def usual_parts(values: Array, name: str, outliers: Mapping[str, Array]) -> Array:
-    """Mask of the parts with which the others are compared in one quantity: those that are outliers in no quantity.
+    """Select the reference parts, with which all parts are compared in one quantity: outliers in no quantity.
 
     Args:
         values: values of the quantity, (n,); NaN if unknown.
@@ -66,7 +64,7 @@ def usual_parts(values: Array, name: str, outliers: Mapping[str, Array]) -> Arra
         outliers: masks of outliers by name of the quantity, (n,) each.
 
     Returns:
-        Mask, (n,); if too few parts remain, that of the parts that are no outliers in this quantity.
+        Mask of the reference parts, (n,); if fewer than four remain, of those that are no outliers in this quantity.
     """
     finite = np.isfinite(values)
     usual = finite & ~np.any([*outliers.values()], axis=0)
@@ -79,7 +77,7 @@ def _studentised(values: Array, errors: Array, usual: Array) -> Array:
     Args:
         values: values of one quantity of the n parts, (n,).
         errors: standard error of each value, (n,).
-        usual: True for parts that are not outliers, (n,).
+        usual: mask of the reference parts, (n,).
     """
     count, other_count = usual.sum(), usual.sum() - usual  # (n,): how many others each value is held against
     if count < FEWEST - 1:

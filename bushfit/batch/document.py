@@ -27,31 +27,25 @@ class Estimate:
 
     @classmethod
     def finite(cls, value: float, low: float | None, high: float | None, stderr: float | None, unit: str) -> "Estimate":
-        """Make an estimate whose numbers are None where they are not finite.
+        """Make an estimate whose interval and standard error are None where they are not finite.
 
         Args:
             value: the value, in `unit`.
             low, high: ends of the 95 % interval, in `unit`.
             stderr: standard error, in `unit`.
             unit: SI unit.
-
-        Returns:
-            The estimate.
         """
         low, high, stderr = (x if x is not None and math.isfinite(x) else None for x in (low, high, stderr))
         return cls(value, low, high, stderr, unit)
 
     @classmethod
     def normal(cls, value: float, stderr: float, unit: str) -> "Estimate":
-        """Make an estimate with a normally distributed error from its standard error.
+        """Make an estimate with the 95 % interval of a normally distributed error.
 
         Args:
             value: the value, in `unit`.
             stderr: standard error, in `unit`.
             unit: SI unit.
-
-        Returns:
-            The estimate with its 95 % interval.
         """
         return cls(value, value - Z95 * stderr, value + Z95 * stderr, stderr, unit)
 

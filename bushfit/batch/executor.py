@@ -121,10 +121,7 @@ def dask_workers(address: str) -> Workers:
         """Count the worker threads of the cluster.
 
         Returns:
-            Number of threads.
-
-        Raises:
-            BatchError: the connection to the scheduler is lost.
+            Number of threads; a lost connection to the scheduler raises a BatchError.
         """
         try:
             if client.status == "running":
@@ -153,7 +150,7 @@ def run_rows(
     workers: Workers,
     warn: Callable[[str], object] = lambda _: None,
 ) -> Iterator[tuple[int, Outcome]]:
-    """Call `work(row)` for all rows on the workers, in any order.
+    """Evaluate all rows of a batch (one row for each part) on the workers, in any order.
 
     Args:
         rows: rows of the batch.
@@ -163,7 +160,7 @@ def run_rows(
         warn: function that is called with a sentence when no worker is available.
 
     Returns:
-        Iterator over the finished rows: index of the row and its outcome, in the order in which they finish.
+        Iterator over index and outcome of each row, in the order in which the rows finish.
 
     Raises:
         BatchError: no worker starts, or the cluster is lost.

@@ -103,7 +103,9 @@ Stiffness = Annotated[float, _STIFFNESS, _LIMIT]
 
 @dataclass(frozen=True, kw_only=True)
 class PointLimits:
-    """Operating point to which limits apply; the last base class, so that pydantic reads the point before the limits.
+    """Operating point to which limits apply.
+
+    As the last base class of a table it makes pydantic read the point before the limits, whose unit depends on it.
 
     Args:
         at: operating point, such as "axial 25 Hz 0.1 mm".
@@ -199,7 +201,7 @@ def read_limits(path: Path, rows: Sequence[Row]) -> Limits:
 
 
 def resolve_limits(limits: Limits, values: Mapping[str, Array]) -> tuple[dict[str, tuple[float, float]], list[str]]:
-    """Compute the allowed range of each quantity, including limits relative to the batch (`sigma`).
+    """Compute the allowed range of each quantity; limits relative to the batch (`sigma`) need the values of all parts.
 
     Args:
         limits: the limits file.

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -43,8 +44,9 @@ _PATTERN = re.compile(r"[*?\[]")
 
 
 def _check_name(lookup: Callable[[str], Effect], raw: object, _: object) -> object:
+    """Return the name of an effect unchanged; `lookup` raises an error for an unknown name."""
     if isinstance(raw, str):
-        lookup(raw)  # raises for an unknown name
+        lookup(raw)
     return raw
 
 
@@ -56,7 +58,9 @@ Candidates = Annotated[tuple[Annotated[str, converter(partial(_check_name, get_c
 
 @dataclass(frozen=True, kw_only=True)
 class RowSettings:
-    """Settings of a row or of a whole manifest; None if not stated: the manifest or the default then applies.
+    """Settings of one part (a row of the batch), or of a whole manifest; None if not stated.
+
+    A row without a setting takes that of the manifest, or else the default.
 
     Args:
         commands: run alone, or any of fit, diagnose, predict and respond; default fit.
@@ -81,12 +85,12 @@ class RowSettings:
     def with_defaults(self, defaults: RowSettings) -> RowSettings:
         """Copy of these settings in which None is replaced by the value in `defaults`; other keys are dropped."""
         names = [setting.name for setting in fields(RowSettings)]
-        own_settings = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
-        return RowSettings(**{**{name: getattr(defaults, name) for name in names}, **own_settings})
+        chosen = {name: getattr(defaults if getattr(self, name) is None else self, name) for name in names}
+        return RowSettings(**chosen)
 
     @property
     def diagnoses(self) -> bool:
-        """True if the commands of the row include a diagnosis."""
+        """True if the commands include a diagnosis."""
         return not {"run", "diagnose"}.isdisjoint(self.commands or ())
 
 
@@ -288,7 +292,8 @@ def make_rows(entries: Sequence[Entry], base: Path, settings: RowSettings, sourc
     Raises:
         CampaignError: settings that contradict each other, or that no command uses.
     """
-    check_used(settings, {entry.commands or settings.commands or _DEFAULT_COMMANDS for entry in entries}, source)
+    commands = {entry.commands or settings.commands or _DEFAULT_COMMANDS for entry in entries}
+    refuse_unused_settings(settings, commands, source)
     stems = Counter(Path(entry.campaign).stem for entry in entries)
     used_folders, namesakes = set[str](), Counter[str]()
     completed, rows = dict[RowSettings, RowSettings](), list[Row]()
@@ -313,12 +318,14 @@ def make_rows(entries: Sequence[Entry], base: Path, settings: RowSettings, sourc
     return rows
 
 
-def check_used(settings: RowSettings, rows: Collection[tuple[Command, ...]], source: str) -> None:
-    """Check that at least one command of the rows uses each stated setting.
+def refuse_unused_settings(
+    settings: RowSettings, commands_of_rows: Collection[tuple[Command, ...]], source: str
+) -> None:
+    """Refuse a setting that no command of the rows uses.
 
     Args:
         settings: settings that apply to all these rows.
-        rows: commands of each row.
+        commands_of_rows: commands of each row.
         source: manifest, for error messages.
 
     Raises:
@@ -326,17 +333,17 @@ def check_used(settings: RowSettings, rows: Collection[tuple[Command, ...]], sou
     """
     for name, users in _COMMANDS_USING.items():
         # after a fit, predict and respond use the fitted model
-        unused = [
-            {*users} - ({"predict", "respond"} if name == "model" and "fit" in commands else set()) for commands in rows
-        ]
-        is_used = any(not names.isdisjoint(commands) for names, commands in zip(unused, rows, strict=True))
+        without_fit = {"diagnose"} if name == "model" else {*users}
+        is_used = any(
+            not (without_fit if "fit" in commands else {*users}).isdisjoint(commands) for commands in commands_of_rows
+        )
         if getattr(settings, name) is not None and not is_used:
-            another = "" if ("run",) in rows else f"--command {users[0]} too, or "
+            another = "" if ("run",) in commands_of_rows else f"--command {users[0]} too, or "
             raise CampaignError(
                 "this setting has no effect here",
                 file=source,
                 place=name,
-                found=f"commands {', '.join(sorted({command for commands in rows for command in commands}))}",
+                found="commands " + ", ".join(sorted({*chain(*commands_of_rows)})),
                 expected=f"a setting of {' or '.join(users)}",
                 hint=f"{another}leave {name} out",
             )
@@ -368,7 +375,7 @@ def complete_settings(row_settings: RowSettings, defaults: RowSettings, base: Pa
             expected='commands = ["run"], or any of fit, diagnose, predict, respond without it',
             hint="--command run alone" if row_settings.commands is None else None,
         )
-    check_used(row_settings, [commands], source)
+    refuse_unused_settings(row_settings, [commands], source)
     if {*commands} <= {"predict", "respond"} and not settings.model:
         expected = f'commands = ["fit", "{commands[0]}"], or model = "model.json"'
         raise CampaignError(

@@ -135,7 +135,7 @@ def list_quantities(names: Collection[str], points: Iterable[Point]) -> dict[str
 
 
 def measured_at(sweeps: Iterable[Sweep], point: Point, noise: float) -> dict[str, Estimate]:
-    """Find the measured stiffness and loss factor at a point.
+    """Mean measured stiffness and loss factor at an operating point, with 95 % intervals.
 
     Args:
         sweeps: sweeps of one part.
@@ -143,7 +143,7 @@ def measured_at(sweeps: Iterable[Sweep], point: Point, noise: float) -> dict[str
         noise: standard deviation of the real and imaginary part of one measured point, relative to |K|.
 
     Returns:
-        Mean of the repeats [SI] with its interval, by name of the quantity; empty if no sweep contains the point.
+        Means over the repeats [SI] by name of the quantity; empty if no sweep contains the point.
     """
     for sweep in sweeps:
         near = np.abs(sweep.frequency / point.frequency - 1.0) <= _SAME_FREQUENCY
@@ -159,10 +159,11 @@ def measured_at(sweeps: Iterable[Sweep], point: Point, noise: float) -> dict[str
 
 
 def measured_curve(sweeps: Iterable[Sweep]) -> dict[str, float]:
-    """Measured |K| of the first sweep with one constant and one stepped quantity, at the middle constant level.
+    """Measured |K| along one run of a sweep, by which the parts of a batch are compared.
 
-    Levels and steps are rounded to three digits, so that parts have common points although a rig reaches its set points
-    with some error.
+    The run is that of the middle constant amplitude (or frequency) of the first sweep over frequency (or amplitude).
+    Both are rounded to three digits, so that parts have common points although a rig reaches its set points with some
+    error.
 
     Args:
         sweeps: sweeps of one part.

@@ -36,7 +36,7 @@ _ZERO = 1e-3
 
 @dataclass(frozen=True)
 class RowTask:
-    """Function that evaluates a row of a batch on a worker, with the settings that all rows share.
+    """Function that evaluates one part (a row of the batch) on a worker, with the settings that all rows share.
 
     Args:
         output: results folder of the batch.
@@ -56,7 +56,7 @@ class RowTask:
         """Evaluate a row and save its results.
 
         Returns:
-            The record, and True if it was kept from an earlier run.
+            Results for the table of the batch, and True if they were kept from an earlier run.
 
         Raises:
             BatchError: this process runs another version of bushfit.
@@ -96,7 +96,7 @@ def limit_threads() -> Any:
 
 
 def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFile, dict[str, bytes]]:
-    """Run the commands of a row.
+    """Evaluate one part of a batch: run the commands of its row, and collect what the batch compares.
 
     Args:
         row: row with its campaign and commands.
@@ -104,7 +104,7 @@ def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFi
         formats: formats of the result files.
 
     Returns:
-        The record of the results, and the contents of the result files by name.
+        Results for the table of the batch, and the contents of the result files by name.
 
     Raises:
         BushfitError: inputs that cannot be used.
@@ -125,15 +125,15 @@ def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFi
         amount = result.model.values[name] - (parameter.neutral or 0.0)
         if "." in name and parameter.neutral is not None and abs(amount) <= _ZERO * parameter.typical:
             del at_bound[name]  # an added effect of zero is a result and not a bound
-    found = diagnosis.effects if diagnosis else ()
+    effects = diagnosis.effects if diagnosis else ()
     twins = [twin for name in (diagnosis.result.unresolved if diagnosis else ()) for twin in get_effect(name).twins]
     record = RowFile(
         status="done",
         inputs=inputs,
         campaign_name=campaign.name,
         verdict=diagnosis.verdict if diagnosis else None,
-        effects=[effect.label for effect in found],
-        alternatives=[*(name for effect in found for name in effect.alternatives), *twins],
+        effects=[effect.label for effect in effects],
+        alternatives=[*(name for effect in effects for name in effect.alternatives), *twins],
         warnings=warnings_of(result, [*warnings, response_warnings], diagnosis.notes if diagnosis else ()),
         quantities=quantities,
         measured=measured,
@@ -146,11 +146,11 @@ def evaluate(row: Row, points: Sequence[Point], formats: Formats) -> tuple[RowFi
 def run_commands(
     campaign: Campaign, settings: RowSettings, formats: Formats
 ) -> tuple[Result, Diagnosis | None, dict[str, bytes], list[str]]:
-    """Run the commands of a row: run alone, or any of fit, diagnose, predict and respond, each from the last result.
+    """Run the commands on one campaign: run alone, or any of fit, diagnose, predict and respond, in this order.
 
     Args:
-        campaign: campaign of the row.
-        settings: complete settings of the row.
+        campaign: campaign of one part.
+        settings: complete settings of the part.
         formats: formats of the result files; the tables of a prediction are always written.
 
     Returns:
@@ -211,9 +211,10 @@ def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[s
     if result.quality:
         estimates |= {quantity.name: Estimate(getattr(result.quality, key)) for key, quantity in FIT_QUALITY.items()}
     for point in points:
-        place, *others = get_places(point.place, result.specimens)
-        if others:
-            expected = " or ".join(f'"{one} ..."' for one in (place, *others))
+        places = get_places(point.place, result.specimens)
+        place = places[0]
+        if len(places) > 1:
+            expected = " or ".join(f'"{name} ..."' for name in places)
             raise BatchError("this operating point is of several places", found=str(point), expected=expected)
         if place.motion != point.motion:
             expected = f"an amplitude in {place.display.displacement.name}"

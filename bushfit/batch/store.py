@@ -33,19 +33,18 @@ STAGE = ".aside"
 
 
 def row_key(row: Row, points: Collection[Point], formats: Formats) -> str:
-    """Hash of the settings and the version that the results of a row depend on; input files are hashed separately.
+    """Hash of all that the results of a part depend on beside its input files: settings and version of bushfit.
 
     Args:
-        row: row with its settings.
+        row: row of the batch (one part) with its settings.
         points: operating points of stiffness and loss factor.
         formats: formats of the files that the row writes.
 
     Returns:
-        SHA-256 of settings, points, formats and the version of bushfit.
+        SHA-256 in hexadecimal digits.
     """
-    predicts = not {"run", "predict", "respond"}.isdisjoint(
-        row.settings.commands or ()
-    )  # whose tables are always written
+    # their tables are always written
+    predicts = not {"run", "predict", "respond"}.isdisjoint(row.settings.commands or ())
     settings = {
         "settings": asdict(row.settings),
         "points": [str(point) for point in points],
@@ -58,15 +57,15 @@ def row_key(row: Row, points: Collection[Point], formats: Formats) -> str:
 
 
 def load_row(output: Path, row: Row, key: str) -> RowFile | None:
-    """Load the record of a row that an earlier run evaluated.
+    """Load the results of a part from an earlier run, if they are still valid.
 
     Args:
         output: results folder of the batch.
-        row: row of the batch.
+        row: row of the batch (one part).
         key: hash of the row's settings, from `row_key`.
 
     Returns:
-        The record; None if settings or inputs have changed, or a file is damaged or missing.
+        The results; None if settings or inputs have changed, or a file is damaged or missing.
     """
     folder, campaign_folder = output / ROWS_FOLDER / row.folder, Path(row.campaign).parent
     with contextlib.suppress(OSError, ValueError, BushfitError):
@@ -80,13 +79,13 @@ def load_row(output: Path, row: Row, key: str) -> RowFile | None:
 
 
 def save_row(output: Path, row: Row, files: Mapping[str, bytes], record: RowFile) -> None:
-    """Write the files and the record of a row, and remove those of an earlier run.
+    """Write the result files of a part and its record, row.json, and remove those of an earlier run.
 
     Args:
         output: results folder of the batch.
-        row: row of the batch.
+        row: row of the batch (one part).
         files: contents of the result files by name.
-        record: record of the results, written as row.json.
+        record: results of the part, for row.json.
 
     Raises:
         OSError: the disk is full or cannot be written.
@@ -110,6 +109,7 @@ def save_row(output: Path, row: Row, files: Mapping[str, bytes], record: RowFile
 
 
 def digest(data: bytes) -> str:
+    """SHA-256 of data, in hexadecimal digits."""
     return hashlib.sha256(data).hexdigest()
 
 

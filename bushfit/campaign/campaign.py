@@ -44,7 +44,11 @@ class Campaign:
         path: path of the campaign file.
         sha256: SHA-256 of the campaign file; empty without a file.
         logo: logo of [report] as a data URI; None without a logo.
-        bushing: the bushing; None if only specimens were tested.
+        bushing: the bushing; None if only specimens, or several bushings, were tested.
+        loops, sweeps: measured tests.
+        validation: records that are compared with the model and never fitted.
+        specimens: specimens, and the directions of each of several bushings.
+        fit, predict, rig, report, effects: settings of the table of this name.
         simulate, compound: settings of the table of this name; None if the file lacks the table.
     """
 
@@ -108,7 +112,7 @@ def load_campaign(path: str | Path) -> Campaign:
         for kind, tests in (("loops", content.loops), ("sweeps", content.sweeps), ("records", content.validation))
     )
     several = " and ".join(table.name for table in content.bushings)
-    found: dict[str, Any] = {
+    contents: dict[str, Any] = {
         "name": content.name or (bushing.name if bushing else several or specimens[0].body),
         "bushing": bushing,
         "specimens": specimens,
@@ -131,9 +135,9 @@ def load_campaign(path: str | Path) -> Campaign:
         if (setting := parameters[name]).vary and not (setting.prior or setting.tie):
             parameters[name] = replace(setting, prior=f"1 +- {FACTOR_SPREAD}")
     effects = (*content.fit.effects, *(name for name in factors if name not in content.fit.effects))
-    found["fit"] = replace(content.fit, effects=effects, parameters=parameters)
+    contents["fit"] = replace(content.fit, effects=effects, parameters=parameters)
     settings = {key: value for key, value in vars(content).items() if key != "bushings"}
-    return Campaign(**{**settings, **found}, path=path)
+    return Campaign(**{**settings, **contents}, path=path)
 
 
 def _read_file(path: Path) -> CampaignFile:
@@ -170,8 +174,8 @@ def _check_bodies(content: CampaignFile) -> None:
     if content.bushing and content.bushings:
         expected = "[bushing] for one bushing, or [[bushings]] for several of one compound"
         raise CampaignError("two lists of bushings", found="[bushing] and [[bushings]]", expected=expected)
-    taken = [*names, *(f"{table.name} {axis}" for table in content.bushings for axis in Direction)]
-    if doubles := {name for name in taken if taken.count(name) > 1}:
+    all_names = [*names, *(f"{table.name} {axis}" for table in content.bushings for axis in Direction)]
+    if doubles := {name for name in all_names if all_names.count(name) > 1}:
         table = "[[bushings]]" if content.bushings else "[[specimens]]"
         raise CampaignError("two bodies have one name", place=table, found=", ".join(sorted(doubles)))
     tested = {test.bushing or test.specimen for test in (*content.loops, *content.sweeps)}
@@ -256,15 +260,15 @@ def refuse_tests(paths: Sequence[Path]) -> None:
 
 
 def reader_keywords(
-    campaign: Path, tests: Sequence[LoopFile | SweepFile], specimens: Sequence[Specimen] = ()
+    path: Path, tests: Sequence[LoopFile | SweepFile], specimens: Sequence[Specimen] = ()
 ) -> Iterator[dict[str, Any]]:
-    """Keywords of `read_loop` or `read_sweep` for the tests of a campaign.
+    """Keyword arguments with which `read_loop` or `read_sweep` reads the tests of a campaign.
 
     The name of a test is the stem of its file, or the path as the campaign lists it if two files have the same stem. If
     one file contains several tests, sheet, temperature, direction, specimen number and selected rows are added.
 
     Args:
-        campaign: path of the campaign file.
+        path: path of the campaign file.
         tests: [[loops]] or [[sweeps]] tables.
         specimens: specimens of the campaign.
 
@@ -275,21 +279,16 @@ def reader_keywords(
         CampaignError: a test that is listed twice, or that states no direction or specimen.
     """
     listed_tests = set()
-    places = [(os.path.normpath(campaign.parent / test.file), test.sheet, test.temperature) for test in tests]
-    counts = Counter(places)
-    for test, place, name in zip(tests, places, _test_names(tests), strict=True):
-        if (identity := (*place, test.direction, test.specimen_number, *test.rows.items())) in listed_tests:
-            raise CampaignError(
-                "a file is listed twice", file=campaign, found=test.file, expected="each file once, or each sheet of it"
-            )
+    sources = [(os.path.normpath(path.parent / test.file), test.sheet, test.temperature) for test in tests]
+    counts = Counter(sources)
+    for test, source, name in zip(tests, sources, _test_names(tests), strict=True):
+        if (identity := (*source, test.direction, test.specimen_number, *test.rows.items())) in listed_tests:
+            expected = "each file once, or each sheet of it"
+            raise CampaignError("a file is listed twice", file=path, found=test.file, expected=expected)
         listed_tests.add(identity)
-        keywords: dict[str, Any] = {
-            "file": campaign.parent / test.file,
-            "test": test,
-            "name": name,
-            "shared": counts[place] > 1,
-        }
-        with error_location(campaign, place=test.file):
+        shared = counts[source] > 1
+        keywords: dict[str, Any] = {"file": path.parent / test.file, "test": test, "name": name, "shared": shared}
+        with error_location(path, place=test.file):
             keywords["direction"] = body = place_tested(vars(test), specimens)
             if isinstance(test, SweepFile) and (amplitude := test.at_amplitude):
                 keywords["at_amplitude"] = level = parse_quantity(amplitude, body.motion.displacement_unit)
@@ -299,7 +298,7 @@ def reader_keywords(
 
 
 def _test_names(tests: Sequence[LoopFile | SweepFile]) -> list[str]:
-    """Make unique names for tests from their files, sheets and conditions, in order."""
+    """Make a unique name for each test from its file, sheet and conditions."""
     keys = ("direction", "specimen_number")
     stems, values = Counter(Path(test.file).stem for test in tests), defaultdict[str, list[tuple[Any, ...]]](list)
     for test in tests:

@@ -22,13 +22,13 @@ _PLUS_MINUS = re.compile(rf"\s*{_NUMBER}\s*(|[^\d\s+].*?)\s*(?:\+/?-|±)\s*{_NUM
 
 
 def constraints_of(campaign: Campaign) -> Constraints:
-    """Read the priors and ties of a campaign.
+    """Read what a campaign states about its parameters beside the tests: priors (earlier knowledge), and ties.
 
     Args:
         campaign: campaign with its [fit].
 
     Returns:
-        Priors, and ties in an order in which each can be computed.
+        Priors, and ties (expressions of other parameters) in an order in which each can be computed.
 
     Raises:
         CampaignError: a text that is no prior, ties in a circle, or settings that exclude each other.
@@ -57,11 +57,11 @@ def constraints_of(campaign: Campaign) -> Constraints:
 def _require_compatible_keys(setting: ParameterSetting) -> None:
     """Raise a CampaignError for settings of a parameter that exclude each other."""
     limits = [key for key in ("value", "min", "max") if getattr(setting, key) is not None]
-    stated = [key for key in ("equal", "expression") if getattr(setting, key)]
-    stated += limits if stated else []
-    stated += ["vary = false"] * (not setting.vary and bool(stated or setting.prior))
-    if len(stated) > 1 or (setting.prior and not setting.vary):
-        found = ", ".join([*stated, *(["prior"] * bool(setting.prior))])
+    keys = [key for key in ("equal", "expression") if getattr(setting, key)]
+    keys += limits if keys else []
+    keys += ["vary = false"] * (not setting.vary and bool(keys or setting.prior))
+    if len(keys) > 1 or (setting.prior and not setting.vary):
+        found = ", ".join([*keys, *(["prior"] * bool(setting.prior))])
         expected = "equal or expression alone, or a prior of a parameter that varies"
         raise CampaignError("these keys exclude each other", found=found, expected=expected)
 
@@ -115,20 +115,20 @@ def _from_result(
 def _tie(campaign: Campaign, name: str, setting: ParameterSetting) -> Tie:
     """Parse the expression, or the name of an equal parameter of the same unit, that a parameter is tied to."""
     labels = [label for specimen in campaign.specimens for label in specimen.labels]
-    if other := (setting.equal or "").strip():
-        tie = Tie(name, other, (other,), "p0", campaign.path)
-        if not is_parameter(other):
+    if equal := (setting.equal or "").strip():
+        tie = Tie(name, equal, (equal,), "p0", campaign.path)
+        if not is_parameter(equal):
             hint = 'expression = "..." takes the value of an expression'
-            raise unknown_key(other, parameter_names(), hint)
+            raise unknown_key(equal, parameter_names(), hint)
     else:
         tie = Tie.from_expression(name, setting.expression or "", labels, campaign.path)
     for used in tie.names:
         if place := place_suffix(used):
             get_places(place, campaign.specimens)
-    units = [get_parameter(one).unit for one in (name, other or name)]
-    if units[0] != units[1]:
-        found, expected = f"{name} [{units[0]}], {other} [{units[1]}]", "two parameters of one unit"
-        hint = f'expression = "{other}" takes the value in SI units'
+    unit, equal_unit = get_parameter(name).unit, get_parameter(equal or name).unit
+    if unit != equal_unit:
+        found, expected = f"{name} [{unit}], {equal} [{equal_unit}]", "two parameters of one unit"
+        hint = f'expression = "{equal}" takes the value in SI units'
         raise CampaignError("parameters of different units are not equal", found=found, expected=expected, hint=hint)
     return tie
 

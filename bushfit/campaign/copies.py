@@ -87,7 +87,7 @@ def without_copied_repeats(sweep: Sweep) -> Sweep:
 
 
 def _digits(sweep: Sweep, rows: NDArray[np.bool_] | slice = slice(None)) -> bytes:
-    """Encode rounded and sorted frequency, amplitude and stiffness of sweep rows: equal bytes for equal data."""
+    """Encode frequency, amplitude and stiffness of rows of a sweep, rounded and sorted; equal data have equal bytes."""
     stiffness = sweep.stiffness[rows]
     numbers = np.stack([sweep.frequency[rows], sweep.amplitude_reached[rows], stiffness.real, stiffness.imag])
     scale = 10.0 ** (_DIGITS - 1 - np.floor(np.log10(np.maximum(np.abs(numbers), 1e-300))))

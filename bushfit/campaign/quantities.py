@@ -22,7 +22,7 @@ _S_TO_ALPHA = re.compile(r"[\s*·]*s\s*(\^|\*\*)\s*alpha\s*$")
 Polymer = Literal["natural", "SBR", "EPDM", "NBR", "CR", "IIR"]
 #: Range of hardness in which Gent's relation is used [Shore A]; a durometer hardly distinguishes rubbers outside.
 _HARDNESS = (20.0, 90.0)
-#: Unit of the filler.
+#: Unit of the content of carbon black: parts per hundred parts of rubber.
 _PHR = r"phr(?:\s+(?:of\s+)?carbon[\s-]black)?"
 #: Maximum carbon black [phr]; no rubber for moving parts contains more.
 _MOST_FILLER = 120.0
@@ -59,7 +59,7 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
 
 
 def convert_effects(raw: dict[str, Any]) -> dict[str, Any]:
-    """Convert tables of parameter values by effect to SI; pydantic checks entries that are not tables."""
+    """Convert tables of parameter values, one table for each effect, to SI; pydantic checks other entries."""
     return {
         effect: {key: parameter_value(f"{effect}.{key}", f"{effect}.{key}", value) for key, value in table.items()}
         if isinstance(table, dict)
@@ -69,9 +69,11 @@ def convert_effects(raw: dict[str, Any]) -> dict[str, Any]:
 
 
 def convert_limits(raw: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
-    """Convert the values of the given keys, such as "min", in tables by parameter name to SI.
+    """Convert tables of limits, one table for each parameter, to SI; pydantic checks entries that are not tables.
 
-    Pydantic checks entries that are not tables.
+    Args:
+        raw: tables by parameter name, such as {"mu": {"min": "1 MPa"}}.
+        keys: keys of a table that are converted, such as "min".
     """
     return {
         name: table | {key: parameter_value(f"{name}.{key}", name, table[key]) for key in keys if key in table}

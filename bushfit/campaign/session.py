@@ -81,15 +81,15 @@ def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], rep
 
 
 def session(bushing: Bushing | None, visits: Sequence[SessionTest]) -> list[RubberConditions]:
-    """Conditions of the tests of a session: temperature, time, earlier strains, preload; each body has its session.
+    """Conditions on which the stiffness of each test depends, from the sequence of all tests of a body (its session).
 
     Args:
         bushing: the bushing; None if only specimens were tested.
-        visits: tests in the order of the campaign.
+        visits: tests of all bodies in the order of the campaign.
 
     Returns:
-        Conditions of each test, in the order of `visits`: temperature [K], position in the session (from 0 to
-        1), and the strain amplitudes before each point, (n,) each.
+        Conditions of each test, in the order of `visits`: temperature [K], time of each point in the session (from 0
+        to 1), strain amplitudes before each point, (n,) each, and preload.
     """
     numbers = [place if visit.order is None else visit.order for place, visit in enumerate(visits, start=1)]
     bodies = [visit.place.body for visit in visits]
@@ -107,7 +107,7 @@ def session(bushing: Bushing | None, visits: Sequence[SessionTest]) -> list[Rubb
 
 
 def _last_larger(strain: Array, session_time: Array) -> tuple[Array, Array]:
-    """Find the last earlier strain amplitude of a larger level than that of each point.
+    """Find, for each point, the last earlier strain amplitude of a larger level than its own; a level spans 15 %.
 
     Args:
         strain: strain amplitude of each point, in measured order [1], (n,).

@@ -39,6 +39,9 @@ def labels_of_file(file: Path, sheet: str, test_options: Mapping[str, Any]) -> L
         file: test file.
         sheet: name of the sheet, or "".
         test_options: options of the test; `amplitude` states whether amplitudes are zero-to-peak or peak-to-peak.
+
+    Returns:
+        The quantities and conditions, as `Labels`.
     """
     labels = labels_in_names(sheet, file.stem)
     convention = test_options.get("amplitude")
@@ -81,14 +84,14 @@ def keys_from_labels(
     has_convention = True
     for key, role in _CONSTANT_ROLES.items() if is_sweep else ():
         if role not in table.roles and key not in test_options:
-            origin, stated = _constant_quantity(table, place, key, sources)
-            convention = test_options.get("amplitude") or stated.convention
-            keys[key] = sentence = stated.text
+            origin, quantity = _constant_quantity(table, place, key, sources)
+            convention = test_options.get("amplitude") or quantity.convention
+            keys[key] = sentence = quantity.text
             if role == "amplitude" and convention in ("peak-to-peak", "rms"):
-                number, _, unit = stated.text.partition(" ")
+                number, _, unit = quantity.text.partition(" ")
                 keys[key] = f"{float(number) * ZERO_TO_PEAK[convention]:.6g} {unit}"
                 factor = "half of" if convention == "peak-to-peak" else "the square root of two times the rms of"
-                sentence = f"{keys[key]}, {factor} {stated.text}"
+                sentence = f"{keys[key]}, {factor} {quantity.text}"
             facts.setdefault(origin, []).append(f"{role} {sentence}")
             has_convention &= role != "amplitude" or convention is not None
     amplitude = table.roles.get("amplitude")
@@ -125,7 +128,7 @@ def _constant_quantity(
     """
     role = _CONSTANT_ROLES[key]
     expected = place.motion.displacement_unit if role == "amplitude" else "Hz"
-    quantities = {origin: stated for origin, labels in sources.items() if (stated := labels.of_dimension(expected))}
+    quantities = {origin: texts for origin, labels in sources.items() if (texts := labels.of_dimension(expected))}
     origin, found = next(iter(quantities.items()), ("", []))
     if len(found) == 1:
         return origin, found[0]

@@ -39,9 +39,9 @@ def implausible_sizes(place: Place, frequency: Array, amplitude: Array, stiffnes
         positive = values[values > 0.0]
         if positive.size and (np.min(positive) < lowest or np.max(positive) > highest):
             ends = [float(np.min(positive)), float(np.max(positive))]
-            shown, factor = ("%", 100.0) if unit == "1" else display_unit(unit, 1.0, math.sqrt(ends[0] * ends[1]))
+            shown_unit, factor = ("%", 100.0) if unit == "1" else display_unit(unit, 1.0, math.sqrt(ends[0] * ends[1]))
             found, expected = (
-                f"{' to '.join(dict.fromkeys(number(factor * end, 3) for end in pair))} {shown}"
+                f"{' to '.join(dict.fromkeys(number(factor * end, 3) for end in pair))} {shown_unit}"
                 for pair in (ends, (lowest, highest))
             )
             yield f"{name} of {found} is outside all tests of rubber ({expected}): is the unit in the header right?"

@@ -149,20 +149,20 @@ def test_direction(file: Path, table: Table, test_options: Mapping[str, Any]) ->
     in_column = dict.fromkeys(table.row_labels.get("direction", (0, ()))[1])
     named = direction_of_file(file, headers, turns=is_torsion, sheet=table.source.sheet)
     found = Direction(*in_column) if len(in_column) == 1 else named
-    if (stated := test_options.get("direction")) is None:
+    if (option := test_options.get("direction")) is None:
         if len(in_column) > 1:
             problem, hint = "this file contains tests in several directions", "state one: --direction axial"
             raise table.header_error(problem, found=", ".join(in_column), expected="one direction", hint=hint)
         return found
-    if found and found != stated and len(in_column) < 2:
+    if found and found != option and len(in_column) < 2:
         raise table.header_error(
-            f"{'the units say' if is_torsion else 'the file says'} {found}, but --direction says {stated}",
+            f"{'the units say' if is_torsion else 'the file says'} {found}, but --direction says {option}",
             found=", ".join([*filter(None, [file.name, table.source.sheet]), *headers]),
             expected="one direction",
             hint="leave --direction out; or state the direction in the file name, which takes precedence over "
             "the header",
         )
-    return Direction(stated)
+    return Direction(option)
 
 
 def open_content(file: Path, test_options: Mapping[str, Any]) -> OpenedFile:

@@ -148,7 +148,11 @@ class Inspection:
         return "; ".join(assumptions) or None
 
     def to_document(self) -> InspectedFile:
-        """Document of the inspection for JSON, without the measured data."""
+        """Document of the inspection for JSON.
+
+        Returns:
+            Entries by key, without the measured data.
+        """
         return {
             "file": str(self.file),
             "sheet": self.entry.get("sheet"),

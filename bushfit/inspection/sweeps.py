@@ -267,7 +267,11 @@ def outlying_blocks(sweep: Sweep, from_repeats: Array) -> Iterator[str]:
 
 
 def odd_losses(sweep: Sweep) -> Iterator[str]:
-    """Warn of negative loss factors, and of a median loss factor that is unusual for rubber, with possible causes."""
+    """Warn of negative loss factors, and of a median loss factor that is unusual for rubber.
+
+    Returns:
+        A sentence for each, with possible causes.
+    """
     negative = np.flatnonzero(sweep.stiffness.imag < 0.0)
     if negative.size:
         level = shown_amplitude(sweep.direction, sweep.amplitude[negative[0]])
