@@ -109,7 +109,8 @@ def si_factor(text: str, expected: str) -> float:
         words = set(_WORD.findall(text))
         hint = 'a pound of force is "lbf"' if {"lb", "lbs"} & words else None
         hint = 'a kilogram of force is "kgf"' if {"kg", "g"} & words and "N" in expected else hint
-        raise UnitError("the unit does not fit", found=f'"{text}"', expected=describe_unit(expected), hint=hint)
+        fitting = ", such as ".join(common_unit(expected))
+        raise UnitError("the unit does not fit", found=f'"{text}"', expected=fitting, hint=hint)
     return scale
 
 
@@ -140,7 +141,7 @@ def parse_quantity(value: object, *expected: str) -> float:
     Raises:
         UnitError: no text, no number, no unit, or a unit of another dimension.
     """
-    kind, unit = _kind(expected[0])
+    kind, unit = common_unit(expected[0])
     refuse = partial(UnitError, expected=f'{kind} with its unit, such as "10 {unit}"')
     text = str(value).strip()
     number = _NUMBER.match(text)
@@ -163,14 +164,14 @@ def parse_quantity(value: object, *expected: str) -> float:
 
 
 def check_size(value: float, unit: str) -> float:
-    """Return an SI value unchanged if its magnitude is plausible.
+    """Return an SI value unchanged, or refuse it if no bushing, test or rig has a quantity of this magnitude.
 
     Args:
         value: SI value.
         unit: its SI unit.
 
     Raises:
-        UnitError: the value is not zero, and smaller or larger than any quantity of a bushing, its tests or its rig.
+        UnitError: the value is not zero, and below the smallest or above the largest plausible magnitude of its unit.
     """
     smallest, largest = _SIZES.get(unit, SIZES)
     if value == 0.0 or smallest <= abs(value) <= largest:
@@ -179,13 +180,13 @@ def check_size(value: float, unit: str) -> float:
     raise UnitError(
         "no bushing has this",
         found=f"{value:g}{written}",
-        expected=f"{_kind(unit)[0]} from {smallest:g} to {largest:g}{written}",
+        expected=f"{common_unit(unit)[0]} from {smallest:g} to {largest:g}{written}",
         hint="check the number and its unit",
     )
 
 
 def display_unit(unit: str, factor: float, size: float) -> tuple[str, float]:
-    """Unit for display of a value: MPa for 1.09e6 Pa, kPa for 1.46e4 Pa.
+    """Choose a display unit by the magnitude of a value: MPa for 1.09e6 Pa, kPa for 1.46e4 Pa.
 
     Args:
         unit: SI unit, or another unit together with its factor from SI.
@@ -229,7 +230,7 @@ def number(value: float, digits: int, sign: str = "") -> str:
 
 
 def format_aligned(values: Sequence[float], digits: int, minimum_digits: int = 0) -> list[str]:
-    """Format numbers with equal decimals, as many as the first needs: 1.4530, 1.4488.
+    """Format numbers with equal decimals, as many as the first number needs: 1.4530, 1.4488.
 
     Args:
         values: one or more numbers; the first determines the decimals.
@@ -285,19 +286,9 @@ def format_range(unit: str, *values: float, digits: int = 3) -> str:
     return f"{' to '.join(dict.fromkeys(number(value * factor, digits) for value in values))} {unit}"
 
 
-def describe_unit(expected: str) -> str:
-    """Description of an SI unit for a message: "a length, such as mm"."""
-    kind, example = _kind(expected)
-    return f"{kind}, such as {example}"
-
-
-def example_unit(expected: str) -> str:
-    """Common unit of the same dimension as an SI unit: mm for m."""
-    return _kind(expected)[1]
-
-
-def _kind(expected: str) -> tuple[str, str]:
-    return _KINDS.get(expected, ("a quantity", expected))
+def common_unit(unit: str) -> tuple[str, str]:
+    """Quantity of an SI unit, and a unit in which it is usually written: "a length" and "mm" for "m"."""
+    return _KINDS.get(unit, ("a quantity", unit))
 
 
 @lru_cache(maxsize=256)

@@ -182,18 +182,19 @@ class Table(Cells):
             UnitError: the unit is missing, unknown, or of another dimension.
         """
         label, expected = role.replace("_", " "), si_unit(role, tested.motion)
+        quantity, example = units.common_unit(expected)
         if role not in self.roles:
             self.refuse_other_motion(role)
             ways = ", ".join(filter(None, (self.columns_key(role, expected), hint)))
             raise self.header_error(
                 f"there is no column for the {label}",
-                expected=f'a header such as "{label} [{units.example_unit(expected)}]"',
+                expected=f'a header such as "{label} [{example}]"',
                 hint=f"name the column in the campaign: {ways}",
             )
         column = self.roles[role]
         if column.index in self.clocks:
             return column
-        place, example = self.place(self.layout.header_line, column), units.example_unit(expected)
+        place = self.place(self.layout.header_line, column)
         unclear = partial(UnitError, file=self.file, place=place, found=f'"{column.header}"')
         if math.isnan(column.logarithm):
             unit = column.unit or example
@@ -214,7 +215,7 @@ class Table(Cells):
             alternative = f', or units = {{ {role} = "{second}" }}' if second else ""
             raise unclear(
                 f"the {label} has no unit",
-                expected=f"{units.describe_unit(expected)}{', or an angular frequency, such as rad/s' * angular}",
+                expected=f"{quantity}, such as {example}{', or an angular frequency, such as rad/s' * angular}",
                 hint=f'write "{column.header} [{"rad/s" if angular else example}]" in the header, '
                 f'or units = {{ {role} = "{example}" }} in the campaign{alternative}',
             )
