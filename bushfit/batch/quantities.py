@@ -108,7 +108,10 @@ class PartQuantity:
 
 #: Quality of the fit: NRMSE is the relative root mean square difference of model and tests, reduced chi-square the mean
 #: square residual in units of noise. The keys are those of a limits file.
-FIT_QUALITY = {"nrmse": PartQuantity("NRMSE", "-"), "reduced_chi_square": PartQuantity("reduced chi-square", "-")}
+FIT_QUALITY = {
+    "nrmse": PartQuantity("NRMSE", "%", 100.0),
+    "reduced_chi_square": PartQuantity("reduced chi-square", "-"),
+}
 FIT_NAMES = frozenset(quantity.name for quantity in FIT_QUALITY.values())
 #: Quantities at an operating point: |K|, and K''/K'.
 STIFFNESS, LOSS_FACTOR = "stiffness", "loss factor"

@@ -95,8 +95,9 @@ def cli() -> None:
         bushfit run CAMPAIGN.toml
 
     prints the verdict on the model and writes parameters, stiffness tables, plots and a report to results/<campaign
-    name>. `bushfit COMMAND -h` explains one command. Exit status: 0 done; 1 done, but a stated limit is missed;
-    2 wrong usage or unusable input.
+    name>. The other commands on a campaign or model write to a folder in it, such as results/<campaign name>/predict.
+    `bushfit COMMAND -h` explains one command. Exit status: 0 done; 1 done, but a stated limit is missed; 2 wrong
+    usage or unusable input.
     """
 
 
@@ -125,6 +126,9 @@ def _status(command: click.Command) -> int:
         message = "aborted"
     except click.ClickException as error:
         context = error.ctx if isinstance(error, click.UsageError) else None
+        if isinstance(error, click.NoSuchOption) and context and not error.possibilities:
+            names = [name for parameter in context.command.params for name in parameter.opts]
+            error.possibilities = [name for name in names if name.startswith(f"-{error.option_name}")]  # --d... for -d
         text = " ".join(error.format_message().split())
         if wrong := re.search(r"'([^']*)' is not one of (.*)\.$", text):
             near = did_you_mean(wrong[1], re.findall(r"'([^']*)'", wrong[2]))

@@ -45,7 +45,7 @@ _CHANCE = 0.05
         flag_value=_ALL,
     ),
 )
-@with_output("results/<names>", "tables", "pictures", "pages")
+@with_output("results/<names>/compare", "tables", "pictures", "pages")
 def command(
     sources: tuple[Path, ...],
     families: str | None,
@@ -82,7 +82,7 @@ def command(
                 all(map(get_effect, name.split("+")))
         campaign = load_campaign(sources[0])
         name = campaign.name
-        folder = output.folder(name, "compare.json", form="{} families")
+        folder = output.folder(name, "compare.json")
         compared = compare(campaign, families=names, **settings)
     else:
         entries = []

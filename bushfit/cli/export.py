@@ -16,6 +16,12 @@ from bushfit.cli.shared_options import (
     static_rate_option,
 )
 
+#: File of each format, or dialect, that must not exist yet; an FMU is named after the bushing.
+_FILES = {
+    **{"nastran": "bushing.bdf", "optistruct": "bushing.fem", "abaqus": "bushing.inp", "adams": "bushing_car.bus"},
+    **{"prony": "prony.csv", "csv": "parameters.csv", "xlsx": "bushing.xlsx"},
+}
+
 
 @command_called(
     "export",
@@ -54,7 +60,7 @@ from bushfit.cli.shared_options import (
     option("--accuracy", "ERROR", "Largest permitted error of the modulus in an FMU or prony [1 %].", default="1 %"),
 )
 @prediction_options("Use the frequencies and amplitudes of this campaign.")
-@with_output("results/<name>", "tables")
+@with_output("results/<name>/export", "tables")
 def command(
     model: Path,
     formats: tuple[str, ...],
@@ -72,9 +78,9 @@ def command(
 ) -> None:
     """Write a fitted model for other programs: a solver, a multibody code, a spreadsheet.
 
-    MODEL is the model.json of run, fit or diagnose, its folder, or dynamic.json. The command lists properties that a
-    format cannot represent, with the error in stiffness. Effects that belong to the test rig are left out. The axis
-    of the bushing is z.
+    MODEL is the model.json of run, fit or diagnose, its folder, or dynamic.json. If a format cannot represent a
+    property of the model, the command states the error in stiffness. -v also lists properties without a stated error.
+    Effects that belong to the test rig are left out. The axis of the bushing is z.
 
     Writes bushing.bdf, .fem, .inp or .xlsx; bushing_car.bus and bushing_ride.bus (adams); one CSV file for each
     table; prony.csv, a row per term; or an .fmu, with its Maxwell arms in arms.csv.
@@ -105,10 +111,20 @@ def command(
     settings["accuracy"] = parse_positive(accuracy, "--accuracy", "1")
     comma = output.formats.table_form == "decimal-comma"
     names, file = tuple(dict.fromkeys(formats)), model_file(model)
+    written = [_FILES[dialect or name if name == "nastran" else name] for name in names if name in _FILES]
+    folder = output.folder((loaded or result).name, *written)
     exported = export(file, names, loaded, dialect=dialect or "nastran", decimal_comma=comma, **settings)
-    for name, written in exported.exported.items():
-        for omission in written.omissions:
-            output.print(f"limit of {name}: {omission}")
+    limits = dict[str, list[str]]()
+    for name, of_format in exported.exported.items():
+        for omission in of_format.omissions:
+            limits.setdefault(omission, []).append(name)
+    printed = [*limits] if output.verbose else [limit for limit in limits if "error" in limit]
+    for limit in printed:
+        output.print(f"limit of {', '.join(limits[limit])}: {limit}")
+    if remaining := len(limits) - len(printed):
+        output.print(
+            f"{remaining} more limit{'s' * (remaining > 1)} of the formats: -v prints all; the files state them"
+        )
     output.warn(exported.predicted.warnings)
     inputs = [file, *(input_files(loaded) if loaded else [])]
-    output.write(output.folder((loaded or result).name), exported.files, exported.document, inputs)
+    output.write(folder, exported.files, exported.document, inputs)

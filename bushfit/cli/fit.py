@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @command_called("fit-static", "configs/cmp_15961.toml")
 @option_group("Fit", file_option("--dynamic", "Keep m and alpha fixed at their values in this dynamic.json."))
 @campaign_options()
-@with_output("results/<campaign name>", "tables", "pictures")
+@with_output("results/<campaign name>/fit-static", "tables", "pictures")
 def static(
     campaigns: tuple[Path, ...], dynamic: Path | None, loss: Loss | None, max_nrmse: float | None, output: Output
 ) -> None:
@@ -49,7 +49,7 @@ def static(
     ),
 )
 @campaign_options()
-@with_output("results/<campaign name>", "tables", "pictures")
+@with_output("results/<campaign name>/fit-dynamic", "tables", "pictures")
 def dynamic(
     campaigns: tuple[Path, ...], static: Path | None, loss: Loss | None, max_nrmse: float | None, output: Output
 ) -> None:
@@ -84,7 +84,7 @@ def dynamic(
     flag("--profile", "Compute additional 95 % intervals by profile likelihood; takes some seconds."),
 )
 @campaign_options()
-@with_output("results/<campaign name>", "tables", "pictures")
+@with_output("results/<campaign name>/fit", "tables", "pictures")
 def fit(
     campaigns: tuple[Path, ...],
     directions: tuple[str, ...],

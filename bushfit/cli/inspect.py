@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -38,7 +39,7 @@ def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Ou
     unit; cycles, noise, frequencies and amplitudes; and anything unusual, such as missing rows, outliers, drift or
     repeats that disagree. Rows are numbered from 1, starting below the header. The command prints the lines that a
     campaign needs for these tests. If a file cannot be read, the exit status is 2, and nothing is written. Writes
-    inspect.png; for more than five files also inspect_2.png and so on.
+    inspect.png, in place of an earlier one; for more than five files also inspect_2.png and so on.
     """
     from bushfit.inspection.gathering import gather, with_contradictions
     from bushfit.inspection.record import pasted_text, with_specimens_named
@@ -82,7 +83,7 @@ def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Ou
             ResultFile(page, "figure", partial(draw, inspections, number * _FILES_A_PICTURE, _FILES_A_PICTURE))
             for number, page in enumerate(pages)
         ]
-        output.write(folder, figures, document, files)
+        replace(output, force=True).write(folder, figures, document, files)
     else:
         output.print_json(document)
 

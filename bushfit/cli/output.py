@@ -85,6 +85,7 @@ class Output:
     """Terminal messages and result files of one call of a command, controlled by the options that all commands share.
 
     Args:
+        default: default results folder, with a placeholder such as <name> for the name of the result.
         output: results folder from --output; None for the default.
         verbose, quiet: True to print more, or errors only.
         as_json: True to print the result as JSON on standard output.
@@ -93,6 +94,7 @@ class Output:
         table_format, plot_format: formats of tables and figures.
     """
 
+    default: str = "results/<name>"
     output: Path | None = None
     verbose: bool = False
     quiet: bool = False
@@ -120,18 +122,17 @@ class Output:
             console.width = int(columns) if columns.isdecimal() else _WIDTH
         return console
 
-    def folder(self, name: str, *files: str, form: str = "{}") -> Path:
-        """Folder for results: --output, or results/<name>; checked for conflicts if names of files are given.
+    def folder(self, name: str, *files: str) -> Path:
+        """Folder for results: --output, or the default; checked for conflicts if names of files are given.
 
         Args:
-            name: name of the result.
+            name: name of the result, which replaces the placeholder in the default folder.
             files: names of the main result files, with extensions, which must not exist yet (unless --force).
-            form: template of the folder name, such as "plan {}".
 
         Raises:
             OutputError: the folder cannot be written, or contains one of the files.
         """
-        folder = self.output or Path("results") / form.format(folder_name(name))
+        folder = self.output or Path(re.sub("<.*>", lambda _: folder_name(name), self.default))
         if files:
             check_free(folder, files, overwrite=self.force)
         return folder
@@ -234,7 +235,7 @@ def with_output(folder: str, *written: Written) -> Parameter:
     """Decorator that adds the options shared by all commands, and passes them to the command as one `output`.
 
     Args:
-        folder: default results folder, as text for the help.
+        folder: default results folder, with a placeholder such as <campaign name> for the name of the result.
         written: kinds of result file whose formats can be chosen.
     """
 
@@ -242,7 +243,7 @@ def with_output(folder: str, *written: Written) -> Parameter:
         @wraps(function)
         def wrapped(**given: Any) -> Any:
             names = [option.name for option in fields(Output) if option.name in given]
-            output = Output(**{name: given.pop(name) for name in names})
+            output = Output(folder, **{name: given.pop(name) for name in names})
             with _progress(output.console):
                 try:
                     return function(output=output, **given)

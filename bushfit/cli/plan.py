@@ -78,7 +78,7 @@ _MOST_VALUES = 6
     ),
 )
 @option_group("Range of later predictions", grid_options("from the campaign"))
-@with_output("results/plan <name>", "tables")
+@with_output("results/<name>/plan", "tables")
 def command(
     source: Path,
     aim: str | None,
@@ -122,7 +122,7 @@ def command(
     opened, settings_campaign = load_source(source), load_campaign(campaign) if campaign else None
     if settings_campaign and isinstance(opened, Campaign):
         raise click.UsageError("'--campaign' requires MODEL.json.")
-    folder = output.folder(opened.name, "plan.json", form="plan {}")
+    folder = output.folder(opened.name, "plan.json")
     with error_location(source):
         outcome = plan(opened, settings_campaign, **settings)
     _print_plan(output, outcome)

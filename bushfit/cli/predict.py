@@ -73,7 +73,7 @@ _MOST_AMPLITUDES = 8
         flag_value="1 %",
     ),
 )
-@with_output("results/<name>", "tables", "pictures")
+@with_output("results/<name>/predict", "tables", "pictures")
 def command(
     model: Path,
     campaign: Path | None,

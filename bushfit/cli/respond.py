@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     TEMPERATURE,
 )
 @metadata_options("displacements")
-@with_output("results/<name> response", "tables", "pictures")
+@with_output("results/<name>/respond", "tables", "pictures")
 def command(
     model: Path,
     history: Path,
@@ -68,7 +68,7 @@ def command(
     result = load_model(model)
     if not history.exists():
         view_bytes(history, MeasurementError)
-    folder = output.folder(result.name, output.formats.table("response"), form="{} response")
+    folder = output.folder(result.name, output.formats.table("response"))
     file_format = FileFormat(**{key.name: test_options.get(key.name) for key in fields(FileFormat)})
     with options_named():
         response = respond(

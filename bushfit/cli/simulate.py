@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     ),
     option("--phase-error", "ANGLE", 'Phase error that all points of a run share, drawn for each run: "0.2 deg".'),
 )
-@with_output("results/simulated <name>", "tables")
+@with_output("results/<name>/simulate", "tables")
 def command(source: Path, effects: tuple[str, ...], output: Output, **settings: Any) -> None:
     """Simulate the tests of a model on a virtual rig and write them as a campaign.
 
@@ -80,7 +80,7 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
         simulated = simulate_campaign(truth, replace(tests, **changes), output.formats.table_form)
     output.warn(simulated.warnings)
     output.print(simulated.simulated.truth.equation())
-    folder = output.folder(simulated.simulated.result.name, form="simulated {}")
+    folder = output.folder(simulated.simulated.result.name)
     output.write(folder, simulated.files, simulated.document, [source])
 
 

@@ -51,12 +51,13 @@ def model_file(path: Path) -> Path:
     if path.is_dir() or (path.is_file() and ending in (".toml", *TEST_FILES)):
         found = "a folder without model.json" if path.is_dir() else "a campaign" if ending == ".toml" else "a test file"
         command = f"run {quote_path(path)}" if ending == ".toml" else f"init {quote_path(path)} ..., then bushfit run"
+        models = [quote_path(path / name) for name in ("fit", "diagnose") if (path / name / "model.json").is_file()]
         raise ModelError(
             "a fitted model is needed",
             file=path,
             found=found,
             expected="a .json file, as bushfit run, the fits and diagnose write it, or its folder",
-            hint=f"bushfit {command} writes one",
+            hint=f"name {' or '.join(models)}" if models else f"bushfit {command} writes one",
         )
     return path
 

@@ -84,7 +84,7 @@ def test_the_table_is_in_order_with_units_and_the_numbers_of_the_models(typed, s
         assert 1e3 * float(row["sigma_fmax [kPa]"]) == pytest.approx(
             model["parameters"]["sigma_fmax"]["value"], rel=1e-6
         )
-        assert float(row["NRMSE [-]"]) == pytest.approx(model["fit"]["nrmse"], rel=1e-6)
+        assert float(row["NRMSE [%]"]) == pytest.approx(100.0 * model["fit"]["nrmse"], rel=1e-6)
         low, value, high = (float(row[f"stiffness axial 25 Hz 0.1 mm [N/mm]{end}"]) for end in (", low", "", ", high"))
         assert low < value < high
         assert float(row["loss factor torsion 10 Hz 1 deg [-]"]) > 0

@@ -4,6 +4,7 @@
 #: (arguments parted by |, what the error says ...)
 USAGE = [
     ("fitt|campaign.toml", "No such command 'fitt'; did you mean \"fit\"?  (see bushfit -h)"),
+    ("predict|model.json|-d|axial", "No such option '-d'. Did you mean '--direction'?"),
     ("fit|campaign.toml|--lss|linear", "No such option '--lss'. Did you mean '--loss'?  (see bushfit fit -h)"),
     ("fit|campaign.toml|--loss|liner", "'liner' is not one of 'linear', 'soft_l1'; did you mean \"linear\"?"),
     ("fit", "Missing argument 'CAMPAIGN'."),

@@ -73,8 +73,9 @@ def test_results_are_not_replaced_unasked(bushfit, tmp_path, arguments, file):
         assert (tmp_path / file).read_text() == "mine"
     (tmp_path / file).unlink()
     bushfit(*arguments, "-o", tmp_path)
-    refused = bushfit(*arguments, "-o", tmp_path, status=2)
-    assert "--force" in refused.stderr
+    again = bushfit(*arguments, "-o", tmp_path, status=0 if arguments[0] == "inspect" else 2)
+    assert ("--force replaces them" in again.stderr) == (arguments[0] != "inspect")
+    assert "limit of" not in again.stderr  # nothing is computed in vain
     bushfit(*arguments, "-o", tmp_path, "--force")
 
 
@@ -96,13 +97,24 @@ def test_an_input_of_the_run_is_not_replaced(own, typed):
     assert {file.name: file.read_bytes() for file in own.glob("*.*")} == before
 
 
-def test_a_missed_limit_is_status_1_and_results_go_to_a_folder_of_the_campaign(bushfit, tmp_path, work, typed):
+def test_a_missed_limit_is_status_1(bushfit, tmp_path):
     missed = bushfit("fit", CAMPAIGN, "-o", tmp_path / "x", "--no-plots", "--max-nrmse", "1e-4", status=1)
     assert "is above --max-nrmse 0.0001" in missed.stderr
     assert "model.json" in names(tmp_path / "x")
     bushfit("fit", CAMPAIGN, "-o", tmp_path / "y", "--no-plots", "--max-nrmse", "5 %")
-    typed("fit-static", work / CAMPAIGN, "--no-plots")
-    assert (tmp_path / "results" / "CMP 15 961" / "static.json").exists()
+
+
+def test_commands_one_after_the_other_need_no_folder_of_results(typed, root, work, tmp_path):
+    folder = tmp_path / "results/CMP 15 961"
+    typed("fit", work / CAMPAIGN, "--no-plots")
+    assert f'try: name "{Path("results/CMP 15 961/fit")}"' in typed("predict", "results/CMP 15 961", status=2).stderr
+    (folder / "fit/model.json").rename(folder / "model.json")  # as run writes it
+    for command, *more in (
+        ("predict", folder), ("respond", folder, root / "data/road/axial_radial.csv"), ("fit-static", work / CAMPAIGN),
+        ("export", folder, "--format", "nastran"), ("diagnose", work / CAMPAIGN), ("plan", folder, "--hours", "1"),
+    ):  # fmt: skip
+        typed(command, *more, "--no-plots")
+        assert len(names(folder / command)) > 0
 
 
 @pytest.mark.parametrize(

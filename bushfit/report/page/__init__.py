@@ -64,12 +64,13 @@ def templates() -> jinja2.Environment:
     return environment
 
 
-def folder_pages(folder: Path, base: str = "") -> list[ResultFile]:
+def folder_pages(folder: Path, base: str = "", date: str | None = None) -> list[ResultFile]:
     """HTML pages for a results folder: report.html for a result, compare.html for a comparison, index.html for a batch.
 
     Args:
         folder: results folder written by `bushfit run`, `diagnose`, a fit, `compare` or `batch`.
         base: prefix of the links of a batch page that is written to another folder.
+        date: date in the head of report.html; None for the date that the campaign states.
 
     Returns:
         Result files for the pages; their content is made when they are written.
@@ -94,5 +95,5 @@ def folder_pages(folder: Path, base: str = "") -> list[ResultFile]:
         comparison = ComparisonDocument.from_document(read_document(file), file)
         pages.append(ResultFile("compare", "page", partial(comparison_page, comparison)))
     if not pages or any((folder / f"{name}.json").exists() for name in MODELS):
-        pages.append(ResultFile("report", "page", partial(report_page, read_results(folder))))
+        pages.append(ResultFile("report", "page", partial(report_page, read_results(folder), date)))
     return pages

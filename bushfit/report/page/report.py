@@ -64,12 +64,13 @@ MOST, _MOST_PLACES = 12, 6
 _LARGEST_FIGURES = 440_000
 
 
-def report_page(files: Sequence[ResultFile]) -> str:
+def report_page(files: Sequence[ResultFile], date: str | None = None) -> str:
     """Make the report of a result as an HTML page.
 
     Args:
         files: documents (model, fit without the effects of a diagnosis, diagnosis), tables (sweeps, loops, gap, and
             predictions of directions and specimens) and figures.
+        date: date of the report; None for the date that the campaign states.
 
     Returns:
         The page as HTML.
@@ -79,6 +80,7 @@ def report_page(files: Sequence[ResultFile]) -> str:
     """
     record = report_record(files)
     result, diagnosis, campaign = record.result, record.diagnosis, record.campaign
+    head = {**(campaign.report if campaign else {}), **({"date": date} if date else {})}
     tests = campaign.tests if campaign else ()
     bodies = [("Bushing", tube_description(result.model.bushing))] if result.model.bushing else []
     tubes = len(result.bushings) + (result.model.bushing is not None)
@@ -104,9 +106,7 @@ def report_page(files: Sequence[ResultFile]) -> str:
     context = {
         "name": campaign.name if campaign else result.name,
         "subject": "rubber compound" if not tubes else "rubber bushing" if tubes == 1 else "rubber bushings",
-        "head": {
-            key.replace("_", " ").capitalize(): text for key, text in (campaign.report if campaign else {}).items()
-        },
+        "head": {key.replace("_", " ").capitalize(): text for key, text in head.items()},
         "logo": campaign.logo if campaign else None,
         "facts": [*bodies, *summarize_conditions(test.conditions for test in tests)],
         "headlines": [headline_texts(record, prediction) for prediction in predictions],

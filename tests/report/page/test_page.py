@@ -129,9 +129,11 @@ def test_conditions_of_the_tests_are_told(root, tmp_path):
     assert "bushfit fit c.toml --direction axial --direction radial --effect inertia" in found
     (shown,) = re.findall(r'<img src="data:image/png;base64,([^"]*)" alt="Logo of Elasto Lab"', page_of(tmp_path / "x"))
     assert base64.b64decode(shown) == logo
+    typing(tmp_path)("report", "x", "-q", "--date", "21 May 2025")
+    assert ("20 May 2025" in page_of(tmp_path / "x"), page_of(tmp_path / "x").count("21 May 2025")) == (False, 2)
     model = tmp_path / "x/model.json"
     model.write_text(model.read_text(encoding="utf-8").replace("data:image/png;base64,", "https://a.b/"))
-    refused = typing(tmp_path)("report", "x", "--force", status=2)
+    refused = typing(tmp_path)("report", "x", status=2)
     assert "campaign.logo: this is not a picture" in refused.stderr
 
 
