@@ -128,7 +128,8 @@ def _status(command: click.Command) -> int:
         context = error.ctx if isinstance(error, click.UsageError) else None
         if isinstance(error, click.NoSuchOption) and context and not error.possibilities:
             names = [name for parameter in context.command.params for name in parameter.opts]
-            error.possibilities = [name for name in names if name.startswith(f"-{error.option_name}")]  # --d... for -d
+            similar = [name for name in names if name.startswith(f"-{error.option_name}")]  # --direction for -d
+            error = click.NoSuchOption(error.option_name, None, similar, context)
         text = " ".join(error.format_message().split())
         if wrong := re.search(r"'([^']*)' is not one of (.*)\.$", text):
             near = did_you_mean(wrong[1], re.findall(r"'([^']*)'", wrong[2]))
