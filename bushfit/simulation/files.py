@@ -31,7 +31,7 @@ class SimulationDocument(TypedDict):
 
 
 def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
-    """Convert a simulated campaign to files.
+    """Convert a simulated campaign to the files of a laboratory.
 
     Args:
         simulated: simulated campaign.
@@ -54,22 +54,20 @@ def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
 
 
 def _campaign_toml(simulated: Simulated, form: Form) -> str:
-    seed, end = simulated.plan.seed, ending(form)
-    lines = [f"# Simulated by bushfit simulate with seed {seed}: no rubber was tested. The model is in truth.json."]
+    """Content of the campaign file, which names tables of the file format `form`."""
+    plan, end = simulated.plan, ending(form)
+    lines = [
+        f"# Simulated by bushfit simulate with seed {plan.seed}: no rubber was tested. The model is in truth.json."
+    ]
     origins = (ORIGINS[name] for name in simulated.truth.effects if name in ORIGINS)
     for law in {origin.file for origin in origins if origin.file}:
         lines += ["[effects]", f"file = {toml_value(Path(law).resolve().as_posix())}", ""]
     lines += body_lines(simulated.truth.bushing, simulated.specimens)
-    plan = simulated.plan
     if plan.level_gain_error or plan.level_phase_error:  # repeats do not show these errors: the campaign states them
         errors = {"gain_error": (plan.level_gain_error, "1"), "phase_error": (plan.level_phase_error, "rad")}
         lines += ["", "[rig]", *(f'{key} = "{size:.6g} {unit}"' for key, (size, unit) in errors.items())]
-    for kind, tests in (
-        ("loops", simulated.loops),
-        ("sweeps", simulated.sweeps),
-        ("validation", simulated.validation),
-    ):
-        for test in tests:
+    for kind in ("loops", "sweeps", "validation"):
+        for test in getattr(simulated, kind):
             lines += table_lines(kind, f"{test.name}.{end}", test.direction, test.temperature, test.preload)
     for mass, resonance in simulated.resonances:
         file, folder = (quote_path(Path(name)) for name in (f"{resonance.name}.{end}", resonance.name))
@@ -77,9 +75,8 @@ def _campaign_toml(simulated: Simulated, form: Form) -> str:
         place = quote_path(Path(str(resonance.direction)))
         lines += ["", "# This command converts the resonance test to a sweep:"]
         lines += [f'# bushfit reduce {file} --mass "{mass:.6g} kg" --{option} {place} -o {folder}']
-        lines += [
-            f"# {line}" for line in table_lines("sweeps", f"{resonance.name}/sweep.{end}", resonance.direction) if line
-        ]
+        sweep_lines = table_lines("sweeps", f"{resonance.name}/sweep.{end}", resonance.direction)
+        lines += [f"# {line}" for line in sweep_lines if line]
     return "\n".join(lines) + "\n"
 
 
@@ -106,7 +103,7 @@ def raw_loop_table(loop: Loop) -> pd.DataFrame:
 def raw_sweep_table(sweep: Sweep) -> pd.DataFrame:
     """Convert a simulated sweep to a test table like a laboratory's, in display units.
 
-    A stepped amplitude is written as reached by the rig, without its nominal level.
+    If the amplitude is stepped, the table has the amplitudes that the rig reached instead of the nominal ones.
 
     Args:
         sweep: simulated sweep.

@@ -1,4 +1,4 @@
-"""Simulated measurements of a rig: noise of every point, and errors that the points of a run or of a level share."""
+"""Simulated measurements: tests of a known model with the noise of a rig, and gain and phase errors of its runs."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ from bushfit.effects.contract import Array, RubberConditions
 from bushfit.geometry import Specimen
 from bushfit.model.model import Model
 from bushfit.model.result import Result
+from bushfit.model.rig import Record
 from bushfit.reading.measurement import Loop, Source, Sweep
 from bushfit.reading.resonance import ResonanceTest
 from bushfit.reading.runs import runs_of
 from bushfit.reading.tablefile import folder_name
 from bushfit.reduction.programme import split_record
 from bushfit.reduction.resonance import reduce_resonance
-from bushfit.simulation.undisturbed import Undisturbed, near, undisturbed
+from bushfit.simulation.undisturbed import Undisturbed, extrapolate_stiffness, undisturbed
 
 if TYPE_CHECKING:
     from numpy.random import Generator
@@ -30,15 +31,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """Simulated tests of a campaign with the true model behind them.
+    """Simulated tests of a campaign with noise, and the true model, as `simulate` writes them to files.
 
     Args:
         truth: true model, with effects of the rig.
-        plan: settings of the simulation.
-        loops, sweeps: simulated tests with noise.
-        resonances: mass [kg] and record of each simulated resonance test.
+        plan: settings [simulate].
+        loops, sweeps: simulated tests.
+        resonances: mass [kg] and record of each resonance test.
         specimens: tested specimens.
-        validation: validation records with noise.
+        validation: validation records: motions that no fit uses.
     """
 
     truth: Model
@@ -65,12 +66,11 @@ class Simulated:
 
 
 def simulate(truth: Model, plan: SimulateSettings) -> Simulated:
-    """Simulate the tests of a campaign on the virtual rig, with noise.
+    """Simulate the tests of a campaign on the virtual rig, with noise; equal seeds give equal data.
 
     Args:
         truth: true model, including effects of the rig.
-        plan: settings [simulate] with tests and noise; without tests, the tests of the paper are simulated. Equal seeds
-            give equal data.
+        plan: settings [simulate] with tests and noise; without tests, the tests of the paper are simulated.
     """
     return measure(undisturbed(truth, plan), plan)
 
@@ -86,8 +86,8 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
         The simulated campaign.
 
     Notes:
-        If a sweep does not reach its amplitudes, its stiffness is evaluated at the amplitude reached (see `near`). If
-        the model depends on the order of the tests, the loops come first.
+        If a sweep does not reach its amplitudes, its stiffness is evaluated at the amplitude reached (see
+        `extrapolate_stiffness`). If the model depends on the order of the tests, the loops come first.
     """
     planned = [test for kind in (clean.loops, clean.sweeps, clean.resonances) for test, _ in kind]
     conditions = planned_session(clean.truth.bushing, planned, plan.repeats)[len(clean.loops) :]
@@ -97,37 +97,38 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
             gains[loop] = 1.0 + plan.level_gain_error * random.standard_normal() if plan.level_gain_error else 1.0
         rows, largest = record.time.size, max(amplitude for _, amplitude in loop.parts)
         displacement = record.displacement + plan.displacement_noise * largest * random.standard_normal(rows)
-        noise = plan.force_noise * np.ptp(record.force) / 2.0 * _filtered_noise(rows, plan, random)
+        noise = _force_noise(record, plan, random)
         name, force = f"loop_{loop.direction}_{number}", gains[loop] * record.force + noise
         noisy = Loop(name, loop.direction, record.time, displacement, force, temperature=loop.temperature)
         loops.append(replace(noisy, preload=loop.static))
-    named = zip(_names("sweep", [test for test, _ in clean.sweeps]), clean.sweeps, conditions, strict=False)
-    sweeps = [_sweep(clean.truth, test, k, name, plan, random, conditions) for name, (test, k), conditions in named]
+    named = zip(_test_names("sweep", [test for test, _ in clean.sweeps]), clean.sweeps, conditions, strict=False)
+    sweeps = [
+        _noisy_sweep(clean.truth, test, k, name, plan, random, conditions) for name, (test, k), conditions in named
+    ]
     shaken = [resonance for resonance in clean.resonances for _ in range(plan.repeats)]
     resonances = []
-    for name, (test, ratio) in zip(_names("resonance", [test for test, _ in shaken]), shaken, strict=True):
+    for name, (test, ratio) in zip(_test_names("resonance", [test for test, _ in shaken]), shaken, strict=True):
         frequency, measured = np.array(test.frequencies), _with_noise(ratio[None], plan, random)[0]
         base, source = np.full(ratio.shape, test.base_acceleration), Source(Path(f"{name}.csv"), "")
         resonances.append((test.mass, ResonanceTest(name, test.direction, frequency, measured, base, source)))
     records = []
-    for name, (planned_record, record) in zip(_names("record", plan.validation), clean.validation, strict=True):
-        noise = plan.force_noise * np.ptp(record.force) / 2.0 * _filtered_noise(record.time.size, plan, random)
-        place, temperature = planned_record.direction, planned_record.temperature
-        force = record.force + noise
-        records.append(Loop(name, place, record.time, record.displacement, force, temperature=temperature))
+    for name, (planned_record, record) in zip(_test_names("record", plan.validation), clean.validation, strict=True):
+        place, force = planned_record.direction, record.force + _force_noise(record, plan, random)
+        noisy = Loop(name, place, record.time, record.displacement, force, temperature=planned_record.temperature)
+        records.append(noisy)
     tested = (*planned, *plan.validation)
     specimens = dict.fromkeys(test.direction for test in tested if isinstance(test.direction, Specimen))
     tests = tuple(loops), tuple(sweeps), tuple(resonances)
     return Simulated(clean.truth, plan, *tests, tuple(specimens), tuple(records))
 
 
-def _names(kind: str, tests: Sequence[SimulatedTest]) -> list[str]:
-    """Name the tests and their files by kind and direction or specimen, with a number to distinguish equal names."""
+def _test_names(kind: str, tests: Sequence[SimulatedTest]) -> list[str]:
+    """Names of tests and their files, from kind and direction or specimen, with a number where names are equal."""
     stems = [f"{kind}_{folder_name(str(test.direction))}" for test in tests]
     return [stem if stems.count(stem) == 1 else f"{stem}_{place}" for place, stem in enumerate(stems, start=1)]
 
 
-def _sweep(
+def _noisy_sweep(
     truth: Model,
     test: SimulatedSweep,
     clean: Array,
@@ -149,8 +150,9 @@ def _sweep(
 
     Notes:
         If the rig does not reach its amplitudes, amplitudes reached and requested have a lognormal ratio; half of its
-        variance is common to all points at a frequency. All repeats of a level share a gain and a phase error. The
-        levels of a stepped amplitude are computed from the amplitudes reached, as the reader of a file does.
+        variance is common to all points at a frequency. All repeats of a level (the points at one constant amplitude or
+        frequency) share a gain and a phase error. Amplitudes that are stepped through are computed from the amplitudes
+        reached, as the reader of a file does.
     """
     repeats = test.repeats or plan.repeats
     shape = (len(test.levels), repeats, len(test.steps))
@@ -164,7 +166,7 @@ def _sweep(
         reached = level * ratios.ravel()
     if test.reached or truth.depends_on_conditions:
         planned = frequency, level, stiffness.ravel(), RubberConditions(test.temperature, preload=test.static)
-        nearby = near(truth, test.direction, *planned, conditions)
+        nearby = extrapolate_stiffness(truth, test.direction, *planned, conditions)
         stiffness = nearby(level if reached is None else reached).reshape(shape)
     if plan.level_gain_error or plan.level_phase_error:
         gain, phase = random.standard_normal((2, shape[0], 1, 1))
@@ -186,21 +188,21 @@ def _sweep(
     )
 
 
-def _filtered_noise(rows: int, plan: SimulateSettings, random: Generator) -> Array:
-    """Draw stationary noise of unit variance, (rows,), from a first-order autoregressive process, AR(1).
+def _force_noise(record: Record, plan: SimulateSettings, random: Generator) -> Array:
+    """Draw the noise of a recorded force [N or N m], (rows,), from a first-order autoregressive process, AR(1).
 
     Args:
-        rows: number of rows.
-        plan: settings [simulate], with the correlation between successive rows.
+        record: record without noise, whose force range scales the noise.
+        plan: settings [simulate], with the noise and the correlation between successive rows.
         random: random number generator.
     """
-    noise = random.standard_normal(rows)
-    if not plan.force_correlation:
-        return noise
-    from scipy.signal import lfilter
+    noise = random.standard_normal(record.time.size)
+    if plan.force_correlation:
+        from scipy.signal import lfilter
 
-    noise[1:] *= np.sqrt(1.0 - plan.force_correlation**2)
-    return lfilter([1.0], [1.0, -plan.force_correlation], noise)
+        noise[1:] *= np.sqrt(1.0 - plan.force_correlation**2)
+        noise = lfilter([1.0], [1.0, -plan.force_correlation], noise)
+    return plan.force_noise * np.ptp(record.force) / 2.0 * noise
 
 
 def _with_noise(clean: Array, plan: SimulateSettings, random: Generator) -> Array:

@@ -1,7 +1,7 @@
 """Tests of a known model on a rig without errors: loops, sweeps and resonance tests.
 
 The virtual rig computes the tests in the time domain (Eqs. 3 and 5). The closed form of the fits is used only to
-convert the results to nearby amplitudes (see `near`).
+convert the results to nearby amplitudes (see `extrapolate_stiffness`).
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ _SWELL_CYCLES, _SWELL_TO = 100, 0.3
 
 @dataclass(frozen=True, eq=False)
 class Undisturbed:
-    """Tests of a known model simulated on a rig without noise and random errors.
+    """Tests of a known model without noise and random errors, to which `measure` adds those of a rig.
 
     Args:
         truth: true model, including effects of the rig.
@@ -142,10 +142,10 @@ def _clean_loop(truth: Model, test: SimulatedLoop, conditions: RubberConditions)
 
 
 def _run_in(truth: Model, place: Place, amplitude: float) -> tuple[int, tuple[int, float]]:
-    """Choose the motion before the record of a steady loop, so that the mean friction stress from the start decays.
+    """Choose the motion before the record of a steady loop.
 
-    This stress must decay to a thousandth. One cycle at a strain of a tenth of eps_half keeps 95 % of it, at a
-    hundredth 99.96 %.
+    The mean friction stress from the start must decay to a thousandth. One cycle at a strain of a tenth of eps_half
+    leaves 95 % of it, at a hundredth 99.96 %.
 
     Args:
         truth: true model.
@@ -153,8 +153,8 @@ def _run_in(truth: Model, place: Place, amplitude: float) -> tuple[int, tuple[in
         amplitude: zero-to-peak amplitude of the loop [m or rad].
 
     Returns:
-        Number of cycles at this amplitude before the record; and number of preceding cycles that grow and decay, with
-        their largest amplitude relative to that of the loop.
+        Number of cycles at this amplitude before the record; then the number of cycles before these whose amplitude
+        grows and decays, and their largest amplitude relative to that of the loop.
     """
     if truth.is_transient:
         return 0, (0, 1.0)
@@ -169,7 +169,13 @@ def _run_in(truth: Model, place: Place, amplitude: float) -> tuple[int, tuple[in
 
 
 def _clean_programme(truth: Model, test: SimulatedLoop, conditions: RubberConditions) -> rig.Record:
-    """Simulate the record of a loop programme from rest without noise, under the conditions at its start."""
+    """Simulate the record of a programme (loops one after the other, from rest) without noise.
+
+    Args:
+        truth: true model, including effects of the rig.
+        test: settings of the programme.
+        conditions: temperature and earlier strains of the rubber at the start.
+    """
     fastest = max(frequency for frequency, _ in test.parts)
     step = 1.0 / (fastest * _ROWS_PER_CYCLE * _STEPS_PER_ROW)
     duration = sum(test.cycles / frequency + test.pause for frequency, _ in test.parts)
@@ -260,12 +266,11 @@ def _clean_resonance(truth: Model, test: SimulatedResonance, steps_per_cycle: in
 
     approximate, _ = shaken_response(closed, test.mass, frequency, base)
     stiffness = rig.dynamic_stiffness(mount, test.direction, frequency, approximate, steps_per_cycle=steps_per_cycle)
-    return shaken_response(near(mount, test.direction, frequency, approximate, stiffness), test.mass, frequency, base)[
-        1
-    ]
+    exact = extrapolate_stiffness(mount, test.direction, frequency, approximate, stiffness)
+    return shaken_response(exact, test.mass, frequency, base)[1]
 
 
-def near(
+def extrapolate_stiffness(
     truth: Model,
     place: Place,
     frequency: Array,
@@ -274,7 +279,7 @@ def near(
     conditions: RubberConditions = UNKNOWN,
     target: RubberConditions = UNKNOWN,
 ) -> Callable[[Array], Array]:
-    """Extrapolate a stiffness computed by the virtual rig to nearby amplitudes and other test conditions.
+    """Extrapolate stiffnesses that the virtual rig computed to nearby amplitudes and other test conditions.
 
     Args:
         truth: true model.
