@@ -15,7 +15,7 @@ from bushfit.fitting.agreement import (
     prior_uses,
     prior_warnings,
 )
-from bushfit.fitting.assess import FitStage, covariance, measured_range, quality, temperature_warning
+from bushfit.fitting.assess import covariance, measured_range, quality, temperature_warning
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.design import fit_from
 from bushfit.fitting.model_error import model_error_warning, with_model_error
@@ -142,17 +142,16 @@ def result_of(
         The model with covariance, quality, range, warnings and expected error.
     """
     tests, model, error = evidence.data_sets, evidence.model, None
-    found = corrected or evidence.estimate
+    solution = corrected or evidence.estimate
     if lacking and not corrected:
-        found, error = with_model_error(found, bounds, rig)
-        model = found.model
-    solution = found
-    moving = tuple(name for name in solution.coordinates.names if name not in solution.at_bound)
-    cov = covariance(solution.model, [FitStage(moving, found.covariance_tests or found.minimised, found.smooth_error)])
+        solution, error = with_model_error(solution, bounds, rig)
+        model = solution.model
+    stage = solution.stage(solution.at_bound)
+    cov = covariance(solution.model, [stage], smooth_error=solution.smooth_error)
     priors = prior_uses(solution, cov)
     return Result(
         model,
-        moving,
+        tuple(stage.names),
         cov,
         quality(model, tests, len(solution.coordinates.names)),
         measured_range(model, tests),
@@ -161,7 +160,7 @@ def result_of(
             *([model_error_warning(error)] if error else []),
             *temperature_warning(model, tests),
             *prior_warnings(priors),
-            *fit_warnings(solution.model, found, bounds, cov),
+            *fit_warnings(solution.model, solution, bounds, cov),
         ),
         sources(tests),
         at_bound=solution.at_bound,

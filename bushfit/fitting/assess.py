@@ -6,7 +6,6 @@ Warnings name tests that no rubber could have given, tests at different temperat
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from bushfit.fitting.preparation import (
     residual_slices,
     split_by_kind,
 )
-from bushfit.fitting.problem import SmoothError
+from bushfit.fitting.problem import FitProblem, SmoothError
 from bushfit.geometry import Bushing, Direction, stiffness_per_modulus, unit_strain
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -46,28 +45,20 @@ _MOST_STRAIN = 3.0
 _CHECK = "check the units of displacement and force, and the dimensions of what was tested"
 
 
-@dataclass(frozen=True, eq=False)
-class FitStage:
-    """One of several fits of a procedure, such as the static fit of the paper's two-step procedure.
-
-    Args:
-        names: names of the parameters that the fit estimated.
-        data_sets: tests that the fit used.
-        smooth_error: estimated error of the model, if the model misses the tests by more than their noise; else None.
-    """
-
-    names: tuple[str, ...]
-    data_sets: Sequence[MeasuredTest]
-    smooth_error: SmoothError | None = None
-
-
-def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | None = None) -> Covariance:
+def covariance(
+    model: Model,
+    stages: Sequence[FitProblem],
+    fixed: Covariance | None = None,
+    smooth_error: SmoothError | None = None,
+) -> Covariance:
     """Covariance of all parameters that a procedure estimated, each stage with the results of the others fixed.
 
     Args:
         model: fitted model.
-        stages: fits of the procedure, in order.
+        stages: fits of the procedure, in order, such as the static and the dynamic fit of the paper: their free
+            parameters, and their tests with the weights of the fit.
         fixed: covariance of parameters that all stages kept fixed; None if these are exact.
+        smooth_error: error of a model that misses its tests by more than their noise; None for a model that fits.
 
     Returns:
         Covariance of the parameter values in SI units. If the residuals of a stage, or of one of its tests, exceed the
@@ -90,17 +81,15 @@ def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | Non
     bases = []
     for stage in stages:
         equations = slice(begin, begin + len(stage.names))
-        slope = jacobian(model, stage.data_sets, names, with_priors=True)
+        slope = jacobian(model, stage.tests, names, with_priors=True)
         basis = np.linalg.qr(slope[equations].T)[0]
         system[equations] = basis.T @ slope.T
-        excess = [1.0] * len(stage.data_sets)
-        if not stage.smooth_error:
-            of_all = lack_of_fit(model, stage.data_sets, len(stage.names)) or 1.0
-            excess = [max(of_all, lack_of_fit(model, [test], 0) or 1.0) for test in stage.data_sets]
-        row_excess = np.ones(len(basis))  # 1 in the rows of priors
-        sizes = [test.size for test in stage.data_sets]
-        row_excess[: sum(sizes)] = np.repeat(excess, sizes)
-        share = basis.T * np.sqrt(row_excess)
+        excess = np.ones(len(basis))  # 1 in the rows of priors
+        if not smooth_error:
+            of_all = lack_of_fit(model, stage.tests, len(stage.names)) or 1.0
+            for test, rows in zip(stage.tests, residual_slices(stage.tests), strict=True):
+                excess[rows] = max(of_all, lack_of_fit(model, [test], 0) or 1.0)
+        share = basis.T * np.sqrt(excess)
         root[equations, equations] = np.linalg.qr(share.T)[1].T
         bases.append((equations, share))
         begin = equations.stop
@@ -111,17 +100,17 @@ def covariance(model: Model, stages: Sequence[FitStage], fixed: Covariance | Non
     by_noise = dict[Hashable, tuple[Array, Array]]()
     for stage, (equations, basis) in zip(stages, bases, strict=True):
         influence = reaction[:, equations] @ basis
-        blocks = list(zip(stage.data_sets, residual_slices(stage.data_sets), strict=True))
-        if stage.smooth_error:  # beside it the error of the noise is the least part
-            added = stage.smooth_error.covariance(model, stage.data_sets, influence)
-            spread.append(added * np.sqrt(2.0 / stage.smooth_error.freedom))
+        blocks = list(zip(stage.tests, residual_slices(stage.tests), strict=True))
+        if smooth_error:  # beside it the error of the noise is the least part
+            added = smooth_error.covariance(model, stage.tests, influence)
+            spread.append(added * np.sqrt(2.0 / smooth_error.freedom))
             matrix = matrix + added + sum(test.extra_covariance(influence[:, rows]) for test, rows in blocks)
             continue
         for test, rows in blocks:
             if isinstance(test, MeasuredLoop) and not test.gain_weighs:  # which the weights do not count
                 change = test.gain_error * (influence[:, rows] @ test.gain_and_offset()[0])
                 matrix = matrix + np.outer(change, change)
-        for variance, (change, lost) in _changes_by_noise(stage.data_sets, influence, basis).items():
+        for variance, (change, lost) in _changes_by_noise(stage.tests, influence, basis).items():
             changes, losses = by_noise.get(variance, (0.0, 0.0))
             by_noise[variance] = changes + change, losses + lost
     for change, lost in by_noise.values():
@@ -244,10 +233,8 @@ def quality(model: Model, data_sets: Sequence[MeasuredTest], parameters: int) ->
     Returns:
         Figures over all tests together; `loop_gain_error` is None without loops.
     """
-    relative, counts = (
-        np.concatenate([test.relative(model) for test in data_sets]),
-        [test.residual_count for test in data_sets],
-    )
+    relative = np.concatenate([test.relative(model) for test in data_sets])
+    counts = [test.residual_count for test in data_sets]
     loops, _ = split_by_kind(data_sets)
     repeats = np.count_nonzero(repeats_of(loops), axis=1)
     return Quality(
@@ -332,13 +319,11 @@ def temperature_warning(model: Model, data_sets: Sequence[MeasuredTest]) -> list
     """
     degrees = [(data_set.name, data_set.test.temperature) for data_set in data_sets]
     temperatures = sorted((float(np.mean(kelvin)) - CELSIUS, name) for name, kelvin in degrees if kelvin is not None)
-    if (
-        not temperatures
-        or temperatures[-1][0] - temperatures[0][0] <= _ONE_TEMPERATURE
-        or "temperature" in model.effects
-    ):
+    if not temperatures or "temperature" in model.effects:
         return []
     (low, coldest), (high, warmest) = temperatures[0], temperatures[-1]
+    if high - low <= _ONE_TEMPERATURE:
+        return []
     tested = f"{warmest} was tested at {number(high, 3)} degC and {coldest} at {number(low, 3)} degC"
     return [
         f"{tested}, {number(high - low, 3)} degC apart: this model has no effect of temperature, and another "

@@ -5,8 +5,6 @@ throughout is unchanged, so it may start and end anywhere in its cycle. Of a rec
 longest part without a hole is kept, because the number of cycles in the hole is unknown.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from bushfit.effects.contract import Array
@@ -45,27 +43,12 @@ _LIKE = 0.03
 _OUTER = 0.9
 
 
-class SteadyCycles(NamedTuple):
-    """Steady cycles of a loop.
-
-    Args:
-        loop: loop without the rows before and after its steady cycles.
-        frequency: frequency of the motion [Hz].
-        cycles: number of steady cycles, including fractions.
-        left_out: sentence on the rows that were left out, or None.
-    """
-
-    loop: Loop
-    frequency: float
-    cycles: float
-    left_out: str | None
-
-
-def steady_cycles(loop: Loop) -> SteadyCycles:
+def steady_cycles(loop: Loop) -> tuple[Loop, float, float, str | None]:
     """Find the steady cycles of a loop; if rows are missing, those of its longest part without a hole.
 
     Returns:
-        The steady part, its frequency and number of cycles, and a note.
+        The loop without the rows before and after its steady cycles, the frequency of its motion [Hz], the number of
+        steady cycles, including fractions, and a note on the rows that were left out, or None.
 
     Raises:
         FitError: the loop does not contain a whole cycle, or rows are missing in its steady part.
@@ -85,7 +68,7 @@ def steady_cycles(loop: Loop) -> SteadyCycles:
             expected="no gap longer than a third of a cycle",
             hint="keep the whole cycles before the gap, or those after it",
         )
-    return SteadyCycles(part, frequency, cycles, note)
+    return part, frequency, cycles, note
 
 
 def _thinned(loop: Loop) -> tuple[Array, Array]:
@@ -112,7 +95,7 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
 
     Args:
         loop: the whole record.
-        time, motion: time [s] and displacement [m or rad] of the thinned rows, see `_thinned`, (n,) each.
+        time, motion: time [s] and displacement [m or rad] of every k-th row, from `_thinned`, (n,) each.
     """
     period = _period(time, motion)
     if period is None or time[-1] - time[0] <= period:
@@ -150,7 +133,7 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
 
 
 def _cut(loop: Loop, first: float, last: float) -> Loop:
-    """Return a loop with only its rows from one time to another [s]."""
+    """Return a loop with only its rows from the time `first` to the time `last` [s]."""
     return loop.select(slice(np.searchsorted(loop.time, first), np.searchsorted(loop.time, last, side="right")))
 
 
@@ -175,7 +158,7 @@ def _fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, 
 
     Args:
         loop: steady cycles of the record.
-        clock, displacement: time [s] and displacement [m or rad] of the thinned rows, see `_thinned`, (n,) each.
+        clock, displacement: time [s] and displacement [m or rad] of every k-th row, from `_thinned`, (n,) each.
 
     Notes:
         Several cycles are counted by crossings of the middle in one direction, and their frequency is refined by
@@ -194,11 +177,11 @@ def _fundamental(loop: Loop, clock: Array, displacement: Array) -> tuple[float, 
 
 
 def _of_one_cycle(loop: Loop, clock: Array, x: Array, crossings: Array) -> tuple[float, float]:
-    """Frequency [Hz] and number of cycles of a loop that crosses its middle once each way.
+    """Frequency [Hz] and number of cycles of a loop that crosses its middle once upwards and once downwards.
 
     Args:
         loop: steady cycles of the record.
-        clock, x: time [s] and motion relative to its middle of the thinned rows, see `_thinned`, (n,) each.
+        clock, x: time [s] and motion relative to its middle at every k-th row, (n,) each.
         crossings: times of the two crossings [s].
     """
     rows, motion = loop.time.size, loop.displacement
@@ -235,7 +218,7 @@ def _period_by_ends(clock: Array, x: Array, duration: float, whole: float) -> fl
     Args:
         clock, x: time [s] and motion relative to its middle, (n,) each.
         duration: duration of the record [s].
-        whole: expected period [s], returned if the ends determine no significantly different one.
+        whole: expected period [s], which is returned unless the ends show a significantly shorter one.
     """
     few, ends = max(3, int(0.02 * x.size)), []
     for rows, origin in ((slice(few), clock[0]), (slice(-few, None), clock[-1])):
@@ -308,10 +291,14 @@ def waveform(coefficients: Array) -> str:
 
 
 def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
-    """Note on a loop whose generated time contradicts the even sampling of its rows; None without contradiction.
+    """Note on a loop without a time column whose stated waveform is not that of its rows, sampled evenly in time.
+
+    Args:
+        loop: steady cycles, with the time that follows from the stated waveform.
+        coefficients: complex harmonics of the displacement over this time, mean first.
 
     Returns:
-        The sentence, or None.
+        The sentence, or None without contradiction.
     """
     if loop.has_recorded_time:
         return None
@@ -325,6 +312,5 @@ def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
     return (
         f"{100 * outer:.2g} % of the rows lie beyond {_OUTER:g} of the amplitude, like those of {like} recorded "
         f"evenly in time, but the {loop.direction.motion.words[0]} over time is {opposite}: where a file has no "
-        "time, rate "
-        'means a triangle, and frequency with waveform = "sine" a sine'
+        'time, rate means a triangle, and frequency with waveform = "sine" a sine'
     )

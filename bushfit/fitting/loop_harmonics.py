@@ -82,16 +82,12 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
     recorded = {"displacement": loop.displacement, "force": loop.force}
     values = np.column_stack([column[chosen] for column in recorded.values()])
     solution, inliers, outliers = least_squares(columns, values), np.empty(values.shape, dtype=bool), {}
-    for column_number, (name, column) in enumerate(recorded.items()):
-        solution[:, column_number], inliers[:, column_number] = _fit_without_outliers(
-            columns, values[:, column_number], solution[:, column_number]
-        )
-        residual = values[:, column_number] - columns @ solution[:, column_number]
-        outliers[name] = (
-            _column_outliers(loop, frequency, column, solution[:, column_number], residual)
-            if column.size <= _MOST_ROWS_CHECKED or not inliers[:, column_number].all()
-            else _NO_OUTLIERS
-        )
+    for i, (name, column) in enumerate(recorded.items()):
+        solution[:, i], inliers[:, i] = _fit_without_outliers(columns, values[:, i], solution[:, i])
+        outliers[name] = _NO_OUTLIERS
+        if column.size <= _MOST_ROWS_CHECKED or not inliers[:, i].all():
+            residual = values[:, i] - columns @ solution[:, i]
+            outliers[name] = _column_outliers(loop, frequency, column, solution[:, i], residual)
     remainder = values - columns @ solution
     of_motion, of_force = inliers.T
     freedom = np.maximum(np.count_nonzero(inliers, axis=0) - 2 * order - 1, 1)
@@ -103,7 +99,7 @@ def loop_harmonics(loop: Loop, frequency: float, cycles: float) -> LoopHarmonics
 
 
 def _cleared(coefficients: Array, noise: float, phase: Array, displacement: Array, inliers: Array) -> Array:
-    """Remove noise from the harmonics of a motion: keep those above the noise, or those of an ideal triangle wave.
+    """Remove noise from the harmonics of a displacement: keep those above the noise, or those of an ideal triangle.
 
     Args:
         coefficients: complex harmonics of the displacement, mean first [m or rad].
@@ -128,11 +124,11 @@ def _cleared(coefficients: Array, noise: float, phase: Array, displacement: Arra
 
 
 def remove_slow_changes(phase: Array, residual: Array) -> tuple[Array, int]:
-    """Remove slow changes (mean and three harmonics of each cycle: settling, drift) from residuals of the force.
+    """Remove settling and drift, which are no noise, from residuals of the force: mean, three harmonics of each cycle.
 
     Args:
         phase: position of each row [cycles], (n,).
-        residual: force without its harmonics, (n,).
+        residual: force without its harmonics [N or N m], (n,).
 
     Returns:
         Remaining residuals, (n,), and number of fitted unknowns.
@@ -150,28 +146,28 @@ def remove_slow_changes(phase: Array, residual: Array) -> tuple[Array, int]:
 
 
 def outlier_distance(solution: Array, residual: Array, rows: int) -> float:
-    """Distance from the harmonics, in units of the column, beyond which a row is an outlier.
+    """Distance of a displacement or force from its fitted harmonics beyond which a row is an outlier, in its unit.
 
     The limit allows for the noise and for corners of a triangle, which the harmonics round off.
 
     Args:
-        solution: harmonics of the column: mean, cosines and sines, (2 order + 1,).
+        solution: mean, cosines and sines of the displacement or force, (2 order + 1,).
         residual: residuals of the fitted rows, (n,).
-        rows: number of rows of the column.
+        rows: number of rows of the record.
     """
     corner = _CORNER / (solution.size // 2) * abs(as_complex(solution)[1])
     return outlier_limit(rows, 1, np.inf) * _spread(residual) + corner
 
 
 def _fit_without_outliers(columns: Array, values: Array, solution: Array) -> tuple[Array, Array]:
-    """Fit harmonics to a column without its outliers.
+    """Fit harmonics to a displacement or force without its outliers.
 
     Least squares, as in `solution`, may follow a cluster of outliers. Rows are therefore first weighted down by their
     distance; then outliers are found and left out repeatedly until the set of outliers no longer changes.
 
     Args:
-        columns: mean, cosines and sines at the rows, (n, 2 order + 1).
-        values: values of the column, (n,).
+        columns: basis of mean, cosines and sines at the rows, (n, 2 order + 1).
+        values: displacement or force of the rows, (n,).
         solution: harmonics by least squares, (2 order + 1,).
 
     Returns:
@@ -193,13 +189,13 @@ def _fit_without_outliers(columns: Array, values: Array, solution: Array) -> tup
 
 
 def _column_outliers(loop: Loop, frequency: float, column: Array, solution: Array, residual: Array) -> OutlierRows:
-    """Outliers among all rows of a column (displacement or force), from harmonics fitted to some of the rows.
+    """Outliers among all rows of a displacement or force, from harmonics fitted to some of the rows.
 
     Args:
         loop: steady cycles of the loop.
         frequency: frequency of the motion [Hz].
-        column: values of the column, (n,).
-        solution: harmonics of the column: mean, cosines and sines, (2 order + 1,).
+        column: displacement or force of all n rows, (n,).
+        solution: mean, cosines and sines of the column, (2 order + 1,).
         residual: residuals of the fitted rows, in the unit of the column.
     """
     grid = np.arange(GRID + 1) / GRID
@@ -211,12 +207,12 @@ def _column_outliers(loop: Loop, frequency: float, column: Array, solution: Arra
 
 
 def _inliers(columns: Array, values: Array, solution: Array, stuck: Array) -> Array:
-    """Mask of the rows of a column that are neither stuck nor far from its harmonics, (n,).
+    """Mask of the rows whose displacement or force is neither stuck nor far from its harmonics, (n,).
 
     Args:
-        columns: mean, cosines and sines at the rows, (n, 2 order + 1).
-        values: values of the column, (n,).
-        solution: harmonics of the column: mean, cosines and sines, (2 order + 1,).
+        columns: basis of mean, cosines and sines at the rows, (n, 2 order + 1).
+        values: displacement or force of the rows, (n,).
+        solution: fitted mean, cosines and sines, (2 order + 1,).
         stuck: mask of the rows that repeat the value of the row before, (n,).
     """
     residual = values - columns @ solution
@@ -251,12 +247,9 @@ def phase_bins(
         Mean phase [cycles], mean force and number of rows of each bin, (k,) each.
     """
     number = np.arange(int(cycles) + 2)
-    separate_cycles, growth = (
-        4,
-        1.5,
-    )  # cycles over which a loop settles have bins of their own; later it does ever more slowly
-    later = separate_cycles * growth ** np.arange(np.log(number.size / separate_cycles) / np.log(growth))
-    starts = number if each_cycle else np.union1d(np.arange(separate_cycles), later.astype(np.intp))
+    separate, growth = 4, 1.5  # a loop settles in its first cycles, and then ever more slowly
+    later = separate * growth ** np.arange(np.log(number.size / separate) / np.log(growth))
+    starts = number if each_cycle else np.union1d(np.arange(separate), later.astype(np.intp))
     group = np.searchsorted(starts, number, side="right") - 1
     middle = np.round(np.bincount(group, weights=number) / np.bincount(group))
     edges = np.append(np.arange(int(cycles * GRID) + 1) / (frequency * GRID), np.inf)
@@ -284,7 +277,7 @@ def phase_bins(
 
 
 def smooth_waves(phase: Array) -> Array:
-    """Constant 1, then cosine and sine of each of the first five harmonics, at phases [cycles], (n,) -> (11, n)."""
+    """Constant 1, then cosine and sine of each of the first five harmonics, (11, n), at phases [cycles], (n,)."""
     angle = 2.0 * np.pi * phase
     waves = [wave(order * angle) for order in range(1, SMOOTH_HARMONICS + 1) for wave in (np.cos, np.sin)]
     return np.array([np.ones_like(angle), *waves])

@@ -150,24 +150,18 @@ def sweep_noise(sweeps: Sequence[Sweep], rig: RigSettings = UNSTATED) -> SweepNo
         for key, variance in variances.items()
     }
     if repeated:
-        level, freedom = (
-            class_errors(rig, (0.0, 0.0)),
-            max(round(sum(line.shared_freedom for line in repeated)), _ENOUGH),
-        )
-        largest, excesses = (
-            np.maximum(largest_error(rig), largest_error(UNSTATED)),
-            {},
-        )  # [rig] states what repeats share
+        freedom = max(round(sum(line.shared_freedom for line in repeated)), _ENOUGH)
+        largest = np.maximum(largest_error(rig), largest_error(UNSTATED))  # [rig] states what repeats share
+        excesses = dict[str, str]()
         for name in by_name:
             error = _shared([line for key, line in lines.items() if key[0] == name], rig)
             if np.any(error > largest):
                 excesses[name] = (
-                    f"repeats differ as a whole by an error of {format_class_errors(_pair(error))}, "
-                    f"more than a rig of this class causes "
-                    f"({describe_class(rig)}): measure again, or state the class under [rig]"
+                    f"repeats differ as a whole by an error of {format_class_errors(_pair(error))}, more than a rig of "
+                    f"this class causes ({describe_class(rig)}): measure again, or state the class under [rig]"
                 )
-        shared = _pair(_shared(repeated, rig))
-        return SweepNoise(random, shared, "repeats", freedom, scatter_freedom, slopes, level, excess_warnings=excesses)
+        errors = _pair(_shared(repeated, rig)), "repeats", freedom, scatter_freedom
+        return SweepNoise(random, *errors, slopes, class_errors(rig, (0.0, 0.0)), excess_warnings=excesses)
     if all(sweep.noise is not None for sweep in sweeps):
         return SweepNoise(random, class_errors(rig, (0.0, 0.0)), "stated", 0, scatter_freedom)
     return SweepNoise(random, class_errors(rig), "assumed", 0, scatter_freedom)
@@ -208,26 +202,25 @@ def _scatter_growth(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
 
 
 def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -> tuple[dict[LineKey, Array], int]:
-    """Variance of gain and phase [rad] from point to point, (2,), of each line, pooled over lines that agree.
+    """Variances of gain and phase [rad] from point to point of each line, pooled over lines that agree.
 
     With few degrees of freedom gain and phase share one variance, unless they differ significantly.
 
     Args:
-        lines: noise of all lines, by name of the sweep and value held constant.
+        lines: noise of all lines (runs at one held value), by name of the sweep and held value.
         measured: noise of the lines with repeats or enough points.
 
     Returns:
-        Variances by line, and their degrees of freedom.
+        Variances of gain and phase by line, (2,) each, and their degrees of freedom.
     """
     if not measured:
         return {key: line.variance for key, line in lines.items()}, round(min(line.freedom for line in lines.values()))
     well_known = [line for line in measured if line.freedom >= _OWN_SCATTER]
     compared = sorted(well_known or measured, key=lambda line: -float(line.variance.sum()))
-    for place, line in enumerate(compared):  # a single outlier may set a line apart
-        if line.scatter_without_largest is not None and line.scatter_without_largest.size and _unequal(compared):
-            compared[place] = replace(
-                line, scatter=line.scatter_without_largest, freedom=len(line.scatter_without_largest)
-            )
+    for i, line in enumerate(compared):  # a single outlier may set a line apart
+        calmer = line.scatter_without_largest
+        if calmer is not None and calmer.size and _unequal(compared):
+            compared[i] = replace(line, scatter=calmer, freedom=len(calmer))
     equal = not _unequal(compared)
     few = [line for line in measured if well_known and line.freedom < _OWN_SCATTER]
     counted = [*compared, *few] if equal else measured
@@ -243,7 +236,7 @@ def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -
 
 
 def _shared(lines: Sequence[LineNoise], rig: RigSettings) -> Array:
-    """Standard deviation of the errors of relative gain and phase [rad] shared by a run, (2,), from pairs of repeats.
+    """Standard deviation of the relative gain and phase [rad] errors that a run's points share, (2,), from repeats.
 
     Outlying pairs are left out. Few repeats often agree by chance: below `_ENOUGH` degrees of freedom the variance is
     averaged with that of the rig's accuracy class.

@@ -193,6 +193,11 @@ class FitResult:
         """Tests, weighted by their noise alone; excluded outliers have weight 0."""
         return self.noise_weighted or self.problem.tests
 
+    def stage(self, fixed: Collection[str] = ()) -> FitProblem:
+        """Problem with the tests weighted as for the covariance, in which the `fixed` parameters are not free."""
+        names = [name for name in self.names if name not in fixed]
+        return replace(self.problem, tests=self.covariance_tests or self.problem.tests, names=names)
+
     @property
     def chi_square(self) -> float:
         """Chi-square: sum of the squared whitened residuals."""

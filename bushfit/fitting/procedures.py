@@ -11,7 +11,6 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError
 from bushfit.fitting.agreement import expected_errors, misfits, prior_uses, prior_warnings
 from bushfit.fitting.assess import (
-    FitStage,
     covariance,
     implausible_modulus,
     lack_of_fit,
@@ -287,12 +286,9 @@ def _result(
         unused: tests that no step fitted, which the model is compared with.
     """
     model, tests = steps[-1].model, [test for step in steps for test in step.data_sets]
-    # beside a model error, a parameter at a bound is fixed
-    stages = []
-    for step in steps:
-        names = tuple(name for name in step.names if not (step.smooth_error and name in step.at_bound))
-        stages.append(FitStage(names, step.covariance_tests or step.minimised, step.smooth_error))
-    cov = covariance(model, stages, fixed)
+    error = steps[-1].smooth_error
+    stages = [step.stage(step.at_bound if error else ()) for step in steps]  # beside an error, one at a bound is fixed
+    cov = covariance(model, stages, fixed, error)
     priors = {name: use for step in steps for name, use in prior_uses(step, cov).items()}
     fitted = tuple(name for step in steps for name in step.names)
     outliers = tuple(outlier for step in steps for outlier in step.outliers)

@@ -85,26 +85,23 @@ def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed:
     numbers, row = np.unique(sweep.repeat[chosen], return_inverse=True)
     table = np.full((numbers.size, steps.size), np.nan + 0j)
     table[row, column] = log_stiffness[chosen]
-    differences = (one - second for one, second in combinations(table, 2))
-    usual_steps = [(difference, _is_typical(difference, np.log(steps))) for difference in differences]
-    pairs = [(difference[usual], steps[usual]) for difference, usual in usual_steps if usual.sum() >= FEWEST_STEPS]
-    if not pairs:
+    scatter, shared, between, freedom = list[Array](), list[Array](), list[Array](), 0.0
+    for one, second in combinations(table, 2):
+        usual = _is_typical(one - second, np.log(steps))
+        if usual.sum() < FEWEST_STEPS:
+            continue
+        difference, pair_steps = (one - second)[usual], steps[usual]
+        spread = _parts(np.diff(difference)) / np.sqrt(2.0)
+        free = difference_freedom(len(spread))
+        shared.append((_parts(difference).mean(axis=0) ** 2 - np.square(spread).mean(axis=0) / len(difference)) / 2.0)
+        scatter.append(spread * np.sqrt(free / len(spread) / numbers.size))
+        between.append(np.sqrt(pair_steps[1:] * pair_steps[:-1]))
+        freedom += free
+    if not scatter:
         return _about_smooth_curve(steps, np.nanmean(table, axis=0))
-    scatter = [_parts(np.diff(difference)) / np.sqrt(2.0) for difference, _ in pairs]
-    shared = [
-        (_parts(difference).mean(axis=0) ** 2 - np.square(spread).mean(axis=0) / len(difference)) / 2.0
-        for (difference, _), spread in zip(pairs, scatter, strict=True)
-    ]
     independent = 2.0 / numbers.size  # of each pair: m repeats have m (m - 1)/2 pairs, and m - 1 of them are free
-    return LineNoise(
-        np.concatenate(
-            [spread * np.sqrt(difference_freedom(len(spread)) / len(spread) / numbers.size) for spread in scatter]
-        ),
-        independent * sum(difference_freedom(len(spread)) for spread in scatter),
-        np.array(shared),
-        independent * len(pairs),
-        steps=np.concatenate([np.sqrt(pair_steps[1:] * pair_steps[:-1]) for _, pair_steps in pairs]),
-    )
+    joined = np.concatenate(scatter), independent * freedom, np.array(shared), independent * len(scatter)
+    return LineNoise(*joined, steps=np.concatenate(between))
 
 
 def difference_freedom(steps: int) -> float:
@@ -115,7 +112,7 @@ def difference_freedom(steps: int) -> float:
 def _is_typical(difference: Array, log_step: Array) -> Array:
     """Mask of the steps at which the difference of two repeats is no outlier, (n,).
 
-    The limit is constant, or grows along the run if the differences grow, by Theil's (1950) median slope.
+    The limit of an outlier is constant, or grows along the run if the differences do, by Theil's (1950) median slope.
 
     Args:
         difference: difference of ln K between the repeats at each step, complex (n,).
@@ -135,7 +132,14 @@ def _is_typical(difference: Array, log_step: Array) -> Array:
 
 
 def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
-    """Noise of a line without repeats: scatter of ln K about a smooth curve; assumed if there are one or two points."""
+    """Noise of a line without repeats: scatter of ln K about a smooth curve over ln(step).
+
+    The scatter is assumed if there are one or two points.
+
+    Args:
+        steps: stepped frequency [Hz] or amplitude [m or rad] of each point, (n,).
+        log_stiffness: ln K of each point, complex (n,).
+    """
     degree = min(_SMOOTH_DEGREE, steps.size - 2)
     if degree < 1:
         return LineNoise(np.full((1, 2), ASSUMED[0]), 1, np.empty((0, 2)))
@@ -152,10 +156,9 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
     worst = int(np.argmax(falls))  # the point without which the sum of squares about the curve falls most
     calmer = _project_out(np.delete(basis, worst, axis=0), np.delete(values, worst, axis=0))
     squares = np.square(residual / np.maximum(MEDIAN_TO_SIGMA * usual, FLOOR)).sum(axis=1)
-    squared_distance = dict(zip(steps.tolist(), squares.tolist(), strict=True))
-    return LineNoise(
-        scatter, len(scatter), np.empty((0, 2)), scatter_without_largest=calmer, squared_distances=squared_distance
-    )
+    squared = dict(zip(steps.tolist(), squares.tolist(), strict=True))
+    unshared = np.empty((0, 2))
+    return LineNoise(scatter, len(scatter), unshared, scatter_without_largest=calmer, squared_distances=squared)
 
 
 def disturbed_steps(lines: Iterable[LineNoise]) -> list[float]:

@@ -12,7 +12,7 @@ from fits import joint_fit
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.fitting.agreement import LeaveOut
-from bushfit.fitting.assess import FitStage, covariance
+from bushfit.fitting.assess import covariance
 from bushfit.fitting.coordinates import jacobian
 from bushfit.fitting.preparation import MeasuredLoop, planned_loop
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -31,13 +31,13 @@ LEVELS = (1e-4, 2e-4, 5e-4)
 def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(measured, result):
     """The noise is estimated too, which can only add to the inverse of J J^T."""
     model, data_sets = result.model, measured.select_tests(None)
-    found = covariance(model, [FitStage(FIVE, data_sets)])
+    found = covariance(model, [FitProblem(model, data_sets, FIVE)])
     slope = jacobian(model, data_sets, FIVE)
     values = np.array([model.values[name] for name in FIVE])
     plain = np.sqrt(np.diag(np.linalg.inv(slope @ slope.T))) * values
     assert np.all(np.array([found.stderr(name) for name in FIVE]) >= plain * (1.0 - 1e-6))
     known = [replace(each, gain_error=0.0) if isinstance(each, MeasuredLoop) else each for each in data_sets]
-    certain = covariance(model, [FitStage(FIVE, known)])  # of gain
+    certain = covariance(model, [FitProblem(model, known, FIVE)])  # of gain
     np.testing.assert_allclose([certain.stderr(name) for name in FIVE], plain, rtol=0.1)
 
 
@@ -93,7 +93,7 @@ def test_what_wrong_weights_cost_is_that_of_a_mean_of_two_groups(paper_model):
             replace(each, prepared=replace(each.prepared, loop=test)) for each, test in zip(loops, tests, strict=True)
         ]
 
-    plain, wide = (covariance(paper_model, [FitStage(("mu",), stated(noise))]) for noise in (0.01, None))
+    plain, wide = (covariance(paper_model, [FitProblem(paper_model, stated(noise), ["mu"])]) for noise in (0.01, None))
     told = np.array([float(np.sum(np.square(loop.jacobian(paper_model, ["mu"])))) for loop in loops])
     share, freedom = told / told.sum(), np.array([loop.residual_count for loop in loops])
     print("weights", share, "of rows", freedom)

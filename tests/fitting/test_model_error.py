@@ -16,7 +16,7 @@ from tries import SEEDS, some
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.errors import FitError
-from bushfit.fitting.assess import FitStage, covariance
+from bushfit.fitting.assess import covariance
 from bushfit.fitting.coordinates import Coordinates, jacobian
 from bushfit.fitting.discrepancy import SIZES, FittedTests, discrepancies
 from bushfit.fitting.model_error import log_likelihood, with_model_error
@@ -252,7 +252,7 @@ def test_the_covariance_is_the_sandwich_of_noise_and_process(refitted):
     ]
     slopes = found.coordinates.slopes(model.values)
     moved = np.linalg.pinv(jacobian(model, [sweep], FIVE).T) @ np.concatenate(sources).T * slopes[:, None]
-    known = covariance(model, [FitStage(FIVE, found.covariance_tests or found.minimised, found.smooth_error)])
+    known = covariance(model, [found.stage()], smooth_error=found.smooth_error)
     np.testing.assert_allclose(known.matrix, moved @ moved.T, rtol=1e-6)
 
 

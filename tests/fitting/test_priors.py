@@ -10,7 +10,7 @@ from fits import joint_fit
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import ParameterSetting, RigSettings
 from bushfit.errors import BushfitError
-from bushfit.fitting.assess import FitStage, covariance
+from bushfit.fitting.assess import covariance
 from bushfit.fitting.coordinates import jacobian, residual
 from bushfit.fitting.model_error import log_likelihood
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -35,7 +35,7 @@ def test_a_prior_weighs_as_one_more_measurement_of_the_parameter(measured, paper
     fitted = solver(FitProblem(known, tests, FIVE))
     assert fitted.model.values["alpha"] == pytest.approx(value + error, rel=0.02 * error / value)
     assert fitted.chi_square - plain.chi_square == pytest.approx(2.0, rel=0.05)
-    stage = [FitStage(tuple(FIVE), tests)]
+    stage = [FitProblem(plain.model, tests, FIVE)]
     before, after = (covariance(fit.model, stage).stderr("alpha") or 0.0 for fit in (plain, fitted))
     assert after == pytest.approx(np.hypot(before, error) / 2.0, rel=0.03)
 

@@ -8,7 +8,7 @@ import pytest
 from agreement import digits
 from strd import Problem, problems
 
-from bushfit.fitting.assess import FitStage, covariance
+from bushfit.fitting.assess import covariance
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.fitting.solve import solve
 
@@ -53,7 +53,9 @@ def test_certified_values_from_both_starts(agree):
         solution = fitted(problem, start, FINEST)
         found = np.array([solution.model.values[name] for name in names])
         scatter = math.sqrt(solution.chi_square / (problem.response.size - len(names)))
-        cov = covariance(solution.model, [FitStage(names, [replace(problem.data_set(), noise=scatter)])])
+        cov = covariance(
+            solution.model, [FitProblem(solution.model, [replace(problem.data_set(), noise=scatter)], names)]
+        )
         default[at], values[at] = digits(coarse, certified), digits(found, certified)
         apart[at] = np.max(np.abs(coarse - certified) / stderr)
         errors[at] = digits([cov.stderr(name) for name in names], stderr)
@@ -76,7 +78,7 @@ def test_what_is_not_solved_has_an_error_beyond_all_values(name, start):
     problem = next(problem for problem in PROBLEMS if problem.name == name)
     names = tuple(problem.certified)
     solution = fitted(problem, start)
-    cov = covariance(solution.model, [FitStage(names, [problem.data_set()])])
+    cov = covariance(solution.model, [FitProblem(solution.model, [problem.data_set()], names)])
     relative = {each: cov.stderr(each) / abs(solution.model.values[each]) for each in names}
     print(f"{name}, start {start}: {relative}")
     assert max(relative.values()) > 100.0
