@@ -35,7 +35,7 @@ _ALL = 0.99
 
 
 class _Run(NamedTuple):
-    """Run of a test: quantity that is constant (or None), its value and unit, and its points as a mask or slice."""
+    """Run of a test: constant quantity (None in a loop), its value and unit, and its points as mask or slice."""
 
     held: Literal["amplitude", "frequency"] | None
     value: float | None
@@ -45,7 +45,9 @@ class _Run(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LeaveOut:
-    """Linearised fit that predicts how its parameters and residuals would change if some rows were left out.
+    """Linearised fit that predicts how its parameters and residuals would change if some residuals were left out.
+
+    A row is one of the n whitened residuals.
 
     Args:
         basis: orthonormal basis of the column space of the Jacobian of the whitened residuals, (n, m).
@@ -71,13 +73,13 @@ class LeaveOut:
         return cls(basis, directions[determined].T / size[determined], basis.T @ residual, residual)
 
     def undetermined(self, rows: Array) -> Array:
-        """Mask of the parameters, (k,), that a fit without some rows (indices or mask) would not determine."""
+        """Mask of the parameters, (k,), that a fit without the given rows (indices or mask) would not determine."""
         size, vectors = np.linalg.eigh(self._information(rows))
         without = np.square(self.coordinate_steps @ vectors) @ (1.0 / np.maximum(size, _LEAST_SEEN**2))
         return without > _MOST_GROWTH * np.sum(np.square(self.coordinate_steps), axis=1)
 
     def step(self, rows: Array) -> Array | None:
-        """Change of the k fitted parameters (in fit coordinates), (k,), if `rows` (indices or mask) are left out.
+        """Change of the k fitted parameters in their coordinates, (k,), if `rows` (indices or mask) are left out.
 
         The change is one Gauss-Newton step, which is exact for a linear model. None if the step is too long to predict
         a refit, or if the remaining rows do not determine one of the parameters.
@@ -308,12 +310,11 @@ def _absolute_difference(modelled: Array, measured: Array) -> Array:
 
 
 def _runs(data_set: MeasuredTest) -> Iterator[_Run]:
-    """Split a test into runs, one for each constant amplitude or frequency; a loop, or a sweep without, is one run."""
+    """Yield the runs of a test, one for each constant amplitude or frequency; one for a loop or a sweep without."""
     if not isinstance(data_set, MeasuredSweep) or data_set.sweep.stepped is None:
         yield _Run(None, None, None, np.ones(data_set.frequency.size, dtype=bool))
         return
     quantity: Literal["amplitude", "frequency"] = "amplitude" if data_set.sweep.stepped == "frequency" else "frequency"
     unit = data_set.direction.motion.displacement_unit if quantity == "amplitude" else "Hz"
-    held_value = data_set.sweep.held_value[data_set.order]
-    for value in np.unique(held_value):
-        yield _Run(quantity, float(value), unit, held_value == value)
+    for value in np.unique(data_set.held_value):
+        yield _Run(quantity, float(value), unit, data_set.held_value == value)

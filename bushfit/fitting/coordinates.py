@@ -6,7 +6,6 @@ coordinate is of order one.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from operator import methodcaller
 
 import numpy as np
 
@@ -59,13 +58,13 @@ class Coordinates:
         }
 
     def slopes(self, values: Mapping[str, float]) -> Array:
-        """Derivative of each parameter value (SI units, by name) by its coordinate, (k,)."""
+        """Derivatives of the k parameter values [SI] by their coordinates, (k,), at values by name."""
         pairs = zip(self.names, self.parameters, strict=True)
         return np.array([values[name] if parameter.log else parameter.typical for name, parameter in pairs])
 
 
 def coordinate_bounds(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, Array]:
-    """Lower and upper bound of each coordinate, (k,) each; the parameter's default limit where `bounds` has none."""
+    """Lower and upper bounds of k coordinates, (k,) each: those in `bounds`, else the parameter's default limits."""
     ends = []
     for name, parameter in zip(coordinates.names, coordinates.parameters, strict=True):
         limits = zip(bounds.get(name, (None, None)), parameter.bounds, strict=True)
@@ -82,9 +81,8 @@ def residual(model: Model, data_sets: Sequence[MeasuredTest], *, with_priors: bo
         data_sets: tests.
         with_priors: True to append the residuals of the model's priors, (n + p,).
     """
-    of_tests = list(map(methodcaller("residual", model), data_sets))
     of_priors = [prior_rows(model, ())[0]] if with_priors else []
-    return whiten_together(data_sets, np.concatenate([*of_tests, *of_priors]))
+    return whiten_together(data_sets, np.concatenate([*(test.residual(model) for test in data_sets), *of_priors]))
 
 
 def jacobian(
@@ -103,7 +101,7 @@ def jacobian(
     """
     slopes = Coordinates.of_parameters(model, names).slopes(model.values)
     moving = (*names, *model.tied)
-    by_value = np.concatenate(list(map(methodcaller("jacobian", model, moving), data_sets)), axis=-1)
+    by_value = np.concatenate([test.jacobian(model, moving) for test in data_sets], axis=-1)
     if model.tied:
         by_value = by_value[: len(names)] + model.constraints.slopes(model.values, names) @ by_value[len(names) :]
     by_value *= slopes[:, None]
@@ -169,10 +167,5 @@ def coordinate_changes(model: Model, names: Sequence[str], changed: Sequence[str
 
 
 def whiten_together(data_sets: Sequence[MeasuredTest], rows: Array) -> Array:
-    """Whiten residuals or derivatives of all tests by an error that the tests share; unchanged if they share none.
-
-    Args:
-        data_sets: tests, each with its own noise already whitened.
-        rows: residuals or derivatives in units of noise, (..., n).
-    """
+    """Whiten residuals or derivatives of all tests, (..., n), by an error that the tests share, if there is one."""
     return data_sets.error.whiten(rows) if isinstance(data_sets, CorrelatedTests) else rows

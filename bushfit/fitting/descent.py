@@ -112,7 +112,7 @@ class Descent:
 
     @property
     def expected_fall(self) -> float:
-        """Fall of chi-square still to be expected until convergence, from the linearised model (not relative)."""
+        """Absolute fall of chi-square still to be expected until convergence, from the linearised model."""
         return max(self._step(0.0)[1], 0.0)
 
     @property
@@ -146,22 +146,15 @@ class Descent:
                 step, expected = fit._step(damping)
                 bend = fit._bend(step, damping)
             point = np.clip(fit.point + step + bend, *fit._reach)
-            before, fit = (
-                fit,
-                replace(
-                    fit,
-                    evaluations=fit.evaluations + 1,
-                    converged=converged,
-                    damping=damping * fit.growth,
-                    growth=2.0 * fit.growth,
-                ),
-            )
+            has_failed, damped = fit.growth > _FIRST_GROWTH, damping * fit.growth
+            fit = replace(fit, evaluations=fit.evaluations + 1, converged=converged)
+            fit = replace(fit, damping=damped, growth=2.0 * fit.growth)
             try:
-                model = fit.model.with_values(fit.problem.coordinates.values(point))
+                model = fit.model.with_values(problem.coordinates.values(point))
                 with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
                     # derivatives bring the response along; after a step that failed the response is asked for alone
                     # first, and what is left of a last step is too short for them to change
-                    slopes = None if converged or before.growth > _FIRST_GROWTH else problem.jacobian(model)
+                    slopes = None if converged or has_failed else problem.jacobian(model)
                     reached = problem.residual(model)
                     fall = fit.chi_square - float(reached @ reached)
                     if expected <= 0.0 or not fall > _LEAST_GAIN_RATIO * expected:
@@ -256,15 +249,15 @@ class Descent:
 
 
 def _solved(curvature: Array, pull: Array, free: Array) -> Array:
-    """Solve curvature @ step = pull for some parameters; along eigenvectors below rounding errors the step is 0.
+    """Solve curvature @ step = pull for the free parameters, with a step of 0 along combinations that are rounding.
 
     Args:
         curvature: Gauss-Newton Hessian by coordinate, (k, k).
         pull: negative gradient by coordinate, (k,).
-        free: mask of the parameters that move, (k,).
+        free: mask of the f parameters that move, (k,).
 
     Returns:
-        Step of the free parameters only.
+        Step of the free parameters, (f,).
     """
     scale = np.sqrt(np.diag(curvature)[free])
     scaled = curvature[np.ix_(free, free)] / np.outer(scale, scale)

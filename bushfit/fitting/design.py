@@ -1,6 +1,6 @@
 """Fits of added effects, from several start values of their shapes, as one start may end in a local minimum.
 
-The shape parameters of an effect are its times, gaps, orders and frequencies; a valley is a local minimum.
+The shape parameters of an effect are its times, gaps, orders and frequencies.
 """
 
 from collections.abc import Sequence
@@ -107,7 +107,7 @@ def with_effect(
 
 
 def fit_from(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds) -> Descent:
-    """Prepare a fit of all parameters of a model except the fixed ones, from the values of the model, without a step.
+    """Prepare a fit of all parameters of a model except the fixed ones; `Descent.run` then takes the steps.
 
     Args:
         model: model with the start values.
@@ -124,10 +124,10 @@ def shape_start_values(data_sets: Sequence[MeasuredTest], model: Model, paramete
     Args:
         data_sets: tests.
         model: fitted model.
-        parameter: shape parameter.
+        parameter: shape parameter; its `scale` names the quantity of the tests that limits the range.
 
     Returns:
-        Start values in the parameter's SI unit, (n,).
+        Five start values in the parameter's SI unit, (5,), or its typical value, (1,), without a scale.
     """
     frequencies, strains = operating_conditions(model.bushing, data_sets)
     match parameter.scale:
@@ -138,10 +138,7 @@ def shape_start_values(data_sets: Sequence[MeasuredTest], model: Model, paramete
             low, high = 0.7 * frequencies.max(), 4.0 * frequencies.max()
         case "displacement":
             amplitudes = np.concatenate([data_set.amplitude for data_set in data_sets])
-            low, high = (
-                0.8 * amplitudes.min(),
-                0.95 * amplitudes.max(),
-            )  # some test reaches one, and just misses the other
+            low, high = 0.8 * amplitudes.min(), 0.95 * amplitudes.max()  # every test passes the first, one the second
         case "strain":
             low = 0.03 * strains.min()
             high = max(0.5 * model.values.get("eps_half", strains.max()), low)

@@ -103,16 +103,10 @@ def undetermined_parameters(
     information = FisherInformation.from_tests(model, data_sets, names)
     groups, lines = _groups(information), list[str]()
     changes = np.abs(Coordinates.of_parameters(model, names).slopes(model.values) * relative_sizes(model, names))
-    relative_errors = {
-        name: (covariance.stderr(name) or 0.0) / float(c) for name, c in zip(names, changes, strict=True)
-    }
+    errors = {name: (covariance.stderr(name) or 0.0) / float(c) for name, c in zip(names, changes, strict=True)}
 
     def is_zero(name: str) -> bool:
-        """True if the amount of an added effect differs from its neutral value by no more than noise explains.
-
-        Args:
-            name: name of the parameter in files and reports.
-        """
+        """True if an amount of an added effect, given by name, is within noise of its neutral value."""
         neutral, noise = model.parameters[name].neutral, Z95 * (covariance.stderr(name) or 0.0)
         return "." in name and neutral is not None and abs(model.values[name] - neutral) < noise
 
@@ -133,7 +127,7 @@ def undetermined_parameters(
         return []
     combinations: dict[str, None] = {}
     for group in groups:
-        listed = ", ".join(f"{name} {percent(relative_errors[name])}" for name in group)
+        listed = ", ".join(f"{name} {percent(errors[name])}" for name in group)
         reasons = "; ".join(_reasons(model, data_sets, group)) or "these tests do not determine"
         meaning = f"{', '.join(group[:-1])} and {group[-1]} cannot be determined separately"
         if set(group) == set(_FRICTION) and information.error({"sigma_fmax": 1.0, "eps_half": -1.0}) < _KNOWN:
@@ -150,10 +144,10 @@ def undetermined_parameters(
 
 
 def _groups(information: FisherInformation) -> list[list[str]]:
-    """Group the names of parameters that the tests do not determine.
+    """Group the names of the parameters that the tests do not determine.
 
-    An open direction is a combination of parameters with a large standard error; directions with a common parameter
-    are merged into one group.
+    An open direction is a combination of parameters with a large standard error. The parameters of one open direction,
+    and of all open directions that have a parameter in common with it, form a group.
     """
     errors, vectors = information.directions()
     groups: list[set[str]] = []
@@ -201,16 +195,13 @@ def _reasons(model: Model, data_sets: Sequence[MeasuredTest], involved: Sequence
 def _known_combinations(
     model: Model, data_sets: Sequence[MeasuredTest], information: FisherInformation, involved: Sequence[str]
 ) -> Iterator[str]:
-    """Yield texts on moduli that the tests determine although they do not determine each of their parameters.
+    """Yield texts (formula, value, relative standard error) on moduli that are known better than their parameters.
 
     Args:
         model: fitted model.
         data_sets: tests of the campaign.
         information: Fisher information of the tests on relative changes of the parameters.
-        involved: names of the parameters that are not determined.
-
-    Yields:
-        Formula, value and relative standard error of each such modulus.
+        involved: names of the parameters in these moduli that the tests do not determine.
     """
     errors = dict(zip(information.names, information.errors(), strict=True))
     enough = min(_KNOWN, _BETTER * min(float(errors[name]) for name in involved))

@@ -38,7 +38,7 @@ _HOPELESS = 10.0
 
 @dataclass(frozen=True, eq=False)
 class FisherInformation:
-    """Fisher information of tests on relative changes of parameters.
+    """Fisher information of tests on relative changes of parameters, from which standard errors follow.
 
     Args:
         names: names of the k parameters.
@@ -136,17 +136,14 @@ def _candidates(model: Model, data_sets: Sequence[MeasuredTest]) -> Iterator[tup
             ("at ten times the rate", 1.0, 10.0),
         ):
             coefficients, frequency = largest.prepared.coefficients * amplitude, largest.prepared.frequency * rate
-            changed = replace(
-                largest, prepared=replace(largest.prepared, coefficients=coefficients, frequency=frequency)
-            )
-            yield f"a loop {words}", [changed.noise_free(model).with_noise(largest.relative_noise)]
+            prepared = replace(largest.prepared, coefficients=coefficients, frequency=frequency)
+            changed = replace(largest, prepared=prepared).noise_free(model)
+            yield f"a loop {words}", [changed.with_noise(largest.relative_noise)]
     else:
         direction = data_sets[0].direction
-        largest_amplitude = max(
-            float(data_set.amplitude.max()) for data_set in data_sets if data_set.direction == direction
-        )
+        widest = max(float(sweep.amplitude.max()) for sweep in sweeps if sweep.direction == direction)
         for times, words in ((1.0, ""), (3.0, "three times "), (10.0, "ten times ")):
-            motion = model, direction, _NEW_RATE, times * largest_amplitude, _FORCE_NOISE
+            motion = model, direction, _NEW_RATE, times * widest, _FORCE_NOISE
             loop = planned_loop(*motion, cycles=2.0, rows=400, from_rest=True)
             yield f"a loop at {_NEW_RATE} Hz of {words}the largest amplitude", [replace(loop, gain_error=ASSUMED[0])]
     reach = measured_range(model, data_sets)

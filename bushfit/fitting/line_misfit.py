@@ -61,17 +61,12 @@ class LineMisfit:
 
 
 def line_misfits(sweep: MeasuredSweep, model: Model) -> Iterator[LineMisfit]:
-    """Compare a model with each line of a sweep: the runs at one held amplitude or frequency.
-
-    Yields:
-        Mean difference between measurement and model along a line, over its repeats.
-    """
+    """Yield the mean misfit of a model along each line of a sweep: the runs at one held amplitude or frequency."""
     ratio = sweep.measured / sweep.stiffness(model) - 1.0
     for held_value in np.unique(sweep.held_value):
         mask = sweep.held_value == held_value
-        _, first, index, counts = np.unique(
-            sweep.step[mask], return_index=True, return_inverse=True, return_counts=True
-        )
+        _, first, index = np.unique(sweep.step[mask], return_index=True, return_inverse=True)
+        counts = np.bincount(index)
         mean = (np.bincount(index, ratio[mask].real) + 1j * np.bincount(index, ratio[mask].imag)) / counts
         variance = np.square(sweep.noise.random[sweep.name, float(held_value)]) + np.square(sweep.noise.shared)
         noise = np.sqrt(variance / np.median(counts) + np.square(sweep.noise.level))

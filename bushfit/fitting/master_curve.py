@@ -94,15 +94,14 @@ def _further_shift(model: Model, sweep: MeasuredSweep) -> tuple[float, float]:
     Returns:
         Addition to the model's ln a_T, and its standard error; nan if the stiffness does not change with frequency.
 
-    Notes: Gauss-Newton with equal weights, because the residuals are mostly not noise.
+    Notes:
+        Gauss-Newton with equal weights, because the residuals are mostly not noise.
     """
     shift, place, conditions = 0.0, sweep.direction, sweep.conditions
 
     def over_measured(shift: float) -> Array:
-        return (
-            model.stiffness(place, sweep.frequency * np.exp(shift), sweep.amplitude, conditions=conditions)
-            / sweep.measured
-        )
+        frequency = sweep.frequency * np.exp(shift)
+        return model.stiffness(place, frequency, sweep.amplitude, conditions=conditions) / sweep.measured
 
     for _ in range(_STEPS):
         slope = (over_measured(shift + _APART) - over_measured(shift - _APART)) / (2.0 * _APART)

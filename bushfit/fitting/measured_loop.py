@@ -82,7 +82,7 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def conditions(self) -> RubberConditions:
-        """Temperature of the rubber and its earlier strains, at the only point of a loop or all points of a sweep."""
+        """Temperature of the rubber and its earlier strains, in a loop or at each point of a sweep."""
         return self.test_conditions
 
     @cached_property
@@ -97,7 +97,7 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def residual_count(self) -> int:
-        """Number of residuals with weight; if the noise of rows is correlated, the effective number."""
+        """Number of residuals with weight, for degrees of freedom; if the noise is correlated, the effective number."""
         if self.fundamental_only:
             return 2
         return round(self.prepared.row_noise.observed_share * np.count_nonzero(self._usable_rows))
@@ -113,11 +113,11 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def relative_noise(self) -> float:
-        """Standard deviation of one row's noise, relative to half the force range (of a sweep: relative to |K|)."""
+        """Standard deviation of a row's noise relative to half the force range, or of a sweep's point to |K|."""
         return self.prepared.noise / self.prepared.half_range
 
     def weighted(self, weight: Array) -> Self:
-        """Return the test with the weight of each row (of a sweep: point) multiplied by a factor, (n,)."""
+        """Return the test with the weight of each of its n points multiplied by a factor, (n,)."""
         return replace(self, prepared=replace(self.prepared, weight=self.prepared.weight * weight))
 
     def fundamental(self) -> Self:
@@ -139,12 +139,7 @@ class MeasuredLoop(MeasuredBase):
         return replace(self, prepared=replace(self.prepared, force=force, half_range=float(np.ptp(force)) / 2.0))
 
     def force(self, model: Model, values: Values | None = None) -> Array:
-        """Model force at the rows [N or N m], (..., n).
-
-        Args:
-            model: model to evaluate.
-            values: parameter values in place of the model's own; leading axes are added to the result.
-        """
+        """Model force at the rows [N or N m], (..., n); leading axes are those of `values`, in place of the model's."""
         if values is None and (force := self._recall("force", model)) is not None:
             return force
         history = self.prepared.history(model.is_transient)
@@ -153,22 +148,19 @@ class MeasuredLoop(MeasuredBase):
         return force if values is not None else self._keep("force", model, (), force)
 
     def residual_with_added(self, added: Array, model: Model) -> Array:
-        """Whitened residuals, model minus measured in units of noise, of a model with an additional stiffness.
+        """Whitened residuals, (size,), model minus measured in units of noise, of a model with an additional stiffness.
 
         Args:
             added: stiffness added to the model's at each operating point (one in a loop), complex [N/m or N m/rad].
             model: model without the added stiffness.
-
-        Returns:
-            Residuals, (size,).
         """
         return self.residual(model) + self.residual_change(added, model)
 
     def slopes(self, model: Model, names: Sequence[str]) -> Array:
-        return self.whiten(self._slopes(model, names) * self._per_noise)
+        return self.whiten(self._force_slopes(model, names) * self._per_noise)
 
-    def _slopes(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the force at the n rows by parameter value, (len(names), n); may cache the force, too."""
+    def _force_slopes(self, model: Model, names: Sequence[str]) -> Array:
+        """Derivatives of the model's force at the n rows by parameter value [SI], (len(names), n)."""
         history = self.prepared.history(model.is_transient)
         if model.only_branches:
             return self.prepared.interpolate_at_rows(force_slopes_of_branches(model, self.direction, history, names))
@@ -283,7 +275,7 @@ class MeasuredLoop(MeasuredBase):
         return white @ self._fundamental if self.fundamental_only else white
 
     def _whiten_shared(self, white: Array) -> Array:
-        """Whiten rows of uncorrelated noise, (..., n), by the error that all rows share: model error or gain error."""
+        """Whiten rows of uncorrelated noise, (..., n), by the error that all rows share, `_shared`."""
         return self._shared.whiten(white) if self._shared else white
 
     def force_changes(self, waves: Array) -> Array:
@@ -295,7 +287,7 @@ class MeasuredLoop(MeasuredBase):
 
     @property
     def log_det_covariance(self) -> float:
-        """ln det S of the covariance S = 1 + (error shared by all rows) of the uncorrelated rows in units of noise."""
+        """ln det S of the residuals' covariance S = 1 + (error shared by all rows), in units of noise."""
         return self._shared.log_det_covariance if self._shared else 0.0
 
     @cached_property
@@ -317,7 +309,7 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def _unit_gain(self) -> Array:
-        """Change of the uncorrelated rows by a gain error of 100 %, (size,).
+        """Change of the whitened rows by a gain error of 100 %, (size,).
 
         Notes: computed from the force without its noise. With noise, a fit would attribute noise to the gain, and bias
         the model towards small forces (Peelle's puzzle: R. Fruehwirth, D. Neudecker, H. Leeb, EPJ Web of Conferences
@@ -341,7 +333,7 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def _error_waves(self) -> Array:
-        """Change of the uncorrelated rows by one standard deviation of each part of a model error of 100 %, (c, n).
+        """Change of the whitened rows by one standard deviation of each of c parts of a model error of 100 %, (c, n).
 
         The parts are cosine and sine of each harmonic and an offset, and for a loop from rest also a deviation of the
         first cycle and a drift.
@@ -359,27 +351,25 @@ class MeasuredLoop(MeasuredBase):
 
     @cached_property
     def _unit_error(self) -> CommonError:
-        """Model error of 100 % of half the force range, among the n uncorrelated rows."""
+        """Model error of 100 % of half the force range, as an error that the n rows share."""
         return CommonError(self._error_waves[2 * (self.first_error - 1) :])
 
     def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
-        """Inner products of the residuals and their derivatives by parameter, to estimate the size of a model error.
+        """Inner products of the residuals and their derivatives by the named parameters, for the size of a model error.
 
-        Args:
-            model: model at whose values residuals and derivatives are computed.
-            names: names of the parameters.
+        They are computed at the values of the model; see `likeliest_model_error`.
         """
-        slopes = self._slopes(model, names)
+        slopes = self._force_slopes(model, names)
         misfit = (self.force(model) - self.prepared.force)[None]
         white = self._whiten_rows(np.concatenate((misfit, slopes)) * self._per_noise)
         directions, size = self._unit_error.principal_errors
         return ErrorProducts(white @ white.T, white @ directions * size, np.square(size))
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
-        """Sensitivity of parameter estimates to errors of each noise variance that was itself estimated.
+        """Sensitivity of k parameter estimates to errors of each noise variance that was itself estimated.
 
         Args:
-            influence: weight of each whitened residual in the estimates, (k, size).
+            influence: change of each estimate by a unit of each whitened residual, (k, size).
 
         Returns:
             By identifier of the variance, (k, size): the influence times the whitened derivative of the residuals'
@@ -387,7 +377,7 @@ class MeasuredLoop(MeasuredBase):
         """
         reaction = self._whiten_shared(influence)
         whole = reaction @ self._fundamental.T if self.fundamental_only else reaction
-        parts = list(self.prepared.row_noise.noise_sensitivity(whole))
+        parts = self.prepared.row_noise.noise_sensitivity(whole)
         if self.fundamental_only:
             parts = [part @ self._fundamental for part in parts]
         if not parts and self.test.noise is None:
@@ -396,16 +386,13 @@ class MeasuredLoop(MeasuredBase):
         return {(self.name, index): self._whiten_shared(part) for index, part in enumerate(parts)}
 
     def extra_covariance(self, influence: Array) -> Array:
-        """Covariance of parameter estimates by errors that the weights of the residuals do not include.
+        """Covariance, (k, k), of k parameter estimates by errors that the weights of the residuals do not include.
 
         For a loop with model error: the gain error, minus the model error of the first harmonic, which the Gaussian
         process of the model error already includes.
 
         Args:
-            influence: weight of each whitened residual in the estimates, (k, size).
-
-        Returns:
-            Covariance to be added, (k, k).
+            influence: change of each estimate by a unit of each whitened residual, (k, size).
         """
         first = influence @ self._whiten_shared(self.model_error * self._error_waves[:2]).T
         gain = influence @ self._whiten_shared(self.gain_error * self._unit_gain)

@@ -68,24 +68,22 @@ class MeasuredSweep(MeasuredBase):
     def notes(self) -> list[str]:
         """Sentences for the user on the file, repeats that differ, contradictory tests, and rounded values."""
         file = self.source.file if self.source else self.name
-        found = [*self.source.notes] if self.source else []
+        notes = [*self.source.notes] if self.source else []
         points = np.unique([self.frequency, self.amplitude], axis=1, return_inverse=True)[1]
         if pairs := contradictions(self.measured, points):
             rows = [f"{one} and {second}" for _, *pair in pairs for one, second in [sorted(self.order[pair] + 1)]]
             more = f" and {len(rows) - _MOST_LISTED} more pairs" if len(rows) > _MOST_LISTED else ""
             difference = f"repeats of the same points differ by up to {number(100.0 * pairs[0][0], 2)} %"
-            found.append(f"{file}: {difference}, rows {', '.join(rows[:_MOST_LISTED])}{more}")
+            notes.append(f"{file}: {difference}, rows {', '.join(rows[:_MOST_LISTED])}{more}")
         if self.contradiction:
-            found.append(self.contradiction)
+            notes.append(self.contradiction)
         sizes = np.unique(np.log(np.abs(self.measured)).round(_DIGITS))
         step = float(np.median(np.diff(sizes))) if sizes.size > 2 else 0.0
         if sizes.size <= _FEW_SIZES * self.measured.size and step >= _COARSE:
             coarse = f"{sizes.size} magnitudes at {self.measured.size} points, {number(100.0 * step, 2)} % apart"
             rounded = "they are rounded, and the rounding error is included in the noise; save more digits"
-            found.append(f"{file}: {coarse}: {rounded}")
-        if self.name in self.noise.excess_warnings:
-            found.append(self.noise.excess_warnings[self.name])
-        return found
+            notes.append(f"{file}: {coarse}: {rounded}")
+        return [*notes, *filter(None, [self.noise.excess_warnings.get(self.name)])]
 
     @property
     def temperature(self) -> Array:
@@ -196,9 +194,11 @@ class MeasuredSweep(MeasuredBase):
         return distinct.real, distinct.imag, distinct_index
 
     def _operating_points(self, model: Model) -> tuple[Array, Array, RubberConditions, Array | slice]:
-        """Frequency, amplitude and conditions at which to evaluate a model, and for each point the index of its own.
+        """Operating points at which a model has to be evaluated, so that repeats are computed once.
 
-        These are the distinct operating points, or all points if the model depends on temperature or earlier strains.
+        Returns:
+            Frequency [Hz], amplitude [m or rad] and conditions of the distinct operating points, or of all points if
+            the model depends on temperature or earlier strains; and the index among them of each point of the sweep.
         """
         if model.depends_on_conditions:
             reached = self.sweep.amplitude_reached[self.order]
@@ -211,7 +211,7 @@ class MeasuredSweep(MeasuredBase):
 
         Args:
             model: model to evaluate.
-            values: parameter values in distinct_index of the model's own; leading axes are added to the result.
+            values: parameter values in place of the model's own; leading axes are added to the result.
 
         Returns:
             Complex stiffness, (..., n) [N/m or N m/rad].
@@ -219,9 +219,8 @@ class MeasuredSweep(MeasuredBase):
         if values is None and (stiffness := self._recall("stiffness", model)) is not None:
             return stiffness
         frequency, amplitude, conditions, distinct_index = self._operating_points(model)
-        stiffness = model.stiffness(self.direction, frequency, amplitude, values=values, conditions=conditions)[
-            ..., distinct_index
-        ]
+        distinct = model.stiffness(self.direction, frequency, amplitude, values=values, conditions=conditions)
+        stiffness = distinct[..., distinct_index]
         return stiffness if values is not None else self._keep("stiffness", model, (), stiffness)
 
     def difference(self, model: Model, values: Values | None = None) -> Array:
@@ -232,7 +231,7 @@ class MeasuredSweep(MeasuredBase):
         return self.whiten(self.deviation(self.stiffness(model) + added))
 
     def slopes(self, model: Model, names: Sequence[str]) -> Array:
-        return self.residual_change(self._slopes(model, names), model)
+        return self.residual_change(self._stiffness_slopes(model, names), model)
 
     def jacobian_with_added(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
         """Derivatives by k parameters of the whitened residuals, gains then phases, of a model with an added stiffness.
@@ -247,14 +246,13 @@ class MeasuredSweep(MeasuredBase):
             Derivatives per SI unit of each parameter, (k, 2 n).
         """
         grown = 1.0 + added / self.stiffness(model) if as_share else 1.0
-        return self.residual_change(grown * self._slopes(model, names), model, added)
+        return self.residual_change(grown * self._stiffness_slopes(model, names), model, added)
 
-    def _slopes(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the stiffness at the points by parameter value, (len(names), n); caches the stiffness too."""
+    def _stiffness_slopes(self, model: Model, names: Sequence[str]) -> Array:
+        """Derivatives of the model's complex stiffness at the n points by parameter value [SI], (len(names), n)."""
         frequency, amplitude, conditions, distinct_index = self._operating_points(model)
-        stiffness, slopes = stiffness_and_slopes(
-            model, self.direction, frequency, amplitude, names, conditions=conditions
-        )
+        points = self.direction, frequency, amplitude
+        stiffness, slopes = stiffness_and_slopes(model, *points, names, conditions=conditions)
         self._keep("stiffness", model, (), stiffness[distinct_index])
         return slopes[:, distinct_index]
 
@@ -275,8 +273,7 @@ class MeasuredSweep(MeasuredBase):
             stiffness: stiffness at the points of the sweep, complex (..., n) [N/m or N m/rad].
 
         Returns:
-            Complex (..., n): the real part is the relative difference in magnitude |K|, the imaginary part the
-            difference in phase [rad]; stiffness minus measurement.
+            Stiffness minus measurement, complex (..., n): relative difference in |K| + i difference in phase [rad].
         """
         if self.residuals == "complex":
             return np.log(stiffness / self.measured)
@@ -336,7 +333,7 @@ class MeasuredSweep(MeasuredBase):
         return self.covariance.log_det_covariance if self.model_error else 0.0
 
     def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
-        slopes = self._deviation_change(self._slopes(model, names), self.stiffness(model))
+        slopes = self._deviation_change(self._stiffness_slopes(model, names), self.stiffness(model))
         return self.covariance.error_products(np.concatenate((self.deviation(self.stiffness(model))[None], slopes)))
 
     def relative_difference(self, model: Model) -> Array:
@@ -376,13 +373,10 @@ class MeasuredSweep(MeasuredBase):
             yield Outlier(self.name, file, row, "stiffness", noise_units)
 
     def shared_error_columns(self, chosen: Array) -> list[Array]:
-        """Change of the whitened residuals, (2 n,), by an error of gain of 100 %, and by an error of phase of 1 rad.
+        """Change of the whitened residuals by a gain error of 100 %, (2 n,), and by a phase error of 1 rad, (2 n,).
 
         Args:
             chosen: mask of the points that have the error, (n,).
-
-        Returns:
-            Two arrays (2 n,): for the gain and for the phase.
         """
         return [self.whiten(unit * chosen.astype(complex)) for unit in (1.0, 1.0j)]
 

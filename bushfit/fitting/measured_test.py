@@ -14,11 +14,12 @@ from bushfit.reading.measurement import Loop, Source, Sweep
 
 
 class MeasuredBase(ABC):
-    """One measured test, a loop or a sweep, with its noise.
+    """One measured test with its noise: a loop from `prepare_loops` or a sweep from `prepare_sweeps`.
 
     Fits, quality figures, pictures and the diagnosis use both kinds in the same way; `MeasuredLoop` documents the
-    methods. A whitened residual is model minus measured in units of noise; residuals are independent with unit variance
-    if the model is right. A loop of n points has n residuals, a sweep 2 n: all gains, then all phases.
+    methods. A loop has n points, its rows (or bins of phase, if it is long), and n residuals; a sweep has n operating
+    points and 2 n residuals: all gains, then all phases. Whitened residuals are model minus measured in units of noise,
+    independent and of unit variance if the model is right.
 
     Args:
         kind: "loop" or "sweep".
@@ -69,7 +70,7 @@ class MeasuredBase(ABC):
 
     @abstractmethod
     def slopes(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the whitened residuals by parameter value, (len(names), size); the response is cached too."""
+        """Derivatives of the whitened residuals by parameter value, (len(names), size), for `jacobian`."""
 
     def residual(self, model: Model, values: Values | None = None) -> Array:
         """Whitened residuals: model minus measured in units of noise; independent with variance 1 for a true model.
@@ -84,24 +85,24 @@ class MeasuredBase(ABC):
         return self.whiten(self.difference(model, values))
 
     def misfit(self, model: Model) -> Array:
-        """Residuals for tables, (size,): as `residual`, but rows of a loop keep their correlation and shared errors."""
+        """Model minus measured in units of noise, (size,), for tables: whitened for a sweep, row by row for a loop."""
         return self.residual(model)
 
     def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the whitened residuals by parameter value, (len(names), size)."""
+        """Derivatives of the whitened residuals by parameter value [SI], (len(names), size); the last are cached."""
         rows = self._recall("jacobian", model, tuple(names))
         return self._keep("jacobian", model, tuple(names), self.slopes(model, names)) if rows is None else rows
 
     def without(self, points: Array) -> Self:  # noqa: ARG002
-        """Return the test with weight 0 at the given point indices (a loop has no weight at outliers anyway)."""
+        """Return a sweep with weight 0 at the points with the given indices; a loop is unchanged."""
         return self
 
     def with_weight(self) -> Self:
-        """Return the test with only those points that have weight; a loop is unchanged."""
+        """Return a sweep with only those points that have weight; a loop is unchanged."""
         return self
 
     def fundamental(self) -> Self:
-        """Return the test reduced to its first harmonic, for an added stiffness that is known at one frequency only."""
+        """Return a loop that is compared by its first harmonic only, as one operating point; a sweep is unchanged."""
         return self
 
     @property
@@ -146,7 +147,7 @@ class MeasuredBase(ABC):
         return {}
 
     def _recall(self, key: str, model: Model, names: Any = ()) -> Array | None:
-        """Return the array that was cached for the same key, model and parameter names; None if there is none."""
+        """Return the array that `_keep` cached for the same key, model and parameter names; None if there is none."""
         last = self._last.get(key)
         return last[2] if last and last[0] is model and last[1] == names else None
 

@@ -89,12 +89,7 @@ def with_model_error(
     closest, size = closest_fit(plain_fit, bounds)
     if size >= SIZES[-1]:  # that is no error of a model, but another thing than it
         return plain_fit, None
-    # of a loop only the shape has an independent error: its first harmonic changes with the stiffness
-    thinned = [
-        replace(test, model_error=size, first_error=2) if isinstance(test, MeasuredLoop) else test
-        for test in _thinned(plain_fit.minimised)
-    ]
-    tests = _fitted_tests(closest, thinned)
+    tests = _fitted_tests(closest, _thinned(plain_fit.minimised, size))
     sizes = np.geomspace(_SMOOTH_RATIO[0] * size, _SMOOTH_RATIO[1] * size, 9)
     processes = [replace(process, sizes=sizes) for process in discrepancies(tests)]
     likeliest = max(processes, key=lambda process: process.best[0])
@@ -168,11 +163,7 @@ def likeliest_model_error(model: Model, data_sets: Sequence[MeasuredTest], names
     variance = np.concatenate([part.variance for part in parts])
 
     def cost(log_size: float) -> float:
-        """Minus twice the log of the restricted likelihood of a model error, given the natural log of its size.
-
-        Returns:
-            The value, up to a constant.
-        """
+        """Minus twice the log of the restricted likelihood, up to a constant, given the natural log of the size."""
         square = float(np.exp(2.0 * log_size))
         grown = 1.0 + square * variance
         both = products - components * (square / grown) @ components.T
@@ -202,10 +193,8 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
         Natural log of the likelihood, up to a constant that is the same for all models.
     """
     size = max(test.model_error for test in solution.minimised)
-    bare = [replace(test, model_error=0.0) for test in _thinned(solution.minimised)]
-    if size:
-        bare = [replace(t, model_error=size, first_error=2) if isinstance(t, MeasuredLoop) else t for t in bare]
-    tests = _fitted_tests(solution, bare)
+    bare = [replace(test, model_error=0.0) for test in solution.minimised]
+    tests = _fitted_tests(solution, _thinned(bare, size))
     rows, residual = tests.free_jacobian, tests.solution.residual
     information, gain = rows @ rows.T, 0.0
     if size:
@@ -220,15 +209,12 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
         shares = columns[best] * SIZES[likelihoods[best].gains(SIZES).argmax()]
         across = shares @ tests.project(tests.free_jacobian).T
         information = information - across.T @ np.linalg.solve(shares @ shares.T + np.eye(len(shares)), across)
-    prior = np.diag([prior_precision.get(solution.names[i], 0.0) for i in solution.moving])
-    log_size = sum(test.log_det_covariance for test in tests.data_sets) + float(
-        np.linalg.slogdet(information + prior)[1]
-    )
-    for stated_prior in solution.model.constraints.priors:
-        names = [name for name in stated_prior.names if name in solution.names]
-        log_size += float(
-            np.linalg.slogdet(prior_covariance(stated_prior, Coordinates.of_parameters(solution.model, names)))[1]
-        )
+    information = information + np.diag([prior_precision.get(solution.names[i], 0.0) for i in solution.moving])
+    log_size = sum(test.log_det_covariance for test in tests.data_sets) + float(np.linalg.slogdet(information)[1])
+    for prior in solution.model.constraints.priors:
+        names = [name for name in prior.names if name in solution.names]
+        covariance = prior_covariance(prior, Coordinates.of_parameters(solution.model, names))
+        log_size += float(np.linalg.slogdet(covariance)[1])
     return gain - 0.5 * (float(residual @ residual) + log_size)
 
 
@@ -280,18 +266,19 @@ def _errors_of_class(test: MeasuredTest, rig: RigSettings) -> Array:
 
 
 def _fitted_tests(solution: FitResult, tests: Sequence[MeasuredTest]) -> FittedTests:
-    """Evaluate a fit for reweighted or thinned tests, for the estimate of a smooth model error without rig errors.
-
-    Args:
-        solution: result of the fit.
-        tests: reweighted or thinned tests.
-
-    Returns:
-        Fitted model and tests.
-    """
+    """Evaluate a fit for reweighted or thinned tests, for the estimate of a smooth model error without rig errors."""
     return FittedTests(solution.reevaluate(solution.model, tests), [np.empty((0, test.size)) for test in tests])
 
 
-def _thinned(tests: Sequence[MeasuredTest]) -> list[MeasuredTest]:
-    """Reduce dense sweeps to at most 600 evenly chosen points, enough to estimate a smooth error of the model."""
-    return [test if isinstance(test, MeasuredLoop) else test.thinned(_ENOUGH) for test in tests]
+def _thinned(tests: Sequence[MeasuredTest], error: float = 0.0) -> list[MeasuredTest]:
+    """Reduce dense sweeps to at most 600 evenly chosen points, enough to estimate a smooth error of the model.
+
+    Args:
+        tests: tests without a model error.
+        error: independent model error of the loops. Only the shape of a loop has it, from the second harmonic up: the
+            first harmonic changes with the stiffness.
+    """
+    thinned = [test if isinstance(test, MeasuredLoop) else test.thinned(_ENOUGH) for test in tests]
+    if not error:
+        return thinned
+    return [replace(t, model_error=error, first_error=2) if isinstance(t, MeasuredLoop) else t for t in thinned]

@@ -21,15 +21,7 @@ from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.reading.measurement import Loop, Source, Sweep
 from bushfit.units import number
 
-__all__ = [
-    "MeasuredLoop",
-    "MeasuredSweep",
-    "MeasuredTest",
-    "prepare_loops",
-    "prepare_sweeps",
-    "sources",
-    "split_by_kind",
-]
+__all__ = ["MeasuredLoop", "MeasuredSweep"]
 
 #: Relative difference of two loops' amplitudes, or frequencies, up to which one repeats the other; chosen: rigs come
 #: back to an amplitude within it.
@@ -37,7 +29,7 @@ SAME_LOOP = 0.02
 #: Step in temperature [K] up to which tests belong to the same temperature.
 _SAME_KELVIN = 1.0
 
-#: One measured test with its noise, see `data_set.MeasuredBase`.
+#: One measured test with its noise, see `MeasuredBase`.
 MeasuredTest = MeasuredLoop | MeasuredSweep
 
 _Kind = TypeVar("_Kind", MeasuredLoop, MeasuredSweep)
@@ -46,7 +38,7 @@ _Kind = TypeVar("_Kind", MeasuredLoop, MeasuredSweep)
 def prepare_loops(
     loops: Sequence[Loop], rig: RigSettings = UNSTATED, *, without_outliers: bool = False
 ) -> list[MeasuredLoop]:
-    """Prepare loops for a fit, each with its noise.
+    """Prepare measured loops for a fit, each with its noise and a note if it contradicts an earlier loop.
 
     Args:
         loops: measured loops.
@@ -74,7 +66,7 @@ def with_gain_errors(loops: Sequence[MeasuredLoop], rig: RigSettings) -> list[Me
 
 
 def with_gain_weighting(data_sets: Iterable[MeasuredTest], *, weigh: bool) -> list[MeasuredTest]:
-    """Include (`weigh`) or exclude the gain error of the rig in the noise that weights the residuals of loops."""
+    """Return the tests; the noise that weights residuals of loops includes the rig's gain error if `weigh` is True."""
     return [replace(test, gain_weighs=weigh) if isinstance(test, MeasuredLoop) else test for test in data_sets]
 
 
@@ -120,10 +112,12 @@ def prepare_sweeps(
 
 
 def _with_contradictions(tests: Sequence[_Kind], conditions: Sequence[Array]) -> list[_Kind]:
-    """Mark each test that contradicts an earlier test with a sentence on the pair of points that differs most.
+    """Return the tests, each that contradicts an earlier test with a sentence on the pair of points that differs most.
 
-    Points of different tests are repeats if all conditions, (n,) each over the points of all tests, and temperatures
-    are equal.
+    Args:
+        tests: loops, or sweeps.
+        conditions: labels or values of the n operating points of all tests, (n,) each; points with equal conditions
+            and temperatures repeat each other.
     """
     if len(tests) < 2:
         return list(tests)
@@ -163,7 +157,7 @@ def split_by_kind(data_sets: Iterable[MeasuredTest]) -> tuple[list[MeasuredLoop]
 
 
 def residual_slices(data_sets: Iterable[MeasuredTest]) -> list[slice]:
-    """Slice of each test's residuals in the array of the residuals of all tests."""
+    """Slices of the residuals of each test in the array of the residuals of all tests in order."""
     ends = accumulate((test.size for test in data_sets), initial=0)
     return [slice(*pair) for pair in pairwise(ends)]
 
@@ -176,7 +170,7 @@ def operating_conditions(bushing: Bushing | None, data_sets: Iterable[MeasuredTe
 
 
 def log_slopes(model: Model, data_set: MeasuredTest, names: Sequence[str]) -> Array:
-    """Derivatives of ln K of a model at the operating points of a test by parameter, complex (len(names), n).
+    """Derivatives of ln K of a model at the operating points of a test by parameter value, complex (len(names), n).
 
     Args:
         model: model at whose values the derivatives are taken.

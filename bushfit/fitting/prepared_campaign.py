@@ -41,7 +41,7 @@ _Kind = TypeVar("_Kind", MeasuredLoop, MeasuredSweep, MeasuredLoop | MeasuredSwe
 
 @dataclass(frozen=True, eq=False)
 class PreparedCampaign:
-    """A campaign ready to fit.
+    """A campaign ready to fit: its tests with their noise, and bounds, priors and ties of its parameters.
 
     Args:
         campaign: campaign as read from its file.
@@ -85,9 +85,8 @@ class PreparedCampaign:
         """Return the campaign with the stated temperature and earlier strains of the session at every test point."""
         conditions = iter(measured_session(self.campaign.bushing, [data_set.test for data_set in self.data_sets]))
         loops = tuple(replace(loop, test_conditions=next(conditions).select(0)) for loop in self.loops)
-        return replace(
-            self, loops=loops, sweeps=tuple(replace(sweep, test_conditions=next(conditions)) for sweep in self.sweeps)
-        )
+        sweeps = tuple(replace(sweep, test_conditions=next(conditions)) for sweep in self.sweeps)
+        return replace(self, loops=loops, sweeps=sweeps)
 
     @property
     def data_sets(self) -> list[MeasuredTest]:
@@ -103,15 +102,13 @@ class PreparedCampaign:
     @property
     def assumed(self) -> list[str]:
         """Warnings about the influence of preload, and about a rig whose accuracy is neither stated nor measured."""
-        if None not in self.campaign.rig.stiffness_errors or all(
-            sweep.noise.origin != "assumed" for sweep in self.sweeps
-        ):
+        is_assumed = any(sweep.noise.origin == "assumed" for sweep in self.sweeps)
+        if not is_assumed or None not in self.campaign.rig.stiffness_errors:
             return [*self.preload_notes]
-        shared = describe_class(self.campaign.rig)
         return [
             *self.preload_notes,
             "no test was repeated at three points or more: the errors shared by a run are assumed from the class "
-            f"of the rig, {shared}",
+            f"of the rig, {describe_class(self.campaign.rig)}",
         ]
 
     @property
@@ -148,7 +145,7 @@ class PreparedCampaign:
         return replace(self, sweeps=tuple(sweeps))
 
     def with_sweeps(self, sweeps: Sequence[Sweep]) -> "PreparedCampaign":
-        """Replace the sweeps by others with the same rows; their noise is estimated again."""
+        """Return the campaign with other sweeps of the same rows, such as corrected ones; their noise is estimated."""
         fit, new = self.campaign.fit, []
         for old, data_set in zip(self.sweeps, prepare_sweeps(sweeps, fit.residuals, self.campaign.rig), strict=True):
             rows = old.order[old.weights == 0.0]
@@ -295,7 +292,7 @@ def _chi_square(model: Model, data_sets: Sequence[MeasuredTest]) -> float:
 
 
 def _preferred(data_sets: Sequence[_Kind]) -> list[_Kind]:
-    """Select the axial tests, else those of the bushing, else all; of these, the tests at the smallest preload."""
+    """Select the axial tests, else those of the bushing, else all; of these, only those at the smallest preload."""
     axial = [test for test in data_sets if test.direction.axis is Direction.AXIAL]
     tests = axial or [test for test in data_sets if test.direction.axis] or list(data_sets)
     loads = [abs(test.test.preload.value) if test.test.preload else 0.0 for test in tests]

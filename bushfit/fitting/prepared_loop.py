@@ -5,7 +5,7 @@ squares at the samples as they are (any number of cycles, sine or triangle, even
 turning points that friction needs are those of the motion and not of the sensor.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -88,7 +88,7 @@ class PreparedLoop:
     first_row: int = 0
     row_noise: RowNoise = field(default_factory=RowNoise)
     # by length of a response: the samples before and after each row, and the part of the way between
-    _places: dict[int, tuple[Array, Array, Array, Array]] = field(default_factory=dict, init=False, repr=False)
+    _samples: dict[int, tuple[Array, Array, Array]] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def amplitude(self) -> float:
@@ -116,10 +116,11 @@ class PreparedLoop:
         return complex(force / self.coefficients[1])
 
     def history(self, is_transient: bool) -> History:
-        """Displacement that drives the model: one settled cycle of GRID samples, or the whole record.
+        """Displacement without noise that drives the model: one settled cycle of 1024 samples, or the whole record.
 
-        The whole record is used if it begins at rest, or if the response of the model changes over the first cycles
-        (`is_transient`). A loop that other cycles precede is settled in any case.
+        Args:
+            is_transient: True if the response of the model changes over the first cycles of a settled motion. Then, and
+                if the record begins at rest, the whole record is returned, unless other cycles precede the loop.
         """
         return self._settling if is_transient and not (self.from_rest or self.has_predecessor) else self._motion
 
@@ -129,7 +130,7 @@ class PreparedLoop:
         return self.loop.part is not None and self.loop.part.first_row > 0
 
     @property
-    def _rounding(self) -> float:
+    def rounding(self) -> float:
         """Half the distance of two rows [cycles]: tolerance within which a record has a whole number of cycles."""
         return 0.5 * self.cycles / self.loop.time.size
 
@@ -143,7 +144,7 @@ class PreparedLoop:
 
     @cached_property
     def _settling(self) -> History:
-        count = int(np.ceil(self.cycles - self._rounding))
+        count = int(np.ceil(self.cycles - self.rounding))
         motion = History.steady(np.tile(self._motion.value, count), self.frequency, cycles=count)
         return replace(motion, accuracy=_ACCURACY)
 
@@ -158,14 +159,14 @@ class PreparedLoop:
         length = response.shape[-1]
         if self.datum is not None and not self.from_rest:
             response = response - response.mean(axis=-1, keepdims=True)
-        if length not in self._places:
+        if length not in self._samples:
             position = self.phase * GRID
             index = position.astype(np.intp)
             ahead = np.minimum(index + 1, length - 1) if self.from_rest else (index + 1) % length
-            self._places[length] = index % length, ahead, position - index, 1.0 - (position - index)
-        index, ahead, part, rest = self._places[length]
+            self._samples[length] = index % length, ahead, position - index
+        index, ahead, part = self._samples[length]
         rows = response.take(index, axis=-1)
-        rows *= rest
+        rows *= 1.0 - part
         rows += response.take(ahead, axis=-1) * part
         if self.datum is not None and self.from_rest:
             rows = rows - np.average(rows, axis=-1, weights=self.weight)[..., None]
@@ -179,7 +180,7 @@ def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> PreparedLoop:
     is an outlier get no weight.
 
     Returns:
-        The loop as an input of the model.
+        The loop as an input of the model, with the noise of its rows.
 
     Raises:
         FitError: the displacement is not one whole cycle or more of a periodic motion, rows are missing, or the loop
@@ -230,7 +231,7 @@ def prepare_loop(loop: Loop, *, without_outliers: bool = False) -> PreparedLoop:
         preload = float(mean) if abs(mean) - np.hypot(cosine, sine) > _PRELOADED * half_force else None
         unknown = prepared.has_predecessor or abs(found.motion[0]) > 0.01 * half_motion
         prepared = replace(prepared, datum=float(found.force[0].real) if unknown else preload)
-    return replace(prepared, notes=(*prepared.notes, *_preload(prepared)))
+    return replace(prepared, notes=(*prepared.notes, *_preload_notes(prepared)))
 
 
 def _check_loses_energy(prepared: PreparedLoop) -> None:
@@ -252,13 +253,16 @@ def _check_loses_energy(prepared: PreparedLoop) -> None:
 
 
 def _with_row_noise(prepared: PreparedLoop, loop_harmonics: LoopHarmonics) -> PreparedLoop:
-    """Estimate size and correlation of the noise of a loop's rows, or bins, from its whole cycles.
+    """Estimate size and correlation of the noise of a loop's rows, or bins of phase, from its whole cycles.
 
     If there is no whole cycle, or the noise is below that of any rig, the rows are taken to be independent.
+
+    Returns:
+        The loop with its noise; the rows of a long loop, which are bins of phase, may have other weights.
     """
     binned = prepared.force.size < prepared.loop.force.size
     turn = prepared.phase.astype(np.intp)
-    rows = (turn >= int(prepared.from_rest)) & (turn < int(prepared.cycles + prepared._rounding))
+    rows = (turn >= int(prepared.from_rest)) & (turn < int(prepared.cycles + prepared.rounding))
     cycles = np.unique(turn[rows]).size
     if not cycles or np.count_nonzero(rows) < 32 * cycles:  # fewer resolve no correlation
         return prepared
@@ -273,8 +277,8 @@ def _with_row_noise(prepared: PreparedLoop, loop_harmonics: LoopHarmonics) -> Pr
         return prepared
     if not weight.all():
         misfit = np.interp(phase, phase[weight > 0.0], misfit[weight > 0.0])
-    scale = np.sqrt(weight) if binned else 1.0
-    model, size = row_noise(misfit * scale, remove_slow_changes(phase, misfit)[0] * scale, cycles)
+    settled, scale = remove_slow_changes(phase, misfit)[0], np.sqrt(weight) if binned else 1.0
+    model, size = row_noise(misfit * scale, settled * scale, cycles)
     if binned and model.order:
         # a row more or less in a bin of rows that depend on one another tells nothing: one weight for each turn
         weighted = prepared.weight > 0.0
@@ -282,7 +286,7 @@ def _with_row_noise(prepared: PreparedLoop, loop_harmonics: LoopHarmonics) -> Pr
         mean = np.bincount(turn[weighted], prepared.weight[weighted], minlength=count.size) / np.maximum(count, 1)
         prepared = replace(prepared, weight=np.where(weighted, mean[turn], 0.0))
         scale = np.sqrt(prepared.weight[rows])
-        model, size = row_noise(misfit * scale, remove_slow_changes(phase, misfit)[0] * scale, cycles)
+        model, size = row_noise(misfit * scale, settled * scale, cycles)
     if binned:
         breaks = () if prepared.from_rest else tuple((np.flatnonzero(np.diff(turn)) + 1).tolist())
         model = replace(model, row_scale=max(size / loop_harmonics.force_noise, 1.0), breaks=breaks)
@@ -309,7 +313,7 @@ def _at_reversal(prepared: PreparedLoop) -> Array:
 def _starts_at_rest(
     loop: Loop, harmonics: LoopHarmonics, frequency: float, half_motion: float, half_force: float, noise: float
 ) -> tuple[bool, bool]:
-    """Return two flags: the record begins at rest at zero, and it begins at rest about a preload.
+    """Test whether a record begins at rest at zero, or at rest about a preload.
 
     A record that begins at rest differs at its start from the force one cycle later by more than noise explains. A
     settled loop does not, even if it passes through the origin, as with a zero error of its load cell.
@@ -321,6 +325,9 @@ def _starts_at_rest(
         half_motion: half of the range of the displacement [m or rad].
         half_force: half of the range of the force [N or N m].
         noise: standard deviation of one row's force [N or N m].
+
+    Returns:
+        Two flags: True if it begins at rest at zero, and True if it begins at rest about a preload.
     """
     end = np.searchsorted(loop.time, loop.time[0] + 2.0 / frequency)
     clock, force = loop.time[:end] - loop.time[0], loop.force[:end]
@@ -356,11 +363,12 @@ def recorded_means(prepared: PreparedLoop) -> list[Preload]:
     return means
 
 
-def _preload(prepared: PreparedLoop) -> Iterator[str]:
-    """Yield a note on the mean displacement and force of a loop without a stated preload."""
-    loop = prepared.loop
-    if means := recorded_means(prepared) if loop.preload is None or not loop.preload.value else []:
-        motion = loop.direction.motion
-        words = {motion.displacement_unit: motion.words[0], motion.force_unit: motion.words[1]}
-        listed = " and ".join(f"a mean {words[mean.unit]} of {mean.text(loop.direction, 3)}" for mean in means)
-        yield f"recorded about {listed}, but no preload is stated: the fit uses the loop about its mean"
+def _preload_notes(prepared: PreparedLoop) -> Sequence[str]:
+    """Note on the mean displacement and force of a loop without a stated preload; none if they are small."""
+    loop, motion = prepared.loop, prepared.loop.direction.motion
+    means = recorded_means(prepared)
+    if not means or (loop.preload and loop.preload.value):
+        return []
+    words = {motion.displacement_unit: motion.words[0], motion.force_unit: motion.words[1]}
+    listed = " and ".join(f"a mean {words[mean.unit]} of {mean.text(loop.direction, 3)}" for mean in means)
+    return [f"recorded about {listed}, but no preload is stated: the fit uses the loop about its mean"]

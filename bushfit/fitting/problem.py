@@ -33,7 +33,7 @@ _AT_BOUND = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class FitProblem:
-    """Parameters of a model to be fitted to tests; parameters that are not named are fixed.
+    """Least-squares problem: a model, the tests to fit it to, and its free parameters; all others are fixed.
 
     Args:
         model: model with the start values.
@@ -111,7 +111,7 @@ class FitProblem:
 
 @dataclass(frozen=True, eq=False)
 class SmoothError:
-    """Smooth error of a model over operating points (Gaussian process), for the covariance of fitted parameters.
+    """Smooth error of a model over operating points (Gaussian process), from `with_model_error`, for a covariance.
 
     Args:
         shapes: relative change of the stiffness by one standard deviation of each of q independent patterns, at the p
@@ -123,22 +123,18 @@ class SmoothError:
     freedom: float
 
     def covariance(self, model: Model, tests: Sequence[MeasuredTest], influence: Array) -> Array:
-        """Covariance of fitted parameters that the smooth error of the model causes, (k, k).
+        """Covariance of k fitted parameters that the smooth error of the model causes, (k, k).
 
         Args:
             model: fitted model.
-            tests: tests.
-            influence: change of each parameter by a unit of each whitened residual, (k, n).
-
-        Returns:
-            Covariance of the parameters, in the units of the influence, (k, k).
+            tests: fitted tests.
+            influence: change of each parameter, in any unit, by a unit of each of the n whitened residuals, (k, n).
         """
-        first, changes = 0, np.zeros((len(influence), len(self.shapes)))
-        for test, rows in zip(tests, residual_slices(tests), strict=True):
-            last = first + test.frequency.size
-            change = self.shapes[:, first:last] * test.noise_free(model).measured
+        changes = np.zeros((len(influence), len(self.shapes)))
+        by_test = np.split(self.shapes, np.cumsum([test.frequency.size for test in tests]), axis=1)
+        for test, rows, shapes in zip(tests, residual_slices(tests), by_test[:-1], strict=True):
+            change = shapes * test.noise_free(model).measured
             changes += influence[:, rows] @ test.residual_change(change, model).T
-            first = last
         return np.asarray(changes @ changes.T)
 
 
@@ -185,12 +181,12 @@ class FitResult:
 
     @property
     def minimised(self) -> Sequence[MeasuredTest]:
-        """Tests, weighted as in the sum of squares that the fit minimises."""
+        """Tests with the weights of the sum of squares that the fit minimises, to which `residual` belongs."""
         return self.problem.tests
 
     @property
     def data_sets(self) -> Sequence[MeasuredTest]:
-        """Tests, weighted by their noise alone; excluded outliers have weight 0."""
+        """Tests weighted by their noise alone, for quality and warnings; excluded outliers have weight 0."""
         return self.noise_weighted or self.problem.tests
 
     def stage(self, fixed: Collection[str] = ()) -> FitProblem:
@@ -210,11 +206,11 @@ class FitResult:
 
     @property
     def flat(self) -> bool:
-        """True if one more Gauss-Newton step would lower chi-square by no more than chance explains."""
+        """True if a further Gauss-Newton step would lower chi-square by no more than chance explains."""
         return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
 
     def gain(self, fixed: Collection[str]) -> float:
-        """Fall of chi-square expected from one Gauss-Newton step of all parameters except the `fixed` ones, by name."""
+        """Fall of chi-square expected from one Gauss-Newton step of all parameters except those named in `fixed`."""
         free = [i for i, name in enumerate(self.names) if name not in fixed]
         left_vectors, values, _ = np.linalg.svd(self.jacobian[free].T, full_matrices=False)
         significant = values > ROUNDING * values.max(initial=0.0)

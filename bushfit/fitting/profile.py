@@ -46,7 +46,7 @@ Interval = tuple[float | None, float | None]
 
 @dataclass(frozen=True, eq=False)
 class _Profile:
-    """Profile of chi-square over one parameter, with the other parameters fitted at each value.
+    """Profile of chi-square over one parameter: its minimum over all others, at fixed values of the parameter.
 
     Args:
         name: name of the parameter.
@@ -81,7 +81,7 @@ class _Profile:
         return float(np.sqrt(max(self.fitted(coordinate).chi_square - self.best.chi_square, 0.0)))
 
     def find_limit(self, start: float, bound: float, step: float, allowed: float) -> float | None:
-        """Find the value [SI] at which the root of the rise of chi-square reaches `allowed`; None if that side is open.
+        """Find an end of an interval [SI], where the root of the rise of chi-square is `allowed`; None if it is open.
 
         Args:
             start: coordinate of the best value.
@@ -163,5 +163,5 @@ def limit95(best: FitResult, name: str) -> float | None:
 
 
 def _excess(best: FitResult) -> float:
-    """Reduced chi-square of a fit, at least 1: factor on the allowed rise of chi-square if the model misfits."""
+    """Factor on the allowed rise of chi-square for a model that misses its tests: reduced chi-square, at least 1."""
     return max(reduced_chi_square(best.model, best.minimised, len(best.names))[0], 1.0)

@@ -35,7 +35,7 @@ _MOST_NAMED = 8
 def list_outliers(
     model: Model, data_sets: Sequence[MeasuredTest], outlying: Sequence[Array] | None = None
 ) -> tuple[Outlier, ...]:
-    """List the outliers of tests by file and row.
+    """List the outliers of tests by file and row, for warnings and tables.
 
     Args:
         model: fitted model.
@@ -76,10 +76,8 @@ def estimate(
         retained = [test.without(points) for test, points in zip(tests, outlying, strict=True)]
         softened = []
         for test in retained:
-            distance = test.distance(model)
-            scale = _SOFT * misfit_scale(
-                distance[distance > 0.0] * np.sqrt(test.residuals_per_point), test.residuals_per_point
-            )
+            distance, parts = test.distance(model), test.residuals_per_point
+            scale = _SOFT * misfit_scale(distance[distance > 0.0] * np.sqrt(parts), parts)
             softened.append(test.weighted(1.0 / np.sqrt(1.0 + (distance / scale) ** 2)))
         found = solver(replace(problem, model=model, tests=softened))
         before, after = (found.coordinates.point(fitted.values) for fitted in (model, found.model))
@@ -119,20 +117,19 @@ def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
     Returns:
         At most two sentences.
     """
-    followed = [outlier for outlier in outliers if not robust and outlier.column != "displacement"]
-    excluded = [outlier for outlier in outliers if robust or outlier.column == "displacement"]
     sentences = []
-    for group, words in (
-        (followed, " and the fit includes them: {}; --loss soft_l1 leaves them out"),
-        (excluded, ", left out of the fit: {}"),
+    for is_excluded, consequence in (
+        (False, " and the fit includes them: {}; --loss soft_l1 leaves them out"),
+        (True, ", left out of the fit: {}"),
     ):
         rows, lists = defaultdict[str, list[str]](list), []
-        for outlier in group:
-            rows[outlier.source].append(str(outlier.row))
-        for place, numbers in rows.items():
+        for outlier in outliers:
+            if (robust or outlier.column == "displacement") == is_excluded:
+                rows[outlier.source].append(str(outlier.row))
+        for file, numbers in rows.items():
             more = f" and {len(numbers) - _MOST_NAMED} more" if len(numbers) > _MOST_NAMED else ""
-            lists.append(f"{place} row{'s' if len(numbers) > 1 else ''} {', '.join(numbers[:_MOST_NAMED])}{more}")
-        if group:
-            points = f"{len(group)} point{'s lie' if len(group) > 1 else ' lies'}"
-            sentences.append(f"{points} farther from the model than noise explains{words.format('; '.join(lists))}")
+            lists.append(f"{file} row{'s' if len(numbers) > 1 else ''} {', '.join(numbers[:_MOST_NAMED])}{more}")
+        if count := sum(map(len, rows.values())):
+            points = f"{count} point{'s lie' if count > 1 else ' lies'} farther from the model than noise explains"
+            sentences.append(points + consequence.format("; ".join(lists)))
     return sentences

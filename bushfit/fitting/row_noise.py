@@ -35,7 +35,7 @@ _LOWEST = 3
 _SLOW = 3.5
 #: Largest power between these harmonics that is taken for noise, relative to the largest of a filter with one pole.
 _MOST_SLOW = 4.0
-#: First even harmonic of a lone cycle that is taken for noise; chosen: a bushing that is equally stiff both ways has
+#: First even harmonic of a single cycle that is taken for noise; chosen: a bushing that is equally stiff both ways has
 #: odd harmonics only, and an uneven one mainly adds the second.
 _FIRST_EVEN = 4
 
@@ -132,8 +132,8 @@ class RowNoise:
         return solve_banded((self.order, 0), band, late).T.reshape(rows.shape)
 
 
-class _Model(NamedTuple):
-    """An autoregressive model: its polynomial, (p + 1,), and its correlations at lags 0 to p, (p + 1,)."""
+class _Autoregression(NamedTuple):
+    """An autoregressive model of order p: its polynomial, (p + 1,), and its correlations at lags 0 to p, (p + 1,)."""
 
     polynomial: Array
     correlations: Array
@@ -145,10 +145,10 @@ class _Model(NamedTuple):
 
 
 def row_noise(residual: Array, settled: Array, cycles: int) -> tuple[RowNoise, float]:
-    """Estimate the noise of the rows of a loop.
+    """Estimate correlation and size of the noise of the rows of a loop.
 
     Args:
-        residual: force without its harmonics [N or N m], (n,); for a lone cycle without mean, first three and all odd
+        residual: force without its harmonics [N or N m], (n,); of a single cycle without mean, first three and all odd
             harmonics.
         settled: residual without slow changes from one cycle to the next [N or N m], (n,).
         cycles: number of whole cycles in the rows.
@@ -181,16 +181,17 @@ def row_noise(residual: Array, settled: Array, cycles: int) -> tuple[RowNoise, f
 
 
 def noise_harmonics_of_single_cycle(number: Array) -> Array:
-    """Mask of the harmonics, by number, (n,), from which the noise of a loop of one cycle is estimated, (n,)."""
+    """Mask of the harmonics, given by number, (n,), from which the noise of a loop of one cycle is estimated, (n,)."""
     return (number % 2 == 0) & (number >= _FIRST_EVEN)
 
 
 def _periodogram(rows: Array) -> Array:
+    """Power of rows, (n,), at their n // 2 + 1 frequencies, no smaller than rounding errors."""
     power = np.abs(np.fft.rfft(rows)) ** 2 / rows.size
     return np.maximum(power, np.finfo(float).eps * power.mean())  # of cycles that repeat exactly, rounding
 
 
-def _fitted(power: Array, waves: Array, used: Array) -> _Model:
+def _fitted(power: Array, waves: Array, used: Array) -> _Autoregression:
     """Fit an autoregressive model to a periodogram, with the order of Schwarz's criterion.
 
     Args:
@@ -210,7 +211,7 @@ def _fitted(power: Array, waves: Array, used: Array) -> _Model:
             correlations = cosines[: order + 1] @ filled
             correlations[0] *= 1.0 + _FLOOR
             predictor = -np.linalg.solve(toeplitz(correlations[:-1]), correlations[1:])
-            model = _Model(np.append(1.0, predictor), correlations)
+            model = _Autoregression(np.append(1.0, predictor), correlations)
             before = filled[:lowest].copy()
             filled[:lowest] = model.spectrum(waves[:, np.maximum(np.arange(lowest), (lowest + 1) // 2)])
             if np.allclose(filled[:lowest], before, rtol=1e-3):
