@@ -61,7 +61,11 @@ class LineMisfit:
 
 
 def line_misfits(sweep: MeasuredSweep, model: Model) -> Iterator[LineMisfit]:
-    """Yield the mean misfit of a model along each line of a sweep: the runs at one held amplitude or frequency."""
+    """Compare a model with each line of a sweep: the runs at one held amplitude or frequency.
+
+    Yields:
+        Mean misfit along a line, over its repeats.
+    """
     ratio = sweep.measured / sweep.stiffness(model) - 1.0
     for held_value in np.unique(sweep.held_value):
         mask = sweep.held_value == held_value

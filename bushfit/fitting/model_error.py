@@ -163,7 +163,11 @@ def likeliest_model_error(model: Model, data_sets: Sequence[MeasuredTest], names
     variance = np.concatenate([part.variance for part in parts])
 
     def cost(log_size: float) -> float:
-        """Minus twice the log of the restricted likelihood, up to a constant, given the natural log of the size."""
+        """Minus twice the log of the restricted likelihood, given the natural log of the size.
+
+        Returns:
+            The value, up to a constant.
+        """
         square = float(np.exp(2.0 * log_size))
         grown = 1.0 + square * variance
         both = products - components * (square / grown) @ components.T
