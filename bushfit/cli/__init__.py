@@ -126,11 +126,11 @@ def _status(command: click.Command) -> int:
         message = "aborted"
     except click.ClickException as error:
         context = error.ctx if isinstance(error, click.UsageError) else None
+        text = " ".join(error.format_message().split())
         if isinstance(error, click.NoSuchOption) and context and not error.possibilities:
             names = [name for parameter in context.command.params for name in parameter.opts]
             similar = [name for name in names if name.startswith(f"-{error.option_name}")]  # --direction for -d
-            error = click.NoSuchOption(error.option_name, None, similar, context)
-        text = " ".join(error.format_message().split())
+            text += f" Did you mean {' or '.join(map(repr, similar))}?" if similar else ""
         if wrong := re.search(r"'([^']*)' is not one of (.*)\.$", text):
             near = did_you_mean(wrong[1], re.findall(r"'([^']*)'", wrong[2]))
             text = f"{text[:-1]}; {near}" if near else text
