@@ -22,7 +22,7 @@ from bushfit.cli.shared_options import (
 from bushfit.errors import error_location
 
 if TYPE_CHECKING:
-    from bushfit.commands.predict import PredictionOutput
+    from bushfit.commands.predicted import PredictionOutput
     from bushfit.geometry import Bushing
     from bushfit.model.result import Result
     from bushfit.prediction.static_curve import StaticCurve

@@ -11,7 +11,8 @@ from bushfit.campaign.schema import PredictSettings
 from bushfit.commands.families import COMPOUND, family_to_use, fit_campaign_families
 from bushfit.commands.fit import fit
 from bushfit.commands.loading import HasResult, as_result
-from bushfit.commands.predict import Numbers, grid_of, requested_preloads, table_columns
+from bushfit.commands.predict import Numbers, grid_of, requested_preloads
+from bushfit.commands.predicted import table_columns
 from bushfit.diagnosis.families import FittedFamily
 from bushfit.errors import BushfitError, ModelError
 from bushfit.geometry import Place, default_places, get_places

@@ -14,7 +14,8 @@ from typing_extensions import TypedDict
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.commands.loading import model_source
-from bushfit.commands.predict import PredictionOutput, predict
+from bushfit.commands.predict import predict
+from bushfit.commands.predicted import PredictionOutput
 from bushfit.export.contract import Dialect, Exported, ExportRequest, UnitSystem
 from bushfit.model.arms import ACCURACY
 from bushfit.model.file import load_result

@@ -12,7 +12,8 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import Loss
 from bushfit.commands.diagnose import DiagnosisOutput, diagnose, diagnosis_files
 from bushfit.commands.fit import FitOutput, campaign_files, fit, fit_static, prepare_tests
-from bushfit.commands.predict import PredictionOutput, predict
+from bushfit.commands.predict import predict
+from bushfit.commands.predicted import PredictionOutput
 from bushfit.commands.provenance import campaign_document, result_document
 from bushfit.commands.respond import validation_files
 from bushfit.diagnosis.document import DiagnosisFile

@@ -1,0 +1,192 @@
+"""Output of the command predict: predictions with their tables, figures, warnings and comparison with tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import groupby
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+import pandas as pd
+
+from bushfit.fitting.agreement import expected_errors_without_refits, misfits
+from bushfit.fitting.preparation import MeasuredSweep
+from bushfit.geometry import Direction
+from bushfit.model.arms import Arms
+from bushfit.model.result import ExpectedError, Misfit, Result
+from bushfit.prediction.caveats import warnings_of
+from bushfit.prediction.resonance import PredictedResonance
+from bushfit.prediction.static_curve import StaticCurve
+from bushfit.prediction.stiffness import Prediction
+from bushfit.report import plots, tables
+from bushfit.report.results import ResultFile, place_names
+from bushfit.report.tables import prediction_table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Content of `predict --json`: columns of each table by header, null in an empty cell; and warnings.
+PredictionDocument = dict[str, dict[str, list[float | None]] | list[str]]
+#: A prediction or a static curve.
+Part = TypeVar("Part", Prediction, StaticCurve)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PredictionOutput:
+    """Predicted stiffness and loss factor of a fitted model, with tables and figures.
+
+    Args:
+        result: the model with its uncertainty.
+        predictions: stiffness over the grid, of each direction or specimen, and of each preload.
+        measured: sweeps of the campaign that the model can predict.
+        notes: further warnings.
+        resonances: resonance of a mass for each direction or specimen; empty without a mass.
+        arms: Maxwell arms of each part of the model; empty unless requested.
+        static: static curve of each direction or specimen; empty unless requested.
+        files: tables and figures.
+    """
+
+    result: Result
+    predictions: Sequence[Prediction]
+    measured: Sequence[MeasuredSweep] = ()
+    notes: Sequence[str] = ()
+    resonances: Sequence[PredictedResonance] = ()
+    arms: Sequence[Arms] = ()
+    static: Sequence[StaticCurve] = ()
+    files: Sequence[ResultFile] = ()
+
+    def __repr__(self) -> str:
+        places = ", ".join(dict.fromkeys(str(prediction.direction) for prediction in self.predictions))
+        return f"Prediction of {self.result.name}: {places}"
+
+    @property
+    def document(self) -> Mapping[str, Any]:
+        """Content of `predict --json`: tables of the predictions by direction, Maxwell arms, tests and warnings."""
+        document: dict[str, Any] = {
+            str(predictions[0].direction): table_columns(joined_table(prediction_table, predictions))
+            for predictions in by_direction(self.predictions)
+        }
+        for resonance in self.resonances:
+            document[f"{resonance.place}_resonance"] = table_columns(tables.predicted_resonance_table(resonance))
+        for curves in by_direction(self.static):
+            document[f"{curves[0].direction}_static"] = table_columns(joined_table(tables.static_table, curves))
+        if self.arms:
+            document["arms"] = [
+                {
+                    "in_place_of": arms.stands_for,
+                    "shear_modulus_Pa": arms.modulus.tolist(),
+                    "relaxation_time_s": arms.time.tolist(),
+                    "band_Hz": arms.band,
+                    "largest_relative_error": arms.error,
+                }
+                for arms in self.arms
+            ]
+        return {**document, "warnings": self.warnings}
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings of the model, of each prediction, static curve and resonance, without repetition."""
+        predicted = [prediction.warnings for prediction in self.predictions]
+        predicted += [curve.warnings for curve in self.static]
+        predicted += [resonance.warnings for resonance in self.resonances]
+        return warnings_of(self.result, predicted, self.notes)
+
+    @cached_property
+    def tests(self) -> tuple[Misfit, ...]:
+        """Misfit of the model with each measured sweep and run: NRMSE, reduced chi-square, mean gap of |K|."""
+        return misfits(self.result.model, *split_by_fit(self.result, self.measured))
+
+    @cached_property
+    def usable(self) -> tuple[ExpectedError, ...]:
+        """Expected error of |K| (relative) and loss factor (absolute) in each direction, from the measured sweeps."""
+        return expected_errors_without_refits(self.result.model, *split_by_fit(self.result, self.measured))
+
+
+def prediction_files(
+    output: PredictionOutput, drawn_sweeps: Sequence[MeasuredSweep], temperature: float | None, *, wide: bool
+) -> list[ResultFile]:
+    """Tables and figures of a prediction.
+
+    Args:
+        output: the prediction.
+        drawn_sweeps: measured sweeps that the figures show.
+        temperature: temperature of the prediction [K]; None for the reference temperature.
+        wide: True to add tables with one column per amplitude.
+    """
+    result, by_place = output.result, by_direction(output.predictions)
+    places = [predictions[0].direction for predictions in by_place]
+    names = place_names(places)
+
+    def draw(prediction: Prediction) -> Figure:
+        """Draw a prediction with the measured sweeps of its direction.
+
+        Returns:
+            Figure with the warnings below it.
+        """
+        place = prediction.direction
+        measured = [sweep for sweep in drawn_sweeps if sweep.direction == place]
+        table = tables.sweeps_table(result.model, measured) if measured else None
+        title = result.name if isinstance(place, Direction) else str(place)
+        title += f", over {prediction.over.describe(place)}" if prediction.over else ""
+        note = plots.style.warnings_note(warnings_of(result, [], (*prediction.warnings, *output.notes)))
+        return plots.prediction.prediction_figure(result, prediction, table, title, note, temperature)
+
+    files = list[ResultFile]()
+    for name, predictions in zip(names, by_place, strict=True):
+        files.append(ResultFile(name, "table", partial(joined_table, prediction_table, predictions)))
+        files.append(ResultFile(name, "figure", partial(draw, predictions[0])))
+        if len(predictions) > 1:
+            over_preload = partial(plots.preload.preload_figure, result, predictions, result.name, temperature)
+            files.append(ResultFile(f"{name}_preload", "figure", over_preload))
+    if output.arms:
+        files.append(ResultFile("arms", "table", partial(tables.arms_table, result.model, output.arms, places)))
+    suffixes: Sequence[tuple[str, Callable[[Any], pd.DataFrame], Sequence[Any]]] = [
+        ("wide", tables.wide_table, output.predictions if wide else ()),
+        ("static", partial(joined_table, tables.static_table), by_direction(output.static)),
+        ("resonance", tables.predicted_resonance_table, output.resonances),
+    ]
+    for suffix, make, parts in suffixes:
+        for name, part in zip(names, parts, strict=False):
+            stem = f"{name}_{suffix}"
+            while stem in names:  # of a specimen
+                stem += "_"
+            files.append(ResultFile(stem, "table", partial(make, part)))
+            if suffix == "static":
+                title = f"{result.name}: {part[0].label if len(part) == 1 else part[0].direction}, static curve"
+                files.append(ResultFile(stem, "figure", partial(plots.prediction.static_figure, part, title)))
+    if output.measured:
+        files.append(ResultFile("measured", "table", partial(measured_table, result, output.measured)))
+    return files
+
+
+def by_direction(parts: Sequence[Part]) -> list[list[Part]]:
+    """Group successive predictions or static curves of a direction or specimen; a group has one per preload."""
+    return [list(group) for _, group in groupby(parts, key=attrgetter("direction"))]
+
+
+def measured_table(result: Result, sweeps: Sequence[MeasuredSweep]) -> pd.DataFrame:
+    """Table of measured sweeps beside the values of the model; sweeps to which the model was fitted come first."""
+    fitted, not_fitted = split_by_fit(result, sweeps)
+    counts = [sum(sweep.frequency.size for sweep in part) for part in (fitted, not_fitted)]
+    table = tables.sweeps_table(result.model, [*fitted, *not_fitted])
+    return table.assign(fitted=np.repeat(["yes", "no"], counts))
+
+
+def joined_table(make: Callable[[Part], pd.DataFrame], parts: Sequence[Part]) -> pd.DataFrame:
+    """Join the tables, made by `make`, of predictions or static curves at several preloads, one below the other."""
+    return pd.concat([make(part) for part in parts], ignore_index=True)
+
+
+def table_columns(table: pd.DataFrame) -> dict[str, list[Any]]:
+    """Convert a table to lists by column header, with None for empty cells."""
+    return {str(name): [None if x != x else x for x in column.tolist()] for name, column in table.items()}
+
+
+def split_by_fit(result: Result, sweeps: Sequence[MeasuredSweep]) -> tuple[list[MeasuredSweep], list[MeasuredSweep]]:
+    """Split sweeps into those to which the model was fitted, by the hash of their files, and the others."""
+    digests = {source.sha256 for source in result.inputs}
+    fitted = [sweep for sweep in sweeps if sweep.source and sweep.source.sha256 in digests]
+    return fitted, [sweep for sweep in sweeps if sweep not in fitted]
