@@ -266,15 +266,15 @@ class SearchState:
         Returns:
             One evidence per explanation, in the same order.
         """
-        at_nodes = replace(self.linear, chosen_nodes=self._likely_nodes)
-        return at_nodes.group_evidence_of([e.group for e in explanations if e.group is not None])
+        near = replace(self.linear, chosen_cases=self._likely_cases)
+        return near.group_evidence_of([e.group for e in explanations if e.group is not None])
 
     @cached_property
-    def _likely_nodes(self) -> Array:
+    def _likely_cases(self) -> Array:
         """Indices of the combinations of rig errors that are likely, alone or together with a smooth curve."""
         smooth = [e.group for e in self.tests.explanations if e.group and e.kind == "unnamed"]
         curves = replace(self.linear, groups=smooth, compound=None)
-        return np.union1d(self.linear.likely(_NEAR), curves.likely(_NEAR))
+        return np.union1d(self.linear.likely_cases(_NEAR), curves.likely_cases(_NEAR))
 
     def extended(self, explanation: Explanation, evidence: GroupEvidence, log_odds: float) -> list[Hypothesis]:
         """Extend this state by one explanation, whose evidence comes from the linear model.

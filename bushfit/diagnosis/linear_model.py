@@ -9,7 +9,7 @@ Notes:
     Thompson, 1971). Amounts of variance v^2 along columns U add, with the eigenvalues l of U^T P U and the components b
     of U^T P r along its eigenvectors, sum (v^2 b^2/(1 + v^2 l) - ln(1 + v^2 l))/2. One decomposition of D^T P D gives
     the same for every size s of the deviation. Sizes of the rig's errors, of the deviation and of amounts are summed
-    over nodes with weights of a prior. Only inner products of rows enter; errors of the rig stay within blocks of rows.
+    over cases with weights of a prior. Only inner products of rows enter; errors of the rig stay within blocks of rows.
 """
 
 from collections.abc import Sequence
@@ -22,174 +22,33 @@ from scipy.special import chdtrc, log_ndtr
 
 from bushfit.diagnosis.groups import Group, GroupEvidence
 from bushfit.diagnosis.priors import SIZES
-from bushfit.diagnosis.rig_errors import RigErrors
+from bushfit.diagnosis.projected_columns import AT_ONCE, ProjectedColumns
 from bushfit.effects.contract import Array
-
-#: Share of a parameter's information that is added to it, so that the matrix of undetermined parameters has an inverse.
-_ROUNDING = 1e-9
-#: Largest array of products, over nodes or groups, that is computed at once: 4 million numbers, 32 MB.
-_AT_ONCE = 4_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class LinearModel:
+class LinearModel(ProjectedColumns):
     """Linearised residuals of a fitted model, from which the evidence for each further explanation is computed.
 
-    A node is one combination of sizes of the rig's errors and of the compound's deviation from the model's laws. All
-    log evidences are natural logs of the marginal likelihood, averaged over nodes and up to a common constant.
-
-    Args:
-        residual: residuals in units of the scatter from point to point, (n,).
-        jacobian: derivatives of the residuals by the parameters and by the deviations of faulty parts, (k, n).
-        precision: prior precision of each row of the Jacobian, 0 for a flat prior, (k,).
-        rig: errors of the rig, with the nodes.
-        groups: candidate explanations, each a group of residual columns.
-        chosen_nodes: indices of the nodes to average over; None for all.
-        compound: columns of the compound's deviation at unit size, part of every hypothesis; None without a deviation.
+    All log evidences are natural logs of the marginal likelihood, averaged over noise cases and up to a common
+    constant. A noise case is one assumption on the sizes of the rig's errors and of the compound's deviation.
     """
 
-    residual: Array
-    jacobian: Array
-    precision: Array
-    rig: RigErrors
-    groups: Sequence[Group] = ()
-    chosen_nodes: Array | None = None
-    compound: Group | None = None
-
     @cached_property
-    def nodes(self) -> Array:
-        """Indices of the combinations of error sizes (nodes) to average over.
-
-        Without `compound`, only nodes in which the compound follows the model's laws.
-        """
-        chosen = np.arange(len(self.rig.nodes)) if self.chosen_nodes is None else self.chosen_nodes
-        return np.array([n for n in chosen.tolist() if self.compound or not self.rig.nodes[n].compound], dtype=int)
-
-    @cached_property
-    def _deviation(self) -> Array:
-        """Standard deviation of the compound's deviation from the model at each node, relative to |K|, (nodes,)."""
-        return np.array([self.rig.nodes[n].compound for n in self.nodes])
-
-    @cached_property
-    def _plain(self) -> Array:
-        """Mask of the nodes (error sizes) with rig errors within the stated accuracy and no compound deviation."""
-        return np.array([not self.rig.nodes[n].wide for n in self.nodes]) & (self._deviation == 0.0)
-
-    @cached_property
-    def _blocks(self) -> list[tuple[Array, Array]]:
-        """Blocks of columns that act together, collected by their number of columns (width) for array operations.
-
-        The columns of a group are one block if they act together, else one block each.
-
-        Returns:
-            For each width, the index of each block's group, (blocks,), and the indices of its columns among residual,
-            Jacobian and all columns, (blocks, width).
-        """
-        first = 1 + len(self.jacobian) + (len(self.compound.columns) if self.compound else 0)
-        ends = first + np.cumsum([0, *(len(group.columns) for group in self.groups)])
-        by_width: dict[int, list[tuple[int, Array]]] = {}
-        for number, (group, (start, stop)) in enumerate(zip(self.groups, pairwise(ends.tolist()), strict=True)):
-            rows = np.arange(start, stop)
-            for block in rows[None] if group.act_together else rows[:, None]:
-                by_width.setdefault(block.size, []).append((number, block))
-        return [tuple(map(np.array, zip(*blocks, strict=True))) for blocks in by_width.values()]  # type: ignore[misc]
-
-    @cached_property
-    def _at_nodes(self) -> "_AtNodes":
-        """Evidence without a further explanation, and inner products of all columns, for each node (error sizes).
-
-        Nodes are computed in parts to limit memory.
-        """
-        rig = self.rig
-        deviation = self.compound.whole if self.compound else np.zeros((0, self.residual.size))
-        rows = np.concatenate([self.residual[None], self.jacobian, deviation, *(group.scaled for group in self.groups)])
-        first = 1 + len(self.jacobian) + len(deviation)
-        scatters = np.zeros(self.residual.size, dtype=bool)
-        projections = np.zeros((len(rig.blocks), rig.roots[0].shape[-1], len(rows)))
-        for number, block in enumerate(rig.blocks):
-            scatters[block.rows] |= block.scatters
-            projections[number, : len(block.kinds)] = block.columns @ rows[:, block.rows].T
-        parts = [_columns(rows, scatters), _columns(rows, ~scatters)]
-        products = [part[:first] @ part.T for part in parts]
-        block_products = [[_block_products(part, block_rows) for part in parts] for _, block_rows in self._blocks]
-        by_noise = np.diag(products[0] + products[1])[1 : 1 + len(self.jacobian)]
-        index = rig.combinations[1][self.nodes]
-        used = np.unique(index)
-        results = list[tuple[Array, list[Array]]]()
-        for part in np.array_split(used, max(1, min(used.size, used.size * projections.size // _AT_ONCE))):
-            scatter, roots = rig.combinations[0][part, 0], rig.roots[0][part]
-            share = 1.0 / np.square(scatter)[:, None, None]
-            error_products = (roots @ projections).reshape(len(part), -1, len(rows))
-            gram = share * products[0] + products[1] - error_products[..., :first].swapaxes(1, 2) @ error_products
-            grams = []
-            for (_, block_rows), both in zip(self._blocks, block_products, strict=True):
-                errors = np.moveaxis(error_products[..., block_rows], 1, -1)  # (combinations, blocks, width, errors)
-                grams.append(share[..., None] * both[0] + both[1] - errors @ errors.swapaxes(-1, -2))
-            log_det = rig.roots[1][part] + 2.0 * np.count_nonzero(scatters) * np.log(scatter)
-            chosen = np.flatnonzero(np.isin(index, part))
-            arrays = self._projected(chosen, np.searchsorted(part, index[chosen]), gram, grams, log_det, by_noise)
-            results.append((chosen, arrays))
-        order = np.argsort(np.concatenate([chosen for chosen, _ in results]))
-        joined = [np.concatenate(kind)[order] for kind in zip(*(arrays for _, arrays in results), strict=True)]
-        base, misfit, changes, *products = joined
-        return _AtNodes(base, misfit, changes, products[: len(self._blocks)], products[len(self._blocks) :])
-
-    def _projected(
-        self, chosen: Array, index: Array, gram: Array, grams: Sequence[Array], log_det: Array, by_noise: Array
-    ) -> list[Array]:
-        """Project parameters and the compound's deviation out of the inner products, for some error sizes (nodes).
-
-        Args:
-            chosen: positions of the m nodes in `nodes`, (m,).
-            index: index of the combination of rig errors at each node, (m,).
-            gram: inner products of residual, Jacobian and compound with all rows, for each combination.
-            grams: inner products within the blocks of groups, for each combination, one array per block width.
-            log_det: natural log of the determinant of the covariance of noise and rig errors, for each combination.
-            by_noise: squared norms of the rows of the Jacobian, whitened by noise alone, (k,).
-
-        Returns:
-            Arrays of `_AtNodes` in order, those of projections and grams one by one.
-        """
-        flat, has_prior = slice(1, 1 + len(self.jacobian)), self.precision > 0.0
-        scale = np.sqrt(np.maximum(by_noise + self.precision, np.finfo(float).tiny))
-        information = gram[:, flat, flat] + np.diag(self.precision)
-        root = np.linalg.cholesky(information / np.outer(scale, scale) + _ROUNDING * np.eye(scale.size))
-        free = np.linalg.solve(root, gram[:, flat] / scale[:, None])
-        log_det = log_det + 2.0 * np.sum(np.log(np.einsum("nkk->nk", root) * scale), axis=1)
-        log_det -= np.sum(np.log(self.precision[has_prior]))
-        residual = gram[:, 0] - np.einsum("nk,nkc->nc", free[..., 0], free)
-        smooth = slice(flat.stop, gram.shape[1])
-        deviation = gram[:, smooth] - free[..., smooth].swapaxes(1, 2) @ free
-        values, vectors = np.linalg.eigh(deviation[..., smooth])
-        values, deviation = np.maximum(values, 0.0)[index], (vectors.swapaxes(1, 2) @ deviation)[index]
-        variance = np.square(self._deviation[chosen])[:, None]
-        shrinkage = variance / (1.0 + variance * values)  # of the products along each eigenvector
-        residual = residual[index] - np.einsum("nq,nqc->nc", shrinkage * deviation[..., 0], deviation)
-        log_det = log_det[index] + np.sum(np.log1p(variance * values), axis=1)
-        changes = np.zeros(len(chosen))
-        if self.compound:
-            amounts = np.einsum("nij,nj->ni", vectors[index], shrinkage * deviation[..., 0])
-            changes = np.square(np.abs(amounts @ self.compound.unit)).max(axis=-1)
-        projections, projected = [], []
-        for (_, rows), products in zip(self._blocks, grams, strict=True):
-            absorbed = np.moveaxis(free[..., rows], 1, -1)  # (combinations, blocks, width, k)
-            smooth_rows = np.moveaxis(deviation[..., rows], 1, -1)
-            products = products - absorbed @ absorbed.swapaxes(-1, -2)
-            projected.append(products[index] - (smooth_rows * shrinkage[:, None, None]) @ smooth_rows.swapaxes(-1, -2))
-            projections.append(residual[:, rows])
-        weight = np.array([self.rig.nodes[n].log_weight for n in self.nodes[chosen]])
-        return [weight - 0.5 * (residual[:, 0] + log_det), residual[:, 0], changes, *projections, *projected]
+    def _is_plain(self) -> Array:
+        """Mask of the noise cases with rig errors within the stated accuracy and without compound deviation."""
+        return np.array([not self.rig.cases[n].wide for n in self.cases]) & (self.deviations == 0.0)
 
     @cached_property
     def _gains(self) -> list[tuple[Array, Array]]:
-        """Gain in log evidence and squared relative change of |K| by each group of columns, in blocks of equal width.
+        """Gain in log evidence and squared relative change of |K| by each group, for each prior size of its amounts.
 
         Returns:
-            For each block width, gain and squared change, (nodes, blocks, sizes) each.
+            For each group, gain and squared change, (cases, blocks, sizes) each; a block is what acts at once.
         """
         gains: list[list[tuple[Array, Array]]] = [[] for _ in self.groups]
-        at_nodes = self._at_nodes
-        for (numbers, _), projections, gram in zip(self._blocks, at_nodes.projections, at_nodes.grams, strict=True):
+        products = self.products
+        for (numbers, _), projections, gram in zip(self.blocks, products.projections, products.grams, strict=True):
             units = [self.groups[number].unit if self.groups[number].act_together else np.eye(1) for number in numbers]
             senses = np.array([self.groups[number].sign for number in numbers])
             for number, gain, changes in zip(numbers, *_block_gains(gram, projections, units, senses), strict=True):
@@ -200,24 +59,23 @@ class LinearModel:
     @cached_property
     def group_evidence(self) -> list[GroupEvidence]:
         """Evidence of the tests for each explanation in `groups`, with rig errors within the stated accuracy."""
-        bent = self._deviation > 0.0
+        deviates = self.deviations > 0.0
         return [
-            self._over_nodes(gains, self._plain, self._over_nodes(gains, bent) if bent.any() else None)
+            self._over_cases(gains, self._is_plain, self._over_cases(gains, deviates) if deviates.any() else None)
             for gains in self._gains
         ]
 
-    def _over_nodes(
+    def _over_cases(
         self, gains: tuple[Array, Array], chosen: Array, with_compound: GroupEvidence | None = None
     ) -> GroupEvidence:
-        """Average the evidence for one explanation over some combinations of error sizes (nodes).
+        """Average the evidence for one explanation over some noise cases.
 
         Args:
-            gains: gain in log evidence, and squared relative change of |K|, by node and size of the amounts, (nodes,
-                sizes).
-            chosen: mask of the nodes, (nodes,).
+            gains: gain in log evidence, and squared relative change of |K|, (cases, blocks, sizes) each.
+            chosen: mask of the noise cases, (cases,).
             with_compound: evidence together with a compound deviation, copied to the result; None without it.
         """
-        log_evidence = (self._at_nodes.base[:, None, None] + gains[0])[chosen]
+        log_evidence = (self.products.base[:, None, None] + gains[0])[chosen]
         if not log_evidence.size:
             return GroupEvidence(-np.inf, 0.0, float(SIZES[0]), with_compound)
         total = _log_sum(log_evidence)
@@ -232,7 +90,7 @@ class LinearModel:
         Returns:
             One evidence per group, in the same order.
         """
-        part = np.cumsum([len(group.columns) for group in groups]) * self.residual.size // _AT_ONCE
+        part = np.cumsum([len(group.columns) for group in groups]) * self.residual.size // AT_ONCE
         ends = [0, *(np.flatnonzero(np.diff(part)) + 1).tolist(), len(groups)]
         return [
             evidence
@@ -241,23 +99,26 @@ class LinearModel:
         ]
 
     def _log_evidence_over(self, chosen: Array) -> float:
-        """Natural log of the evidence without a further explanation, over the error sizes in a mask, (nodes,)."""
-        return _log_sum(self._at_nodes.base[chosen]) if chosen.any() else -np.inf
+        """Natural log of the evidence without a further explanation, over the noise cases in a mask, (cases,)."""
+        return _log_sum(self.products.base[chosen]) if chosen.any() else -np.inf
 
     @property
     def log_evidence(self) -> float:
         """Natural log of the tests' marginal likelihood if nothing is missing and rig errors are as stated."""
-        return self._log_evidence_over(self._plain)
+        return self._log_evidence_over(self._is_plain)
 
     @property
     def log_evidence_with_compound(self) -> float:
         """Natural log of the tests' marginal likelihood if only the compound deviates from the model's laws."""
-        return self._log_evidence_over(self._deviation > 0.0)
+        return self._log_evidence_over(self.deviations > 0.0)
 
     @property
     def log_evidence_with_level_errors(self) -> float:
-        """Natural log of the tests' marginal likelihood if only rig errors of levels exceed the stated accuracy."""
-        return self._log_evidence_over(~self._plain & (self._deviation == 0.0))
+        """Natural log of the tests' marginal likelihood if only rig errors of levels exceed the stated accuracy.
+
+        A level is the set of all points at one constant amplitude, or frequency, of a sweep.
+        """
+        return self._log_evidence_over(~self._is_plain & (self.deviations == 0.0))
 
     @property
     def deviation(self) -> tuple[float, float]:
@@ -266,43 +127,43 @@ class LinearModel:
         Returns:
             Root mean square over the posterior, and the likeliest size.
         """
-        bent = self._deviation > 0.0
-        share = np.exp(self._at_nodes.base[bent] - self.log_evidence_with_compound)
-        sizes = self._deviation[bent]
+        deviates = self.deviations > 0.0
+        share = np.exp(self.products.base[deviates] - self.log_evidence_with_compound)
+        sizes = self.deviations[deviates]
         likeliest = max(np.unique(sizes), key=lambda size: share[sizes == size].sum())
-        return float(np.sqrt(share @ self._at_nodes.changes[bent])), float(likeliest)
+        return float(np.sqrt(share @ self.products.changes[deviates])), float(likeliest)
 
-    def likely(self, far: float) -> Array:
-        """Select the combinations of error sizes (nodes) that matter to the evidence for further explanations.
+    def likely_cases(self, far: float) -> Array:
+        """Select the noise cases that matter to the evidence for further explanations.
 
         Args:
-            far: difference in log evidence from the best node, beyond which a node is left out.
+            far: difference in log evidence from the best case, beyond which a case is left out.
 
         Returns:
-            Indices of the nodes within `far` of the best node, without a group or with one of `groups`. Nodes without a
-            deviation of the compound are included if a node with the same rig errors and a deviation is near the best.
+            Indices of the cases within `far` of the best case, without a group or with one of `groups`. Cases without a
+            deviation of the compound are included if a case with the same rig errors and a deviation is near the best.
         """
-        plain, index = self._plain, self.rig.combinations[1][self.nodes]
-        base = np.where(plain | (self._deviation > 0.0), self._at_nodes.base, -np.inf)
+        plain, index = self._is_plain, self.rig.combinations[1][self.cases]
+        base = np.where(plain | (self.deviations > 0.0), self.products.base, -np.inf)
         best = np.full(index.max() + 1, -np.inf)
         np.maximum.at(best, index, base)
         near = (base > base.max() - far) | (plain & (base > base[plain].max() - far))
-        with_group = np.max([base, *(self._at_nodes.base + gains.max(axis=(1, 2)) for gains, _ in self._gains)], axis=0)
+        with_group = np.max([base, *(self.products.base + gains.max(axis=(1, 2)) for gains, _ in self._gains)], axis=0)
         led = (best[index] > best.max() - far) | (with_group > with_group[plain].max() - far)
-        return self.nodes[near | (plain & led)]
+        return self.cases[near | (plain & led)]
 
     def p_value(self, *, compound_deviates: bool = False) -> float:
         """Probability that tests of a complete model would have a larger misfit r^T P r than these tests.
 
         Args:
-            compound_deviates: True to average over error sizes with a deviation of the compound; False without one.
+            compound_deviates: True to average over noise cases with a deviation of the compound; False without one.
 
-        Notes: a posterior predictive check (Gelman, Meng and Stern, 1996), averaged over error sizes by probability. r
+        Notes: a posterior predictive check (Gelman, Meng and Stern, 1996), averaged over noise cases by probability. r
         are the whitened residuals, and P projects out the parameters.
         """
-        base = np.where(self._deviation > 0.0 if compound_deviates else self._plain, self._at_nodes.base, -np.inf)
+        base = np.where(self.deviations > 0.0 if compound_deviates else self._is_plain, self.products.base, -np.inf)
         freedom = max(self.residual.size - int(np.count_nonzero(self.precision == 0.0)), 1)
-        return float(np.exp(base - _log_sum(base)) @ chdtrc(freedom, self._at_nodes.misfit))
+        return float(np.exp(base - _log_sum(base)) @ chdtrc(freedom, self.products.misfit))
 
     def amounts(self, number: int) -> tuple[Array, Array]:
         """Posterior mean and covariance of the amounts of a group whose g columns act together.
@@ -313,44 +174,20 @@ class LinearModel:
         Returns:
             Mean, (g,), and covariance, (g, g), averaged over all sizes of the amounts and of the rig's errors.
         """
-        kind, place = next(
-            (kind, int(np.flatnonzero(numbers == number)[0]))
-            for kind, (numbers, _) in enumerate(self._blocks)
+        width, block = next(
+            (width, int(np.flatnonzero(numbers == number)[0]))
+            for width, (numbers, _) in enumerate(self.blocks)
             if number in numbers
         )
-        values, vectors = np.linalg.eigh(self._at_nodes.grams[kind][self._plain, place])
-        projections = np.einsum("nij,ni->nj", vectors, self._at_nodes.projections[kind][self._plain, place])[:, None]
-        v2 = np.square(SIZES)[:, None]
-        grown = 1.0 + v2 * np.maximum(values, 0.0)[:, None]
-        gain = (
-            0.5 * np.sum(v2 * projections**2 / grown - np.log(grown), axis=-1) + self._at_nodes.base[self._plain, None]
+        chosen, products = self._is_plain, self.products
+        gain, means, variances, vectors = _posterior(
+            products.grams[width][chosen, block], products.projections[width][chosen, block]
         )
+        gain = gain + products.base[chosen, None]
         share = np.exp(gain - _log_sum(gain))
-        means = np.einsum("nij,nsj->nsi", vectors, -v2 * projections / grown)
         mean = np.einsum("ns,nsi->i", share, means)
-        spread = np.einsum("nij,nj,nkj->ik", vectors, np.einsum("ns,nsj->nj", share, v2 / grown), vectors)
+        spread = np.einsum("nij,nj,nkj->ik", vectors, np.einsum("ns,nsj->nj", share, variances), vectors)
         return mean, spread + np.einsum("ns,nsi,nsj->ij", share, means - mean, means - mean)
-
-
-@dataclass(frozen=True, eq=False)
-class _AtNodes:
-    """Evidence and inner products at each node, a combination of sizes of rig errors and the compound's deviation.
-
-    P projects out the parameters and the compound's deviation, and whitens by the rig's errors.
-
-    Args:
-        base: natural log of node weight times evidence without a group, (nodes,).
-        misfit: r^T P r of the residuals r, (nodes,).
-        changes: square of the largest relative change of |K| by the compound's deviation, (nodes,).
-        projections: U^T P r of the group columns U, one array (nodes, blocks, width) per block width.
-        grams: U^T P U of the group columns U, one array (nodes, blocks, width, width) per block width.
-    """
-
-    base: Array
-    misfit: Array
-    changes: Array
-    projections: list[Array]
-    grams: list[Array]
 
 
 def _log_sum(values: Array) -> float:
@@ -359,58 +196,43 @@ def _log_sum(values: Array) -> float:
     return float(peak + np.log(np.sum(np.exp(values - peak))))
 
 
-def _columns(rows: Array, chosen: Array) -> Array:
-    """Select columns of a matrix by a mask; a view without a copy if the selected columns are adjacent.
+def _posterior(gram: Array, projections: Array) -> tuple[Array, Array, Array, Array]:
+    """Posterior of the amounts of columns that act together, for each prior size in `priors.SIZES`.
 
     Args:
-        rows: matrix, (m, n).
-        chosen: mask of the columns, (n,).
-    """
-    places = np.flatnonzero(chosen)
-    if places.size and places[-1] - places[0] + 1 == places.size:
-        return rows[:, places[0] : places[-1] + 1]
-    return rows[:, places]
-
-
-def _block_products(part: Array, block_rows: Array) -> Array:
-    """Inner products of the rows within each block; blocks of zero rows are skipped for speed.
-
-    Args:
-        part: rows of residual columns, (rows, n).
-        block_rows: indices of the rows of each block, (blocks, width).
+        gram: inner products U^T P U of the columns, (..., width, width).
+        projections: inner products U^T P r with the residuals, (..., width).
 
     Returns:
-        Products, (blocks, width, width).
+        Gain in log evidence, (..., sizes); mean amounts, (..., sizes, width); variances along the eigenvectors of
+        `gram`, (..., sizes, width); and these eigenvectors, (..., width, width).
     """
-    filled = np.any(np.any(part, axis=1)[block_rows], axis=1)
-    products, rows = np.zeros((*block_rows.shape, block_rows.shape[1])), part[block_rows[filled]]
-    products[filled] = rows @ rows.swapaxes(-1, -2)
-    return products
+    values, vectors = (gram[..., 0], np.ones_like(gram)) if gram.shape[-1] == 1 else np.linalg.eigh(gram)
+    projections = np.einsum("...ij,...i->...j", vectors, projections)[..., None, :]
+    prior_variance = np.square(SIZES)[:, None]
+    grown = 1.0 + prior_variance * np.maximum(values, 0.0)[..., None, :]
+    variances = prior_variance / grown
+    gain = 0.5 * np.sum(prior_variance * projections**2 / grown - np.log(grown), axis=-1)
+    return gain, -(prior_variance * projections / grown) @ vectors.swapaxes(-1, -2), variances, vectors
 
 
 def _block_gains(gram: Array, projections: Array, units: Sequence[Array], senses: Array) -> tuple[Array, Array]:
     """Gains in log evidence and squared relative changes of |K| for blocks of columns that act together.
 
     Args:
-        gram: inner products U^T P U within the blocks, (nodes, blocks, width, width).
-        projections: inner products U^T P r with the residuals, (nodes, blocks, width).
+        gram: inner products U^T P U within the blocks, (cases, blocks, width, width).
+        projections: inner products U^T P r with the residuals, (cases, blocks, width).
         units: relative change of |K| per unit amount at p operating points, (width, p) for each block.
         senses: +1 for a block of one column whose amount must be positive, else 0, (blocks,).
 
     Returns:
-        Gains and squared changes for each of `priors.SIZES`, (blocks, nodes, sizes) each.
+        Gains and squared changes for each of `priors.SIZES`, (blocks, cases, sizes) each.
     """
-    single = gram.shape[-1] == 1
-    values, vectors = (gram[..., 0], np.ones_like(gram)) if single else np.linalg.eigh(gram)
-    projections = np.einsum("nmij,nmi->nmj", vectors, projections)[:, :, None]
-    v2 = np.square(SIZES)[:, None]
-    grown = 1.0 + v2 * np.maximum(values, 0.0)[:, :, None]
-    gain = 0.5 * np.sum(v2 * projections**2 / grown - np.log(grown), axis=-1)
-    amounts = -(v2 * projections / grown) @ vectors.swapaxes(-1, -2)
+    gain, amounts, variances, _ = _posterior(gram, projections)
     if senses.any():
-        standardised = senses[:, None] * (amounts * np.sqrt(grown) / np.sqrt(v2))[..., 0]
+        standardised = senses[:, None] * (amounts / np.sqrt(variances))[..., 0]
         gain = np.where(senses[:, None] != 0, gain + np.log(2.0) + log_ndtr(standardised), gain)
-    if single:
+    if gram.shape[-1] == 1:
         changes = np.square(amounts[..., 0] * np.array([np.abs(unit).max() for unit in units])[:, None])
     else:
         changes = np.stack(

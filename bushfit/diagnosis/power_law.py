@@ -257,7 +257,7 @@ def nearest_power_law(
     begun = model.with_values({name: value for name, value in start.items() if name in model.values})
     rows, smooth_curves = bare.solution.jacobian, [curve.group for curve in unnamed_curves(bare) if curve.group]
     plain = LinearModel(bare.residual, rows, np.zeros(len(rows)), rig_errors(bare, rig), smooth_curves)
-    plain = replace(plain, chosen_nodes=plain.likely(_NEAR))
+    plain = replace(plain, chosen_cases=plain.likely_cases(_NEAR))
     terms = [term for measure in _MEASURES if (term := Term(bare, measure)).has_one_meaning]
     settled = (_settled_grid(fitted, term, plain, begun, bounds) for term in terms)
     grids = [grid for grid in settled if grid]

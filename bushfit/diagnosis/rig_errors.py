@@ -1,4 +1,4 @@
-"""Errors of the rig as columns: errors that a run, a level or a loop shares, and drift along a run."""
+"""Errors of the rig as changes of residuals: shared by a run, a level (of amplitude) or a loop, and drift in a run."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -16,22 +16,22 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, group_repeats, split_by_kind, with_gain_weighting
 from bushfit.fitting.rig_class import ASSUMED, class_errors
 
-#: Kinds of errors of the rig; the values are indices of `Node.errors`.
+#: Kinds of errors of the rig; the values are indices of `NoiseCase.errors`.
 _RUN, _LEVEL, _WAVE, _LOOP = range(4)
 #: Minimum number of points of a run that can drift.
 _FEWEST = 4
 
 
 @dataclass(frozen=True)
-class Node:
-    """One combination of sizes of the rig's random errors, with its prior weight, over which the evidence is averaged.
+class NoiseCase:
+    """One assumption on the sizes of the rig's errors and of the compound's deviation, over which evidence is averaged.
 
     Args:
         scatter: standard deviation of a sweep's point, relative to the estimated point-to-point noise.
-        errors: standard deviations of errors of a run, a level, drift along a run, and a loop, relative to those of
-            the rig's stated class.
-        log_weight: natural log of the prior weight.
-        wide: True if errors of levels are larger than the accuracy class of the rig allows.
+        errors: standard deviations of the errors of a run, of a level (all points at one constant amplitude or
+            frequency), of drift along a run, and of a loop, relative to those of the rig's accuracy class.
+        log_weight: natural log of the prior probability of the case.
+        wide: True if errors of levels are larger than the accuracy class allows.
         compound: standard deviation of the compound's deviation from the model's laws, relative to |K|.
     """
 
@@ -44,14 +44,14 @@ class Node:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Rows of the residuals that share errors of the rig with each other and with no other rows.
+    """Rows of the residuals that share errors of the rig with each other and with no other rows: a level, or a loop.
 
     Args:
         rows: indices of the rows in the residual vector, (n,).
         columns: change of the whitened residuals by each of w errors at the size that the accuracy class of the rig
             states, (w, n).
         kinds: kind of each error (run, level, drift or loop), (w,).
-        scatters: True for points of sweeps, whose scatter differs between nodes; False for loops.
+        scatters: True for points of sweeps, whose scatter differs between noise cases; False for loops.
     """
 
     rows: Array
@@ -62,29 +62,25 @@ class Block:
 
 @dataclass(frozen=True, eq=False)
 class RigErrors:
-    """Random errors of the rig in a set of tests: errors that points share, with the sizes that they may have.
-
-    The tests' residuals are in units of the scatter from point to point. The errors do not depend on the model.
+    """Errors of the rig that points of the tests share, and the sizes that they may have; independent of the model.
 
     Args:
-        blocks: sets of residual rows that share gain and phase errors with each other and with no other rows.
-        nodes: combinations of sizes of the errors with prior weights, over which the evidence is averaged.
+        blocks: sets of residual rows that share errors, with residuals in units of the scatter from point to point.
+        cases: assumptions on the sizes of the errors, over which the evidence is averaged.
     """
 
     blocks: Sequence[Block]
-    nodes: Sequence[Node]
+    cases: Sequence[NoiseCase]
 
     @cached_property
     def combinations(self) -> tuple[Array, Array]:
-        """Distinct combinations of sizes of the rig's errors, so that each is factorised only once.
-
-        Nodes that differ in the size of the compound's deviation alone share a combination.
+        """Distinct combinations of sizes of the rig's errors; cases that differ in the compound alone share one.
 
         Returns:
             Scatter and sizes of the errors of runs, levels, drift and loops, (combinations, 1 + kinds); and the index
-            of the combination of each node, (nodes,).
+            of the combination of each case, (cases,).
         """
-        sizes = np.array([(node.scatter, *node.errors) for node in self.nodes])
+        sizes = np.array([(case.scatter, *case.errors) for case in self.cases])
         distinct, index = np.unique(sizes, axis=0, return_inverse=True)
         return distinct, index.ravel()
 
@@ -116,7 +112,7 @@ class RigErrors:
 
 
 def in_scatter_units(evidence: Evidence) -> Evidence:
-    """Express the residuals of a fit in units of the scatter from point to point, without errors that points share.
+    """Express the residuals of a fit in units of the scatter from point to point, to compare hypotheses.
 
     Residuals of sweeps are differences of ln K (gain and phase): relative to the measurement, noise would seem smaller
     where the model is wrong.
@@ -137,12 +133,12 @@ def in_scatter_units(evidence: Evidence) -> Evidence:
 
 
 def rig_errors(evidence: Evidence, rig: RigSettings) -> RigErrors:
-    """Build the errors of a rig for the fitted tests, with sizes of the accuracy class that [rig] states."""
-    return RigErrors(list(blocks(evidence, rig)), nodes(evidence))
+    """Errors of a rig in the fitted tests, at the sizes of the accuracy class that [rig] states."""
+    return RigErrors(list(error_blocks(evidence, rig)), noise_cases(evidence))
 
 
-def nodes(evidence: Evidence) -> list[Node]:
-    """List the combinations of sizes of the rig's errors and the compound's deviation, with their prior weights.
+def noise_cases(evidence: Evidence) -> list[NoiseCase]:
+    """List the assumptions on the sizes of the rig's errors and of the compound's deviation.
 
     The point-to-point scatter has several sizes if it was estimated from few repeats.
 
@@ -150,7 +146,7 @@ def nodes(evidence: Evidence) -> list[Node]:
         evidence: the fitted model and the tests.
 
     Returns:
-        Nodes, whose weights sum to one.
+        Noise cases, whose prior probabilities sum to one.
     """
     sweeps = split_by_kind(evidence.data_sets)[1]
     freedom = max((sweep.noise.scatter_freedom for sweep in sweeps), default=0)
@@ -158,16 +154,18 @@ def nodes(evidence: Evidence) -> list[Node]:
     scatters = np.sqrt(freedom / chdtri(freedom, 1.0 - thirds)).tolist() if 0 < freedom < KNOWN else [1.0]
     runs, waves = (RUNS, WANDERING) if sweeps else (((0.0, 1.0),),) * 2
     unnormalised = [
-        Node(scatter, (run, level, wave, level), log(a * b * c * d / len(scatters)), level > WITHIN_CLASS, deviation)
+        NoiseCase(
+            scatter, (run, level, wave, level), log(a * b * c * d / len(scatters)), level > WITHIN_CLASS, deviation
+        )
         for scatter, (run, a), (level, b), (wave, c), (deviation, d) in product(scatters, runs, LEVELS, waves, COMPOUND)
         if deviation == 0.0 or level <= WITHIN_CLASS  # errors of levels beyond the class would hide a deviation
     ]
-    total = logsumexp([node.log_weight for node in unnormalised])
-    return [replace(node, log_weight=float(node.log_weight - total)) for node in unnormalised]
+    total = logsumexp([case.log_weight for case in unnormalised])
+    return [replace(case, log_weight=float(case.log_weight - total)) for case in unnormalised]
 
 
-def blocks(evidence: Evidence, rig: RigSettings) -> Iterator[Block]:
-    """List blocks of residual rows that share errors: gains and phases of each level of a sweep, and repeated loops.
+def error_blocks(evidence: Evidence, rig: RigSettings) -> Iterator[Block]:
+    """List the sets of residual rows that share errors: the gain or phase of a level of a sweep, or repeated loops.
 
     Args:
         evidence: the fitted model and the tests.
@@ -197,7 +195,7 @@ def blocks(evidence: Evidence, rig: RigSettings) -> Iterator[Block]:
 
 
 def _shared_errors(count: int, runs: Sequence[Array]) -> tuple[Array, Array]:
-    """Unit errors that n points at one level of a sweep share: of the level, of each run, and drift along each run.
+    """Errors that the n points of a level share, at unit size: of the level, of each run, and drift along each run.
 
     Args:
         count: number n of points.

@@ -11,14 +11,14 @@ from scipy.stats import kstest, multivariate_normal, norm
 from bushfit.diagnosis.groups import Group
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import SIZES
-from bushfit.diagnosis.rig_errors import Block, Node, RigErrors
+from bushfit.diagnosis.rig_errors import Block, NoiseCase, RigErrors
 from bushfit.effects.contract import Array
 
 #: Two errors of the rig within its class, and one of levels beyond it.
-NODES = (
-    Node(1.0, (0.5, 0.4), np.log(0.5)),
-    Node(1.4, (2.0, 0.0), np.log(0.3)),
-    Node(0.8, (1.0, 2.5), np.log(0.2), wide=True),
+CASES = (
+    NoiseCase(1.0, (0.5, 0.4), np.log(0.5)),
+    NoiseCase(1.4, (2.0, 0.0), np.log(0.3)),
+    NoiseCase(0.8, (1.0, 2.5), np.log(0.2), wide=True),
 )
 
 
@@ -41,11 +41,11 @@ def ledger(seed: int, *, flat: int = 2, known: int = 1, rows: int = 10, groups: 
     precision = np.repeat([0.0, 0.5], [flat, known])
     jacobian = random.normal(size=(flat + known, rows))
     return LinearModel(
-        3.0 * random.normal(size=rows), jacobian, precision, RigErrors(blocks, NODES), made if groups else ()
+        3.0 * random.normal(size=rows), jacobian, precision, RigErrors(blocks, CASES), made if groups else ()
     )
 
 
-def covariance(of: LinearModel, node: Node) -> Array:
+def covariance(of: LinearModel, node: NoiseCase) -> Array:
     """Of the residuals by noise, errors of the rig and parameters that are known, in full, (n, n)."""
     variance = np.ones(of.residual.size)
     whole = np.zeros((variance.size, variance.size))
@@ -68,7 +68,7 @@ def restricted(of: LinearModel, whole: Array) -> float:
 
 
 def over_nodes(of: LinearModel, values: Sequence[float], *, wide: bool = False) -> float:
-    own = [node.log_weight + value for node, value in zip(of.rig.nodes, values, strict=True) if node.wide is wide]
+    own = [node.log_weight + value for node, value in zip(of.rig.cases, values, strict=True) if node.wide is wide]
     return float(logsumexp(own))
 
 
@@ -77,7 +77,7 @@ def test_worth_is_that_of_the_covariance_in_full(seed):
     """Of the rig and the parameters; and beside them of columns that move together, and of those of which one is
     chosen, over all sizes and nodes."""
     of = ledger(seed)
-    plain = [restricted(of, covariance(of, node)) for node in of.rig.nodes]
+    plain = [restricted(of, covariance(of, node)) for node in of.rig.cases]
     assert of.log_evidence == pytest.approx(over_nodes(of, plain), abs=1e-6)
     assert of.log_evidence_with_level_errors == pytest.approx(over_nodes(of, plain, wide=True), abs=1e-6)
     for group, worth in zip(of.groups, of.group_evidence, strict=True):
@@ -90,7 +90,7 @@ def test_worth_is_that_of_the_covariance_in_full(seed):
         )
         cases = [size * part for size in SIZES for part in parts]
         by_node = [
-            logsumexp([restricted(of, covariance(of, node) + each.T @ each) for each in cases]) for node in of.rig.nodes
+            logsumexp([restricted(of, covariance(of, node) + each.T @ each) for each in cases]) for node in of.rig.cases
         ]
         assert worth.log_evidence == pytest.approx(over_nodes(of, by_node) - np.log(len(cases)), abs=1e-6)
 
@@ -101,9 +101,9 @@ def test_an_amount_is_integrated_over_its_sense(sense):
     of = ledger(4, flat=1, known=0)
     column, unit, own = of.groups[0].columns[0], 0.7, of.jacobian[0]
     of = replace(
-        of, chosen_nodes=np.array([0]), groups=(Group(column[None], np.array([unit]), act_together=False, sign=sense),)
+        of, chosen_cases=np.array([0]), groups=(Group(column[None], np.array([unit]), act_together=False, sign=sense),)
     )
-    noise, spreads = multivariate_normal(cov=covariance(of, NODES[0])), SIZES / unit
+    noise, spreads = multivariate_normal(cov=covariance(of, CASES[0])), SIZES / unit
     low, high = {1: (0.0, 1.0), -1: (-1.0, 0.0), 0: (-1.0, 1.0)}[sense]
     x, weight = np.polynomial.legendre.leggauss(300)
     parameter, whole = 15.0 * x, 0.0
@@ -113,7 +113,7 @@ def test_an_amount_is_integrated_over_its_sense(sense):
         density = noise.pdf(shifted) @ (15.0 * weight) * norm.pdf(amounts, scale=spread) * (2.0 if sense else 1.0)
         whole += 3.5 * spread * (high - low) * weight @ density / spreads.size
     power = 0.5 * (of.residual.size - 1) * np.log(2.0 * np.pi)
-    assert of.group_evidence[0].log_evidence == pytest.approx(np.log(whole) + power + NODES[0].log_weight, abs=1e-4)
+    assert of.group_evidence[0].log_evidence == pytest.approx(np.log(whole) + power + CASES[0].log_weight, abs=1e-4)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -122,7 +122,7 @@ def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed):
     plain = ledger(seed)
     columns = np.random.default_rng(seed).normal(size=(2, plain.residual.size))
     sizes = (0.0, 0.3, 0.7)
-    nodes = [replace(node, compound=size) for node in NODES[:2] for size in sizes]
+    nodes = [replace(node, compound=size) for node in CASES[:2] for size in sizes]
     of = replace(plain, rig=RigErrors(plain.rig.blocks, nodes), compound=Group(columns, np.eye(2), act_together=True))
     group, size = of.groups[0].columns, SIZES[:, None, None]
 
@@ -149,7 +149,7 @@ def test_amounts_are_those_of_a_dense_posterior(number):
     """By Gaussian conditioning at each node within the class and each size, mixed by their evidence."""
     of = ledger(9)
     group, log_weights, means, seconds = of.groups[number], [], [], []
-    for node in (node for node in of.rig.nodes if not node.wide):
+    for node in (node for node in of.rig.cases if not node.wide):
         for size in SIZES:
             whole = covariance(of, node) + size**2 * group.columns.T @ group.columns
             inverse, own = np.linalg.inv(whole), of.jacobian[of.precision == 0.0]
@@ -169,9 +169,9 @@ def test_amounts_are_those_of_a_dense_posterior(number):
 def test_the_chance_of_clean_tests_is_even(node):
     """Drawn as the ledger says; with several nodes sizes adapt themselves, and extremes are rarer."""
     of, random = ledger(7, groups=False, rows=14), np.random.default_rng(2)
-    noise = np.linalg.cholesky(covariance(of, NODES[node]))
+    noise = np.linalg.cholesky(covariance(of, CASES[node]))
     drawn = [noise @ random.normal(size=of.residual.size) for _ in range(200)]
-    alone = [replace(of, residual=row, chosen_nodes=np.array([node])).p_value() for row in drawn]
+    alone = [replace(of, residual=row, chosen_cases=np.array([node])).p_value() for row in drawn]
     every = [replace(of, residual=row).p_value() for row in drawn]
     assert kstest(alone, "uniform").pvalue > 1e-3
     assert np.mean(np.array(every) < 0.05) < 0.09
