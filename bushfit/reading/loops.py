@@ -8,14 +8,14 @@ import numpy as np
 
 from bushfit.geometry import Place
 from bushfit.reading.headers import LOOP_COLUMNS, Column
-from bushfit.reading.labelled import note_not_understood
+from bushfit.reading.labelled import Rows, note_not_understood
 from bushfit.reading.measurement import Floats, Loop
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.preload import parse_preload
 from bushfit.reading.source import LEAST_VALUE
 from bushfit.reading.stated import LoopFile
 from bushfit.reading.table import Table
-from bushfit.reading.times import DAY, are_day_numbers, spread, without_midnight
+from bushfit.reading.times import DAY, are_day_numbers, spread
 
 #: Latest time of a record [s]; chosen: the year 5138 in seconds since 1970, or March 1973 in milliseconds.
 _LATEST_SECOND = 1e11
@@ -43,7 +43,7 @@ def read_loop(
     Raises:
         MeasurementError, UnitError: the file, a column, a unit or a value cannot be used.
     """
-    rows = test.rows_of_test(shared=shared)
+    rows = Rows(test.direction, test.specimen_number, test.rows, shared)
     table = Table.open(file, LOOP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
     stated_rate = None if test.states_time or "time" in table.roles else table.sampling_rate
     test = replace(test, sampling_rate=stated_rate) if stated_rate else test
@@ -156,7 +156,8 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
         MeasurementError: the time decreases or is constant, or its unit is in doubt.
     """
     if column.index in table.clocks:
-        time = without_midnight(time)
+        days = np.cumsum(np.append(0.0, np.diff(time) < -0.5 * DAY))  # clock times fall back at midnight
+        time = time + DAY * days
         time = time - time[0]
     likelier_unit = "ms" if time.size and time[0] > _LATEST_SECOND else None
     if column.scale == 1.0 and column.unit and are_day_numbers(time):

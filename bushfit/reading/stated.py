@@ -11,7 +11,6 @@ from pydantic import BeforeValidator, Field, ValidationInfo
 from bushfit.errors import CampaignError, error_location
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Place, Specimen
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, AmplitudeConvention
-from bushfit.reading.labelled import Rows
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.measurement import Floats, Source, Stepped, Waveform, rebuild_time
 from bushfit.units import CELSIUS, parse_quantity
@@ -188,10 +187,6 @@ class TestFile(FileFormat):
             key: value for key, value in {**conditions, "temperature_degC": degrees}.items() if value is not None
         }
         return Source(Path(self.file), sha256, conditions, tuple(notes))
-
-    def rows_of_test(self, *, shared: bool) -> Rows:
-        """Return the criteria that select the rows of the test; with `shared`, the file contains other tests too."""
-        return Rows(self.direction, self.specimen_number, self.rows, shared)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bushfit import units as si
 from bushfit.geometry import Place, strain_factor_of_files
 from bushfit.reading.headers import AGREEING_PAIRS, SWEEP_COLUMNS, ZERO_TO_PEAK, AmplitudeConvention, Column, si_unit
-from bushfit.reading.labelled import column_texts, note_not_understood
+from bushfit.reading.labelled import Rows, column_texts, note_not_understood
 from bushfit.reading.measurement import SAME_TEMPERATURE, Floats, Sweep
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.preload import parse_preload
@@ -68,7 +68,7 @@ def read_sweep(
     Raises:
         MeasurementError, UnitError: the file, a column, a unit or a value cannot be used.
     """
-    rows = test.rows_of_test(shared=shared)
+    rows = Rows(test.direction, test.specimen_number, test.rows, shared)
     table = Table.open(file, SWEEP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
     pair = stiffness_pair(table)
     constants = {"frequency": test.at_frequency}

@@ -83,7 +83,7 @@ def to_csv(table: pd.DataFrame, *, decimal_comma: bool = False) -> bytes:
 
 
 def _texts(column: pd.Series[Any], point: str) -> list[str]:
-    """Texts of the cells of a column, (n,), with decimal mark `point` and seven digits."""
+    """Texts of the cells of a column, (n,), with seven digits and the decimal mark `point`; "" for None and NaN."""
     if column.dtype.kind == "f":  # at once: most cells are numbers, and most of the time goes into their texts
         texts = ["" if value != value else f"{value:.7g}" for value in column.tolist()]
         return texts if point == "." else [text.replace(".", point) for text in texts]
@@ -95,24 +95,17 @@ def _texts(column: pd.Series[Any], point: str) -> list[str]:
             return escape_formula(value)
         return "" if value is None else str(value)
 
-    if column.dtype == "str":
-        codes, values = column.factorize(use_na_sentinel=False)
-        texts = [cell_text(value) for value in values]
-        return [texts[code] for code in codes.tolist()]
     return [cell_text(value) for value in column.tolist()]
 
 
 @lru_cache(maxsize=4096)
 def escape_formula(text: str) -> str:
-    """Return a text on one line, with an apostrophe before it if a spreadsheet would run it as a formula."""
-    line = in_a_line(text)
+    """Return a text for one cell of a CSV file, with an apostrophe if a spreadsheet would run it as a formula.
+
+    Line ends become blanks; other control characters, but tabs, become escape sequences.
+    """
+    line = "\t".join(map(printable, " ".join(_LINE_ENDS.split(text)).split("\t")))
     return f"'{line}" if _FORMULA.match(line) else line
-
-
-@lru_cache(maxsize=4096)
-def in_a_line(text: str) -> str:
-    """Return a text on one line, with escapes for control characters."""
-    return "\t".join(map(printable, " ".join(_LINE_ENDS.split(text)).split("\t")))
 
 
 def unescape_formula(text: str) -> str:

@@ -24,12 +24,13 @@ _LARGEST_DAY_STEP = 1e-4
 
 
 def clock(text: str) -> float | None:
-    """Return the time [s] in a text such as "20:07:10.1": since midnight, or since 1970 if a date precedes it.
-
-    None if the text is not a time.
+    """Parse a clock time such as "20:07:10.1", with or without a date before it.
 
     In 07:10:100 the last part is milliseconds. Days and months that are ambiguous are read as day and month; only the
     differences between rows are used.
+
+    Returns:
+        Time since midnight, or since 1970 if the text has a date [s]; None if the text is not a time.
     """
     text = _ZONE.sub("", text.strip())
     date, days = _DATE.match(text), 0.0
@@ -63,11 +64,6 @@ def are_day_numbers(values: Floats) -> bool:
     low, high = _DAY_NUMBERS
     in_range = values.size > 1 and low <= float(values.min()) and float(values.max()) <= high
     return in_range and 0.0 < float(np.ptp(values)) < _LARGEST_DAY_STEP * values.size
-
-
-def without_midnight(seconds: Floats) -> Floats:
-    """Add a day to clock times [s], (n,), after each midnight, so that they increase."""
-    return seconds + DAY * np.cumsum(np.append(0.0, np.diff(seconds) < -0.5 * DAY))
 
 
 def spread(time: Floats) -> Floats | None:
