@@ -1,22 +1,29 @@
-"""Texts and figures of a diagnosis: missing effects, their sizes, regions of disagreement and the next test."""
+"""The reported diagnosis: summary, named effects with their sizes, regions of disagreement and next test."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-
-import numpy as np
 
 from bushfit.diagnosis.described import GapDescription, describe
 from bushfit.diagnosis.document import Verdict
 from bushfit.diagnosis.evidence import Evidence, fit, result_of
+from bushfit.diagnosis.explanation_text import (
+    LEVELS,
+    NAMELESS,
+    claim_entries,
+    explanation_odds,
+    label,
+    list_candidates,
+    probability_text,
+    reported_names,
+)
 from bushfit.diagnosis.holdout import HoldOut, hold_out
 from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis
 from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.next_test import deciding_test
 from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP
-from bushfit.diagnosis.record import CandidateResult, Diagnosis, MisfitRegion, NamedCause, Odds, format_probability
+from bushfit.diagnosis.record import Diagnosis, MisfitRegion, NamedCause
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Composition, Finding, decide_verdict
 from bushfit.effects import get_effect, qualified_name
@@ -25,11 +32,8 @@ from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
 from bushfit.model.result import Result
 from bushfit.units import display_unit, format_aligned, number
 
-#: Reason for a candidate that is not part of the explanation; and summary if there is no gap.
-_LESS_LIKELY = "another explanation is more probable"
+#: Summary if there is no gap; and note on tests of one direction.
 _NOTHING = "the tests show no missing effect beyond noise and tolerance"
-_NAMELESS = "something without a name"
-_LEVELS = "errors of levels beyond the class of the rig"
 _ONE_DIRECTION = (
     "one direction was tested: a deviation of the compound and a smooth fault of the rig cannot be distinguished; test "
     "another direction or specimen"
@@ -38,11 +42,11 @@ _ONE_DIRECTION = (
 
 @dataclass(frozen=True, eq=False)
 class DiagnosisWriter:
-    """Builder of the reported diagnosis (texts, misfit regions, models) from the verdict of a search.
+    """Builder of the reported diagnosis from the verdict of a search.
 
     Args:
         search: completed search, with the tests.
-        finding: verdict on the hypotheses.
+        finding: verdict on the hypotheses, with the explanations to report.
         hypotheses: all hypotheses that were compared, the most probable first.
         unresolved: effects of the starting model that earlier tests could not distinguish from a twin of the rig.
     """
@@ -64,14 +68,10 @@ class DiagnosisWriter:
         return self.finding.reported[0] if self.finding.reported else None
 
     def diagnosis(self) -> Diagnosis:
-        """Build the diagnosis with all texts.
-
-        Returns:
-            Verdict, effects, regions, hold-out, next test and the model to use.
-        """
+        """Build the diagnosis: verdict, effects, regions, hold-out, next test and the model to use."""
         verdict, first = self.finding.verdict, self.first
         if verdict == "consistent":
-            return self._finished(verdict, _NOTHING, self.request.base)
+            return self._build(verdict, _NOTHING, self.request.base)
         if verdict == "ambiguous":
             return self._ambiguous()
         if first and verdict in ("named", "partly"):
@@ -89,7 +89,8 @@ class DiagnosisWriter:
         after = fit(model, state.evidence.data_sets, request.fixed, request.bounds)
         base, plain = self._with_free_gains(request.base), self._with_free_gains(after)
         company = " with the other named effects" if len(names) > 1 else ""
-        why = f"lowers chi-square by {base.chi_square - plain.chi_square:.0f}{company}; {self._probability(first)}"
+        why = f"lowers chi-square by {base.chi_square - plain.chi_square:.0f}{company}; "
+        why += probability_text(first, self.finding, request.data)
         entries = [NamedCause(name, why) for name in names]
         gap, rest, holdout = None, list[str](), None
         if self.finding.verdict == "named":
@@ -102,13 +103,13 @@ class DiagnosisWriter:
             ]
             share = number(100.0 * (1.0 - excess[1] / excess[0] if excess[0] else 1.0), 2)
             summary = f"{' and '.join(names)} {'explains' if len(names) == 1 else 'explain'} {share} % of the gap"
-            rest = [part.name for part in first.faulty_parts] + [_LEVELS] * first.best.levels
+            rest = [part.name for part in first.faulty_parts] + [LEVELS] * first.best.levels
             if not first.best.levels and (gap := self._described(after)):
                 entries.append(NamedCause(UNNAMED, gap.evidence))
-                rest.append(f"{_NAMELESS} ({gap.sentence})")
+                rest.append(f"{NAMELESS} ({gap.sentence})")
             elif first.unnamed:
-                rest.append(_NAMELESS)
-        diagnosis = self._finished(
+                rest.append(NAMELESS)
+        diagnosis = self._build(
             self.finding.verdict,
             summary,
             gap.after if gap else after,
@@ -143,8 +144,8 @@ class DiagnosisWriter:
         corrections = "; ".join(claim.corrections(data))
         advice = f"if the records of the tests confirm this mistake, state {corrections} (or {command})"
         summary = f"these tests agree if {claim.words(data)}"
-        entries = self._claim_entries(first)
-        diagnosis = self._finished(
+        entries = claim_entries(first, self.finding, self.request)
+        diagnosis = self._build(
             self.finding.verdict, summary, self.request.base, entries, places=best, next_test=advice
         )
         warning = f"fitted to the tests as they are, which only agree if {claim.words(data)}: {advice}"
@@ -157,44 +158,30 @@ class DiagnosisWriter:
             result=replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning)),
         )
 
-    def _claim_entries(self, composition: Composition, alternatives: tuple[str, ...] = ()) -> list[NamedCause]:
-        """Make the reported entries for the mistake in an explanation, one for each affected test."""
-        data, claim = self.request.data, composition.best.claim
-        gain = self.request.base.chi_square - composition.best.state.evidence.chi_square
-        why = f"lowers chi-square by {gain:.0f} without a new parameter; {self._probability(composition)}"
-        return [
-            NamedCause(
-                single.mistake.name,
-                why,
-                alternatives,
-                test=single.test(data),
-                sentence=single.words(data),
-                correction=single.corrections(data)[0],
-            )
-            for single in (claim.single_tests if claim else ())
-        ]
-
     def _ambiguous(self) -> Diagnosis:
         """Diagnosis in which the tests cannot distinguish several explanations, with the test that would."""
         request, compositions = self.request, self.finding.reported
         leader = next((c for c in compositions if c.names or c.best.claim), None)
-        alternatives = tuple(self.label(composition) for composition in compositions if composition is not leader)
+        alternatives = tuple(
+            label(composition, request.data) for composition in compositions if composition is not leader
+        )
         fitted = [composition for composition in compositions if composition.best.effects and composition.best.refitted]
         models = [composition.best.state.evidence.model for composition in fitted]
         odds = [composition.probability for composition in fitted]
         advice = deciding_test(models, odds, request.base.data_sets, request.data.campaign.rig)
         entries: list[NamedCause] = []
         if leader and leader.best.claim:
-            entries = self._claim_entries(leader, alternatives)
+            entries = claim_entries(leader, self.finding, request, alternatives)
             advice = f"check the records of the tests; {'; '.join(leader.best.claim.corrections(request.data))}"
         elif leader:
-            entries = [NamedCause(name, self._probability(leader), alternatives) for name in leader.names]
-        names = [" + ".join(self._names(composition)) for composition in compositions]
+            probability = probability_text(leader, self.finding, request.data)
+            entries = [NamedCause(name, probability, alternatives) for name in leader.names]
+        names = [" + ".join(reported_names(composition, request.data)) for composition in compositions]
         are_distinct = all(names) and len({*names}) == len(names)
-        *labels, last = names if are_distinct else map(self.label, compositions)
+        *labels, last = names if are_distinct else (label(composition, request.data) for composition in compositions)
         summary = f"these tests cannot distinguish between {', '.join(labels)} and {last}"
         places = next((composition.best for composition in compositions if composition.faulty_parts), None)
-        return self._finished("ambiguous", summary, request.base, entries, places=places, next_test=advice)
+        return self._build("ambiguous", summary, request.base, entries, places=places, next_test=advice)
 
     def _without_name(self) -> Diagnosis:
         """Diagnosis without a named effect: described by a correction, or unexplained, or with a faulty test."""
@@ -205,7 +192,7 @@ class DiagnosisWriter:
         if not is_fault and (gap := self._described(self.request.base)):
             summary = f"no known effect closes the gap: {gap.sentence}{leads}"
             summary += f"; it is largest at {at_fault}" if at_fault else ""
-            return self._finished("described", summary, gap.after, [NamedCause(UNNAMED, gap.evidence)], gap=gap)
+            return self._build("described", summary, gap.after, [NamedCause(UNNAMED, gap.evidence)], gap=gap)
         summary, advice = "no known effect closes the gap" + leads, ""
         if at_fault:
             several = len(best.faulty_parts) > 1  # type: ignore[union-attr]
@@ -214,43 +201,9 @@ class DiagnosisWriter:
             summary = "the levels disagree by more than the class of the rig, and nothing else is missing"
             advice = "measure the levels again in another session, or state the class of the rig (gain_error under "
             advice += "[rig])"
-        return self._finished("unexplained", summary, self.request.base, places=best, next_test=advice)
+        return self._build("unexplained", summary, self.request.base, places=best, next_test=advice)
 
-    def label(self, composition: Composition) -> str:
-        """Name of an explanation: its mistakes, effects, faulty parts of the tests and other parts, joined by " + "."""
-        faults = (f"fault: {part.name}" for part in composition.faulty_parts)
-        return " + ".join((*self._names(composition), *faults, *_nameless(composition)))
-
-    def _names(self, composition: Composition) -> list[str]:
-        """Names of the mistakes and effects of an explanation."""
-        claim = composition.best.claim
-        return [*(claim.labels(self.request.data) if claim else ()), *composition.names]
-
-    @cached_property
-    def odds(self) -> Odds:
-        """Reported explanations with texts, probabilities and fitted models, the most probable first."""
-        compositions = sorted(self.finding.reported, key=lambda composition: -composition.probability)
-        sentences, models = [], []
-        for composition in compositions:
-            claim = composition.best.claim
-            parts = [claim.words(self.request.data)] if claim else []
-            parts += [f"{get_effect(name).phrase} ({name})" for name in composition.names]
-            parts += [f"a faulty test: {part.name}" for part in composition.faulty_parts]
-            *parts, last = (*parts, *_nameless(composition))
-            sentences.append(", and ".join(filter(None, (", ".join(parts), last))))
-            models.append(composition.best.state.evidence.model if composition.best.refitted else None)
-        probabilities = (composition.probability for composition in compositions)
-        labels, exclusive = tuple(map(self.label, compositions)), self.finding.verdict == "ambiguous"
-        pairs = tuple(zip(sentences, probabilities, strict=True))
-        return Odds(self.finding.nothing, pairs, tuple(models), labels, exclusive)
-
-    def _probability(self, composition: Composition) -> str:
-        """Text with the probability of an explanation and of its most probable rival."""
-        rivals = [rival for rival in self.finding.reported if rival is not composition][:1]
-        following = [f"that of {self.label(rival)} {format_probability(rival.probability)}" for rival in rivals]
-        return ", ".join([f"probability {format_probability(composition.probability)}", *following])
-
-    def _finished(
+    def _build(
         self,
         verdict: Verdict,
         summary: str,
@@ -263,7 +216,7 @@ class DiagnosisWriter:
         gap: GapDescription | None = None,
         holdout: HoldOut | None = None,
     ) -> Diagnosis:
-        """Assemble the diagnosis with regions, hold-out, candidates and the model to use.
+        """Build the diagnosis with regions, hold-out, candidates and the model to use.
 
         Args:
             verdict: verdict in one word.
@@ -296,7 +249,8 @@ class DiagnosisWriter:
         lacking = verdict in ("partly", "ambiguous", "unexplained") and not (self.first and self.first.best.claim)
         resolved, corrected = {*base.model.effects} - {*self.unresolved}, gap.fitted if gap else None
         regions = tuple(sorted((*at_fault, *find_regions(base)), key=lambda region: -region.excess))
-        result = self.odds.averaged(result_of(after, bounds, resolved, lacking=lacking, corrected=corrected))
+        odds = explanation_odds(self.finding, self.request.data)
+        result = odds.averaged(result_of(after, bounds, resolved, lacking=lacking, corrected=corrected))
         amounts = filter(None, (_format_amount(entry.name, result) for entry in entries))
         return Diagnosis(
             verdict,
@@ -306,13 +260,13 @@ class DiagnosisWriter:
             regions if after is base else find_regions(after),
             gap.holdout if gap else holdout or hold_out(base, after, bounds),
             next_test,
-            tuple(self._candidates()),
+            tuple(list_candidates(self.search, self.hypotheses, self.first)),
             base,
             after,
             result,
             tuple(self._notes()),
             gap.description if gap else None,
-            self.odds,
+            odds,
         )
 
     def _with_free_gains(self, evidence: Evidence) -> Evidence:
@@ -325,40 +279,6 @@ class DiagnosisWriter:
             data_sets = with_gain_weighting(evidence.data_sets, weigh=False)
             self._refitted[evidence] = fit(evidence.model, data_sets, self.request.fixed, self.request.bounds)
         return self._refitted[evidence]
-
-    def _candidates(self) -> list[CandidateResult]:
-        """List all effects that the starting model lacks, and all mistakes that were fitted, the highest score first.
-
-        Each has its score, the result of its refit, and its probability.
-        """
-        base, data, first = self.request.base, self.request.data, self.first
-        log_posteriors = np.array([hypothesis.log_posterior for hypothesis in self.hypotheses])
-        weights = np.exp(log_posteriors - log_posteriors[0])
-        shares = (weights / weights.sum()).tolist()
-        candidates, alone = list[CandidateResult](), dict[str, Evidence]()
-        for hypothesis, share in zip(self.hypotheses, shares, strict=True):
-            evidence, claim = hypothesis.state.evidence, hypothesis.claim
-            if len(hypothesis.key) != 1:
-                continue
-            if hypothesis.refitted and hypothesis.effects:
-                alone[hypothesis.effects[0]] = evidence
-            elif claim:
-                gain = base.chi_square - evidence.chi_square
-                why = "closes the gap" if first and first.best is hypothesis else _LESS_LIKELY
-                candidates.append(CandidateResult(" + ".join(claim.labels(data)), gain, gain, share, {}, why))
-        for proposal in self.search.root.proposals:
-            name, after = proposal.name, alone.get(proposal.name)
-            pairs = zip(self.hypotheses, shares, strict=True)
-            probability = sum(share for hypothesis, share in pairs if name in hypothesis.effects)
-            if after is None:
-                why = "score too small to refit" if proposal.visible else "not visible in these tests"
-                candidates.append(CandidateResult(name, proposal.score, None, probability, {}, why))
-                continue
-            values = {key: value for key, value in after.model.values.items() if key not in base.model.values}
-            why = "part of the most probable explanation" if first and name in first.names else _LESS_LIKELY
-            gain = base.chi_square - after.chi_square
-            candidates.append(CandidateResult(name, proposal.score, gain, probability, values, why))
-        return sorted(candidates, key=lambda candidate: -candidate.score)
 
     def _notes(self) -> list[str]:
         """Sentences on the effects and kinds of fault that these tests cannot show."""
@@ -389,8 +309,3 @@ def _format_amount(name: str, result: Result) -> str:
     value_text, *ends = format_aligned([factor * x for x in (value, *(interval or ()))], 3)
     text = f"{amount.meaning or amount.name}: {f'{value_text} {unit}'.removesuffix(' -').removesuffix(' 1')}"
     return f"{text} (95 % interval {ends[0]} to {ends[1]})" if ends else text
-
-
-def _nameless(composition: Composition) -> list[str]:
-    """Texts for the parts of an explanation that are no known effect: level errors, and unknown smooth curves."""
-    return [_LEVELS] * composition.best.levels + [_NAMELESS] * composition.unnamed

@@ -1,0 +1,142 @@
+"""Names, texts and probabilities of the explanations of a gap, and the table of all candidates."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from bushfit.diagnosis.evidence import Evidence
+from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis
+from bushfit.diagnosis.record import CandidateResult, NamedCause, Odds, format_probability
+from bushfit.diagnosis.search import Search
+from bushfit.diagnosis.verdict import Composition, Finding
+from bushfit.effects import get_effect
+from bushfit.fitting.prepared_campaign import PreparedCampaign
+
+#: Texts for the parts of an explanation that are no known effect.
+NAMELESS = "something without a name"
+LEVELS = "errors of levels beyond the class of the rig"
+#: Reason for a candidate that is not part of the explanation.
+_LESS_LIKELY = "another explanation is more probable"
+
+
+def reported_names(composition: Composition, data: PreparedCampaign) -> list[str]:
+    """Names of the mistakes in the record (as --adopt accepts them) and effects of an explanation."""
+    claim = composition.best.claim
+    return [*(claim.labels(data) if claim else ()), *composition.names]
+
+
+def label(composition: Composition, data: PreparedCampaign) -> str:
+    """Name of an explanation: its mistakes, effects, faulty parts of the tests and other parts, joined by " + "."""
+    faults = (f"fault: {part.name}" for part in composition.faulty_parts)
+    return " + ".join((*reported_names(composition, data), *faults, *_nameless(composition)))
+
+
+def _nameless(composition: Composition) -> list[str]:
+    """Texts for the parts of an explanation that are no known effect: level errors, and unknown smooth curves."""
+    return [LEVELS] * composition.best.levels + [NAMELESS] * composition.unnamed
+
+
+def probability_text(composition: Composition, finding: Finding, data: PreparedCampaign) -> str:
+    """Text with the probability of an explanation and of its most probable rival.
+
+    Args:
+        composition: the explanation.
+        finding: verdict, with all reported explanations.
+        data: tests with their record.
+
+    Returns:
+        Text such as "probability 90 %, that of inertia 10 %".
+    """
+    rivals = [rival for rival in finding.reported if rival is not composition][:1]
+    following = [f"that of {label(rival, data)} {format_probability(rival.probability)}" for rival in rivals]
+    return ", ".join([f"probability {format_probability(composition.probability)}", *following])
+
+
+def claim_entries(
+    composition: Composition, finding: Finding, request: DiagnosisRequest, alternatives: tuple[str, ...] = ()
+) -> list[NamedCause]:
+    """List the reported entries for the mistake in the record of an explanation, one for each affected test.
+
+    Args:
+        composition: the explanation.
+        finding: verdict, with all reported explanations.
+        request: input of the search, with the tests as recorded and the starting model fitted to them.
+        alternatives: names of explanations that the tests cannot distinguish from this one.
+
+    Returns:
+        Entries with the sentence and the correction; none if the explanation has no mistake.
+    """
+    data, claim = request.data, composition.best.claim
+    gain = request.base.chi_square - composition.best.state.evidence.chi_square
+    why = f"lowers chi-square by {gain:.0f} without a new parameter; {probability_text(composition, finding, data)}"
+    return [
+        NamedCause(
+            single.mistake.name,
+            why,
+            alternatives,
+            test=single.test(data),
+            sentence=single.words(data),
+            correction=single.corrections(data)[0],
+        )
+        for single in (claim.single_tests if claim else ())
+    ]
+
+
+def explanation_odds(finding: Finding, data: PreparedCampaign) -> Odds:
+    """Reported explanations with texts, probabilities and fitted models, the most probable first."""
+    compositions = sorted(finding.reported, key=lambda composition: -composition.probability)
+    sentences, models = [], []
+    for composition in compositions:
+        claim = composition.best.claim
+        parts = [claim.words(data)] if claim else []
+        parts += [f"{get_effect(name).phrase} ({name})" for name in composition.names]
+        parts += [f"a faulty test: {part.name}" for part in composition.faulty_parts]
+        *parts, last = (*parts, *_nameless(composition))
+        sentences.append(", and ".join(filter(None, (", ".join(parts), last))))
+        models.append(composition.best.state.evidence.model if composition.best.refitted else None)
+    pairs = tuple(zip(sentences, (composition.probability for composition in compositions), strict=True))
+    labels = tuple(label(composition, data) for composition in compositions)
+    return Odds(finding.nothing, pairs, tuple(models), labels, finding.verdict == "ambiguous")
+
+
+def list_candidates(
+    search: Search, hypotheses: Sequence[Hypothesis], first: Composition | None
+) -> list[CandidateResult]:
+    """List all effects that the starting model lacks, and all mistakes that were fitted, with their results.
+
+    Args:
+        search: completed search, with the tests.
+        hypotheses: all hypotheses that were compared, the most probable first.
+        first: most probable explanation that is reported; None if nothing is missing.
+
+    Returns:
+        Candidates with the result of their refit and their probability, the highest score first.
+    """
+    base, data = search.request.base, search.request.data
+    log_posteriors = np.array([hypothesis.log_posterior for hypothesis in hypotheses])
+    weights = np.exp(log_posteriors - log_posteriors[0])
+    shares = (weights / weights.sum()).tolist()
+    candidates, alone = list[CandidateResult](), dict[str, Evidence]()
+    for hypothesis, share in zip(hypotheses, shares, strict=True):
+        evidence, claim = hypothesis.state.evidence, hypothesis.claim
+        if len(hypothesis.key) != 1:
+            continue
+        if hypothesis.refitted and hypothesis.effects:
+            alone[hypothesis.effects[0]] = evidence
+        elif claim:
+            gain = base.chi_square - evidence.chi_square
+            why = "closes the gap" if first and first.best is hypothesis else _LESS_LIKELY
+            candidates.append(CandidateResult(" + ".join(claim.labels(data)), gain, gain, share, {}, why))
+    for proposal in search.root.proposals:
+        name, after = proposal.name, alone.get(proposal.name)
+        pairs = zip(hypotheses, shares, strict=True)
+        probability = sum(share for hypothesis, share in pairs if name in hypothesis.effects)
+        if after is None:
+            why = "score too small to refit" if proposal.visible else "not visible in these tests"
+            candidates.append(CandidateResult(name, proposal.score, None, probability, {}, why))
+            continue
+        values = {key: value for key, value in after.model.values.items() if key not in base.model.values}
+        why = "part of the most probable explanation" if first and name in first.names else _LESS_LIKELY
+        gain = base.chi_square - after.chi_square
+        candidates.append(CandidateResult(name, proposal.score, gain, probability, values, why))
+    return sorted(candidates, key=lambda candidate: -candidate.score)
