@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import pandas as pd
 
-from bushfit.fitting.agreement import expected_errors_without_refits, misfits
+from bushfit.fitting.agreement import expected_errors, misfits
 from bushfit.fitting.preparation import MeasuredSweep
 from bushfit.geometry import Direction
 from bushfit.model.arms import Arms
@@ -102,7 +102,7 @@ class PredictionOutput:
     @cached_property
     def usable(self) -> tuple[ExpectedError, ...]:
         """Expected error of |K| (relative) and loss factor (absolute) in each direction, from the measured sweeps."""
-        return expected_errors_without_refits(self.result.model, *split_by_fit(self.result, self.measured))
+        return expected_errors(self.result.model, *split_by_fit(self.result, self.measured))
 
 
 def prediction_files(

@@ -8,13 +8,7 @@ import numpy as np
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
-from bushfit.fitting.agreement import (
-    expected_errors,
-    expected_errors_without_refits,
-    misfits,
-    prior_uses,
-    prior_warnings,
-)
+from bushfit.fitting.agreement import expected_errors, misfits, prior_uses, prior_warnings
 from bushfit.fitting.assess import covariance, measured_range, quality, temperature_warning
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.design import fit_from
@@ -166,7 +160,7 @@ def result_of(
         at_bound=solution.at_bound,
         tests=misfits(model, tests),
         # a correction has seen every run
-        usable=expected_errors_without_refits(model, tests, ()) if corrected else expected_errors(solution),
+        usable=expected_errors(model, tests, fit=None if corrected else solution),
         model_error=error,
         ties={tie.name: tie.expression for tie in model.constraints.active_ties(model.values)},
         priors=priors,

@@ -179,27 +179,35 @@ def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[Mea
     return tuple(found)
 
 
-def expected_errors(solution: FitResult, unfitted: Sequence[MeasuredTest] = ()) -> tuple[ExpectedError, ...]:
+def expected_errors(
+    model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest] = (), fit: FitResult | None = None
+) -> tuple[ExpectedError, ...]:
     """Expected error of a fitted model in stiffness and loss factor: 95 % of the points of a direction have less.
 
-    Each run is held out, and predicted from the fit to the other runs, if these determine all parameters and change
-    none by much; a test that was not fitted is always a prediction. If fewer than half the points of a direction can be
-    predicted, the errors of the fit itself at all its points are used.
+    Each run of a fitted test is held out, and predicted from the fit to the other runs, if these determine all
+    parameters and change none by much; a test that was not fitted is always a prediction. If fewer than half the points
+    of a direction can be predicted, the errors of the fit itself at all its points are used.
 
     Args:
-        solution: result of the fit.
+        model: fitted model.
+        fitted: tests that the model was fitted to.
         unfitted: tests that were not fitted.
+        fit: result of the fit; None to hold out no run.
 
     Returns:
         For each direction or specimen, the 95 % quantiles of the absolute relative difference of |K| and of the
         absolute difference of the loss factor.
     """
-    model, free, parts = solution.model, solution.moving, list[tuple[str, Array, bool]]()
-    whole = LeaveOut.from_fit(solution.jacobian[free], solution.residual)
-    per_coordinate = solution.coordinates.slopes(model.values)[:, None]
-    for test, rows in zip(solution.minimised, residual_slices(solution.minimised), strict=True):
+    parts = list[tuple[str, Array, bool]]()
+    if fit:
+        whole = LeaveOut.from_fit(fit.jacobian[fit.moving], fit.residual)
+        per_coordinate = fit.coordinates.slopes(model.values)[:, None]
+    for test, rows in zip(fitted, residual_slices(fitted), strict=True):
         modelled = test.noise_free(model).measured
-        slopes = (log_slopes(model, test, solution.names) * per_coordinate)[free]
+        if not fit:
+            parts.append((str(test.direction), _absolute_difference(modelled, test.measured), False))
+            continue
+        slopes = (log_slopes(model, test, fit.names) * per_coordinate)[fit.moving]
         for run in _runs(test):
             points = np.broadcast_to(run.points, (test.residuals_per_point, test.size // test.residuals_per_point))
             step = whole.step(rows.start + np.flatnonzero(points))
@@ -210,27 +218,6 @@ def expected_errors(solution: FitResult, unfitted: Sequence[MeasuredTest] = ()) 
     for test in unfitted:
         difference = _absolute_difference(test.noise_free(model).measured, test.measured)
         parts.append((str(test.direction), difference, True))
-    return _errors_by_direction(parts)
-
-
-def expected_errors_without_refits(
-    model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[MeasuredTest]
-) -> tuple[ExpectedError, ...]:
-    """Expected error of a model without refits: errors at fitted points are used where too few points were not fitted.
-
-    Args:
-        model: fitted model.
-        fitted: tests that the model was fitted to.
-        unfitted: tests that were not fitted.
-
-    Returns:
-        For each direction or specimen, the 95 % quantiles of the absolute relative difference of |K| and of the
-        absolute difference of the loss factor.
-    """
-    parts = list[tuple[str, Array, bool]]()
-    for index, test in enumerate([*fitted, *unfitted]):
-        difference = _absolute_difference(test.noise_free(model).measured, test.measured)
-        parts.append((str(test.direction), difference, index >= len(fitted)))
     return _errors_by_direction(parts)
 
 

@@ -264,10 +264,9 @@ def measured_range(model: Model, data_sets: Sequence[MeasuredTest]) -> Range:
 def preload_ranges(data_sets: Sequence[MeasuredTest]) -> list[PreloadRange]:
     """Ranges of preload of the directions and specimens that were tested at two preloads or more.
 
-    A direction with preloads of which some are displacements and some forces is left out.
-
     Returns:
-        For each of them the smallest and largest preload [m, rad, N or N m], and the number of preloads.
+        For each of them the smallest and largest preload [m, rad, N or N m], and the number of preloads; none for a
+        direction whose preloads are displacements in some tests and forces in others.
     """
     ranges = []
     for place in dict.fromkeys(test.direction for test in data_sets):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple, overload
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -71,8 +71,7 @@ class ErrorProducts(NamedTuple):
     variance: Array
 
 
-@dataclass(frozen=True, eq=False)
-class CorrelatedTests(Sequence["MeasuredTest"]):
+class CorrelatedTests(list["MeasuredTest"]):
     """Tests that share an error in addition to the noise of each: their residuals are whitened together.
 
     Args:
@@ -80,15 +79,6 @@ class CorrelatedTests(Sequence["MeasuredTest"]):
         error: shared error, over the residuals of all tests in order.
     """
 
-    data_sets: tuple[MeasuredTest, ...]
-    error: CommonError
-
-    @overload
-    def __getitem__(self, index: int) -> MeasuredTest: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[MeasuredTest]: ...
-    def __getitem__(self, index: int | slice) -> MeasuredTest | Sequence[MeasuredTest]:
-        return self.data_sets[index]
-
-    def __len__(self) -> int:
-        return len(self.data_sets)
+    def __init__(self, data_sets: Iterable[MeasuredTest], error: CommonError) -> None:
+        super().__init__(data_sets)
+        self.error = error

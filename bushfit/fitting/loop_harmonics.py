@@ -156,7 +156,7 @@ def outlier_distance(solution: Array, residual: Array, rows: int) -> float:
         rows: number of rows of the record.
     """
     corner = _CORNER / (solution.size // 2) * abs(as_complex(solution)[1])
-    return outlier_limit(rows, 1, np.inf) * _spread(residual) + corner
+    return outlier_limit(rows, 1, np.inf) * (MEDIAN_TO_SIGMA * float(np.median(np.abs(residual)))) + corner
 
 
 def _fit_without_outliers(columns: Array, values: Array, solution: Array) -> tuple[Array, Array]:
@@ -221,12 +221,7 @@ def _inliers(columns: Array, values: Array, solution: Array, stuck: Array) -> Ar
 
 def _noise(solution: Array, residual: Array) -> float:
     """Standard deviation of one row: robust scatter of the residuals, (n,), but at least that of the best rigs."""
-    return max(_spread(residual), FLOOR * abs(as_complex(solution)[1]))
-
-
-def _spread(residual: Array) -> float:
-    """Robust standard deviation of residuals, (n,), about zero."""
-    return MEDIAN_TO_SIGMA * float(np.median(np.abs(residual)))
+    return max(MEDIAN_TO_SIGMA * float(np.median(np.abs(residual))), FLOOR * abs(as_complex(solution)[1]))
 
 
 def phase_bins(

@@ -125,11 +125,6 @@ class MeasuredSweep(MeasuredBase):
         weighed = self.weights > 0.0
         return self if weighed.all() else self.select(weighed)
 
-    def thinned(self, maximum: int) -> Self:
-        """Return the sweep with only every k-th point, so that at most `maximum` points remain."""
-        step = -(-self.order.size // maximum)
-        return self if step == 1 else self.select(np.arange(self.order.size) % step == 0)
-
     def with_model_error(self, size: float) -> Self:
         return replace(self, model_error=size)
 

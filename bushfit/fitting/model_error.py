@@ -282,7 +282,11 @@ def _thinned(tests: Sequence[MeasuredTest], error: float = 0.0) -> list[Measured
         error: independent model error of the loops. Only the shape of a loop has it, from the second harmonic up: the
             first harmonic changes with the stiffness.
     """
-    thinned = [test if isinstance(test, MeasuredLoop) else test.thinned(_ENOUGH) for test in tests]
-    if not error:
-        return thinned
-    return [replace(t, model_error=error, first_error=2) if isinstance(t, MeasuredLoop) else t for t in thinned]
+    thinned = list[MeasuredTest]()
+    for test in tests:
+        if isinstance(test, MeasuredLoop):
+            thinned.append(replace(test, model_error=error, first_error=2) if error else test)
+        else:
+            step = -(-test.order.size // _ENOUGH)
+            thinned.append(test if step == 1 else test.select(np.arange(test.order.size) % step == 0))
+    return thinned

@@ -82,9 +82,7 @@ def _probability_of_chance(data: PreparedCampaign, tests: Sequence[MeasuredTest]
         fixed: names of parameters that stay fixed.
     """
     tests = with_gain_weighting(tests, weigh=True)
-    model = data.starting_model(data.effects, tests, {})
-    names = [name for name in data.free(tuple(model.parameters)) if name not in model.tied]
-    plain, full = _fits(data, FitProblem(model, tests, names, data.bounds), fixed)
+    plain, full = _fits(data, data.problem(data.effects, tests, {}), fixed)
     errors = level_errors(full.minimised, full.residual, full.jacobian, largest_error(data.campaign.rig))
     if errors.significant:
         loops, sweeps = split_by_kind(tests)
@@ -92,7 +90,7 @@ def _probability_of_chance(data: PreparedCampaign, tests: Sequence[MeasuredTest]
         plain, full = _fits(data, replace(plain.problem, model=plain.model, tests=tests), fixed)
     # the errors that a run shares are as uncertain as the repeats are few
     estimated = [sweep.noise.freedom for sweep in split_by_kind(tests)[1] if sweep.noise.freedom]
-    added, freedom = len(full.names) - len(names), min([full.residual.size - len(full.names), *estimated])
+    added, freedom = len(full.names) - len(plain.names), min([full.residual.size - len(full.names), *estimated])
     variance = max(full.chi_square / (full.residual.size - len(full.names)), 1.0)
     return float(fdtrc(added, freedom, max(plain.chi_square - full.chi_square, 0.0) / (added * variance)))
 

@@ -25,6 +25,7 @@ from bushfit.fitting.preparation import (
     prepare_sweeps,
     with_level_errors,
 )
+from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.rig_class import describe_class
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction, get_places
@@ -196,6 +197,20 @@ class PreparedCampaign:
         names = [*models[best].parameters, *plain.parameters]
         still = [name for name in names if name in stage_fixed or not self.free((name,))]
         return start_with_effects(models[best], plain, data_sets, still, self.bounds)
+
+    def problem(
+        self, effects: Sequence[str], data_sets: Sequence[MeasuredTest], stage_fixed: Mapping[str, float]
+    ) -> FitProblem:
+        """Build the least-squares problem of the free parameters of a model, from the start of `starting_model`.
+
+        Args:
+            effects: names of the model's effects.
+            data_sets: tests to fit.
+            stage_fixed: values of parameters that this fit keeps fixed, by name [SI].
+        """
+        model = self.starting_model(effects, data_sets, stage_fixed)
+        names = [name for name in self.free(tuple(model.parameters)) if name not in (*stage_fixed, *model.tied)]
+        return FitProblem(model, data_sets, names, self.bounds)
 
     def free(self, names: Sequence[str]) -> tuple[str, ...]:
         """Select the parameter names that the campaign does not fix."""

@@ -206,7 +206,7 @@ class FitResult:
 
     @property
     def flat(self) -> bool:
-        """True if a further Gauss-Newton step would lower chi-square by no more than chance explains."""
+        """True if the fall of chi-square expected from a further Gauss-Newton step is within chance."""
         return self.gain(self.at_bound) <= Z95**2 * max(self.chi_square / self.residual.size, 1.0)
 
     def gain(self, fixed: Collection[str]) -> float:

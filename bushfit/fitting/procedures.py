@@ -28,7 +28,7 @@ from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.preload import PRELOAD
 from bushfit.fitting.preparation import MeasuredTest, sources, split_by_kind, with_level_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
-from bushfit.fitting.problem import FitProblem, FitResult
+from bushfit.fitting.problem import FitResult
 from bushfit.fitting.profile import limit95, profile95
 from bushfit.fitting.rig_class import format_class_errors, largest_error
 from bushfit.fitting.robust import estimate, outlier_warnings
@@ -95,7 +95,7 @@ def fit_joint(
     if not preload_ranges(tests):
         effects = [name for name in effects if name != PRELOAD]
     unused = [test for test in data.data_sets if test not in tests]
-    problem = _problem(data, tests, effects, {})
+    problem = data.problem(effects, tests, {})
     found = estimate(problem, robust=data.robust)
     rig = data.campaign.rig
     errors = level_errors(found.minimised, found.residual, found.jacobian, largest_error(rig))
@@ -115,7 +115,9 @@ def fit_joint(
             )
     notes += unfitted(found.model, unused, NEXT)
     result = replace(
-        _result(data, [found], notes=notes, unused=unused), usable=expected_errors(found, unused), model_error=error
+        _result(data, [found], notes=notes, unused=unused),
+        usable=expected_errors(found.model, found.minimised, unused, found),
+        model_error=error,
     )
     return replace(result, profile=profile95(found, result.covariance)) if profile else result
 
@@ -239,22 +241,6 @@ def _without_springpot(data: PreparedCampaign, static: FitResult) -> str:
     )
 
 
-def _problem(
-    data: PreparedCampaign, tests: Sequence[MeasuredTest], effects: Sequence[str], fixed: Mapping[str, float]
-) -> FitProblem:
-    """Build the least-squares problem of a model's free parameters, with start values of the campaign or the tests.
-
-    Args:
-        data: prepared campaign.
-        tests: tests to fit.
-        effects: names of the effects of the model.
-        fixed: values of parameters that this fit keeps fixed, by name [SI].
-    """
-    model = data.starting_model(effects, tests, fixed)
-    names = [name for name in data.free(tuple(model.parameters)) if name not in (*fixed, *model.tied)]
-    return FitProblem(model, tests, names, data.bounds)
-
-
 def _fit_step(
     data: PreparedCampaign, tests: Sequence[MeasuredTest], effects: Sequence[str], fixed: Mapping[str, float]
 ) -> FitResult:
@@ -266,7 +252,7 @@ def _fit_step(
         effects: names of the effects of the model.
         fixed: values of parameters that this step keeps fixed, by name [SI].
     """
-    return estimate(_problem(data, tests, effects, fixed), robust=data.robust, solver=solve_with_lmfit)
+    return estimate(data.problem(effects, tests, fixed), robust=data.robust, solver=solve_with_lmfit)
 
 
 def _result(

@@ -118,18 +118,16 @@ class RowNoise:
         """
         if self.error is None:
             return []
-        moves = [influence]
-        for k in range(1, self.order + 1):
-            ahead, behind = (self._coloured(influence[..., ::way], k)[..., ::way] for way in (1, -1))
-            moves.append(-(ahead + behind))
+        moves, rows = [influence], influence.shape[-1]
+        band = np.repeat((self.filter / self.filter[0])[:, None], rows, axis=1)
+        for delay in range(1, self.order + 1):
+            move = np.zeros_like(influence)
+            for way in (1, -1):  # rows delayed and filtered by b_0/b, the inverse of the whitening: a banded system
+                late = np.zeros_like(influence).T
+                late[delay:] = influence[:, ::way][:, : rows - delay].T
+                move -= solve_banded((self.order, 0), band, late).T[:, ::way]
+            moves.append(move)
         return list(np.tensordot(self.error.T, np.array(moves), axes=1))
-
-    def _coloured(self, rows: Array, delay: int) -> Array:
-        """Delay white rows, (..., n), by `delay` rows and filter them by b_0/b, the inverse of the whitening filter."""
-        late = np.zeros((rows.shape[-1], rows[..., 0].size))  # a banded system: no module of filters is loaded
-        late[delay:] = rows.reshape(late.shape[::-1])[:, : len(late) - delay].T
-        band = np.repeat((self.filter / self.filter[0])[:, None], len(late), axis=1)
-        return solve_banded((self.order, 0), band, late).T.reshape(rows.shape)
 
 
 class _Autoregression(NamedTuple):

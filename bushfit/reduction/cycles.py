@@ -89,11 +89,11 @@ class Cycles:
         return [run for run in stretches(changes) if not hole[run.start]]
 
     def fundamentals(self, run: slice, *channels: Floats) -> Complex:
-        """Fit the fundamental of one or more channels in each of the k cycles of a run by least squares.
+        """Fit the fundamental of displacement, force or both in each of the k cycles of a run by least squares.
 
         Args:
             run: slice of the cycles.
-            channels: values of each channel at all rows of the record, (n,) each.
+            channels: displacement or force at all rows of the record, (n,) each.
 
         Returns:
             Complex amplitude of the fundamental, (channels, k); half the displacement range in cycles with too few
@@ -130,7 +130,7 @@ def stretches(changes: NDArray[np.bool_], fewest: int = 1) -> list[slice]:
 
 
 def resumes_in_phase(gap: float, *, step: float = 1.0) -> bool:
-    """Return True if a gap is at most three cycles and a multiple of `step` cycles: a sine then resumes in phase."""
+    """Return True if a gap [cycles] is at most three cycles and a multiple of `step`: a sine then resumes in phase."""
     return gap < _LONGEST_INTERRUPTION and abs(gap - step * round(gap / step)) < _SAME_PHASE
 
 

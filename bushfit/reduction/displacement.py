@@ -51,34 +51,13 @@ def noise_and_highest_frequency(value: NDArray[Any], step: float) -> tuple[float
     return noise, float(frequency[density > _ABOVE * 2.0 * noise**2 * step].max(initial=frequency[1]))
 
 
-def low_pass(value: NDArray[Any], step: float, frequency: float, *, periodic: bool) -> NDArray[Any]:
-    """Filter a displacement by a Butterworth low-pass of fourth order, forward and backward, so without delay.
-
-    Args:
-        value: displacement in any unit, evenly sampled, (n,).
-        step: time between samples [s].
-        frequency: cut-off frequency [Hz], at which half of the amplitude remains; below half of the sampling rate.
-        periodic: True if the samples are repeated endlessly.
-
-    Returns:
-        Displacement without higher frequencies, (n,).
-    """
-    from scipy.signal import butter, sosfiltfilt
-
-    sections = butter(_ORDER, frequency, fs=1.0 / step, output="sos")
-    if periodic:
-        return np.asarray(sosfiltfilt(sections, np.tile(value, 3))[value.size : 2 * value.size])
-    extension = min(value.size - 1, round(_EXTENSION / (frequency * step)))
-    return np.asarray(sosfiltfilt(sections, value, padlen=extension))
-
-
 def prepare_displacements(
     channels: Sequence[DisplacementHistory], *, steady: bool = False, lowpass: float | None = None
 ) -> list[DisplacementHistory]:
     """Prepare the channels of a history for a model; notes state what was changed.
 
     Args:
-        channels: evenly sampled displacements at the same times.
+        channels: evenly sampled displacements at the same times, one per direction.
         steady: True for whole cycles of a steady state, False for a motion from rest.
         lowpass: cut-off frequency of a low-pass filter [Hz]; None for no filter.
 
@@ -122,19 +101,17 @@ def prepare_record(record: Loop, lowpass: float | None = None) -> Loop:
 
 def _moving_channels(channels: Sequence[DisplacementHistory]) -> list[DisplacementHistory]:
     """Check that channels have equal lengths and finite values, and leave out those that never move, with a note."""
-    shapes = {channel.displacement.shape for channel in channels}
+    no_motion, shapes = "this is not a motion", {channel.displacement.shape for channel in channels}
     if len(shapes) != 1 or len(shape := shapes.pop()) != 1 or shape[0] < FEWEST_ROWS:
         found = ", ".join(f"{channel.direction}: {channel.displacement.shape}" for channel in channels)
         expected = f"at least {FEWEST_ROWS} displacements, as many in each direction"
         raise MeasurementError("this is not a history", found=found or "no direction", expected=expected)
     for channel in channels:
         if not np.all(np.abs(channel.displacement) < _LARGEST):
-            expected = "finite displacements"
-            raise MeasurementError("this is not a motion", place=str(channel.direction), expected=expected)
+            raise MeasurementError(no_motion, place=str(channel.direction), expected="finite displacements")
     still = [channel.direction for channel in channels if not np.ptp(channel.displacement)]
     if len(still) == len(channels):
-        expected = "displacements that change"
-        raise MeasurementError("this is not a motion", place=", ".join(map(str, still)), expected=expected)
+        raise MeasurementError(no_motion, place=", ".join(map(str, still)), expected="displacements that change")
     notes = tuple(f"{place}: left out, its displacement never changes" for place in still)
     return [replace(channel, notes=(*channel.notes, *notes)) for channel in channels if channel.direction not in still]
 
@@ -168,20 +145,36 @@ def _require_cycle(channel: DisplacementHistory) -> None:
 
 
 def _smoothed(channel: DisplacementHistory, frequency: float, *, steady: bool) -> DisplacementHistory:
-    """Remove frequencies of a displacement above a cut-off frequency [Hz], and note the size of what is removed."""
+    """Filter a displacement by a Butterworth low-pass of fourth order, forward and backward, so without delay.
+
+    Args:
+        channel: evenly sampled displacement.
+        frequency: cut-off frequency [Hz], at which half of the amplitude remains.
+        steady: True if the samples are repeated endlessly.
+
+    Returns:
+        The filtered displacement, with a note on the size of what is removed.
+    """
     lowest, nyquist = 1.0 / (channel.step * channel.displacement.size), 0.5 / channel.step
     if not lowest <= frequency < nyquist:
         low, high = number(lowest, 4), number(nyquist, 4)
-        expected = f"from {low} Hz, one cycle in the history, to below {high} Hz, half of the sampling rate"
         raise MeasurementError(
             "the low-pass does not suit the history",
             place="lowpass",
             found=f"{number(frequency, 4)} Hz",
-            expected=expected,
+            expected=f"from {low} Hz, one cycle in the history, to below {high} Hz, half of the sampling rate",
         )
-    smooth = low_pass(channel.displacement, channel.step, frequency, periodic=steady)
+    from scipy.signal import butter, sosfiltfilt
+
+    motion, sections = channel.displacement, butter(_ORDER, frequency, fs=1.0 / channel.step, output="sos")
+    if steady:
+        smooth = np.asarray(sosfiltfilt(sections, np.tile(motion, 3))[motion.size : 2 * motion.size])
+    else:
+        extension = min(motion.size - 1, round(_EXTENSION / (frequency * channel.step)))
+        smooth = np.asarray(sosfiltfilt(sections, motion, padlen=extension))
     unit, factor = channel.direction.display.displacement
-    removed = number(factor * float(np.std(channel.displacement - smooth)), 2)
+    removed = number(factor * float(np.std(motion - smooth)), 2)
     cut_off = f"{channel.direction}: low-passed at {number(frequency, 3)} Hz without delay"
-    notes = (*channel.notes, f"{cut_off}, which removes {removed} {unit} rms")
-    return replace(channel, displacement=smooth, notes=notes)
+    return replace(
+        channel, displacement=smooth, notes=(*channel.notes, f"{cut_off}, which removes {removed} {unit} rms")
+    )

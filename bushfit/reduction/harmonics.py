@@ -90,7 +90,7 @@ def series(coefficients: Complex, phase: Floats) -> Floats:
 
 
 def resolved_order(rows_per_cycle: float, max_order: int) -> int:
-    """Number of harmonics that a given number of rows per cycle determines, from 1 to `max_order`."""
+    """Number of harmonics that a record with `rows_per_cycle` rows in a cycle determines, from 1 to `max_order`."""
     return int(np.clip(rows_per_cycle / _ROWS_PER_HARMONIC, 1, max_order))
 
 
@@ -103,7 +103,7 @@ def spread_rows(rows: int, max_rows: int) -> NDArray[np.intp]:
 
 
 def cycle_harmonics(phase: Floats, values: Floats, order: int, drift: int = 0) -> tuple[Floats, Complex, Floats]:
-    """Fit harmonics to several channels by least squares.
+    """Fit harmonics to displacement and force, or other recorded channels, by least squares.
 
     Args:
         phase: phase of each row [cycles], (n,).
@@ -129,7 +129,7 @@ class HarmonicFit:
     Args:
         frequency: fundamental frequency [Hz].
         coefficients: mean and complex harmonics of displacement [m or rad] and force [N or N m], (2, order + 1).
-        chance: expected squared magnitude of each harmonic for white noise of unit variance, (order,).
+        noise_power: expected squared magnitude of each harmonic for white noise of unit variance, (order,).
         freedom: degrees of freedom: rows minus unknowns.
         squares: sums over the rows of squares and products of the residuals of displacement and force, (2, 2).
         cycle_residuals: complex fundamental of the residuals in each cycle, (2, cycles).
@@ -137,7 +137,7 @@ class HarmonicFit:
 
     frequency: float
     coefficients: Complex
-    chance: Floats
+    noise_power: Floats
     freedom: int
     squares: Floats
     cycle_residuals: Complex
@@ -193,8 +193,8 @@ class HarmonicFit:
         cosines, sines = np.split(np.arange(_DRIFT_TERMS, len(solution)), 2)
         coefficients = np.vstack((solution[:1], solution[cosines] + 1j * solution[sines])).T
         variance = np.diag(covariance)
-        chance, freedom = variance[cosines] + variance[sines], max(time.size - len(solution), 1)
-        return cls(frequency, coefficients, chance, freedom, squares, sums)
+        noise_power, freedom = variance[cosines] + variance[sines], max(time.size - len(solution), 1)
+        return cls(frequency, coefficients, noise_power, freedom, squares, sums)
 
     def errors(self) -> Floats:
         """Compute the standard errors of the complex stiffness K = F/X of the fundamentals.
@@ -210,7 +210,7 @@ class HarmonicFit:
         x, f = self.coefficients[:, 1]
         k = f / x
         (xx, xf), (_, ff) = self.squares
-        white = (ff - 2.0 * k.real * xf + abs(k) ** 2 * xx) / self.freedom * self.chance[0] / 2.0
+        white = (ff - 2.0 * k.real * xf + abs(k) ** 2 * xx) / self.freedom * self.noise_power[0] / 2.0
         variance = np.full(2, white)
         cycles = self.cycle_residuals.shape[1]
         if cycles > 2:
@@ -224,7 +224,7 @@ class HarmonicFit:
     def distortion(self) -> Floats:
         """Total harmonic distortion of displacement and force, relative to the fundamental, without noise, (2,)."""
         power = np.square(np.abs(self.coefficients[:, 1:]))
-        noise = np.outer(np.diag(self.squares) / self.freedom, self.chance)
+        noise = np.outer(np.diag(self.squares) / self.freedom, self.noise_power)
         overtones = np.maximum((power - noise)[:, 1:].sum(axis=1), 0.0)
         return np.sqrt(overtones / power[:, 0])
 
@@ -254,9 +254,8 @@ def _drift_and_harmonics(time: Floats, values: Floats, frequency: float, order: 
     while order > 1 and np.linalg.cond(unit[np.ix_(columns_kept, columns_kept)]) > _WORST_CONDITION:
         order -= 1
         columns_kept = np.r_[: _DRIFT_TERMS + order, _DRIFT_TERMS + max_order : _DRIFT_TERMS + max_order + order]
-    covariance = np.linalg.inv(unit[np.ix_(columns_kept, columns_kept)]) * np.outer(
-        scale[columns_kept], scale[columns_kept]
-    )
+    kept_scale = scale[columns_kept]
+    covariance = np.linalg.inv(unit[np.ix_(columns_kept, columns_kept)]) * np.outer(kept_scale, kept_scale)
     return order, covariance @ moments[columns_kept], covariance
 
 

@@ -13,12 +13,7 @@ import numpy as np
 from bushfit.errors import MeasurementError
 from bushfit.reading.measurement import Floats, Loop, RecordPart
 from bushfit.reading.stated import LoopFile
-from bushfit.reduction.cycles import (
-    lone_outliers,
-    resumes_in_phase,
-    shifted_difference,
-    stretches,
-)
+from bushfit.reduction.cycles import lone_outliers, resumes_in_phase, shifted_difference, stretches
 from bushfit.reduction.harmonics import cycle_harmonics
 from bushfit.reduction.turning_points import middle_crossings, motion_turns
 
@@ -145,11 +140,11 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
     inner = size[1:-1]
     if not spans and inner.size >= 4 and np.ptp(np.log(inner)) > 0.3:  # no rig misses its amplitude by a third
         unit, factor = loop.direction.display.displacement
+        low, high = factor * inner.min() / 2.0, factor * inner.max() / 2.0
         raise MeasurementError(
             "no part of the record is a loop",
             file=loop.source.file if loop.source else loop.name,
-            found=f"{inner.size / 2.0:.2g} cycles from {factor * inner.min() / 2.0:.3g} to "
-            f"{factor * inner.max() / 2.0:.3g} {unit}, no two successive ones equal",
+            found=f"{inner.size / 2.0:.2g} cycles from {low:.3g} to {high:.3g} {unit}, no two successive ones equal",
             expected="at least two cycles of one amplitude and rate",
             hint="record more cycles of each amplitude, best five; a road load belongs in respond or [[validation]]",
         )
@@ -161,11 +156,14 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
 
 
 def _alike_runs(values: Floats, reach: Floats) -> Iterator[slice]:
-    """Generate slices of two or more neighbouring strokes with equal values, (n,), within the tolerance `reach`, (n,).
+    """Yield slices of two or more neighbouring strokes of equal range or duration.
 
-    The values are ranges or durations of strokes, upward and downward in turn. Upward and downward strokes may differ
-    by three times the tolerance, as in a drift, if each equals the next stroke of its kind. Over two cycles the values
-    may change by 1.5 times the tolerance.
+    Upward and downward strokes may differ by three times the tolerance, as in a drift, if each equals the next stroke
+    of its kind. Over two cycles the values may change by 1.5 times the tolerance.
+
+    Args:
+        values: ranges or durations of the strokes, upward and downward in turn, (n,).
+        reach: tolerance of each value, in its unit, (n,).
     """
     change = np.abs(np.diff(values))
     of_a_kind = np.concatenate(([False], np.abs(values[2:] - values[:-2]) <= reach[2:], [False]))
@@ -212,8 +210,8 @@ def cut_loops(loop: Loop, time: Floats, spans: Sequence[SteadySpan], test: LoopF
         spans: parts of constant amplitude and rate.
         test: keys of the record in a campaign, which define the time of a record without a time column.
 
-    Returns:
-        Iterator over the loops.
+    Yields:
+        One loop for each part, in order.
     """
     whole, last_end = _clock(loop), float(time[0])
     for number, span in enumerate(spans, start=1):

@@ -193,17 +193,8 @@ def reduce_resonance(test: ResonanceTest, mass: float) -> Resonance:
             expected=f"a standard error of K of at most {100 * LARGEST_ERROR:g} % somewhere",
             hint="sweep through the resonance, or look at the accelerations: they scatter",
         )
-    return Resonance(
-        test,
-        mass,
-        turned,
-        frequency[is_kept],
-        amplitude[is_kept],
-        stiffness[is_kept],
-        error[is_kept],
-        rows[is_kept],
-        frequency[~is_kept],
-    )
+    points = frequency[is_kept], amplitude[is_kept], stiffness[is_kept], error[is_kept], rows[is_kept]
+    return Resonance(test, mass, turned, *points, left_out=frequency[~is_kept])
 
 
 def counts_phases_backwards(test: ResonanceTest) -> bool:

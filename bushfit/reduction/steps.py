@@ -76,7 +76,7 @@ def reduce(histories: Sequence[Loop], *, fewest_cycles: int = 3, levels: Sequenc
 
 
 def steady_sines(history: Loop) -> list[tuple[float, float, int]]:
-    """Find the steady stretches of a history, without computing operating points.
+    """Find the steady stretches of a history, to recognise a stepped sine, without computing operating points.
 
     Args:
         history: record of time, displacement and force.
@@ -121,18 +121,15 @@ def find_steps(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStre
             inside = slice(run.start + part.start, run.start + part.stop)
             start, end, count = float(edges[part.start]), float(edges[part.stop]), part.stop - part.start
             rows = (cycles.first_rows[inside.stop] - cycles.first_rows[inside.start]) / count
-            step, why = None, _CHANGING
+            frequency, why = f"{count / (end - start):.4g} Hz", _CHANGING
             if count < fewest:
-                why = f"{count} cycle{'s' * (count != 1)} of {count / (end - start):.4g} Hz, fewer than {fewest}"
+                why = f"{count} cycle{'s' * (count != 1)} of {frequency}, fewer than {fewest}"
             elif rows < _FEWEST_ROWS_PER_CYCLE:
-                why = f"{rows:.2g} rows per cycle at {count / (end - start):.4g} Hz, "
-                why += f"fewer than {_FEWEST_ROWS_PER_CYCLE:g}"
-            else:
-                step = _step(history, cycles, inside, motion[part], force[part], fewest)
-            if step:
+                why = f"{rows:.2g} rows per cycle at {frequency}, fewer than {_FEWEST_ROWS_PER_CYCLE:g}"
+            elif step := _step(history, cycles, inside, motion[part], force[part], fewest):
                 found.append((start, end, step))
-            else:
-                skipped.append(SkippedStretch(history.name, start, end, why, count >= fewest))
+                continue
+            skipped.append(SkippedStretch(history.name, start, end, why, count >= fewest))
     return join_broken_steps(found), skipped
 
 
@@ -152,13 +149,10 @@ def join_broken_steps(timed_steps: Sequence[tuple[float, float, Step]]) -> list[
     last_end = -np.inf
     for start, end, step in timed_steps:
         if resumes_in_phase((start - last_end) * step.frequency):
-            counts = sorted((joined[-1].found, step.found))
-            reach = _SETTLING_FREQUENCY if 2 * counts[0] < counts[1] else _SAME_FREQUENCY
-            is_same_sine = (
-                abs(np.log(joined[-1].frequency / step.frequency)) < reach
-                and abs(np.log(joined[-1].amplitude / step.amplitude)) < _LEVEL_GAP
-            )
-            if is_same_sine:
+            before, (shorter, longer) = joined[-1], sorted((joined[-1].found, step.found))
+            reach = _SETTLING_FREQUENCY if 2 * shorter < longer else _SAME_FREQUENCY
+            is_same_frequency = abs(np.log(before.frequency / step.frequency)) < reach
+            if is_same_frequency and abs(np.log(before.amplitude / step.amplitude)) < _LEVEL_GAP:
                 step = max(joined.pop(), step, key=lambda one: one.found)
         joined.append(step)
         last_end = end
@@ -180,9 +174,8 @@ def _step(history: Loop, cycles: Cycles, inside: slice, motion: Complex, force: 
     edges = cycles.edges[used.start : used.stop + 1]
     count = used.stop - used.start
     steady_motion = motion[steady]
-    starts = edges[:-1] - np.angle(1j * steady_motion) / (2.0 * np.pi) * np.diff(
-        edges
-    )  # nearer than single crossings are
+    # by the phase of each cycle's fundamental, which scatters less than single crossings
+    starts = edges[:-1] - np.angle(1j * steady_motion) / (2.0 * np.pi) * np.diff(edges)
     if _creeps(np.log(np.diff(starts)), _SETTLING_FREQUENCY) or _creeps(np.log(np.abs(steady_motion)), 0.03):
         return None
     rows = slice(cycles.first_rows[used.start], cycles.first_rows[used.stop])
@@ -212,8 +205,8 @@ def _creeps(values: Floats, smallest: float) -> bool:
     """Return True if values have a linear trend, in total larger than `smallest` and than their scatter explains.
 
     Args:
-        values: values in order, (n,).
-        smallest: smallest total change that is reported, in the unit of the values.
+        values: log of the period, or of the amplitude, of each cycle in order, (n,).
+        smallest: smallest total change of a trend.
     """
     if values.size < 3:
         return False
@@ -247,13 +240,12 @@ def group_steps(steps: Sequence[Step], levels: Sequence[float], direction: Place
         level = nominal_levels[np.argmin(np.abs(np.log(amplitude[:, None] / nominal_levels)), axis=1)]
         far = np.flatnonzero(np.abs(amplitude[:, None] / nominal_levels - 1.0).min(axis=1) > _LEVEL_REACH)
         if far.size:
-            step = steps[far[0]]
+            step, listed = steps[far[0]], " or ".join(f"{factor * value:.4g} {unit}" for value in levels)
             raise MeasurementError(
                 "a step is at none of the levels",
                 place=f"{step.name}, {step.start:.4g} to {step.end:.4g} s",
                 found=f"{factor * step.amplitude:.4g} {unit} at {step.frequency:.4g} Hz",
-                expected=f"within {100 * _LEVEL_REACH:g} % of "
-                + " or ".join(f"{factor * value:.4g} {unit}" for value in levels),
+                expected=f"within {100 * _LEVEL_REACH:g} % of {listed}",
                 hint="name all levels, zero-to-peak, or leave --levels out",
             )
     else:

@@ -22,7 +22,7 @@ _PAUSE = 2.5
 
 
 def reversals(values: Floats, rows: Integers) -> Integers:
-    """Select the rows at which the values change direction, among given rows, and both ends.
+    """Select those of the given rows at which the values change direction, and the first and the last row.
 
     Args:
         values: values of a channel, (n,).
