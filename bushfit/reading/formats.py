@@ -44,8 +44,9 @@ def matlab(data: bytes, _: Path) -> Iterator[Group]:
 def _from_hdf5(node: Any) -> Any:
     """Convert a variable of a MATLAB 7.3 file (HDF5) to the form that scipy returns for older files.
 
-    Returns a dict for a struct, a list of dicts for an array of structs, a text, or an array; None for an empty array
-    or an object of a class, such as a table.
+    Returns:
+        A dict for a struct, a list of dicts for an array of structs, a text, or an array; None for an empty array or
+        an object of a class, such as a table.
     """
     if getattr(node, "external", None) or getattr(node, "is_virtual", False):
         raise ValueError("its data are in other files")
@@ -56,7 +57,7 @@ def _from_hdf5(node: Any) -> Any:
         if fields and all(isinstance(values, list) for values in fields.values()):  # an array of structs
             return [dict(zip(fields, one, strict=True)) for one in zip(*fields.values(), strict=True)]
         return fields
-    _bound(node.size)
+    _refuse_too_many(node.size)
     values = node[()]
     if "MATLAB_object_decode" in node.attrs or "MATLAB_empty" in node.attrs:
         return None
@@ -67,8 +68,8 @@ def _from_hdf5(node: Any) -> Any:
     return np.squeeze((values["real"] + 1j * values["imag"] if values.dtype.names else values).T)
 
 
-def _bound(values: int) -> None:
-    """Raise a ValueError if a MATLAB variable has more values than any recording."""
+def _refuse_too_many(values: int) -> None:
+    """Raise a ValueError if a compressed file would unpack to more values than any recording has."""
     if values > _MOST_VALUES:
         raise ValueError(f"it unpacks to {values} values, of which at most {_MOST_VALUES} are read")
 
@@ -158,7 +159,7 @@ def arrow(data: bytes, _: Path) -> Iterator[Group]:
         from pyarrow.parquet import ParquetFile
 
         file = ParquetFile(pa.BufferReader(data))
-        _bound(file.metadata.num_rows * file.metadata.num_columns)
+        _refuse_too_many(file.metadata.num_rows * file.metadata.num_columns)
         table = file.read()
     else:
         table = pa.ipc.open_file(pa.BufferReader(data)).read_all()

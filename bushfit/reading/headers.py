@@ -368,7 +368,7 @@ def is_angular(header: str, unit: str) -> bool:
 
 @lru_cache(maxsize=4096)
 def split_convention(text: str) -> tuple[str, AmplitudeConvention | None]:
-    """Return a header or unit without the words for an amplitude convention, and the convention, or None."""
+    """Split "amplitude p-p [mm]" into "amplitude [mm]" and "peak-to-peak"; None for a text without a convention."""
     for form in dict.fromkeys((text, _CAMEL.sub(" ", text))):
         for pattern, convention in _CONVENTIONS:
             if match := pattern.search(_folded(form)):
@@ -409,7 +409,10 @@ def split_unit(header: str) -> tuple[str, str | None, AmplitudeConvention | None
 
 
 def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
-    """Yield name, unit or None for each plausible split of a header, and True if it has brackets or no unit."""
+    """Yield each way to split a header, such as "force_N", into name and unit, and True if the split is certain.
+
+    The unit is None for the header as a whole; a split is certain if the unit is in brackets, or None.
+    """
     name, unit = units.split_header(text)
     yield name, unit, True
     if unit is None:

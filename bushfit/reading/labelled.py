@@ -46,27 +46,28 @@ class ColumnTexts(NamedTuple):
 
 
 def same_text(text: str, reference: str) -> bool:
-    """Return True if two texts are equal except for case and number signs, such as 17 and #17."""
+    """Return True if two texts are equal except for case and a leading or final number sign, as in 17 and #17."""
     return text.strip(" #").casefold() == reference.strip(" #").casefold()
 
 
 def column_texts(cells: Cells, *indices: int) -> list[ColumnTexts]:
-    """Return the texts of columns by their indices; an empty or merged cell gets the text of the cell above."""
-    words: list[dict[str, int]] = [{} for _ in indices]
+    """Texts of columns, one entry for each index; an empty or merged cell has the text of the cell above."""
+    code_by_text: list[dict[str, int]] = [{} for _ in indices]
     parts = [[np.empty(0, dtype=np.intp)] for _ in indices]
     for block in cells.blocks() if indices else ():
-        for known, part, (texts, rows) in zip(words, parts, cells.distinct_texts(block, indices), strict=True):
-            numbers = [known.setdefault(_text(cell).strip(" #"), len(known)) for cell in texts]
+        for codes, part, (texts, rows) in zip(code_by_text, parts, cells.distinct_texts(block, indices), strict=True):
+            numbers = [codes.setdefault(_text(cell).strip(" #"), len(codes)) for cell in texts]
             part.append(np.array(numbers, dtype=np.intp)[rows])
     columns = []
-    for known, codes in zip(words, map(np.concatenate, parts), strict=True):
-        if "" in known:
-            codes = codes[np.maximum.accumulate(np.where(codes == known[""], 0, np.arange(codes.size)))]
-        columns.append(ColumnTexts(list(known), codes))
+    for codes, column in zip(code_by_text, map(np.concatenate, parts), strict=True):
+        if "" in codes:
+            column = column[np.maximum.accumulate(np.where(column == codes[""], 0, np.arange(column.size)))]
+        columns.append(ColumnTexts(list(codes), column))
     return columns
 
 
 def _text(cell: str | float) -> str:
+    """Text of a cell; a number has up to twelve digits."""
     return cell if isinstance(cell, str) else f"{cell:.12g}"
 
 
@@ -79,9 +80,11 @@ def _may_distinguish_tests(cells: Cells, index: int) -> bool:
 
 
 def find_labels(cells: Cells) -> Mapping[str, tuple[int, Sequence[str]]]:
-    """Find the columns that state the direction, specimen_number and run of each row.
+    """Find the columns that state the direction, the part (specimen_number) and the run of each row.
 
-    Returns index and texts, (n,), of each column by these three keys; a key without a column is missing.
+    Returns:
+        Index and texts, (n,), of each column by the keys "direction", "specimen_number" and "run"; a key without a
+        column is missing.
     """
     labels: dict[str, tuple[int, Sequence[str]]] = {}
     for index, header in enumerate(cells.headers):
@@ -148,7 +151,7 @@ def select_rows(cells: Cells, labels: Mapping[str, tuple[int, Sequence[str]]], w
 def note_not_understood(
     cells: Cells, labels: Mapping[str, tuple[int, Sequence[str]]], rows: NDArray[np.intp] | None, *settled: Floats
 ) -> Iterator[str]:
-    """Write a sentence on each column that may distinguish tests but has no known meaning.
+    """Warn of columns that may distinguish several tests in one file, but whose meaning is not known.
 
     Args:
         cells: table with all rows.
@@ -174,7 +177,7 @@ def note_not_understood(
         codes = texts.codes if rows is None else texts.codes[rows]
         distinct, number, counts = np.unique(codes, return_inverse=True, return_counts=True)
         depends_on = [settled] if is_number else [(quantity,) for quantity in settled]
-        explained = any(all(np.ptp(number[alike]) == 0 for alike in group_rows(*keys)) for keys in depends_on)
+        explained = any(all(np.ptp(number[group]) == 0 for group in group_rows(*keys)) for keys in depends_on)
         if counts.size > 1 and not explained and not (is_number and counts.min() < _FEWEST_ROWS):
             values = sorted(texts.values[code] for code in distinct)
             listed = ", ".join(values[:4]) + ", ..." * (len(values) > 4)

@@ -67,7 +67,7 @@ def read_loop(
         time, more = increasing_time(table, wanted["time"], values["time"])
         notes = (*notes, *more)
     else:
-        time = test.clock(displacement)
+        time = test.rebuild_time(displacement)
         notes += (table.note_sampling,) if stated_rate else ()
     return Loop(
         name or table.file.stem,

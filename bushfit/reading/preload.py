@@ -35,15 +35,15 @@ class Preload(NamedTuple):
         value, unit = self.in_display_unit(place)
         return f"{number(value, digits)} {unit}"
 
-    def equals(self, other: Preload | None) -> bool:
-        """True if the other preload is within 2 %; a preload of zero equals zero in every unit."""
-        if other is None or (self.unit != other.unit and (self.value or other.value)):
+    def equals(self, preload: Preload | None) -> bool:
+        """True if a second preload agrees within 2 %; a preload of zero equals zero in every unit."""
+        if preload is None or (self.unit != preload.unit and (self.value or preload.value)):
             return False
-        return abs(self.value - other.value) <= SAME_PRELOAD * max(abs(self.value), abs(other.value))
+        return abs(self.value - preload.value) <= SAME_PRELOAD * max(abs(self.value), abs(preload.value))
 
 
 def parse_preload(text: str | None, place: Place) -> Preload | None:
-    """Preload that a text states for a direction or specimen.
+    """Parse the preload that a campaign states for a test of a direction or specimen.
 
     Args:
         text: text of the campaign, such as "500 N", "1.5 mm axial" or "none"; None if the campaign states none.
@@ -64,10 +64,10 @@ def parse_preload(text: str | None, place: Place) -> Preload | None:
 
 
 def distinct_preloads(preloads: Sequence[Preload]) -> list[Preload]:
-    """Sort the preloads of one direction, and keep one of those that are equal within 2 %.
+    """List the different preloads of the tests of one direction; those within 2 % are one.
 
     Returns:
-        Different preloads in ascending order; empty if forces and displacements are mixed.
+        Preloads in ascending order; empty if some are forces and others displacements.
     """
     distinct = list[Preload]()
     for preload in sorted(preloads):

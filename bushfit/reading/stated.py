@@ -227,10 +227,10 @@ class LoopFile(TestFile):
 
     @property
     def states_time(self) -> bool:
-        """True if a sampling rate, speed or frequency gives the time of a file without a time column."""
+        """True if a sampling rate, speed or frequency is stated, from which the time of each row can be rebuilt."""
         return bool(self.sampling_rate or self.rate or self.frequency)
 
-    def clock(self, displacement: Floats) -> Floats:
+    def rebuild_time(self, displacement: Floats) -> Floats:
         """Rebuild the time [s], (n,), of a file without time from its displacement [m or rad], (n,)."""
         if self.sampling_rate:
             return np.arange(displacement.size) / self.sampling_rate

@@ -71,17 +71,18 @@ def read_sweep(
     rows = Rows(test.direction, test.specimen_number, test.rows, shared)
     table = Table.open(file, SWEEP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
     pair = stiffness_pair(table)
-    constants = {"frequency": test.at_frequency}
+    constants: dict[str, float] = {}
+    if test.at_frequency is not None:
+        constants["frequency"] = test.at_frequency
     if at_amplitude is not None:
         constants["amplitude"] = (
             at_amplitude * strain_factor_of_files(direction) * ZERO_TO_PEAK[test.amplitude or "zero-to-peak"]
         )
-    stated = {role: value for role, value in constants.items() if value is not None}
-    columns = sweep_columns(table, direction, pair, stated, test.amplitude)
+    columns = sweep_columns(table, direction, pair, constants, test.amplitude)
     values, notes = table.read(columns, fewest_rows=_FEWEST_SWEEP_ROWS)
     table = table.needing(columns)
     table.check_positive(_POSITIVE, columns, values)
-    for role, value in stated.items():
+    for role, value in constants.items():
         if role in columns:
             table.refuse(
                 np.abs(values[role] - value) > _STATED_AGREEMENT * value,
@@ -126,7 +127,7 @@ def sweep_columns(
     table: Table,
     direction: Place,
     pair: tuple[str, str],
-    stated: Mapping[str, float],
+    constants: Mapping[str, float],
     convention: AmplitudeConvention | None,
 ) -> dict[str, Column]:
     """Find the columns of a sweep, with their factors to SI and, for amplitudes, to zero-to-peak.
@@ -135,7 +136,7 @@ def sweep_columns(
         table: table of the sweep.
         direction: direction of the bushing, or the specimen.
         pair: roles of the two columns that give the stiffness, such as ("stiffness", "loss_factor").
-        stated: frequency [Hz] or amplitude that the campaign states, by role; these roles need no column.
+        constants: frequency [Hz] or amplitude of all rows as the campaign states it, by role; needs no column.
         convention: convention of the amplitudes; None if the campaign does not state it.
 
     Returns:
@@ -148,41 +149,41 @@ def sweep_columns(
     """
     roles = table.roles
     numeric = {role for role, column in roles.items() if table.holds_numbers(column.index)}
-    wanted = [role for role in ("frequency", "amplitude") if role in roles or role not in stated] + [*pair]
+    wanted = [role for role in ("frequency", "amplitude") if role in roles or role not in constants] + [*pair]
     wanted += [role for role in ("amplitude_reached", "relative_error") if role in roles]
     wanted += ["repeat"] if "repeat" in numeric else []
     wanted += ["temperature"] if "temperature" in numeric and roles["temperature"].unit else []
     redundant = (role for other_pair in AGREEING_PAIRS if set(other_pair) <= set(roles) for role in other_pair)
     wanted += [role for role in redundant if table.agrees(role, si_unit(role, direction.motion))]
     columns = {role: table.column(role, direction, _HINTS.get(role)) for role in wanted}
-    counted = columns["amplitude"].convention if "amplitude" in columns else None
-    if counted and convention and counted != convention:
+    in_header = columns["amplitude"].convention if "amplitude" in columns else None
+    if in_header and convention and in_header != convention:
         raise table.header_error(
-            "header and campaign disagree on how amplitudes are counted",
+            "header and campaign state different conventions for the amplitudes",
             column=columns["amplitude"],
-            found=f'{counted} in the header, amplitude = "{convention}" in the campaign',
+            found=f'{in_header} in the header, amplitude = "{convention}" in the campaign',
             expected="one convention",
             hint="correct one of them; what the header states needs no key in the campaign",
         )
-    counted = counted or convention or "zero-to-peak"
+    convention = in_header or convention or "zero-to-peak"
     force = columns.get("force_amplitude")
-    if force and not force.convention and counted != "zero-to-peak":
-        form = {"peak-to-peak": "p-p", "rms": "rms"}[counted]
+    if force and not force.convention and convention != "zero-to-peak":
+        form = {"peak-to-peak": "p-p", "rms": "rms"}[convention]
         raise table.header_error(
-            "the header does not state how the amplitudes of the force are counted",
-            found=f'"{force.header}" beside a displacement that is {counted}',
+            "the header does not state the convention of the force amplitudes",
+            found=f'"{force.header}" beside a displacement that is {convention}',
             expected="p-p, rms or 0-p in the header",
             hint=" or ".join(f'units = {{ force_amplitude = "{force.unit} {end}" }}' for end in (form, "0-p"))
             + " in the campaign",
         )
     for role in ("amplitude", "amplitude_reached", "force_amplitude"):
         if column := columns.get(role):
-            columns[role] = replace(column, scale=ZERO_TO_PEAK[column.convention or counted] * column.scale)
+            columns[role] = replace(column, scale=ZERO_TO_PEAK[column.convention or convention] * column.scale)
     return {"temperature": roles["temperature"], **columns} if "temperature" in numeric else columns
 
 
 def _rows_at_temperature(
-    table: Table, values: Mapping[str, Floats], direction: Place, stated: float | None
+    table: Table, values: Mapping[str, Floats], direction: Place, temperature: float | None
 ) -> tuple[NDArray[np.intp], float | None, Floats | float | None]:
     """Select the rows of a sweep at the temperature of the test.
 
@@ -190,10 +191,10 @@ def _rows_at_temperature(
         table: table of the sweep, for errors.
         values: values in SI by role, (n,) each.
         direction: direction of the bushing, or the specimen.
-        stated: temperature that the campaign states [K]; None if it states none.
+        temperature: temperature that the campaign states [K]; None if it states none.
 
     Returns:
-        Indices of the rows; temperature of the test [K], the stated one or else the mean, None if unknown; and
+        Indices of the rows; temperature of the test [K], as stated or else the mean of the rows, None if unknown; and
         temperature of each row [K], None if unknown.
 
     Raises:
@@ -201,27 +202,27 @@ def _rows_at_temperature(
     """
     rows = np.arange(values["frequency"].size)
     if "temperature" not in values:
-        return rows, stated, stated
+        return rows, temperature, temperature
     unit = table.roles["temperature"].unit
-    if unit is None and stated is None and np.ptp(values["temperature"]) <= ONE_TEST:
+    if unit is None and temperature is None and np.ptp(values["temperature"]) <= ONE_TEST:
         return rows, None, None
     column = table.column("temperature", direction)
     celsius = values["temperature"] + (si.kelvin_scale(unit or "") or (1.0, 0.0))[1] - si.CELSIUS
     kelvin = celsius + si.CELSIUS
-    if stated is None:
+    if temperature is None:
         if np.ptp(celsius) <= ONE_TEST:
             return rows, round(float(celsius.mean()), 2) + si.CELSIUS, kelvin
         problem, expected = "this file contains tests at several temperatures", "one temperature"
     else:
-        rows = np.flatnonzero(np.abs(kelvin - stated) <= SAME_TEMPERATURE)
+        rows = np.flatnonzero(np.abs(kelvin - temperature) <= SAME_TEMPERATURE)
         if rows.size >= _FEWEST_SWEEP_ROWS:
-            return rows, stated, kelvin[rows]
+            return rows, temperature, kelvin[rows]
         problem = "too few rows are near the temperature that is stated"
-        degrees = f"{stated - si.CELSIUS:.4g} degC"
+        degrees = f"{temperature - si.CELSIUS:.4g} degC"
         expected = f"{_FEWEST_SWEEP_ROWS} rows or more within {SAME_TEMPERATURE:g} K of {degrees}"
     ordered = np.sort(celsius)
     means = [part.mean() for part in np.split(ordered, np.flatnonzero(np.diff(ordered) > SAME_TEMPERATURE) + 1)]
-    nearest = min(means, key=lambda mean: abs(mean + si.CELSIUS - (stated or 0.0)))
+    nearest = min(means, key=lambda mean: abs(mean + si.CELSIUS - (temperature or 0.0)))
     raise table.error(
         problem,
         column=column,

@@ -232,7 +232,7 @@ def cut_loops(loop: Loop, time: Floats, spans: Sequence[SteadySpan], test: LoopF
             part=RecordPart(rows.start, sentence),
             softening=measure_softening(loop, span, from_rest=number == 1),
         )
-        yield part if loop.has_recorded_time else replace(part, time=test.clock(part.displacement))
+        yield part if loop.has_recorded_time else replace(part, time=test.rebuild_time(part.displacement))
         last_end = span.end
 
 

@@ -52,7 +52,7 @@ def amplitudes(folder: Path, header: str, columns: Mapping[str, str] | None = No
 def test_a_header_says_how_amplitudes_count(header, tmp_path):
     doubled = header in PEAK_TO_PEAK
     assert set(amplitudes(tmp_path, header)) == {0.5 if doubled else 1.0}
-    with pytest.raises(MeasurementError, match="header and campaign disagree on how amplitudes are counted"):
+    with pytest.raises(MeasurementError, match="header and campaign state different conventions for the amplitudes"):
         amplitudes(tmp_path, header, amplitude="zero-to-peak" if doubled else "peak-to-peak")
 
 
