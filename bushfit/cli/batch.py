@@ -59,7 +59,7 @@ _MOST_SHOWN = 10
 @option_group(
     "Output",
     flag("--tables"),
-    flag("--plots", "Also write the tables, or plots, of each bushing."),
+    flag("--plots", "Also write the tables (or plots) of each bushing."),
     flag("--reports", "Also write report.html for each bushing that is diagnosed."),
 )
 @with_output("results/<manifest>", "tables", "pictures", "pages")
@@ -81,7 +81,7 @@ def command(
 ) -> None:
     """Evaluate many campaigns and collect the results in one table.
 
-    MANIFEST is a list (TOML, or CSV with a column per key), a pattern in quotes, or campaigns:
+    MANIFEST is a pattern in quotes, several campaigns, or a list: a CSV file with a column per key, or a TOML file:
 
     \b
         [[bushings]]

@@ -36,7 +36,7 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
         "EFFECT",
         (
             "Add this effect to the model, such as inertia, or correct this mistake in a test file, such as "
-            "peak_to_peak:sweep_axial; may be given again. An unknown EFFECT prints the list."
+            "peak_to_peak:sweep_axial; may be given again. If no effect has this name, all names are printed."
         ),
         multiple=True,
     ),

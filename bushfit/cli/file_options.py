@@ -105,7 +105,7 @@ def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tes
             )
         ]
     else:
-        words = 'Header of a column, such as "force=Fz"; an unknown ROLE prints the list of roles.'
+        words = 'Header of a column, such as "force=Fz"; if ROLE does not exist, all roles are printed.'
         sign = "Reverse the sign of the force: use -1 if the force falls while the displacement rises."
         further = _OF_TESTS if kind == "tests" else {}
         keys = ("direction", "force_sign", *further)

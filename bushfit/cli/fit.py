@@ -78,7 +78,8 @@ def dynamic(
     option(
         "--effect effects",
         "NAME",
-        "Add an effect to the model, such as inertia; may be given again. An unknown NAME prints the list.",
+        "Add this effect to the model, such as inertia; may be given again. If no effect has this name, all names are "
+        "printed.",
         multiple=True,
     ),
     flag("--profile", "Compute additional 95 % intervals by profile likelihood; takes some seconds."),
@@ -101,8 +102,8 @@ def fit(
     parameters (vary = false), the command reports how well these values agree with the tests. If the tests hardly
     determine a parameter, its standard error is misleading: use --profile.
 
-    Writes model.json, and a table and a plot of loops and sweeps. Of several bushings, bushings.csv compares each with
-    a fit to the others.
+    Writes model.json, and a table and a plot of loops and sweeps; for several bushings also bushings.csv, which
+    compares each bushing with a fit to the others.
     """
     from bushfit.commands.fit import fit as fit_campaign
 

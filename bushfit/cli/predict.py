@@ -40,21 +40,22 @@ _MOST_AMPLITUDES = 8
     option(
         "--preload",
         "LOAD",
-        'Preload such as "500 N" or "1.5 mm", within the tested preloads; may be given again [none].',
+        'Predict at this preload, "500 N" or "1.5 mm", between the tested preloads; may be given again [none].',
         multiple=True,
     ),
     option(
         "--bushing",
         "NAME",
-        "Name of one of several fitted bushings, or a TOML file whose [bushing] is of the same compound.",
+        "Predict this bushing: the name of one of several fitted bushings, or a TOML file with the [bushing] table of "
+        "another bushing of the same compound.",
     ),
     option("--mass", "MASS"),
     option(
         "--base-acceleration",
         "ACCELERATION",
         (
-            'Also predict the resonance of this mass, such as "1.2 kg", on the bushing, if the base vibrates with '
-            'this acceleration, such as "0.1 g".'
+            'Also predict the resonance of this mass, such as "1.2 kg", on the bushing. The base of the bushing '
+            'vibrates with this acceleration, such as "0.1 g".'
         ),
     ),
     flag("--static", "Also write the static curve: force over displacement in a slow motion, and its slope."),

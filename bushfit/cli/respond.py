@@ -30,8 +30,8 @@ if TYPE_CHECKING:
         "--lowpass",
         "FREQUENCY",
         (
-            'Remove the noise of the displacement above this frequency, such as "200 Hz": the friction of the model '
-            "responds to noise [no filter]."
+            'Remove the noise of the displacement above this frequency, such as "200 Hz"; friction would turn the '
+            "noise into force [no filter]."
         ),
     ),
     TEMPERATURE,

@@ -34,8 +34,8 @@ def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | N
     highest frequency. -v prints every step. Steps for which tests are missing are skipped and listed.
 
     Writes model.json (the model to use), report.html, diagnosis.json, candidates.csv, static.json and dynamic.json;
-    tables and plots of loops, sweeps, gap (measured minus model) and of each direction and specimen. If diagnose adds
-    an effect to model.json, joint.json is the fit without this effect.
+    tables and plots of loops, sweeps, gap (measured minus model) and of each direction and specimen. If the diagnosis
+    adds an effect to the model, joint.json contains the fit without this effect.
     """
     from bushfit.commands.fit import prepare_tests
     from bushfit.commands.provenance import input_files

@@ -97,7 +97,9 @@ def grid_options(default: str) -> Parameter:
     return lambda function: add_parameters(
         function,
         option(
-            "--frequencies", "GRID", f'Frequencies: start:stop:step, "5:155:10 Hz", or a list, "20, 50 Hz" [{default}].'
+            "--frequencies",
+            "GRID",
+            f'Frequencies as start:stop:step, "5:155:10 Hz", or as a list, "20, 50 Hz" [{default}].',
         ),
         option("--amplitudes", "GRID", f'Displacement amplitudes, zero-to-peak, such as "0.1, 0.5 mm" [{default}].'),
         option(
@@ -117,7 +119,7 @@ def prediction_options(campaign: str) -> Parameter:
             "Predict in this direction (axial, radial, torsion) or for this specimen; may be given again [axial and "
             "radial, and all specimens]."
         ),
-        grid_options("from the campaign"),
+        grid_options("from the campaign, else as tested"),
         TEMPERATURE,
         file_option("--campaign", campaign),
     )

@@ -52,8 +52,9 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
 
     With CAMPAIGN, its [simulate] table states the model and the tests. With MODEL.json, the tests are those of the
     paper's bushing. Use simulate to check whether `bushfit diagnose` would find an effect that you add with --effect.
-    The equations are solved step by step in time, independently of the formulas that the fits use. The default for
-    radial tests is the paper's formula; for tests that `bushfit init` will read, set shape = "calibrated" in [bushing].
+    The equations are solved step by step in time, independently of the formulas that the fits use. Radial
+    tests follow the paper's formula. If `bushfit init` shall read the tests, set shape = "calibrated" in [bushing], as
+    init does.
 
     Writes campaign.toml, its test files, and truth.json (the model that was simulated).
     """
