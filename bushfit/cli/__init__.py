@@ -178,6 +178,7 @@ class _Stream:
         return getattr(self._stream, name)
 
     def _tried(self, work: Callable[[TextIO], int | None]) -> int:
+        """Call a function that writes to the stream; return its result, or 0 if the stream cannot be written."""
         if self._stream and not self._fault:
             try:
                 return work(self._stream) or 0

@@ -38,10 +38,8 @@ _MOST_SHOWN = 10
     option(
         "--at operating_points",
         "POINT",
-        (
-            'Add table columns with stiffness and loss factor at this point, such as "axial 25 Hz 0.1 mm"; may '
-            "be given again."
-        ),
+        'Add table columns with stiffness and loss factor at this point, such as "axial 25 Hz 0.1 mm"; may '
+        "be given again.",
         multiple=True,
     ),
 )

@@ -37,10 +37,8 @@ _CHANCE = 0.05
     option(
         "--families",
         "[NAME,...]",
-        (
-            "Fit the paper's model and these models to campaign A; NAME is an effect, or several joined by +, such as "
-            "kraus+inertia [each law of frequency with each law of amplitude]."
-        ),
+        "Fit the paper's model and these models to campaign A; NAME is an effect, or several joined by +, such as "
+        "kraus+inertia [each law of frequency with each law of amplitude].",
         is_flag=False,
         flag_value=_ALL,
     ),

@@ -18,14 +18,8 @@ _OF_TESTS = {
         "COUNTING",
         "Meaning of the amplitudes in the file: zero-to-peak, peak-to-peak or rms [from the header].",
     ),
-    "at_amplitude": (
-        "SIZE",
-        'Amplitude of the whole file, such as "0.1 mm" [from a column or the file name].',
-    ),
-    "at_frequency": (
-        "FREQUENCY",
-        'Frequency of the whole file, such as "10 Hz" [from a column or the file name].',
-    ),
+    "at_amplitude": ("SIZE", 'Amplitude of the whole file, such as "0.1 mm" [from a column or the file name].'),
+    "at_frequency": ("FREQUENCY", 'Frequency of the whole file, such as "10 Hz" [from a column or the file name].'),
     "temperature": (
         "TEMP",
         'Temperature of the test, such as "23 degC"; selects its rows if a file contains several temperatures.',
@@ -36,28 +30,18 @@ _OF_TESTS = {
     "waveform": ("WAVE", None),
     "sampling_rate": (
         "FREQUENCY",
-        (
-            'For a loop without time: speed ("10 mm/min"), frequency ("0.1 Hz") with waveform (sine, triangle), or '
-            "sampling rate [from the file]."
-        ),
+        'For a loop without time: speed ("10 mm/min"), frequency ("0.1 Hz") with waveform (sine, triangle), or '
+        "sampling rate [from the file].",
     ),
-    "specimen": (
-        "NAME",
-        "Name of the specimen, if no bushing was tested [coupon, or bar for tension].",
-    ),
+    "specimen": ("NAME", "Name of the specimen, if no bushing was tested [coupon, or bar for tension]."),
     "area": ("AREA", None),
     "thickness": ("LENGTH", None),
     "elements": (
         "N",
-        (
-            'For a specimen of N rubber blocks in shear [1]: sheared area ("772 mm^2") and thickness ("6 mm") of '
-            "one block."
-        ),
+        'For a specimen of N rubber blocks in shear [1]: sheared area ("772 mm^2") and thickness ("6 mm") of '
+        "one block.",
     ),
-    "specimen_number": (
-        "NUMBER",
-        "Serial number of the part; selects its rows if a file contains several parts.",
-    ),
+    "specimen_number": ("NUMBER", "Serial number of the part; selects its rows if a file contains several parts."),
 }
 #: Options for the file format: campaign key and metavar.
 _AS_WRITTEN = {
@@ -191,6 +175,14 @@ def direction_error(file: Path, sheet: str | None = None) -> MeasurementError:
 
 
 def _pairs(texts: Sequence[str], option: str, example: str, roles: Sequence[str]) -> Mapping[str, str]:
+    """Parse the texts of an option such as --unit "force=kN" to values by the role of their column.
+
+    Args:
+        texts: texts of the option, each a role and a value.
+        option: name of the option, for errors.
+        example: a valid text, for errors.
+        roles: known roles.
+    """
     pairs = {}
     for text in texts:
         role, equals, value = text.partition("=")

@@ -32,10 +32,6 @@ def command(page: str | None, output: Output) -> None:
         raise BushfitError("no such page", place="PAGE", found=page, expected=f"one of {', '.join(names)}", hint=hint)
     folder = output.output or Path(tempfile.mkdtemp(prefix="bushfit-manual-"))
     file = (folder / "manual.html").resolve()
-    output.write(
-        folder,
-        [ResultFile("manual", "page", manual_page)],
-        {"file": str(file), "pages": names},
-    )
+    output.write(folder, [ResultFile("manual", "page", manual_page)], {"file": str(file), "pages": names})
     if output.output is None:
         click.launch(f"{file.as_uri()}#{page}" if page else file.as_uri())

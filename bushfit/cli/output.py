@@ -22,15 +22,7 @@ from rich.markup import escape
 from rich.segment import Segment
 from rich.table import Table
 
-from bushfit.cli.options import (
-    Folder,
-    Function,
-    Parameter,
-    add_parameters,
-    flag,
-    option,
-    option_group,
-)
+from bushfit.cli.options import Folder, Function, Parameter, add_parameters, flag, option, option_group
 from bushfit.errors import printable
 from bushfit.progress import report_progress_to
 from bushfit.reading.tablefile import Form, folder_name

@@ -10,15 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.options import (
-    FILE,
-    Size,
-    command_called,
-    direction_option,
-    file_option,
-    option,
-    option_group,
-)
+from bushfit.cli.options import FILE, Size, command_called, direction_option, file_option, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import grid_options, grid_values, parse_positive
 from bushfit.errors import error_location
@@ -50,10 +42,8 @@ _MOST_VALUES = 6
     option(
         "--for aim",
         "AIM",
-        (
-            "Purpose of the tests: predictions (small errors of the stiffness), parameters (small errors of the "
-            "parameters), or rivals (a decision between possible effects) [predictions]."
-        ),
+        "Purpose of the tests: predictions (small errors of the stiffness), parameters (small errors of the "
+        "parameters), or rivals (a decision between possible effects) [predictions].",
         type=click.Choice(["parameters", "predictions", "rivals"]),
     ),
     direction_option(

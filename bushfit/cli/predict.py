@@ -53,10 +53,8 @@ _MOST_AMPLITUDES = 8
     option(
         "--base-acceleration",
         "ACCELERATION",
-        (
-            'Also predict the resonance of this mass, such as "1.2 kg", on the bushing. The base of the bushing '
-            'vibrates with this acceleration, such as "0.1 g".'
-        ),
+        'Also predict the resonance of this mass, such as "1.2 kg", on the bushing. The base of the bushing '
+        'vibrates with this acceleration, such as "0.1 g".',
     ),
     flag("--static", "Also write the static curve: force over displacement in a slow motion, and its slope."),
     static_rate_option("Rate of this motion"),
@@ -157,10 +155,8 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
     from bushfit.units import format_range
 
     places = list(dict.fromkeys(str(prediction.direction) for prediction in predicted.predictions))
-    verdict, action = (
-        f"{', '.join(places)} predicted with 95 % bands",
-        "The prediction may be used: there are no warnings.",
-    )
+    verdict = f"{', '.join(places)} predicted with 95 % bands"
+    action = "The prediction may be used: there are no warnings."
     if warnings := by_importance(predicted.warnings):
         verdict += f", with {len(warnings)} warning{'s' * (len(warnings) > 1)}"
         place, colon, _ = warnings[0].partition(": ")

@@ -86,11 +86,7 @@ def command(
     if table is not None:
         resonance, body, name = _reduce_resonance(files, table, test_options, shaker, levels)
         frequency, largest = resonance.peak
-        document = {
-            "mass_kg": resonance.mass,
-            "resonance_Hz": frequency,
-            "transmissibility_at_resonance": largest,
-        }
+        document = {"mass_kg": resonance.mass, "resonance_Hz": frequency, "transmissibility_at_resonance": largest}
         points, warnings = resonance_table(resonance), resonance.warnings
         title = f"{table.file.stem}, {name}: {number(resonance.mass, 4)} kg on a shaker"
         figure = partial(plots.inspection.resonance_figure, resonance, title)

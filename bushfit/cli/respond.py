@@ -29,10 +29,8 @@ if TYPE_CHECKING:
     option(
         "--lowpass",
         "FREQUENCY",
-        (
-            'Remove the noise of the displacement above this frequency, such as "200 Hz"; friction would turn the '
-            "noise into force [no filter]."
-        ),
+        'Remove the noise of the displacement above this frequency, such as "200 Hz"; friction would turn the '
+        "noise into force [no filter].",
     ),
     TEMPERATURE,
 )

@@ -12,7 +12,7 @@ from bushfit.cli.output import Output, with_output
 from bushfit.cli.predict import print_predictions
 from bushfit.cli.printing import print_origin, print_result, print_step, print_validations
 from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
-from bushfit.units import number
+from bushfit.units import format_range
 
 if TYPE_CHECKING:
     from bushfit.campaign.schema import Loss
@@ -99,17 +99,11 @@ def _print_range(output: Output, outcome: RunOutput) -> None:
     for direction in dict.fromkeys(data_set.direction for data_set in outcome.data.data_sets):
         unit, factor = direction.display.displacement
         tests = [data_set for data_set in outcome.data.data_sets if data_set.direction == direction]
-        frequency, amplitude = (
-            " to ".join(
-                dict.fromkeys(
-                    number(end, 3)
-                    for end in (min(values.min() for values in arrays), max(values.max() for values in arrays))
-                )
-            )
-            for arrays in ([test.frequency for test in tests], [factor * test.amplitude for test in tests])
-        )
+        frequencies = [end for test in tests for end in (test.frequency.min(), test.frequency.max())]
+        amplitudes = [factor * end for test in tests for end in (test.amplitude.min(), test.amplitude.max())]
+        frequency = format_range("Hz", min(frequencies), max(frequencies))
         use = "" if str(direction) in fitted else ", not fitted"
-        output.print(f"  {direction}: {frequency} Hz, {amplitude} {unit}{use}")
+        output.print(f"  {direction}: {frequency}, {format_range(unit, min(amplitudes), max(amplitudes))}{use}")
 
 
 def two_step_line(two_step: TwoStep, joint: Result) -> str:

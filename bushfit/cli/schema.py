@@ -1,5 +1,6 @@
 """`bushfit schema`: JSON Schemas of the files, for other programs and for editors."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -25,24 +26,15 @@ def command(name: str | None, output: Output) -> None:
     from bushfit.schemas import DESCRIBED, schema
 
     with error_location(place="NAME"):
-        documents = {
-            schema_name: schema(schema_name) for schema_name in ([name] if name else DESCRIBED if output.output else ())
-        }
-    document: dict[str, Any] = (
-        documents[name]
-        if name
-        else {**documents} or {schema_name: described.files for schema_name, described in DESCRIBED.items()}
-    )
+        schemas = {key: schema(key) for key in ([name] if name else DESCRIBED if output.output else ())}
+    files = {key: described.files for key, described in DESCRIBED.items()}
+    document: Mapping[str, Any] = schemas[name] if name else schemas or files
     if output.output:
-        output.write(
-            output.output,
-            [ResultFile(f"{schema_name}.schema", "json", text) for schema_name, text in documents.items()],
-            document,
-        )
+        results = [ResultFile(f"{key}.schema", "json", content) for key, content in schemas.items()]
+        output.write(output.output, results, document)
         return
     if name:
-        output.print(f"{name} describes: {DESCRIBED[name].files}")
+        output.print(f"{name} describes: {files[name]}")
     else:
-        rows = ((schema_name, described.files) for schema_name, described in DESCRIBED.items())
-        output.print_table("schemas", ("name", "describes"), rows, text_columns=2)
+        output.print_table("schemas", ("name", "describes"), files.items(), text_columns=2)
     replace(output, as_json=output.as_json or name is not None).print_json(document)

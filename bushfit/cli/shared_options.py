@@ -133,13 +133,13 @@ def static_rate_option(subject: str) -> Parameter:
 
 
 def displacement_unit(text: str, per: str = "") -> str:
-    """SI unit of the displacement in a quantity such as "2 deg", or "10 mm/min" with `per` "/s": m, rad or 1."""
+    """SI unit (m, rad, 1) of a displacement such as "2 deg"; with `per` "/s" for a rate such as "10 mm/min"."""
     suffix = re.sub(r"^[-+.\d\s]+(e[-+]?\d+)?\s*", "", text, flags=re.IGNORECASE)
     return next((unit for unit in ("rad", "1") if is_compatible(suffix, unit + per)), "m")
 
 
 def displacement_rates(text: str | None) -> dict[str, float] | None:
-    """Parse --static-rate to a rate in SI by the unit of its displacement: m, rad or 1; None if it was not given."""
+    """Parse the text of --static-rate to {SI unit of the displacement (m, rad, 1): rate in SI}; None without a text."""
     unit = displacement_unit(text or "", "/s")
     rate = parse_positive(text, "--static-rate", f"{unit}/s")
     return None if rate is None else {unit: rate}

@@ -86,6 +86,7 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
 
 
 def _with_effect(model: Model, text: str) -> Model:
+    """Add an effect to a model by a text such as "inertia.mass=0.1 kg"; return the new model."""
     from bushfit.effects import effect_name_of, get_effect, is_parameter, qualified_name
 
     name, found, value = text.replace(" ", "").partition("=")
@@ -101,8 +102,6 @@ def _with_effect(model: Model, text: str) -> Model:
         )
     unit = next(parameter.unit for parameter in effect.parameters if qualified_name(effect, parameter) == name)
     with error_location(place="--effect"):
-        size = (
-            float(value) if is_number(value) and unit == "1" else parse_quantity(text.partition("=")[2].strip(), unit)
-        )
-    values = {name: size}
+        is_plain = is_number(value) and unit == "1"
+        values = {name: float(value) if is_plain else parse_quantity(text.partition("=")[2].strip(), unit)}
     return model.with_values(values) if effect.name in model.effects else model.with_effect(effect.name, values)

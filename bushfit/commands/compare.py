@@ -244,11 +244,7 @@ def _compared(
 
 
 def _warnings(
-    labels: Sequence[str],
-    entries: Sequence[ComparedResult],
-    comparisons: Sequence[Comparison],
-    *,
-    are_families: bool,
+    labels: Sequence[str], entries: Sequence[ComparedResult], comparisons: Sequence[Comparison], *, are_families: bool
 ) -> list[str]:
     """Warnings on results that share tests, then the warnings of each result with the letters of the results.
 

@@ -175,9 +175,7 @@ def campaign_files(
             files += [
                 ResultFile("master_curve", "table", lambda: tables.master_curve_table(shifted())),
                 ResultFile(
-                    "master_curve",
-                    "figure",
-                    lambda: plots.master_curve.master_curve_figure(model, shifted(), title),
+                    "master_curve", "figure", lambda: plots.master_curve.master_curve_figure(model, shifted(), title)
                 ),
                 ResultFile("shift_factors", "table", lambda: tables.shift_factors_table(shifted())),
             ]

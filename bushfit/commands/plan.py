@@ -125,7 +125,12 @@ def plan(
 
 
 def _knowledge(source: Campaign | Result | Knowledge, rivals: Sequence[str] | None) -> Knowledge:
-    """Model and uncertainty before the planned tests, from a fitted model, a campaign's tests or its compound."""
+    """Model and uncertainty before the planned tests, from a fitted model, a campaign's tests or its compound.
+
+    Args:
+        source: fitted model, campaign, or knowledge, which is returned unchanged.
+        rivals: effects to distinguish; empty for those that a diagnosis cannot separate, None for no rivals.
+    """
     if isinstance(source, Knowledge):
         return source
     if isinstance(source, Result):

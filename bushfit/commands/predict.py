@@ -151,12 +151,9 @@ def predict(
             shaken = mass, base_acceleration, settings.frequencies
             resonances.append(predict_resonance(result, place, *shaken, temperature=temperature, preload=preload))
         if static or static_rates:
-            motion = (
-                static_reach(result, place, prediction.amplitude, settings),
-                static_rate(result, place, static_rates),
-            )
-            load = prediction.preload if preloads else None
-            curves.append(static_curve(result, place, *motion, temperature=temperature, preload=load))
+            reach = static_reach(result, place, prediction.amplitude, settings)
+            rate, load = static_rate(result, place, static_rates), prediction.preload if preloads else None
+            curves.append(static_curve(result, place, reach, rate, temperature=temperature, preload=load))
     maxwell: tuple[Arms, ...] = ()
     if arms:
         frequency = np.concatenate([prediction.frequency for prediction in predictions])
@@ -181,21 +178,15 @@ def _assign_bushing(campaign: Campaign, result: Result) -> Campaign:
     different = sorted({body.name for body in listed - {*fitted}} & {body.name for body in fitted})
     different += [bushing.name] if bushing and fitted and not bodies else []
     if different:
-        found, expected = (
-            ", ".join(different),
-            f"the geometry of {' or '.join(body.name for body in fitted)} in the model",
-        )
+        found, names = ", ".join(different), " or ".join(body.name for body in fitted)
+        expected = f"the geometry of {names} in the model"
         raise ModelError("the campaign tests another bushing", file=campaign.path, found=found, expected=expected)
     if not bodies:
         return campaign
     places = {place.axis: place for place in result.specimens if place.bushing == bodies[0]}
-    return replace(
-        campaign,
-        loops=tuple(
-            replace(loop, direction=places.get(loop.direction.axis, loop.direction)) for loop in campaign.loops
-        ),
-        sweeps=tuple(replace(one, direction=places.get(one.direction.axis, one.direction)) for one in campaign.sweeps),
-    )
+    loops = [replace(loop, direction=places.get(loop.direction.axis, loop.direction)) for loop in campaign.loops]
+    sweeps = [replace(sweep, direction=places.get(sweep.direction.axis, sweep.direction)) for sweep in campaign.sweeps]
+    return replace(campaign, loops=tuple(loops), sweeps=tuple(sweeps))
 
 
 def requested_preloads(result: Result, place: Place, preloads: Sequence[str]) -> list[Preload | None]:

@@ -54,12 +54,7 @@ def parameters(model: Result | HasResult) -> pd.DataFrame:
 
 
 def save(
-    output: CommandOutput,
-    folder: str | Path,
-    *,
-    tables: bool = True,
-    pictures: bool = True,
-    force: bool = False,
+    output: CommandOutput, folder: str | Path, *, tables: bool = True, pictures: bool = True, force: bool = False
 ) -> Path:
     """Write the result files of an output into a folder, as the command would.
 

@@ -81,10 +81,7 @@ def simulate(
     if isinstance(source, Campaign):
         truth, tests = model_of(source), source.simulate or SimulateSettings()
     else:
-        truth, tests = (
-            source if isinstance(source, Model) else as_result(source).model,
-            SimulateSettings(),
-        )
+        truth, tests = source if isinstance(source, Model) else as_result(source).model, SimulateSettings()
     output = simulate_campaign(truth, replace(tests, **settings))
     inputs = [source.path] if isinstance(source, Campaign) else []
     write_results(Path(folder), output.files, overwrite=force, inputs=inputs)

@@ -34,8 +34,7 @@ class QuantityTable:
         Field(description="Cp with its 95 % interval; null without two fixed limits."),
     ]
     cpk: Annotated[
-        tuple[float, float, float] | None,
-        Field(description="Cpk with its 95 % interval; null without a fixed limit."),
+        tuple[float, float, float] | None, Field(description="Cpk with its 95 % interval; null without a fixed limit.")
     ]
 
 

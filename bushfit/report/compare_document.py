@@ -35,8 +35,7 @@ class ComparedEntry(TypedDict):
     ]
     measured: Annotated[Range | None, Doc("ranges of the fitted tests; null if the model was not fitted.")]
     inputs: Annotated[
-        tuple[Source, ...],
-        Doc("files of the fitted tests, with the conditions that the campaign states."),
+        tuple[Source, ...], Doc("files of the fitted tests, with the conditions that the campaign states.")
     ]
 
 

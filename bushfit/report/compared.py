@@ -16,7 +16,7 @@ from bushfit.errors import ModelError
 from bushfit.model.file import require_schema
 from bushfit.prediction.comparison import Comparison, Contrast, ParameterContrast, relative_difference
 from bushfit.report.compare_document import SCHEMA, ComparisonFile
-from bushfit.report.tables import quantity_words, require_columns, response_headers
+from bushfit.report.tables import band_columns, quantity_words, require_columns, response_headers
 from bushfit.units import display_unit, number, split_header
 from bushfit.validation import validate_tables
 
@@ -49,9 +49,7 @@ def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
     }
     for label, side in (("reference", contrast.reference), ("other", contrast.other)):
         for quantity, band, scale in ((name, side.stiffness, factor), ("loss factor [-]", side.loss_factor, 1.0)):
-            header = f"{label} {quantity}"
-            columns |= {header: band.value * scale, f"{header}, low": band.low * scale}
-            columns[f"{header}, high"] = band.high * scale
+            columns |= band_columns(f"{label} {quantity}", band, scale)
     differences = (
         (f"relative difference of {quantity_words(contrast.place)[2]} [-]", contrast.stiffness, relative_difference),
         ("difference of loss factor [-]", contrast.loss_factor, np.asarray),

@@ -7,6 +7,7 @@ import pandas as pd
 
 from bushfit.prediction.response import TimeResponse
 from bushfit.prediction.validation import Validation
+from bushfit.report.tables import band_columns
 
 
 def response_table(time: Any, responses: Sequence[TimeResponse]) -> pd.DataFrame:
@@ -26,9 +27,7 @@ def response_table(time: Any, responses: Sequence[TimeResponse]) -> pd.DataFrame
         moves, resists, _ = response.direction.motion.words
         before = f"{response.direction} " if len(responses) > 1 else ""
         columns[f"{before}{moves} [{length}]"] = length_factor * response.history.value
-        force = f"{before}{resists} [{unit}]"
-        for end, values in (("", response.force.value), (", low", response.force.low), (", high", response.force.high)):
-            columns[f"{force}{end}"] = force_factor * values
+        columns |= band_columns(f"{before}{resists} [{unit}]", response.force, force_factor)
     return pd.DataFrame(columns)
 
 

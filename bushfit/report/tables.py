@@ -15,6 +15,7 @@ from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Display, Place
 from bushfit.model.arms import Arms, arm_rows
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
+from bushfit.prediction.bands import Band
 from bushfit.prediction.other_bushings import OtherBushings
 from bushfit.prediction.resonance import PredictedResonance
 from bushfit.prediction.static_curve import StaticCurve
@@ -66,6 +67,12 @@ def response_columns(place: Place, stiffness: Array, before: str = "") -> dict[s
     """
     magnitude = np.abs(stiffness) * place.display.stiffness.factor
     return {f"{before}{response_headers(place)[1]}": magnitude, f"{before}loss factor [-]": loss_factor(stiffness)}
+
+
+def band_columns(header: str, band: Band, factor: float = 1.0) -> dict[str, Array]:
+    """Table columns of a predicted quantity and of the ends of its 95 % band ("..., low"), all times a factor."""
+    ends = {"": band.value, ", low": band.low, ", high": band.high}
+    return {f"{header}{end}": factor * values for end, values in ends.items()}
 
 
 def prediction_table(prediction: Prediction, display: Display | None = None) -> pd.DataFrame:
@@ -178,8 +185,7 @@ def static_table(curve: StaticCurve) -> pd.DataFrame:
         (f"unloading {force}", curve.unloading, to_force),
         (stiffness, curve.slope, to_stiffness),
     ):
-        ends = {"": band.value, ", low": band.low, ", high": band.high}
-        columns |= {f"{header}{end}": values * scale for end, values in ends.items()}
+        columns |= band_columns(header, band, scale)
     if curve.preload is not None:
         value, unit = curve.preload.in_display_unit(curve.direction)
         columns[f"preload [{unit}]"] = value

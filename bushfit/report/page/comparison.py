@@ -20,7 +20,7 @@ from bushfit.report.compared import (
 from bushfit.report.page import render_page
 from bushfit.report.page.report import MOST, summarize_conditions, tube_description
 from bushfit.report.page.svg import picture
-from bushfit.report.page.values import grid_corners
+from bushfit.report.page.values import spread_points
 from bushfit.report.results import ResultFile
 from bushfit.report.tables import numeric_columns
 from bushfit.units import format_aligned, format_range, number, split_header
@@ -143,7 +143,7 @@ def value_rows(comparison: ComparisonDocument) -> Iterator[tuple[Any, ...]]:
         ((_, length), (_, unit)) = (split_header(header) for header in heads[:2])
         kinds = ((heads.stiffness, heads.relative, f" {unit}", 100.0, " %"), (loss, heads.loss, "", 1.0, ""))
         amplitude, frequency = numeric_columns(table, heads.amplitude, "frequency [Hz]")
-        for index in grid_corners(amplitude, frequency, amplitudes, min(point_limit // amplitudes, _FREQUENCIES)):
+        for index in spread_points(amplitude, frequency, amplitudes, min(point_limit // amplitudes, _FREQUENCIES)):
             row, cells = table.iloc[index], []
             for quantity, difference, suffix, scale, percent in kinds:
                 value, low, high = (scale * row[f"{difference}{end}"] for end in ("", ", low", ", high"))

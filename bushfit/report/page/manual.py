@@ -63,18 +63,24 @@ def _add_identifiers(tokens: Sequence[Token], name: str) -> str:
     return title
 
 
-def _redirect_links(parts: Sequence[Token], name: str, names: Sequence[str]) -> None:
-    """Redirect the links of a paragraph of page `name` into the HTML page, and replace images by their descriptions."""
+def _redirect_links(tokens: Sequence[Token], name: str, names: Sequence[str]) -> None:
+    """Redirect the links of a paragraph into the HTML page, and replace images by their descriptions.
+
+    Args:
+        tokens: tokens of the paragraph; links to other pages are redirected, links to other files are hidden.
+        name: name of the page that contains the paragraph.
+        names: names of all pages.
+    """
     hidden = False
-    for part in parts:
-        if part.type == "link_open":
-            file, _, anchor = str(part.attrGet("href")).partition("#")
+    for token in tokens:
+        if token.type == "link_open":
+            file, _, anchor = str(token.attrGet("href")).partition("#")
             target = Path(file).stem if file else name
             hidden = not file.startswith("https:")
             if hidden and target in names and file in ("", f"{target}.md"):
-                part.attrSet("href", f"#{target}--{anchor}" if anchor else f"#{target}")
+                token.attrSet("href", f"#{target}--{anchor}" if anchor else f"#{target}")
                 hidden = False
-        if part.type in ("link_open", "link_close"):
-            part.hidden = hidden
-        elif part.type == "image":
-            part.type = "text"
+        if token.type in ("link_open", "link_close"):
+            token.hidden = hidden
+        elif token.type == "image":
+            token.type = "text"

@@ -131,7 +131,7 @@ def value_rows(predictions: Sequence[Prediction]) -> Iterator[list[str]]:
     frequencies = min(max(_ROWS // max(_AMPLITUDES * len(predictions), 1), 1), _FREQUENCIES)
     for prediction in predictions:
         (length, to_length), _, (unit, factor) = prediction.direction.display
-        for index in grid_corners(prediction.amplitude, prediction.frequency, _AMPLITUDES, frequencies):
+        for index in spread_points(prediction.amplitude, prediction.frequency, _AMPLITUDES, frequencies):
             stiffness, loss = band_at(prediction.stiffness, index, factor), band_at(prediction.loss_factor, index)
             angles = [math.degrees(math.atan(end)) for end in loss]
             parts = prediction.storage_stiffness, prediction.loss_stiffness
@@ -148,7 +148,7 @@ def value_rows(predictions: Sequence[Prediction]) -> Iterator[list[str]]:
             ]
 
 
-def grid_corners(amplitude: Array, frequency: Array, amplitudes: int, frequencies: int) -> Iterator[int]:
+def spread_points(amplitude: Array, frequency: Array, amplitudes: int, frequencies: int) -> Iterator[int]:
     """Choose a few operating points of a grid, evenly over its amplitudes and frequencies, ends included.
 
     Args:

@@ -60,9 +60,7 @@ def inspection_figure(files: Sequence[Inspection], first: int = 0, count: int = 
             panel = _draw_history(figure, grid[row, 1] if loop else grid[row, :], file.measured, loop)
         panel.set_title(title, fontsize=style.TEXT, loc="left", color=style.GREY)
     swept = any(isinstance(file.measured, Sweep) for file in drawn_files)
-    return figure.explain(
-        "Sweeps: points as measured, lines through the means of the repeats." * swept,
-    )
+    return figure.explain("Sweeps: points as measured, lines through the means of the repeats." * swept)
 
 
 def _draw_history(figure: Figure, cell: SubplotSpec, history: Loop, loop: Axes | None) -> Axes:

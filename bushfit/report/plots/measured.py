@@ -88,11 +88,8 @@ def sweep_groups(table: pd.DataFrame, result: Result) -> list[SweepGroup]:
         place, free = result.place(str(name)), stepped == "neither"
         axis, fixed = cast("tuple[Axis, Axis]", ("frequency", "amplitude")[:: -1 if stepped == "amplitude" else 1])
         unit = "Hz" if fixed == "frequency" else place.display.displacement.name
-        units, levels, palette = (
-            list[str](),
-            [rows["test" if free else header_of(place, fixed)]],
-            "loop" if free else str(fixed),
-        )
+        units, levels = list[str](), [rows["test" if free else header_of(place, fixed)]]
+        palette = "loop" if free else str(fixed)
         if not free and "part" in rows and len(set(rows["part"].fillna(""))) > 1:
             levels, palette, units = ["part " + rows["part"].fillna("not stated"), *levels], "loop", ["", *units]
         if not free and "temperature [degC]" in rows:

@@ -35,10 +35,8 @@ def preload_figure(
     """
     place, preloads = predictions[0].direction, [prediction.preload for prediction in predictions if prediction.preload]
     frequencies, amplitudes = np.unique(predictions[0].frequency), np.unique(predictions[0].amplitude)
-    frequency, amplitudes = (
-        frequencies[frequencies.size // 2],
-        amplitudes[spread_indices(amplitudes.size, _MOST_LEVELS)],
-    )
+    frequency = frequencies[frequencies.size // 2]
+    amplitudes = amplitudes[spread_indices(amplitudes.size, _MOST_LEVELS)]
     ends = min(preloads).value, max(preloads).value
     loads = [Preload(value, preloads[0].unit) for value in np.linspace(*ends, _FINE).tolist()]
     fine = [predict(result, place, [frequency], amplitudes, temperature=temperature, preload=load) for load in loads]
