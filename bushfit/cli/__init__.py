@@ -67,9 +67,11 @@ class _Commands(click.Group):
     """Command group that imports the module of a command when the command is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of all commands, in the order of the help."""
         return list(_COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import the command with this name; raise a UsageError with a similar name for an unknown one."""
         if cmd_name not in _COMMANDS:
             words = (f"No such command '{cmd_name}'", did_you_mean(cmd_name, _COMMANDS))
             raise click.UsageError("; ".join(filter(None, words)), ctx)
@@ -77,6 +79,7 @@ class _Commands(click.Group):
         return getattr(importlib.import_module(f"bushfit.cli.{module}"), name or "command")
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the commands with their help lines under the headings of the help."""
         for heading, commands in _GROUPS.items():
             with formatter.section(heading):
                 formatter.write_dl([(name.ljust(_LONGEST), line) for name, (_, line) in commands.items()])
@@ -167,17 +170,18 @@ class _Stream:
 
     def write(self, text: str) -> int:
         """Write a text to standard output or error; return the number of characters written."""
-        return self._tried(lambda stream: stream.write(text))
+        return self._attempt(lambda stream: stream.write(text))
 
     def flush(self) -> None:
         """Write the buffered text to standard output or error."""
         if self._stream:
-            self._tried(lambda stream: stream.flush())
+            self._attempt(lambda stream: stream.flush())
 
     def __getattr__(self, name: str) -> Any:
+        """Return the attribute of standard output or error that this wrapper does not define, such as `isatty`."""
         return getattr(self._stream, name)
 
-    def _tried(self, work: Callable[[TextIO], int | None]) -> int:
+    def _attempt(self, work: Callable[[TextIO], int | None]) -> int:
         """Call a function that writes to the stream; return its result, or 0 if the stream cannot be written."""
         if self._stream and not self._fault:
             try:

@@ -89,7 +89,7 @@ def command(files: tuple[Path, ...], test_options: Mapping[str, Any], output: Ou
 
 
 def print_inspection(output: Output, inspection: Inspection) -> None:
-    """Print the columns of a test file, its levels and noise, and anything unusual in it."""
+    """Print the columns of a test file, its frequencies, amplitudes and noise, and anything unusual in it."""
     console = output.console
     written = ", ".join(f"{label} {value}" for label, value in inspection.written.items())
     place = inspection.direction or "direction unknown"

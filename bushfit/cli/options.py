@@ -24,6 +24,7 @@ class Option(click.Option):
     heading: str | None = None
 
     def get_help_extra(self, ctx: click.Context) -> Any:
+        """Texts that click appends to the help text of the option: none, since the text states the default."""
         return {}
 
 
@@ -57,6 +58,7 @@ class Command(click.Command):
     """
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options with their help texts under headings."""
         heading, groups = "Options", dict[str, list[tuple[str, str]]]()
         for parameter in self.get_params(ctx):
             heading = getattr(parameter, "heading", None) or heading
@@ -86,16 +88,19 @@ class Folder(click.Path):
     """Option type for a results folder; an empty text is an error."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Convert the text of an option to the path of a folder; an empty text is an error."""
         return super().convert(value, param, ctx) if value else self.fail("an empty text is not a folder", param, ctx)
 
 
 class Size(NumberType):
-    """Option type for a positive number up to `maximum`, also in percent; error messages use `name`, the quantity."""
+    """Option type for a positive number up to a maximum, also in percent, such as 0.02 or "2 %"."""
 
     def __init__(self, name: str, maximum: float) -> None:
+        """Create the type for the quantity `name`, as error messages call it, with its largest permitted value."""
         self.name, self._maximum = name, maximum
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Convert the text of an option to a number, 0.02 for "2 %"; a number out of range is an error."""
         text = str(value).strip()
         with suppress(ValueError):
             if 0.0 < (size := float(text.removesuffix("%")) * (0.01 if "%" in text else 1.0)) <= self._maximum:

@@ -68,6 +68,7 @@ class _Console(Console):
     """Console that escapes control characters in texts from files."""
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Render an object of rich as pieces of text, with control characters as escape sequences."""
         for segment in super().render(renderable, options):
             yield segment if segment.control else segment._replace(text=printable(segment.text, lines=True))
 

@@ -30,11 +30,11 @@ _BEYOND, _POINTS = 10.0, 400
 def fit_campaign_families(
     campaign: Campaign, names: Sequence[str], directions: Sequence[str] | None
 ) -> tuple[list[FittedFamily], list[Result], list[str]]:
-    """Fit model families to a campaign: the model of [fit], then the named families, or all families of the library.
+    """Fit model families (sets of effects) to a campaign: the model of [fit], then the named families.
 
     Args:
         campaign: the campaign.
-        names: names of families; empty or None for all.
+        names: names of families, such as "kraus+inertia"; empty for all families of the library.
         directions: directions or specimens whose tests are fitted; None for the default.
 
     Returns:
@@ -58,7 +58,11 @@ def fit_campaign_families(
 
 
 def family_to_use(families: Sequence[FittedFamily], results: Sequence[Result]) -> str:
-    """Name the most probable family, and the range of frequency and strain over which all probable ones agree.
+    """Name the most probable model family, and the ranges of frequency and strain in which all probable ones agree.
+
+    Args:
+        families: model families, fitted to the same tests.
+        results: result of each family.
 
     Returns:
         The sentence, without a full stop.

@@ -69,7 +69,7 @@ class HeldOutPart(TypedDict):
 
 
 class FamilyEntry(TypedDict):
-    """Entry of compare.json for one model family: agreement with the tests, held-out error and probability."""
+    """Entry of compare.json for one model family (a set of effects): agreement, held-out error and probability."""
 
     label: Annotated[str, Doc("letter of the family in `compared`.")]
     name: Annotated[str, Doc("effects that the family adds or that replace a branch, joined by +.")]

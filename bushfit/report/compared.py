@@ -158,7 +158,7 @@ class ComparisonDocument:
         return tables | ({"families": pd.DataFrame(families)} if families else {})
 
     def family_cells(self) -> Iterator[list[str]]:
-        """Rows of the table of model families, as formatted texts.
+        """Rows of the table of model families (sets of effects, fitted to the same tests), as formatted texts.
 
         Returns:
             An iterator over the families: texts of name, parameters, agreement, probability and held-out error.

@@ -79,7 +79,7 @@ def draw_curves(pair: Sequence[Axes], group: SweepGroup, result: Result) -> None
 
     Args:
         pair: left and right panel.
-        group: sweeps of one direction or specimen, with a curve per level of the fixed quantity.
+        group: sweeps of one direction or specimen, with a curve per fixed amplitude (or frequency).
         result: fitted model, with the effects of the rig.
     """
     stiffness, x_header = response_headers(group.place)[1], group.x_header
@@ -126,15 +126,15 @@ def points_to_draw(rows: pd.DataFrame) -> pd.DataFrame:
 def draw_points(
     axes: Axes, rows: pd.DataFrame, x_header: str, header: str, scale: float, look: style.Style, curves: int
 ) -> None:
-    """Draw the measured points of one level: means of repeats, with bars from the smallest to the largest value.
+    """Draw the measured points of one curve: means of repeats, with bars from the smallest to the largest value.
 
     Args:
         axes: panel.
-        rows: rows of a table of sweeps at one level.
+        rows: rows of a table of sweeps at one fixed amplitude or frequency.
         x_header, header: headers of the columns along x and y.
         scale: factor from the unit of the y column to that of the panel.
-        look: colour and marker of the level.
-        curves: number of levels in the panel; the more there are, the more points are omitted.
+        look: colour and marker of the points.
+        curves: number of curves in the panel; the more there are, the more points are omitted.
     """
     x, index = np.unique(rows[x_header].to_numpy(), return_inverse=True)
     values = scale * rows[header].to_numpy()[np.argsort(index, kind="stable")]
@@ -163,7 +163,7 @@ def _model_line(group: SweepGroup, curve: Curve, header: str, result: Result) ->
 
     Args:
         group: sweeps of one direction or specimen.
-        curve: points of the sweeps at one level.
+        curve: points of the sweeps at one fixed amplitude or frequency.
         header: header of the column along y.
         result: fitted model, with the effects of the rig.
 

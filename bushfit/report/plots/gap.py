@@ -46,8 +46,9 @@ _ROW_NAME: dict[str, Any] = {"rotation": 0, "ha": "right", "va": "center", "ma":
 def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any], title: str) -> style.Chart:
     """Figure of the gap, measured minus model in percent, of all tests before and after a diagnosis.
 
-    Sweeps are colour maps over the stepped quantity (across) and the fixed level (upwards); loops are curves over the
-    phase of the cycle. All maps share one colour scale, and all loops of one direction or specimen share one y axis.
+    Sweeps over frequency are colour maps with the frequency across and the fixed amplitude upwards; for sweeps over
+    amplitude, it is the other way round. Loops are curves over the phase of the cycle. All maps share one colour scale,
+    and all loops of one direction or specimen share one y axis.
 
     Args:
         table: table of the gap from `diagnosed.gap_table`.
@@ -158,12 +159,12 @@ def color_scale(sweeps: pd.DataFrame, sides: Sequence[str]) -> tuple[Array, Scal
 
 
 def draw_map(axes: Axes, group: SweepGroup, rows: Sequence[Curve], header: str, colors: ScalarMappable) -> None:
-    """Draw the gap of a group of sweeps as a colour map: a row per level, a cell per step.
+    """Draw the gap of a group of sweeps as a colour map: a row per fixed amplitude (or frequency), a cell per step.
 
     Args:
         axes: panel.
         group: group of sweeps, which gives the quantity across.
-        rows: rows of the map from `map_rows`, the lowest level first.
+        rows: rows of the map from `map_rows`, the smallest amplitude or frequency first.
         header: header of the column to draw, measured minus model [%].
         colors: colour scale from `color_scale`.
     """
@@ -208,12 +209,12 @@ def cell_edges(values: Array, *, logarithmic: bool) -> tuple[Array, Array]:
 
 
 def _label_maps(panels: Sequence[Axes], group: SweepGroup, rows: Sequence[Curve], part: str) -> None:
-    """Label a row of maps: levels at the left, and the quantity across below the maps of the loss part.
+    """Label a row of maps: fixed amplitudes (or frequencies) at the left, and the stepped quantity below the maps.
 
     Args:
         panels: maps of the row.
         group: sweeps of the maps.
-        rows: rows of each map, the lowest level first.
+        rows: rows of each map, the smallest amplitude or frequency first.
         part: "storage" or "loss".
     """
     names = [style.file_name(row.name, 24) for row in rows]

@@ -158,7 +158,7 @@ def _draw_strip(axes: Axes, history: Loop, reduction: Reduction, looks: dict[flo
         axes: panel.
         history: record to draw.
         reduction: operating points of the histories, which state the cycles used.
-        looks: colour and marker by amplitude level.
+        looks: colour and marker by nominal amplitude [m, rad or 1].
     """
     unit, factor = reduction.direction.display.displacement
     rows = extreme_rows(history.displacement, _MOST_OVER_TIME)
@@ -187,7 +187,7 @@ def _draw_points(
         quality: panels of standard errors and of harmonic distortion.
         reduction: operating points of the histories.
         steps: table of the operating points.
-        looks: colour and marker by amplitude level.
+        looks: colour and marker by nominal amplitude [m, rad or 1].
     """
     unit, length = reduction.direction.display.displacement
     to_table = reduction.direction.display.stiffness.factor

@@ -26,7 +26,7 @@ MOST_CURVES, MOST_LOOPS = 24, 8
 
 
 class Curve(NamedTuple):
-    """Points of sweeps at one level of the fixed quantity (amplitude or frequency): one curve of a figure.
+    """Points of sweeps at one fixed amplitude (or frequency): one curve of a figure.
 
     Args:
         name: legend label, the fixed amplitude or frequency with its unit, or the name of the test if neither is fixed.
@@ -48,7 +48,7 @@ class SweepGroup(NamedTuple):
         x_header: header of the table column of this quantity.
         palette: colour scale, named after the quantity that distinguishes the curves: "amplitude", "frequency",
             "temperature" or, for parts and free sweeps, "loop".
-        curves: a curve per level, ascending.
+        curves: a curve per fixed amplitude (or frequency), ascending.
     """
 
     place: Place
@@ -59,7 +59,7 @@ class SweepGroup(NamedTuple):
 
     @property
     def shares_levels(self) -> bool:
-        """True if the curves differ only in the level of the fixed quantity, not in temperature, part or test."""
+        """True if the curves differ only in the fixed amplitude or frequency, not in temperature, part or test."""
         return self.palette in ("amplitude", "frequency")
 
     def thinned(self) -> SweepGroup:

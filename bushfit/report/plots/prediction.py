@@ -158,7 +158,7 @@ def draw_prediction(
     axis: Axis,
     levels: Array,
 ) -> bool:
-    """Draw predicted stiffness magnitude (left) and loss factor (right): a line, band and measured points per level.
+    """Draw predicted stiffness magnitude (left) and loss factor (right), with 95 % bands and measured points.
 
     Args:
         pair: left and right panel.
@@ -166,7 +166,7 @@ def draw_prediction(
         rig: the same prediction with the effects of the rig; None if the model has no such effects.
         table: measured sweeps of the same direction or specimen; None for no points.
         axis: quantity along x.
-        levels: levels of the other quantity, amplitudes [m, rad or 1] or frequencies [Hz], ascending, (k,).
+        levels: fixed amplitudes [m, rad or 1] or frequencies [Hz], one for each line, ascending, (k,).
 
     Returns:
         True if measured points were drawn.
@@ -219,15 +219,15 @@ def draw_prediction(
 
 
 def points_near(table: pd.DataFrame | None, header: str, levels: Array) -> list[pd.DataFrame]:
-    """Find the measured points at each predicted level, within 1 % of the measured or nominal level of the point.
+    """Find the measured points at each predicted amplitude (or frequency), within 1 % of the measured or nominal one.
 
     Args:
         table: sweeps of one direction or specimen; None for no points.
-        header: header of the column of the levels.
-        levels: predicted levels in the unit of that column, (k,).
+        header: header of the column of amplitudes or frequencies.
+        levels: predicted amplitudes or frequencies in the unit of that column, (k,).
 
     Returns:
-        Rows of the table for each level, empty if the level was not measured, (k,).
+        Rows of the table for each of them, empty if it was not measured, (k,).
     """
     if table is None:
         return [pd.DataFrame({"outlier": []})] * levels.size

@@ -178,7 +178,7 @@ class Chart(Figure):
 
 
 class Style(NamedTuple):
-    """Colour, line style and marker of one level (an amplitude, frequency, temperature or loop) in a figure."""
+    """Colour, line style and marker of one curve (of an amplitude, frequency, temperature or loop) in a figure."""
 
     color: Any
     dashes: Any
@@ -190,11 +190,11 @@ class Style(NamedTuple):
 
 
 def styles(count: int, palette: str) -> list[Style]:
-    """Line styles for `count` levels; they differ only in colour if the levels are too many for a legend.
+    """Line styles for curves; they differ only in colour if there are too many curves for a legend.
 
     Args:
-        count: number of levels.
-        palette: colour scale, named after what distinguishes the levels: "amplitude", "frequency", "temperature" or
+        count: number of curves.
+        palette: colour scale, named after what distinguishes the curves: "amplitude", "frequency", "temperature" or
             "loop".
     """
     name, first, last = _SCALES[palette]
@@ -313,13 +313,13 @@ def name_levels(
     marked: Sequence[bool] = (),
     extra_lines: Mapping[str, Line2D | tuple[Line2D, ...]] | None = None,
 ) -> None:
-    """Add a legend of the levels right of a panel, or a colour bar for more than eight levels.
+    """Add a legend of the curves of a panel by their amplitude, frequency or temperature; a colour bar for over eight.
 
     Args:
         axes: panel.
-        levels: amplitudes, frequencies or temperatures as texts, in ascending order, (k,).
+        levels: amplitude, frequency or temperature of each curve as a text, in ascending order, (k,).
         quantity: "amplitude", "frequency" or "temperature": title, and name of the colour scale.
-        marked: True for each level that has measured points, (k,); empty if all have.
+        marked: True for each curve that has measured points, (k,); empty if all have.
         extra_lines: further lines by their labels.
     """
     looks = styles(len(levels), quantity)
