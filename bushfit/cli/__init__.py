@@ -122,7 +122,7 @@ def main(command: click.Command = cli) -> None:
 def _status(command: click.Command) -> int:
     """Run a command from its command line, print its errors, and return its exit status."""
     try:
-        status = command.main(prog_name=command.name, standalone_mode=False)
+        status = command.main(sys.argv[1:] or ["--help"], prog_name=command.name, standalone_mode=False)
         sys.stdout.flush()
         return status or 0
     except (click.exceptions.Abort, KeyboardInterrupt):

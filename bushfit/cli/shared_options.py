@@ -202,8 +202,9 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
                 hint='write decimals with a point, "0.5", and a space after each comma of a list, "1, 5"',
             )
         parts = re.fullmatch(r"\s*([-+0-9.eE,:\s]*[0-9.])\s*([^-+\d\s:,.][^,]*)", text)
-        if not parts or parts[1].count(":") not in (0, 2):
-            hint = "write the step, too: start:stop:step" if text.count(":") == 1 else None
+        is_span = re.search(r"^[^:]*(:|[0-9.]\s*-)[^:]*$", text)  # "5:155 Hz" or "5-155 Hz"
+        if not parts or parts[1].count(":") not in (0, 2) or is_span:
+            hint = "write the step, too: start:stop:step" if is_span else None
             raise UnitError("these are not values with a unit", found=repr(text), expected=expected, hint=hint)
         is_range = ":" in parts[1]
         values = tuple(

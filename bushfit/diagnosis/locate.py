@@ -168,6 +168,7 @@ def _loop_regions(evidence: Evidence) -> Iterator[MisfitRegion]:
             (amplitude,) * 2,
             "force",
             float(np.sqrt(np.mean(np.square(amounts)))),
-            f"the {data_set.direction} loop of {amplitude * factor:.3g} {unit} differs from the model most in "
+            f"the {data_set.direction} loop of {amplitude * factor:.3g} {unit} at {data_set.prepared.frequency:.3g} Hz "
+            "differs from the model most in "
             f"{_HARMONICS.get(order, f'harmonic {order}')}: {number(100 * share, 2)} % of half its force range",
         )

@@ -199,6 +199,11 @@ class MeasuredLoop(MeasuredBase):
     def relative_difference(self, model: Model) -> Array:
         return ((self.force(model) - self.prepared.force) / self.prepared.half_range)[None]
 
+    def relative(self, model: Model) -> Array:
+        """Magnitude of the relative difference at each row, without the mean: the zero of a load cell is unknown."""
+        difference = self.relative_difference(model)[0, self.weights > 0.0]
+        return np.abs(difference - np.mean(difference))
+
     def difference(self, model: Model, values: Values | None = None) -> Array:
         return (self.force(model, values) - self.prepared.force) * self._per_noise
 

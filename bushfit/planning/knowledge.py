@@ -100,11 +100,11 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
     names = list(dict.fromkeys(twins_of(name)[0] for name in rivals or next(iter(sets), ())))
     if not names:
         raise ModelError(
-            "there are no rivals to distinguish",
+            "there are no rivals that a loop or sweep distinguishes",
             file=data.campaign.path,
-            found=f"the diagnosis of these tests is {diagnosis.verdict}",
-            expected="ambiguous",
-            hint="name effects with --rivals, or plan for parameters or predictions",
+            found=f"verdict {diagnosis.verdict}; next test: {diagnosis.next_test or 'none'}",
+            expected="an ambiguous verdict, with effects that a further loop or sweep distinguishes",
+            hint="make the next test, name effects with --rivals, or plan for parameters or predictions",
         )
     certain = [name for name in diagnosis.result.model.effects if name not in model.effects]
     leaders = [effects[0] for effects in sets if not {*names} & {*effects}]

@@ -69,7 +69,7 @@ def view_bytes(
                 raise kind("this link leads to no file", file=file, found=f"a link to {file.readlink()}")
             siblings = [path.name for path in file.parent.iterdir()] if file.parent.is_dir() else []
             hint = did_you_mean(file.name, siblings) or "check the path for a typing error"
-            expected = "a relative path counts from here, or from the folder of the file that names it"
+            expected = "a path that a file states starts at the folder of this file"
             raise kind("there is no such file", file=file, expected=f"an existing file; {expected}", hint=hint)
         if not file.is_file():
             found = "a folder" if file.is_dir() else "a device"

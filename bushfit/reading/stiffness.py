@@ -202,7 +202,7 @@ def check_stiffness(
         "no bushing has this loss",
         f"a loss factor (loss over storage stiffness) from {low:g} to {high:g}",
         "check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]; or is it 90 deg less the loss? "
-        "Beyond the resonance of a moving mass, leave the rows out.",
+        "Beyond the resonance of a moving mass, delete the rows from the file.",
     )
     for redundant_pair in AGREEING_PAIRS:
         if redundant_pair == pair or not set(redundant_pair) <= set(values):

@@ -273,7 +273,7 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
             "there are results already",
             file=folder if folder.name else None,
             found=", ".join(existing),
-            hint="--force replaces them; -o/--output names another folder",
+            hint="--force replaces them; -o/--output writes elsewhere",
         )
 
 

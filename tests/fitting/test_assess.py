@@ -56,6 +56,13 @@ def without(campaign: Campaign, direction: Direction) -> tuple[Sweep, ...]:
     return tuple(sweep for sweep in campaign.sweeps if sweep.direction is not direction)
 
 
+def test_the_nrmse_of_a_loop_excludes_the_zero_of_the_load_cell(small):
+    (loop,) = small.loops
+    shifted = replace(loop, force=loop.force + 0.02 * np.ptp(loop.force))
+    results = [fit_joint(PreparedCampaign.from_campaign(replace(small, loops=(each,)))) for each in (loop, shifted)]
+    assert results[1].quality.nrmse == pytest.approx(results[0].quality.nrmse, rel=0.02)
+
+
 @pytest.mark.parametrize("factor", [1.0, 1.05])
 def test_a_test_that_was_left_out_is_told_where_the_model_misses_it(small, factor):
     radial = [stiffer(sweep, factor) for sweep in without(small, Direction.AXIAL)]
