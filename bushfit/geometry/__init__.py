@@ -306,7 +306,7 @@ def unit_strain(bushing: Bushing | None, place: Place) -> float:
     >>> unit_strain(None, Specimen("coupon", "modulus"))
     0.5
     """
-    if isinstance(place, Direction) or place.axis:
+    if not isinstance(place, Specimen) or place.axis:
         return _present(bushing, place).unit_strain(_axis_of(place))
     if place.thickness is not None:
         return 0.5 / place.thickness
@@ -326,7 +326,7 @@ def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
     >>> stiffness_per_modulus(None, Specimen("mount", "shear", area=1e-3, thickness=0.01, elements=2))
     0.2
     """
-    if isinstance(place, Direction) or place.axis:
+    if not isinstance(place, Specimen) or place.axis:
         return _present(bushing, place).stiffness_per_modulus(_axis_of(place))
     if place.area is not None and place.thickness is not None:
         return place.elements * place.area / place.thickness
