@@ -1,7 +1,8 @@
-"""Mistakes in the record of a campaign, and how well the tests would agree without them.
+"""Mistakes in the record of a campaign (wrong units, conventions, dimensions), and the misfit without them.
 
-A mistake has no free parameter, so it costs only the logarithm of the number of mistakes considered. It has to close
-the whole gap, and to be more probable than every effect and every fault. The user decides whether it is mended.
+A claim is the hypothesis of one mistake. A mistake has no free parameter, so it costs only the logarithm of the number
+of mistakes considered. It has to close the whole gap, and to be more probable than every effect and every fault. The
+user decides whether to correct it.
 """
 
 from __future__ import annotations
@@ -29,10 +30,10 @@ _EPS_HALF = np.geomspace(2e-4, 0.2, 24)
 _COARSE = 1e-3
 #: Maximum number of points of a test that are used before any fit: enough to show the shape of its curves.
 _MOST_POINTS = 60
-#: Misfit with a claim corrected, relative to the misfit of the tests as recorded, up to which the claim is fitted;
-#: above 1 because the grid is coarse.
+#: Misfit with a mistake corrected, relative to the misfit of the tests as recorded, up to which a fit follows; above 1
+#: because the grid is coarse.
 _WORTH_A_FIT = 1.3
-#: Least relative change of the misfit by a claim; a claim that changes less is equivalent to a change of parameters.
+#: Least relative change of the misfit by a mistake; one that changes less is equivalent to a change of parameters.
 _LEAST_CHANGE = 1e-6
 #: Relative term on the diagonal of the normal equations that keeps three similar columns solvable.
 _RIDGE = 1e-12
@@ -40,7 +41,7 @@ _RIDGE = 1e-12
 
 @dataclass(frozen=True)
 class Claim:
-    """Hypothesis that the record of a campaign has one mistake, such as a wrong unit, in one or several tests.
+    """Hypothesis that the record of a campaign has one mistake, in one or several tests or in [bushing].
 
     Args:
         mistake: kind of mistake, such as a wrong unit, with its correction.
@@ -68,7 +69,7 @@ class Claim:
         """Values of the option --adopt that correct the mistake, "mistake:test" for each affected test."""
         return tuple(labelled(self.mistake.name, claim.test(data)) for claim in self.single_tests)
 
-    def words(self, data: PreparedCampaign) -> str:
+    def sentence(self, data: PreparedCampaign) -> str:
         """Sentence that states the mistake, with the files of the affected tests."""
         data_sets = [*data.loops, *data.sweeps]
         files = [file_or_name(data_sets[index].test) for index in self.tests]
@@ -82,13 +83,10 @@ class Claim:
         )
 
     def corrected(self, data: PreparedCampaign) -> PreparedCampaign:
-        """Return a campaign in which this mistake is corrected.
+        """Campaign in which the mistake is corrected, in the tests or in the dimensions of the bushing.
 
         Args:
             data: the campaign as it was read.
-
-        Returns:
-            The campaign with corrected tests, or corrected dimensions of the bushing.
         """
         campaign = data.campaign
         if not self.tests:
@@ -107,7 +105,7 @@ class Claim:
         return data.with_rubber_conditions()
 
 
-def adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[PreparedCampaign, list[str]]:
+def correct_adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[PreparedCampaign, list[str]]:
     """Correct the mistakes that the user adopts with the option --adopt.
 
     Args:
@@ -123,13 +121,13 @@ def adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[PreparedCam
     messages = []
     for name in names:
         claim = _parse_claim(data, name)
-        messages.append(f"corrected by --adopt {name}: read as if {claim.words(data)}; {claim.corrections(data)[0]}")
+        messages.append(f"corrected by --adopt {name}: read as if {claim.sentence(data)}; {claim.corrections(data)[0]}")
         data = claim.corrected(data)
     return data, messages
 
 
 def _parse_claim(data: PreparedCampaign, name: str) -> Claim:
-    """Convert one value of --adopt to a claim (hypothesis of a mistake in the record).
+    """Convert one value of --adopt to the hypothesis of a mistake in the record.
 
     Args:
         data: the campaign as it was read.
@@ -138,12 +136,12 @@ def _parse_claim(data: PreparedCampaign, name: str) -> Claim:
     Raises:
         ModelError: no such test, or the mistake is not possible in the test.
     """
-    mistake, test = get_mistake(name), name.partition(SEPARATOR)[2]
+    mistake, (mistake_name, _, test) = get_mistake(name), name.partition(SEPARATOR)
     data_sets: list[MeasuredTest] = [*data.loops, *data.sweeps]
-    possible = [index for index, one in enumerate(data_sets) if mistake and _is_possible(mistake, one, data)]
+    possible = [index for index, data_set in enumerate(data_sets) if mistake and _is_possible(mistake, data_set, data)]
     tests = tuple(index for index in possible if data_sets[index].name == test)
     if mistake is None or bool(tests) != bool(mistake.kinds) or (test and not tests):
-        expected = [labelled(name.partition(SEPARATOR)[0], data_sets[index].name) for index in possible]
+        expected = [labelled(mistake_name, data_sets[index].name) for index in possible]
         raise ModelError(
             "this mistake is not possible in this test",
             found=name,
@@ -155,7 +153,7 @@ def _parse_claim(data: PreparedCampaign, name: str) -> Claim:
 
 
 def _is_possible(mistake: Mistake, data_set: MeasuredTest, data: PreparedCampaign) -> bool:
-    """True if a mistake is possible in a test: it can occur there, and explains an implausible modulus or strain.
+    """True if a mistake is possible in a test, whose modulus and strain it must make plausible.
 
     Args:
         mistake: kind of mistake, such as a wrong unit.
@@ -169,14 +167,14 @@ def _is_possible(mistake: Mistake, data_set: MeasuredTest, data: PreparedCampaig
 
 
 def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
-    """List all possible mistakes in a record, each in one test, in all tests of a kind or direction, or in all tests.
+    """List the hypotheses of one mistake in the record: in one test, in all of a kind or direction, or in all tests.
 
     Args:
         data: the campaign as it was read.
         without: mistakes not to consider, "mistake" or "mistake:test".
 
     Returns:
-        Claims without duplicates.
+        Hypotheses without duplicates.
     """
     data_sets: list[MeasuredTest] = [*data.loops, *data.sweeps]
     found = []
@@ -200,8 +198,8 @@ def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
 
 
 @dataclass(frozen=True, eq=False)
-class Screen:
-    """Fast comparison of claims by the misfit of the paper's model to the corrected tests, before any fit.
+class ClaimScreening:
+    """Selection of the mistakes that are worth a fit, by the misfit of the paper's model to the corrected tests.
 
     Args:
         data: the campaign as it was read.
@@ -212,18 +210,15 @@ class Screen:
     """
 
     data: PreparedCampaign
-    _known: dict[tuple[int, str, Bushing | None], Array] = field(default_factory=dict)
+    _products: dict[tuple[int, str, Bushing | None], Array] = field(default_factory=dict)
     _responses: dict[tuple[Bushing | None, Place, bytes, bytes], Array] = field(default_factory=dict)
 
     def best(self, candidates: Sequence[Claim], limit: int) -> list[Claim]:
-        """Select the claims with the smallest misfit.
+        """Select the mistakes that change the misfit and may lower it in a fit, the smallest misfit first.
 
         Args:
-            candidates: claims to compare.
-            limit: maximum number of claims.
-
-        Returns:
-            Claims that change the misfit and may lower it in a fit, the smallest misfit first.
+            candidates: hypotheses of mistakes to compare.
+            limit: maximum number of mistakes to select.
         """
         before, misfits = self.misfit(None), np.array([self.misfit(claim) for claim in candidates])
         changed = np.abs(misfits - before) > _LEAST_CHANGE * before
@@ -232,7 +227,7 @@ class Screen:
         return [candidates[index] for index in better][:limit]
 
     def misfit(self, claim: Claim | None) -> float:
-        """Compute the misfit of the paper's model to the tests: least sum of squared residuals over its parameters.
+        """Compute the least sum of squared residuals of the paper's model over its parameters.
 
         Args:
             claim: mistake that is corrected first; None for the tests as recorded.
@@ -246,7 +241,7 @@ class Screen:
         data_sets: list[MeasuredTest] = [*self.data.loops, *self.data.sweeps]
         mistakes = [claim.mistake if claim and index in claim.tests else None for index in range(len(data_sets))]
         try:
-            parts = [self._part(index, test, mistakes[index], bushing) for index, test in enumerate(data_sets)]
+            parts = [self._test_products(index, test, mistakes[index], bushing) for index, test in enumerate(data_sets)]
         except ModelError:  # a shape for which a formula was not checked
             return np.inf
         whole = np.sum(parts, axis=0)
@@ -256,8 +251,10 @@ class Screen:
         explained = np.einsum("gi,gi->g", right, np.linalg.solve(unit, right[..., None])[..., 0])
         return max(_paraboloid_minimum((total - explained).reshape(_EPS_HALF.size, _ALPHA.size)), 0.0)
 
-    def _part(self, index: int, data_set: MeasuredTest, mistake: Mistake | None, bushing: Bushing | None) -> Array:
-        """Inner products of the three model columns and the measured stiffness of one test, at each of g grid points.
+    def _test_products(
+        self, index: int, data_set: MeasuredTest, mistake: Mistake | None, bushing: Bushing | None
+    ) -> Array:
+        """Inner products of the stiffness per unit of mu, m and sigma_fmax and the measured stiffness of one test.
 
         Args:
             index: index of the test, loops before sweeps.
@@ -269,19 +266,17 @@ class Screen:
             Matrix of products at each value of alpha and eps_half, (g, 4, 4).
         """
         key = (index, mistake.name if mistake else "", bushing)
-        if key not in self._known:
-            direction, frequency, amplitude, stiffness, error = _points(data_set, mistake)
-            columns = self._columns(bushing, direction, frequency, amplitude) / (stiffness * error)
+        if key not in self._products:
+            direction, frequency, amplitude, stiffness, error = _corrected_points(data_set, mistake)
+            columns = self._responses_of(bushing, direction, frequency, amplitude) / (stiffness * error)
             wanted = np.broadcast_to(1.0 / error, (len(columns), 1, error.size))
             rows = np.concatenate((columns, wanted), axis=1)
             rows = np.concatenate((rows.real, rows.imag), axis=-1)
-            self._known[key] = rows @ rows.transpose(0, 2, 1)
-        return self._known[key]
+            self._products[key] = rows @ rows.transpose(0, 2, 1)
+        return self._products[key]
 
-    def _columns(self, bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
-        """Complex stiffness per unit of mu, m and sigma_fmax at all g grid values, (g, 3, n); cached.
-
-        Mistakes that keep the operating points share the cached result.
+    def _responses_of(self, bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
+        """Complex stiffness per unit of mu, m and sigma_fmax at g values of alpha and eps_half, (g, 3, n).
 
         Args:
             bushing: bushing with its dimensions; None for tests of specimens.
@@ -291,7 +286,13 @@ class Screen:
         """
         key = (bushing, direction, frequency.tobytes(), amplitude.tobytes())
         if key not in self._responses:
-            self._responses[key] = _columns(bushing, direction, frequency, amplitude)
+            alpha, eps_half = (axis.reshape(-1, 1) for axis in np.meshgrid(_ALPHA, _EPS_HALF))
+            model = Model.with_defaults(bushing, BASE, {})
+            names = ("mu", "m", "sigma_fmax")
+            none = {**dict.fromkeys(names, 0.0), "alpha": alpha, "eps_half": eps_half}
+            responses = (model.stiffness(direction, frequency, amplitude, values={**none, name: 1.0}) for name in names)
+            shape = alpha.size, frequency.size
+            self._responses[key] = np.stack([np.broadcast_to(response, shape) for response in responses], axis=1)
         return self._responses[key]
 
 
@@ -316,33 +317,16 @@ def _paraboloid_minimum(misfit: Array) -> float:
     return float(near[4]) + min(fall, 0.0)
 
 
-def _columns(bushing: Bushing | None, direction: Place, frequency: Array, amplitude: Array) -> Array:
-    """Complex stiffness per unit of mu, m and sigma_fmax at the g grid values of alpha and eps_half, (g, 3, n).
+def _corrected_points(data_set: MeasuredTest, mistake: Mistake | None) -> tuple[Place, Array, Array, Array, Array]:
+    """Operating points of a test in which a mistake is corrected; repeated points are averaged.
 
     Args:
-        bushing: bushing with its dimensions; None for tests of specimens.
-        direction: direction or specimen.
-        frequency: [Hz], (n,).
-        amplitude: zero-to-peak [m or rad, or strain], (n,).
-    """
-    names = ("mu", "m", "sigma_fmax")
-    alpha, eps_half = (axis.reshape(-1, 1) for axis in np.meshgrid(_ALPHA, _EPS_HALF))
-    model = Model.with_defaults(bushing, BASE, {})
-    none = {**dict.fromkeys(names, 0.0), "alpha": alpha, "eps_half": eps_half}
-    responses = [
-        np.broadcast_to(
-            model.stiffness(direction, frequency, amplitude, values={**none, name: 1.0}), (alpha.size, frequency.size)
-        )
-        for name in names
-    ]
-    return np.stack(responses, axis=1)
+        data_set: the test as it was recorded.
+        mistake: kind of mistake; None for the test as recorded.
 
-
-def _points(data_set: MeasuredTest, mistake: Mistake | None) -> tuple[Place, Array, Array, Array, Array]:
-    """Operating points of a test in which a mistake is corrected.
-
-    Direction, frequency [Hz], amplitude [m or rad], complex stiffness and its relative error, (n,) each.
-    Repeated points are averaged, and at most `_MOST_POINTS` points are kept.
+    Returns:
+        Direction, and frequency [Hz], amplitude [m or rad], complex stiffness and its relative error at n points, at
+        most `_MOST_POINTS`, (n,) each.
     """
     if isinstance(data_set, MeasuredSweep):
         sweep, noise = data_set.sweep, np.hypot(data_set.relative_noise, max(data_set.noise.shared))
@@ -354,9 +338,9 @@ def _points(data_set: MeasuredTest, mistake: Mistake | None) -> tuple[Place, Arr
         )
         mended = mistake.corrected_harmonic(sweep) if mistake else sweep
     points = np.stack((mended.frequency, mended.amplitude_reached))
-    distinct, place, count = np.unique(points, axis=1, return_inverse=True, return_counts=True)
-    place = place.ravel()
-    mean = (np.bincount(place, mended.stiffness.real) + 1j * np.bincount(place, mended.stiffness.imag)) / count
+    distinct, index, count = np.unique(points, axis=1, return_inverse=True, return_counts=True)
+    index = index.ravel()
+    mean = (np.bincount(index, mended.stiffness.real) + 1j * np.bincount(index, mended.stiffness.imag)) / count
     thin = np.unique(np.linspace(0, count.size - 1, min(count.size, _MOST_POINTS)).round().astype(int))
     error = np.hypot(noise / np.sqrt(count[thin]), _COARSE)
     return mended.direction, *distinct[:, thin], mean[thin], error

@@ -75,7 +75,7 @@ def claim_entries(
             why,
             alternatives,
             test=single.test(data),
-            sentence=single.words(data),
+            sentence=single.sentence(data),
             correction=single.corrections(data)[0],
         )
         for single in (claim.single_tests if claim else ())
@@ -88,7 +88,7 @@ def explanation_odds(finding: Finding, data: PreparedCampaign) -> Odds:
     sentences, models = [], []
     for composition in compositions:
         claim = composition.best.claim
-        parts = [claim.words(data)] if claim else []
+        parts = [claim.sentence(data)] if claim else []
         parts += [f"{get_effect(name).phrase} ({name})" for name in composition.names]
         parts += [f"a faulty test: {part.name}" for part in composition.faulty_parts]
         *parts, last = (*parts, *_nameless(composition))

@@ -143,12 +143,12 @@ class DiagnosisWriter:
         command = " ".join(["bushfit diagnose CAMPAIGN", *(f"--adopt {name}" for name in claim.labels(data))])
         corrections = "; ".join(claim.corrections(data))
         advice = f"if the records of the tests confirm this mistake, state {corrections} (or {command})"
-        summary = f"these tests agree if {claim.words(data)}"
+        summary = f"these tests agree if {claim.sentence(data)}"
         entries = claim_entries(first, self.finding, self.request)
         diagnosis = self._build(
             self.finding.verdict, summary, self.request.base, entries, places=best, next_test=advice
         )
-        warning = f"fitted to the tests as they are, which only agree if {claim.words(data)}: {advice}"
+        warning = f"fitted to the tests as they are, which only agree if {claim.sentence(data)}: {advice}"
         after = self._with_free_gains(best.state.evidence)
         return replace(
             diagnosis,

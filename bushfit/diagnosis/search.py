@@ -14,7 +14,7 @@ from math import log
 
 import numpy as np
 
-from bushfit.diagnosis.claims import Screen, claims
+from bushfit.diagnosis.claims import ClaimScreening, claims
 from bushfit.diagnosis.evidence import Evidence, fit
 from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart, OutlierCluster
 from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, SearchState, Tests
@@ -277,7 +277,7 @@ class Search:
         """States of the starting model fitted to the tests with one mistake in the record corrected, the best first."""
         data, base = self.request.data, self.request.base
         possible = claims(data, self.request.without)
-        for claim in track("mistakes put right", list(Screen(data).best(possible, _CLAIMS))):
+        for claim in track("mistakes put right", list(ClaimScreening(data).best(possible, _CLAIMS))):
             with suppress(FitError, ModelError):  # corrected tests that nothing can be fitted to
                 evidence = self.request.fit_corrected(claim.corrected(data))
                 if [test.size for test in evidence.data_sets] == [test.size for test in base.data_sets]:

@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
-from bushfit.diagnosis.claims import Screen, adopted, claims
-from bushfit.diagnosis.condense import condensed
+from bushfit.diagnosis.claims import ClaimScreening, claims, correct_adopted
+from bushfit.diagnosis.condense import shorten_tests
 from bushfit.diagnosis.evidence import EVALUATIONS, Evidence
 from bushfit.diagnosis.explanations import outlier_clusters
 from bushfit.diagnosis.hypotheses import DiagnosisRequest
@@ -54,7 +54,7 @@ def diagnose(
         get_candidate(name)
         if place := place_suffix(name):
             get_places(place, data.campaign.specimens)
-    data, messages = adopted(data, [name for name in settings.adopt if get_mistake(name)])
+    data, messages = correct_adopted(data, [name for name in settings.adopt if get_mistake(name)])
     excluded: tuple[Outlier, ...] = ()
     fixed = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
     for _ in range(_MAXIMUM_ROUNDS):  # single outliers of sweeps, which repeats and neighbours contradict
@@ -62,9 +62,9 @@ def diagnose(
             base, start, outliers = _initial_fit(data, model, settings, fixed)
         except FitError as error:
             thousands = [claim for claim in claims(data, settings.without) if claim.mistake.scales]
-            for claim in Screen(data).best(thousands, 1):
+            for claim in ClaimScreening(data).best(thousands, 1):
                 options = " ".join(f"--adopt {label}" for label in claim.labels(data))
-                error.hint = f"these tests agree if {claim.words(data)}: {options} corrects it"
+                error.hint = f"these tests agree if {claim.sentence(data)}: {options} corrects it"
             raise
         known_rows = {(outlier.test, outlier.row) for outlier in excluded}  # a robust fit finds them anew
         candidates = (*outliers, *list_outliers(base.model, split_by_kind(base.data_sets)[1]))
@@ -72,7 +72,7 @@ def diagnose(
         if not wild:
             break
         data, excluded = data.without(wild), (*excluded, *wild)
-    whole, (data, reductions) = data, condensed(data)
+    whole, (data, reductions) = data, shorten_tests(data)
     if reductions:
         base, start, outliers = _initial_fit(data, model, settings, fixed)
     search = Search(

@@ -10,7 +10,7 @@ from rigged import LEVELS
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings
-from bushfit.diagnosis.condense import condensed
+from bushfit.diagnosis.condense import shorten_tests
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects.contract import Array
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -62,7 +62,7 @@ def off(sweep: Sweep) -> Array:
 
 def test_means_are_as_sharp_as_their_points():
     """Scatter of 900 points in 100 bands falls with the root of 9, and so does the noise that is estimated."""
-    (sweep,), said = condensed(data_of(swept(PAPER)))[0].sweeps, condensed(data_of(swept(PAPER)))[1]
+    (sweep,), said = shorten_tests(data_of(swept(PAPER)))[0].sweeps, shorten_tests(data_of(swept(PAPER)))[1]
     assert said == ("swept: 5400 points are averaged to 600 narrow bands for the diagnosis",)
     expected = SCATTER / np.sqrt(POINTS / 100)
     assert np.std(off(sweep.sweep).real) == pytest.approx(expected, rel=0.1)
@@ -75,7 +75,7 @@ def test_of_very_many_levels_some_are_diagnosed_and_none_forgotten():
     """Rows of levels that are not looked at were measured all the same, and the rubber remembers them."""
     levels = np.random.default_rng(1).permutation(np.geomspace(1e-5, 1e-3, 300))
     data = data_of(grid(levels))
-    banded, said = condensed(data)
+    banded, said = shorten_tests(data)
     sweep = banded.sweeps[0].sweep
     assert said == ("silent: 40 of its 300 runs at one level, or frequency, are used in the diagnosis, evenly spread",)
     assert sweep.frequency.size == 160
@@ -102,7 +102,7 @@ def test_of_very_many_levels_some_are_diagnosed_and_none_forgotten():
 def test_means_lie_on_the_curve(sweep, largest):
     """Evenly in frequency the first bands are wide in its logarithm; where neither is held, points at one frequency may
     have amplitudes far apart, and are taken in turn."""
-    made = condensed(data_of(sweep))[0].sweeps[0].sweep
+    made = shorten_tests(data_of(sweep))[0].sweeps[0].sweep
     assert made.frequency.size < sweep.frequency.size
     assert np.abs(off(made)).max() < largest
     if sweep.stepped == "frequency":
@@ -136,9 +136,9 @@ def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_re
         for n, (of, size, place) in enumerate(made)
     )
     data = PreparedCampaign.from_campaign(replace(campaign, loops=loops, rig=RigSettings(gain_error=0.01)))
-    assert condensed(data)[1] == ()
+    assert shorten_tests(data)[1] == ()
     monkeypatch.setattr("bushfit.diagnosis.condense._MOST_ROWS", most * data.loops[0].size)
-    fewer, said = condensed(data)
+    fewer, said = shorten_tests(data)
     assert "".join(each.name for each in fewer.loops) == kept
     assert len(said) == (len(kept) < 6)
     assert all(f"{len(kept)} of the 6 loops are used in the diagnosis" in words for words in said)
