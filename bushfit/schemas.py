@@ -87,19 +87,26 @@ def _generator(way: str) -> Any:
     from pydantic.json_schema import GenerateJsonSchema
 
     class Generator(GenerateJsonSchema):
+        """Methods of pydantic for parts of a schema, with the changes for the files of bushfit."""
+
         def field_title_should_be_set(self, _: Any) -> bool:
-            return False  # a title made of the key says nothing that the key does not
+            """No key has a title: a title made of the key says nothing that the key does not."""
+            return False
 
         def field_is_required(self, field: Any, total: bool) -> bool:
+            """All keys are required in a file that bushfit writes."""
             return (way == "written" and field["type"] == "dataclass-field") or super().field_is_required(field, total)
 
         def nullable_schema(self, schema: Any) -> dict[str, Any]:
+            """Schema of a value that may be None; TOML has no null."""
             return self.generate_inner(schema["schema"]) if way == "toml" else super().nullable_schema(schema)
 
         def dataclass_schema(self, schema: Any) -> dict[str, Any]:
+            """Schema of a dataclass with the descriptions of its keys."""
             return _explained(super().dataclass_schema(schema), schema["cls"])
 
         def typed_dict_schema(self, schema: Any) -> dict[str, Any]:
+            """Schema of a TypedDict with the descriptions of its keys."""
             return _explained(super().typed_dict_schema(schema), schema["cls"])
 
     return Generator

@@ -90,6 +90,7 @@ def check_effect(name: str, *, add: AddEffect | None = None, seed: int = 2024060
 
 
 def _check_record(effect: Effect) -> None:
+    """Check that an effect has a sentence, an equation and a source, and parameters with consistent bounds."""
     assert effect.sentence.endswith((".", ".)")), f"{effect.name}: the sentence has no full stop"
     assert effect.equation, f"{effect.name}: no equation"
     assert effect.source, f"{effect.name}: no source"
@@ -126,6 +127,7 @@ def _check_neutral(plain: Model, effect: Effect, direction: Direction, amplitude
 
 
 def _check_harmonic(model: Model, effect: Effect, direction: Direction, frequency: float, amplitude: float) -> None:
+    """Check that the first harmonic of the force over a steady sine of displacement equals the stiffness."""
     motion = History.steady(amplitude * np.cos(2.0 * np.pi * np.arange(_SAMPLES) / _SAMPLES), frequency)
     force = model.force(direction, motion, conditions=CONDITIONS)
     harmonic = 2.0 * np.fft.rfft(force)[..., 1] / (_SAMPLES * amplitude)
@@ -137,6 +139,7 @@ def _check_harmonic(model: Model, effect: Effect, direction: Direction, frequenc
 
 
 def _check_arrays(model: Model, direction: Direction, amplitude: float, rng: np.random.Generator) -> None:
+    """Check that arrays of parameter values give the same stiffness and force as one value after the other."""
     models = [
         model.with_values({name: value * rng.uniform(0.9, 1.1) for name, value in model.values.items()})
         for _ in range(3)

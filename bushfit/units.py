@@ -246,6 +246,7 @@ def format_aligned(values: Sequence[float], digits: int, minimum_digits: int = 0
     decimals = digits - 1 - math.floor(math.log10(abs(first)))
 
     def text(value: float) -> str:
+        """Format one number with the common decimals."""
         rounded = round(value, decimals) + 0.0 if math.isfinite(value) else value  # no -0
         if abs(value) >= _LARGEST_PLAIN or not math.isfinite(value):
             return number(value, digits)
@@ -335,6 +336,7 @@ def _by_pint(text: str) -> tuple[float, str]:
 
 @lru_cache(maxsize=1)
 def _registry() -> pint.UnitRegistry[Any]:
+    """Units of pint as units.txt defines them; imported at the first use, because pint is slow to import."""
     import pint
 
     return pint.UnitRegistry(str(Path(__file__).with_name("units.txt")), cache_folder=None)

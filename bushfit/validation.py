@@ -91,6 +91,7 @@ def converter(
     """
 
     def run(raw: Any, info: ValidationInfo) -> Any:
+        """Convert a raw value; pydantic takes a ValueError as its own."""
         try:
             return convert(raw, info)
         except BushfitError as error:
@@ -235,9 +236,9 @@ def si(*units: str) -> BeforeValidator:
     return converter(lambda raw, _: parse_quantity(raw, *units), text(f"a number with a unit of {' or '.join(units)}"))
 
 
-def text(words: str) -> dict[str, Any]:
-    """JSON Schema of a text, described by the words."""
-    return {"type": "string", "description": words}
+def text(description: str) -> dict[str, Any]:
+    """JSON Schema of a value that is a text in the file, with a description for users."""
+    return {"type": "string", "description": description}
 
 
 def table(convert: Callable[[dict[str, Any]], Any], written: Mapping[str, Any] | None = None) -> BeforeValidator:

@@ -81,6 +81,7 @@ def _start_worker() -> None:
     """Initialise a worker process: it ignores Ctrl-C, which the parent handles, and ends when the parent ends."""
 
     def follow(parent: Any) -> None:
+        """End this process as soon as the parent process ends."""
         parent.join()
         os._exit(1)
 

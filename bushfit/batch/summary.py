@@ -198,7 +198,7 @@ class BatchResult:
         return cast("Mapping[str, Any]", to_json_data(whole, BatchFile))
 
     def quantity_table(self, name: str, column: PartQuantity) -> QuantityTable:
-        """Compute the scatter, limits and capability of one quantity over the parts.
+        """Summarize one quantity over all parts: median, scatter, limits and capability.
 
         Args:
             name: name of the quantity.
@@ -226,14 +226,14 @@ class BatchResult:
         return QuantityTable(known_values.size, median, sigma, detectable, minimum, maximum, cp, cpk)
 
     def part_table(self, index: int, columns: Mapping[str, PartQuantity]) -> PartTable:
-        """Make the entry of one part in `batch.json`.
+        """Summarize one part of the batch: result by the limits, deviations from the other parts, and values.
 
         Args:
             index: index of the part in the batch, from 0.
             columns: quantities by name, with the units of their table columns.
 
         Returns:
-            Result by the limits, deviations from the other parts, and values.
+            Entry of the part in `batch.json`.
         """
         row, record, limits = self.plan.rows[index], self.records[index], self.plan.limits
         result, misses, doubtful = None, dict[str, str](), dict[str, str]()
@@ -281,6 +281,7 @@ class BatchResult:
         """
 
         def listed(names: Sequence[str]) -> str:
+            """Join up to ten names, and state how many more there are."""
             more = f" and {len(names) - _NAMES_LISTED} more" if len(names) > _NAMES_LISTED else ""
             return ", ".join(names[:_NAMES_LISTED]) + more
 

@@ -96,9 +96,11 @@ def _digits(sweep: Sweep, rows: NDArray[np.bool_] | slice = slice(None)) -> byte
 
 
 def _with_note(test: _Test, note: str) -> _Test:
+    """Add a sentence to the notes on how the file of a test was read."""
     source: Source | None = test.source
     return replace(test, source=source and source.with_note(note))
 
 
 def _listed(names: Sequence[str]) -> str:
+    """Join names as in "a, b and c"."""
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))

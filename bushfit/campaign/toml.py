@@ -84,6 +84,7 @@ def body_lines(bushing: Bushing | None, specimens: Collection[Specimen]) -> list
 
 
 def _bushing_lines(bushing: Bushing) -> list[str]:
+    """Write the name, the sizes and, unless it is "paper", the shape of a bushing as lines of TOML."""
     sizes = [f'{key} = "{getattr(bushing, key) * 1e3:.6g} mm"' for key in ("inner_radius", "outer_radius", "length")]
     shape = [f'shape = "{bushing.shape}"'] if bushing.shape != "paper" else []
     return [f"name = {toml_value(bushing.name)}", *sizes, *shape]

@@ -348,10 +348,12 @@ def bushing_at(bushing: Bushing | None, place: Place) -> Bushing | None:
 
 
 def _axis_of(place: Place) -> Direction:
+    """Direction of the bushing in which the motion of a test is."""
     return place.axis if isinstance(place, Specimen) and place.axis else Direction(str(place))
 
 
 def _present(bushing: Bushing | None, place: Place) -> Bushing:
+    """Bushing to which a direction or specimen belongs; without one, a ModelError is raised."""
     if (bushing := bushing_at(bushing, place)) is None:
         raise ModelError(
             "there is no bushing",

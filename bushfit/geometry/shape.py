@@ -36,7 +36,7 @@ class Correction(NamedTuple):
     Args:
         stiffness: radial stiffness over the stiffness of Eqs. 11 and 12.
         strain: equivalent strain over the strain of Eq. 8. At this strain the friction branch equals its average over
-            the uneven strain field, for strain amplitudes from 0.3 to 3 eps_half.
+            the uneven strain field, for strain amplitudes from 0.3 to 3 times that of half the friction (eps_half).
         softening: relative increase of the radial compliance, divided by shear modulus over bulk modulus.
     """
 

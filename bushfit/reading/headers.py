@@ -228,7 +228,7 @@ class Column(Heading):
 
 
 class Vocabulary:
-    """Dictionary that finds the role and unit of a column from its header.
+    """Dictionary of column names: finds the unit and the role (the quantity, such as "force") of a header.
 
     Args:
         names: usual column names, by role.
@@ -256,7 +256,7 @@ class Vocabulary:
     def shared(
         cls, names: Mapping[str, Sequence[str]], columns: Mapping[str, str], stated_units: Mapping[str, str]
     ) -> "Vocabulary":
-        """Return the cached vocabulary of usual names and the user's columns and units, all by role."""
+        """Return a vocabulary from a cache, because building one is slow; arguments as those of the class."""
         usual = tuple((role, tuple(words)) for role, words in names.items())
         return _shared(usual, tuple(columns.items()), tuple(stated_units.items()))
 
@@ -276,7 +276,7 @@ class Vocabulary:
         return self._known[key]
 
     def name_of(self, role: str) -> str:
-        """Return the column name that the user gave for a role, or else its first usual name."""
+        """Return the column name that the user gave for a role such as "force", or else its first usual name."""
         return self._names[role]
 
     def roles(self, cells: Sequence[str]) -> set[str]:
@@ -284,6 +284,7 @@ class Vocabulary:
         return {heading.role for cell in cells if (heading := self.heading(cell))}
 
     def _read(self, header: str, unit_below: str | None) -> Heading | None:
+        """Find the meaning of a header cell, as `heading` does, but not in the cache."""
         text = _TWO_PRIMES.sub(r"\1''", _TAN.sub("tan delta", _CHANNEL.sub("", header))).translate(_SPELLINGS)
         text = _DECIBELS.sub(r" [dB \1]", text)
         logarithm = 0.0
@@ -336,16 +337,20 @@ def _shared(
     columns: tuple[tuple[str, str], ...],
     stated_units: tuple[tuple[str, str], ...],
 ) -> Vocabulary:
+    """Vocabulary from arguments that can be the key of a cache; see `Vocabulary.shared`."""
     return Vocabulary(dict(names), dict(columns), dict(stated_units))
 
 
 def fits(word: str, role: str, unit: str | None) -> bool:
-    """Return False if the unit of a column shows that its ambiguous name does not mean a role.
+    """Check by its unit whether a column with an ambiguous name, such as "f", can have a role, such as "force".
 
     Args:
         word: column name, in the spelling that `plain` returns.
         role: role that the name may mean.
         unit: unit of the column, "" if it has none; None if it is not known.
+
+    Returns:
+        False if the unit excludes the role.
     """
     if unit == "" and (role in _NEEDING_UNITS or word == "k"):
         return False

@@ -71,8 +71,8 @@ class Loop:
         noise: standard deviation of the force, relative to its half range; None if the campaign does not state it.
         has_recorded_time: True if time was recorded, False if it was rebuilt from the displacement.
         part: position in a record of several loops; None if the record is one loop.
-        softening: excess stiffness of the first cycle relative to the last; None if noise and the memory of rubber
-            explain the difference.
+        softening: stiffness of the first cycle relative to that of the last, minus 1; None if noise and the memory of
+            the rubber explain the difference.
         temperature: temperature of the test [K]; None if it is not known.
         preload: static displacement or force about which the test was made; None if it is not known.
 
@@ -166,6 +166,7 @@ class Sweep:
 
 
 def _check_lengths(name: str, *columns: NDArray[np.generic]) -> None:
+    """Raise a MeasurementError if the columns of a test are not one-dimensional arrays of equal length."""
     shapes = [column.shape for column in columns]
     if len(set(shapes)) > 1 or len(shapes[0]) != 1:
         raise MeasurementError(f"the columns of {name} differ in shape", found=str(shapes), expected="(n,) each")

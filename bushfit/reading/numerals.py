@@ -38,6 +38,7 @@ class Numerals:
 
     @cached_property
     def _pattern(self) -> re.Pattern[str]:
+        """Regular expression of a number in this notation."""
         mark = re.escape(self.decimal)
         forms = [rf"(?:\d+(?:{mark}\d*)?|{mark}\d+)(?:[eEdD]{_SIGN}?\d+)?"]  # Fortran writes 1.0D-03
         if self.thousands:

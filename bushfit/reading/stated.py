@@ -42,6 +42,7 @@ def motion_quantity(suffix: str = "") -> BeforeValidator:
     """
 
     def convert(raw: Any, info: ValidationInfo) -> float:
+        """SI value of a text, in the unit of the direction or specimen that the same table states."""
         direction = info.data.get("direction")
         motion = direction.motion if isinstance(direction, Place) else TRANSLATION
         return parse_quantity(raw, motion.displacement_unit + suffix)
@@ -106,6 +107,7 @@ def with_places(tables: Any, specimens: Sequence[Specimen]) -> Any:
     """
 
     def with_place(test: Any, place: str) -> Any:
+        """Replace the keys of one test that state what was tested; `place` locates the test in errors."""
         if not isinstance(test, dict):
             return test
         with error_location(place=place):
@@ -123,11 +125,17 @@ def with_places(tables: Any, specimens: Sequence[Specimen]) -> Any:
 
 
 def _roles(roles: Collection[str], value_name: str) -> BeforeValidator:
-    """Validator that refuses keys that are not roles of columns; `value_name` describes the values in the schema."""
+    """Make a validator of a table such as { force = "F1" }, which refuses keys that are no roles of columns.
+
+    Args:
+        roles: roles of columns that are valid keys, such as "force".
+        value_name: description of the values for the JSON Schema, such as "unit".
+    """
     written = {"properties": {role: text(f"{value_name} of {role.replace('_', ' ')}") for role in roles}}
     closed = {"type": "object", **written, "additionalProperties": False}
 
     def check_keys(raw: dict[str, Any]) -> dict[str, Any]:
+        """Return the table unchanged if all its keys are roles."""
         for role in raw:
             if role not in roles:
                 raise unknown_key(role, roles)
@@ -194,7 +202,7 @@ class LoopFile(TestFile):
     """Table [[loops]]: a file and its missing information, for `loops.read_loop`.
 
     Args:
-        columns: header or number of each column with an unusual name, by role.
+        columns: header or number of each column with an unusual name, by its role, such as force.
         units: units that the file does not state, by role.
         force_sign: -1 if the load cell has the opposite sign.
         sampling_rate: sampling rate [Hz], for a file without time that does not state it.
@@ -255,7 +263,7 @@ class SweepFile(TestFile):
     """Table [[sweeps]]: a file and its missing information, for `sweeps.read_sweep`.
 
     Args:
-        columns: header or number of each column with an unusual name, by role.
+        columns: header or number of each column with an unusual name, by its role, such as force.
         units: units that the file does not state, by role.
         amplitude: convention of the amplitudes; default that of the header, else zero-to-peak.
         at_amplitude: amplitude of all rows with its unit, "0.1 mm" or "0.15 %", for a file without an amplitude column.

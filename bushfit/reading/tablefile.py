@@ -89,6 +89,7 @@ def _texts(column: pd.Series[Any], point: str) -> list[str]:
         return texts if point == "." else [text.replace(".", point) for text in texts]
 
     def cell_text(value: object) -> str:
+        """Text of a cell that may be a number, a text or None."""
         if isinstance(value, float):
             return "" if value != value else f"{value:.7g}".replace(".", point)
         if isinstance(value, str):
@@ -169,6 +170,7 @@ def _sheet_name(title: str, used: set[str]) -> str:
     """Sheet name that Excel allows and that is not among the used names, to which it is added in lower case."""
 
     def cut(text: str, length: int) -> str:
+        """Start of a text, at most `length` UTF-16 units long."""
         return text.encode("utf-16-le")[: 2 * length].decode("utf-16-le", "ignore")
 
     plain = cut(_UNSAFE_IN_SHEETS.sub("_", _text(title)), _LONGEST_SHEET).strip(" '") or "table"
