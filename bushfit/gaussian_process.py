@@ -63,14 +63,14 @@ def in_lengths(points: Array, lengths: Sequence[float]) -> Array:
 
 
 def matern(points: Array, nodes: Array) -> Array:
-    """Matern 5/2 correlation of points with nodes, both in units of the correlation lengths.
+    """Matern 5/2 correlation of a Gaussian process between operating points.
 
     Args:
-        points: points, (..., n, d).
-        nodes: nodes, (m, d).
+        points: points in units of the correlation lengths, (..., n, d).
+        nodes: reference points (nodes) in the same units, (m, d).
 
     Returns:
-        Correlation of each point with each node, (..., n, m).
+        Correlation of the process at each point with that at each node, (..., n, m).
 
     >>> matern(np.zeros((1, 2)), np.array([[0.0, 0.0], [1.0, 0.0], [9.0, 0.0]])).round(3)
     array([[1.   , 0.524, 0.   ]])
@@ -83,7 +83,7 @@ def matern(points: Array, nodes: Array) -> Array:
 
 
 def condition(points: Array, nodes: Array) -> tuple[Array, Array]:
-    """Condition a Gaussian process of unit variance on its values at nodes.
+    """Condition a Gaussian process of unit variance on its values at some points, the nodes.
 
     Args:
         points: points in units of the correlation lengths, (..., n, d).

@@ -210,7 +210,7 @@ def classify_recording(measured: Loop, by_name: Labels, test: LoopFile) -> tuple
 
 
 def describe_columns(table: Table, *, is_sweep: bool) -> tuple[ColumnDescription, ...]:
-    """Describe the columns of a test file: header, role, unit and range.
+    """Describe the columns of a test file: header, role (quantity, such as "force"), unit and range.
 
     Returns:
         The columns in order, with the range of their values in the unit of the file.

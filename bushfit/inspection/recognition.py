@@ -184,7 +184,7 @@ def open_table(
 
     Args:
         file: test file, or its opened content.
-        names: known headers of the columns of this kind of test, by role.
+        names: known headers of the columns of this kind of test, by role such as "force".
         test_options: options of the test; options for columns of other tests are ignored.
         motion: kind of motion that the columns describe.
 

@@ -119,10 +119,12 @@ class Cells:
             raise self.error("the table cannot be read", found=str(error)) from error
 
     def fault(self, cells: Sequence[str | float]) -> str | None:
-        """Return the reason why a row is not data, as one of the words below; None for a row of data.
+        """Find the reason why a row is not data.
 
-        "other": clearly not data, such as a remark or a mean; "missing": a known placeholder instead of a number;
-        "word": another word instead of a number; "doubtful": looks like data, but cannot be read.
+        Returns:
+            "other" for what is clearly not data, such as a remark or a mean; "missing" for a placeholder such as NaN
+            instead of a number; "word" for another word instead of a number; "doubtful" for a row that looks like data
+            but cannot be read; None for a row of data.
         """
         texts = [str(cell) for cell in cells]
         if is_summary_row(texts):
@@ -267,7 +269,7 @@ class Cells:
         )
 
     def holds_numbers(self, index: int) -> bool:
-        """Return True if the first row of data has a number in the column with this index."""
+        """Return True if the column with this index has a number in the first row of data."""
         cell = self.first_row[index]
         return not isinstance(cell, str) or is_like_number(cell)
 
@@ -365,7 +367,7 @@ class Cells:
         return notations
 
     def number_texts(self) -> Iterator[tuple[Place, str]]:
-        """Yield location and text of each cell in columns with a role, except those that the file stores as numbers."""
+        """Yield location and text of each cell in columns of known quantity, unless the file stores it as a number."""
         indices = {column.index for column in self.roles.values()} - self.source.numeric - self.clocks
         for line, cells in self.rows() if indices else ():
             for index in indices:

@@ -131,7 +131,7 @@ def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, 
         columns: header or number of a column as the user states it, by role.
 
     Returns:
-        Role by index of the column.
+        Role, such as "force", by index of the column.
 
     Raises:
         NoColumnError: a stated header or number that the file does not have.
@@ -169,7 +169,7 @@ def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | No
 
     Args:
         cells: header and rows of the table.
-        heading: meaning of the header: role, unit and convention.
+        heading: meaning of the header: role (quantity, such as "force"), unit and convention.
         index: index of the column.
         stated_unit: unit that the user states; None without one.
     """
@@ -199,7 +199,7 @@ def _first_numbers(cells: Cells, columns: Sequence[Column]) -> NDArray[np.float6
 
 
 def _preferred(cells: Cells, first: Column, second: Column) -> Column:
-    """Choose between two columns for one role: frequency in Hz rather than rad/s, else the first of two equal ones.
+    """Choose between two columns for one quantity: frequency in Hz rather than rad/s, else the first of two equal ones.
 
     Args:
         cells: header and rows of the table.
@@ -252,7 +252,7 @@ def _add_by_unit(
 
     Args:
         cells: header and rows of the table.
-        roles: columns found so far, by role; changed in place.
+        roles: columns found so far, by role such as "force"; changed in place.
         names: usual column names, by role.
         motion: kind of motion: translation, rotation or strain.
 
@@ -321,7 +321,7 @@ def _add_motion_as_amplitude(cells: Cells, roles: dict[str, Column], stated_unit
 
     Args:
         cells: header and rows of the table.
-        roles: columns found so far, by role; changed in place.
+        roles: columns found so far, by role such as "force"; changed in place.
         stated_units: units as the user states them, by role.
 
     Returns:

@@ -72,7 +72,7 @@ def _text(cell: str | float) -> str:
 
 
 def _may_distinguish_tests(cells: Cells, index: int) -> bool:
-    """Return True if a column has no role and few distinct texts, so that its texts may distinguish tests."""
+    """Return True if a column contains no measured quantity and few distinct texts, which may distinguish tests."""
     if not cells.headers[index] or index in {column.index for column in cells.roles.values()}:
         return False
     first = [_text(row[index]) for row in cells.first_rows]

@@ -93,7 +93,7 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
         test: table [[loops]] of the campaign; if it states the time, the file needs no time column.
 
     Returns:
-        Columns of displacement, force and, if present, time, by role.
+        Columns by "displacement", "force" and, if the file has one, "time".
 
     Raises:
         MeasurementError: a column is missing, or displacement and force are swapped.
@@ -121,9 +121,9 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
 
 
 def time_column(table: Table, place: Place) -> Column:
-    """Return the time column with its factor to seconds.
+    """Return the time column of a table with its factor to seconds.
 
-    Without a unit, it may contain day numbers of a spreadsheet, or a sampling rate above the table shows its unit.
+    If its header has no unit, day numbers of a spreadsheet or a sampling rate above the table show the unit.
     """
     time = table.roles.get("time")
     if time is None or time.unit or time.index in table.clocks:

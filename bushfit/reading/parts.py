@@ -52,7 +52,10 @@ class OpenedFile:
     parts: Sequence[RowSource]
 
     def choose(self, is_usable: Callable[[RowSource], bool]) -> RowSource:
-        """Return the only part for which a function returns True; a file with one part needs no choice.
+        """Choose the part (sheet or group) that contains the table of the test; a file with one part needs no choice.
+
+        Args:
+            is_usable: function that returns True if a part can contain the table.
 
         Raises:
             MeasurementError: no part, or more than one, is usable.

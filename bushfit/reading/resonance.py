@@ -80,7 +80,16 @@ def read_resonance(table: Table, direction: Place, base_acceleration: float | No
 
 
 def _resonance_columns(table: Table, place: Place, *, has_stated_base: bool) -> dict[str, Column]:
-    """Columns of a resonance test by role: frequency, and either transmissibility or accelerations of base and mass."""
+    """Find the columns of a resonance test: frequency, and either transmissibility or accelerations of base and mass.
+
+    Args:
+        table: table that was opened with RESONANCE_COLUMNS.
+        place: direction of the bushing, or the specimen, that is the mount.
+        has_stated_base: True if the user states the acceleration of the base.
+
+    Returns:
+        Columns with their factors to SI, by role such as "mass_acceleration".
+    """
     columns = next((columns for columns in _COLUMN_SETS if set(columns) <= set(table.roles)), None)
     if columns is None:
         alternatives = ", or ".join(" and ".join(columns) for columns in _COLUMN_SETS).replace("_", " ")

@@ -36,7 +36,10 @@ _DAMPING = Vocabulary({"damping": ["damping", "damp", "Dämpfung", "amortissemen
 
 
 def stiffness_pair(table: Table) -> tuple[str, str]:
-    """Return the roles of two columns of a table that give the complex stiffness, such as stiffness and loss_factor.
+    """Find two columns of a table that give the complex stiffness.
+
+    Returns:
+        Their roles, such as ("stiffness", "loss_factor").
 
     Raises:
         MeasurementError: the table has no such pair, or its damping can be read in two ways.
@@ -86,7 +89,7 @@ def with_positive_loss(
     """Correct the sign of a loss that is negative throughout, and the range of a phase.
 
     Args:
-        values: values in SI by role, (n,) each.
+        values: values in SI by role such as "phase", (n,) each.
         columns: columns by role, for the sentences.
         test: table [[sweeps]] of the campaign; its force_sign and phase_sign are None for an automatic correction.
 

@@ -189,7 +189,7 @@ def _rows_at_temperature(
 
     Args:
         table: table of the sweep, for errors.
-        values: values in SI by role, (n,) each.
+        values: values in SI by role such as "frequency", (n,) each.
         direction: direction of the bushing, or the specimen.
         temperature: temperature that the campaign states [K]; None if it states none.
 

@@ -74,7 +74,7 @@ class Table(Cells):
         Args:
             file: path of a text in any dialect, a workbook or a recording, or the opened file. There may be other lines
                 above the header, and a row of units below it.
-            names: usual column names by role: LOOP_COLUMNS, SWEEP_COLUMNS or RESONANCE_COLUMNS.
+            names: usual column names by role such as "force": LOOP_COLUMNS, SWEEP_COLUMNS or RESONANCE_COLUMNS.
             columns: header, or number from 1, of columns with unusual names, by role.
             stated_units: units that the file does not state, by role.
             file_format: format of the file as the user states it; default detected.
@@ -233,12 +233,12 @@ class Table(Cells):
             return replace(column, scale=strain_factor * units.si_factor(unit, expected))
 
     def agrees(self, role: str, expected: str) -> bool:
-        """Return True if the table has a column for a role whose unit has the dimension of `expected` or is 1."""
+        """True if there is a column for a role such as "force", in a unit compatible with `expected`, or 1."""
         column = self.roles.get(role)
         return column is not None and units.is_compatible(column.unit or "1", expected)
 
     def columns_key(self, role: str, unit: str) -> str:
-        """Return campaign keys for up to three unused headers with a fitting unit: 'columns = { force = "F1" }'."""
+        """Suggest campaign keys for a missing column: 'columns = { force = "F1" }' for unused headers with its unit."""
         usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS}, {})
         free = [
             (header, split_convention(units.split_header(split_convention(header)[0])[1] or in_row)[0])
@@ -277,7 +277,7 @@ class Table(Cells):
         """Read columns, and list the rows that are left out.
 
         Args:
-            wanted: columns by role, with their factors to SI.
+            wanted: columns by role such as "force", with their factors to SI.
             fewest_rows: smallest number of rows that is accepted.
 
         Returns:
@@ -314,14 +314,14 @@ class Table(Cells):
         return values, notes
 
     def needing(self, wanted: Mapping[str, Column]) -> "Table":
-        """Return the table with only those rows that have a number in each wanted column."""
+        """Copy of the table in which only rows with a number in each wanted column are data."""
         return replace(self, needed=self.needed | {column.index for column in wanted.values()})
 
     def check_positive(self, roles: Sequence[str], wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> None:
         """Refuse values that are not positive, or positive but smaller than any rig records.
 
         Args:
-            roles: roles whose values must be positive, if they are among `values`.
+            roles: roles such as "frequency" whose values must be positive, if they are among `values`.
             wanted: columns by role.
             values: values in SI by role, (n,) each.
 
@@ -358,11 +358,11 @@ class Table(Cells):
     def _read_block(
         self, block: RowSource, wanted: Mapping[str, Column], left_out: list[FaultyRow]
     ) -> Iterator[dict[str, Floats]]:
-        """Yield values in SI by role, (n,) each, of a block: at once if all its rows are data, else row by row.
+        """Read a block of rows as numbers: at once if all its rows are data, else row by row.
 
         Args:
             block: block of the source.
-            wanted: columns by role, with their factors to SI.
+            wanted: columns by role such as "force", with their factors to SI.
             left_out: list to which rows without data are added.
 
         Raises:
