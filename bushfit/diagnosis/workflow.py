@@ -101,7 +101,7 @@ def diagnose(
     )
     of_loops = list_outliers(diagnosis.result.model, data.loops)
     warnings = (*outlier_warnings(of_loops, robust=data.robust), *outlier_warnings(excluded, robust=True))
-    notes = (*messages, *reductions, *left_out, *diagnosis.notes, *data.assumed, *warnings)
+    notes = (*messages, *reductions, *left_out, *diagnosis.notes, *data.assumptions, *warnings)
     result = replace(
         diagnosis.result,
         outliers=(*of_loops, *excluded),

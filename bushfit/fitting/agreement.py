@@ -230,7 +230,7 @@ def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUs
 
     Returns:
         By name of the parameter, the share of the information that comes from the prior, and the distance of the tests
-        from it.
+        from it in standard deviations.
 
     Notes:
         With the variance S of the prior, the variance V of the estimate and v of the same estimate if the weights of

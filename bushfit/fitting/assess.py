@@ -130,9 +130,9 @@ def _changes_by_noise(
     """Changes of the covariance by errors of the estimated noise variances, by identifier of the noise variance.
 
     Args:
-        data_sets: tests of one stage.
+        data_sets: tests of one fit.
         influence: change of each of the k parameters by a unit of each of the n whitened residuals, (k, n).
-        basis: r orthogonal rows that span the Jacobian of the stage's own parameters, (r, n).
+        basis: r orthogonal rows that span the Jacobian of the parameters of this fit, (r, n).
 
     Returns:
         By noise variance: change of the covariance by one standard error of the noise variance, and the covariance
@@ -330,7 +330,7 @@ def temperature_warning(model: Model, data_sets: Sequence[MeasuredTest]) -> list
     ]
 
 
-def mixed_conditions(data_sets: Sequence[MeasuredTest]) -> list[str]:
+def mixed_condition_warnings(data_sets: Sequence[MeasuredTest]) -> list[str]:
     """Warnings about tests of one bushing made on several specimens or under several preloads.
 
     Args:
@@ -358,7 +358,7 @@ def mixed_conditions(data_sets: Sequence[MeasuredTest]) -> list[str]:
     return sentences
 
 
-def unfitted(model: Model, data_sets: Sequence[MeasuredTest], advice: str) -> list[str]:
+def unfitted_warnings(model: Model, data_sets: Sequence[MeasuredTest], advice: str) -> list[str]:
     """Warnings about tests that a model was not fitted to and misses by more than their noise, one for each direction.
 
     Args:

@@ -67,7 +67,7 @@ def start_with_effects(
 def with_effect(
     solution: FitResult, data_sets: Sequence[MeasuredTest], effect: Effect, fixed: Sequence[str], bounds: Bounds
 ) -> FitResult:
-    """Add an effect, in place of the branch that it replaces if it does, and refit all parameters from several starts.
+    """Add an effect to a fitted model, in which it may replace a branch, and refit all parameters from several starts.
 
     Args:
         solution: fit without the effect.

@@ -95,10 +95,11 @@ class FittedTests:
 
     @cached_property
     def _blocks(self) -> list[tuple[MeasuredTest, slice, Array | None, Array]]:
-        """For each test: its residual rows, and the directions in which a change of the stiffness moves its residuals.
+        """Tests, with the directions in the space of their residuals along which a change of the stiffness acts.
 
-        A tuple of test, slice of rows, orthonormal directions, (n, 2) or None for a sweep, and components, (2, 2), of
-        the residuals' changes by stiffness changes of 1 and of i [N/m or N m/rad] along these directions.
+        Returns:
+            For each test: the test; the slice of its n residuals; orthonormal directions, (n, 2), or None for a sweep;
+            and components along them, (2, 2), of residual changes by stiffness changes of 1 and i [N/m or N m/rad].
         """
         units, blocks = np.array([[1.0], [1.0j]]), list[tuple[MeasuredTest, slice, Array | None, Array]]()
         for test, rows in zip(self.data_sets, residual_slices(self.data_sets), strict=True):
@@ -193,7 +194,7 @@ class Discrepancy:
     def over_tests(
         cls, tests: FittedTests, groups: Groups, lengths: tuple[float, float], maximum_nodes: int
     ) -> Discrepancy:
-        """Build the process over the operating points of tests.
+        """Build the Gaussian process of a model's error over the operating points of tests.
 
         Args:
             tests: fitted model and tests.
@@ -215,12 +216,16 @@ class Discrepancy:
 
     @cached_property
     def complex_shapes(self) -> Array:
-        """Complex relative errors of the stiffness by q patterns, in phase and then in quadrature, (2 q, p)."""
+        """Relative errors of the stiffness at p operating points by each of q patterns, in phase, then in quadrature.
+
+        Returns:
+            Complex relative errors, (2 q, p).
+        """
         return np.concatenate((self.shapes, 1j * self.shapes))
 
     @cached_property
     def likelihood(self) -> RestrictedLikelihood:
-        """Restricted likelihood of the size of the process, given the tests."""
+        """Restricted likelihood of the standard deviation of the model's error, relative to |K|, given the tests."""
         span, remainder = self.tests.remainder
         return RestrictedLikelihood.from_columns(self.tests.columns(self.complex_shapes), remainder, span)
 
@@ -252,7 +257,7 @@ class Discrepancy:
 
 
 def averaged(processes: Sequence[Discrepancy]) -> Unnamed:
-    """Average of processes conditioned on the tests, weighted by their likelihood, as a correction of the model.
+    """Average Gaussian processes of a model's error, weighted by their likelihood, to a correction of the model.
 
     Nodes and groups are those of the likeliest process; lengths are geometric means. As few degrees of freedom
     determine the size, standard deviations are enlarged so that a normal 95 % interval is as wide as Student's t.

@@ -139,7 +139,7 @@ class MeasuredLoop(MeasuredBase):
         return replace(self, prepared=replace(self.prepared, force=force, half_range=float(np.ptp(force)) / 2.0))
 
     def force(self, model: Model, values: Values | None = None) -> Array:
-        """Model force at the rows [N or N m], (..., n); leading axes are those of `values`, in place of the model's."""
+        """Model force at the n rows [N or N m], (..., n); `values` replace parameters of the model, (...) or scalar."""
         if values is None and (force := self._recall("force", model)) is not None:
             return force
         history = self.prepared.history(model.is_transient)

@@ -242,7 +242,7 @@ def _exceeds_noise(solution: FitResult, rig: RigSettings) -> bool:
 
 
 def _is_smooth(solution: FitResult, rig: RigSettings) -> bool:
-    """True if a smooth discrepancy is more probable than noise and errors of the rig's accuracy class alone."""
+    """True if a smooth error of the model is more probable than noise and errors of the rig's class alone."""
     thinned = _thinned(solution.minimised)
     solution = solution.reevaluate(solution.model, thinned)
     tests = FittedTests(solution, [_errors_of_class(test, rig) for test in thinned])

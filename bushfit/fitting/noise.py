@@ -53,7 +53,7 @@ class SweepNoise:
     """Noise of all sweeps of a campaign.
 
     Args:
-        random: standard deviation from point to point of (ln|K|, phase [rad]), by line.
+        random: standard deviation from point to point of (ln|K|, phase [rad]), by line (runs at one held value).
         shared: standard deviation of the errors shared by a run, (ln|K|, phase [rad]).
         origin: source of the noise: "repeats", "stated" or "assumed".
         freedom: degrees of freedom behind `shared`; 0 if it is not estimated from repeats.

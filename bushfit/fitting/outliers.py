@@ -136,7 +136,7 @@ def outlying_points(
         deviation: deviation of each point from the model, gain + i phase, complex (n,).
         distance_of: function from deviations to distances in units of noise; with `shared=False` the errors shared by a
             block are not subtracted.
-        starts: index of the first point of each block.
+        starts: index of the first point of each block (run).
         points: frequency and amplitude of each point, (2, n); points with equal values are repeats.
         freedom: degrees of freedom behind the noise; inf if the noise is known.
 

@@ -78,7 +78,7 @@ def repeats_of(loops: Sequence[MeasuredLoop]) -> Array:
 
 
 def group_repeats(loops: Sequence[MeasuredLoop]) -> list[list[MeasuredLoop]]:
-    """Group loops that are repeats: same direction, amplitude and frequency within 2 %."""
+    """Group loops that repeat each other: same direction and preload, amplitude and frequency within 2 %."""
     if not loops:
         return []
     first = np.argmax(repeats_of(loops), axis=1)
@@ -112,7 +112,7 @@ def prepare_sweeps(
 
 
 def _with_contradictions(tests: Sequence[_Kind], conditions: Sequence[Array]) -> list[_Kind]:
-    """Return the tests, each that contradicts an earlier test with a sentence on the pair of points that differs most.
+    """Add a sentence to each test that contradicts an earlier test, on the pair of points that differs most.
 
     Args:
         tests: loops, or sweeps.

@@ -13,7 +13,7 @@ from bushfit.campaign.constraints import constraints_of
 from bushfit.campaign.session import measured_session
 from bushfit.effects import BASE, effect_name_of, get_effect, with_base
 from bushfit.errors import FitError, ModelError, error_location
-from bushfit.fitting.assess import check_strain, mixed_conditions
+from bushfit.fitting.assess import check_strain, mixed_condition_warnings
 from bushfit.fitting.coordinates import Bounds, residual
 from bushfit.fitting.design import start_with_effects
 from bushfit.fitting.preload import with_preload
@@ -98,10 +98,10 @@ class PreparedCampaign:
     def notes(self) -> list[str]:
         """Warnings about the recorded data of the tests, and about mixed specimens or preloads."""
         of_tests = [f"{test.name}: {note}" for test in self.data_sets for note in test.notes]
-        return [*of_tests, *mixed_conditions(self.data_sets)]
+        return [*of_tests, *mixed_condition_warnings(self.data_sets)]
 
     @property
-    def assumed(self) -> list[str]:
+    def assumptions(self) -> list[str]:
         """Warnings about the influence of preload, and about a rig whose accuracy is neither stated nor measured."""
         is_assumed = any(sweep.noise.origin == "assumed" for sweep in self.sweeps)
         if not is_assumed or None not in self.campaign.rig.stiffness_errors:
@@ -120,11 +120,11 @@ class PreparedCampaign:
     def require_tests(
         self, tests: Sequence[_Kind], message: str, hint: str, found: str = "no [[loops]] and no [[sweeps]]"
     ) -> Sequence[_Kind]:
-        """Return the tests that a fit requires.
+        """Return the tests of a fit, after a check that there are any and that none strains rubber beyond its limits.
 
         Args:
             tests: loops or sweeps.
-            message: message of the error.
+            message: error message if there are none.
             hint: next step for the user.
             found: text on the tests that the campaign has instead.
 
@@ -146,7 +146,7 @@ class PreparedCampaign:
         return replace(self, sweeps=tuple(sweeps))
 
     def with_sweeps(self, sweeps: Sequence[Sweep]) -> "PreparedCampaign":
-        """Return the campaign with other sweeps of the same rows, such as corrected ones; their noise is estimated."""
+        """Return the campaign with other sweeps of the same rows, such as corrected ones, and their noise estimated."""
         fit, new = self.campaign.fit, []
         for old, data_set in zip(self.sweeps, prepare_sweeps(sweeps, fit.residuals, self.campaign.rig), strict=True):
             rows = old.order[old.weights == 0.0]

@@ -111,7 +111,7 @@ class FitProblem:
 
 @dataclass(frozen=True, eq=False)
 class SmoothError:
-    """Smooth error of a model over operating points (Gaussian process), from `with_model_error`, for a covariance.
+    """Smooth error of a model over operating points (a Gaussian process), which widens the errors of its parameters.
 
     Args:
         shapes: relative change of the stiffness by one standard deviation of each of q independent patterns, at the p
@@ -190,7 +190,7 @@ class FitResult:
         return self.noise_weighted or self.problem.tests
 
     def stage(self, fixed: Collection[str] = ()) -> FitProblem:
-        """Problem with the tests weighted as for the covariance, in which the `fixed` parameters are not free."""
+        """Problem of this fit for `covariance`, with its weights of the tests; the `fixed` parameters are not free."""
         names = [name for name in self.names if name not in fixed]
         return replace(self.problem, tests=self.covariance_tests or self.problem.tests, names=names)
 

@@ -19,7 +19,7 @@ from bushfit.fitting.assess import (
     preload_ranges,
     quality,
     temperature_warning,
-    unfitted,
+    unfitted_warnings,
 )
 from bushfit.fitting.coordinates import Bounds, Coordinates
 from bushfit.fitting.identify import undetermined_parameters
@@ -113,7 +113,7 @@ def fit_joint(
                 f"levels disagree by more than their repeats, as by an error of {size} for each level: parameters are "
                 "the closest fit, and their intervals include this error"
             )
-    notes += unfitted(found.model, unused, NEXT)
+    notes += unfitted_warnings(found.model, unused, NEXT)
     result = replace(
         _result(data, [found], notes=notes, unused=unused),
         usable=expected_errors(found.model, found.minimised, unused, found),
@@ -282,7 +282,7 @@ def _result(
         *notes,
         *implausible_modulus(data.campaign.bushing, tests),
         *temperature_warning(model, tests),
-        *data.assumed,
+        *data.assumptions,
         *prior_warnings(priors),
         *(
             f"the tie {tie.name} = {tie.expression} is not used: the model lacks {', '.join(lacking)}"

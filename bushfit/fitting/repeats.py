@@ -69,7 +69,7 @@ class LineNoise:
 
 
 def line_noise(sweep: Sweep, log_stiffness: Array, held_value: float, disturbed: Collection[float] = ()) -> LineNoise:
-    """Estimate the noise of one line of a sweep from pairs of repeats, or from its scatter about a smooth curve.
+    """Estimate the noise of a line of a sweep (its runs at one held value), from repeats or about a smooth curve.
 
     Args:
         sweep: measured sweep.
@@ -162,7 +162,10 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
 
 
 def disturbed_steps(lines: Iterable[LineNoise]) -> list[float]:
-    """Find steps at which lines without repeats scatter far more than at others, such as near the mains frequency.
+    """Find frequencies or amplitudes at which sweeps without repeats scatter far more than at others, as near the mains'.
+
+    Args:
+        lines: noise of the lines (runs at one held value) of all sweeps.
 
     Returns:
         Frequencies [Hz] or amplitudes [m or rad].
@@ -196,10 +199,10 @@ def _parts(values: Array) -> Array:
 
 
 def log_stiffness_at_nominal(sweep: Sweep) -> Array:
-    """Logarithm of the stiffness of each point, corrected to the nominal amplitude of its level, complex (n,).
+    """Logarithm of the stiffness of each point of a sweep, corrected from the reached to the nominal amplitude.
 
-    The correction from the reached to the nominal amplitude follows a smooth surface fitted to ln K over ln f and ln X.
-    With fewer than two levels there is no correction.
+    The correction follows a smooth surface fitted to ln K over ln f and ln X. With fewer than two nominal amplitudes
+    there is no correction.
 
     Returns:
         ln K, complex (n,).

@@ -95,7 +95,10 @@ def estimate(
 
 @lru_cache(maxsize=4)
 def _efficiency(parts: int) -> float:
-    """Efficiency (E psi')^2/E psi^2 of soft_l1 under normal noise, for points with `parts` (1 or 2) residuals."""
+    """Efficiency (E psi')^2/E psi^2 of soft_l1 under normal noise, for points with `parts` (1 or 2) residuals.
+
+    psi is the derivative of the loss by the distance z of a point in units of noise, and E the mean over all z.
+    """
     z = np.linspace(0.0, 12.0, 4001)[1:]
     density = z ** (parts - 1) * np.exp(-(z**2) / 2.0)
     density /= density.sum()

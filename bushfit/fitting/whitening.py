@@ -56,7 +56,7 @@ class SharedError:
         return 1.0 - 1.0 / np.sqrt(1.0 + self.variance * self.weight)
 
     def components(self, rows: Array) -> Array:
-        """Project deviations in units of noise, (..., m), on the shared error of each group.
+        """Project deviations in units of noise, (..., m), on the shared error of each of g groups (runs, lines, points).
 
         Returns:
             Inner products of the deviations with their change by a shared error of 1, (..., g).
@@ -64,7 +64,7 @@ class SharedError:
         return np.add.reduceat(rows * self.unit, self.starts, axis=-1)
 
     def whiten(self, rows: Array) -> Array:
-        """Whiten deviations in units of noise, (..., m), by subtracting a share of each group's shared component."""
+        """Whiten m deviations in units of noise, (..., m), by subtracting a share of the component each group shares."""
         if not self.variance.any():
             return rows
         return rows - (self.components(rows) / self.weight * self.share)[..., self.group] * self.unit
@@ -75,8 +75,8 @@ class Whitening:
     """Covariance of the deviations (residuals in gain and phase) of a sweep, to whiten them.
 
     Args:
-        starts: index of the first point of each block, (blocks,).
-        lines: index of the first point of each line, whose blocks are adjacent, (lines,).
+        starts: index of the first point of each block (run), (blocks,).
+        lines: index of the first point of each line (adjacent blocks with one held value), (lines,).
         random: standard deviation of the gain and phase of each point at full weight, (2, n).
         noise: noise of the campaign's sweeps: shared errors, and degrees of freedom of the estimates.
         weights: weight of each point, 0 to 1, (n,).
@@ -99,7 +99,7 @@ class Whitening:
         return self._less_points(rows) if self.model_error else self._line.whiten(self._block.whiten(rows))
 
     def extra_covariance(self, influence: Array) -> Array:
-        """Covariance of estimates that the weights of the residuals do not include if there is a model error.
+        """Covariance of k parameter estimates that the weights of residuals do not include beside a model error.
 
         Args:
             influence: weight of each whitened residual in the k estimates, (k, 2 n).

@@ -43,7 +43,7 @@ def test_the_class_of_a_rig_that_is_assumed_is_said(measured):
         (RigSettings(gain_error=4e-3), "0.4 % gain and 0.25 deg phase, phase assumed"),
         (RigSettings(gain_error=4e-3, phase_error=3.5e-3), ""),
     ):
-        assumed = PreparedCampaign.from_campaign(replace(campaign, rig=rig)).assumed
+        assumed = PreparedCampaign.from_campaign(replace(campaign, rig=rig)).assumptions
         assert [note.partition(" class of the rig, ")[2] for note in assumed] == [words] * bool(words)
 
 
