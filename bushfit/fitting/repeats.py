@@ -162,7 +162,7 @@ def _about_smooth_curve(steps: Array, log_stiffness: Array) -> LineNoise:
 
 
 def disturbed_steps(lines: Iterable[LineNoise]) -> list[float]:
-    """Find frequencies or amplitudes at which sweeps without repeats scatter far more than at others, as near the mains'.
+    """Find frequencies or amplitudes at which sweeps without repeats scatter far more than at others, as by hum.
 
     Args:
         lines: noise of the lines (runs at one held value) of all sweeps.

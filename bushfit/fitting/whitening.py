@@ -56,7 +56,7 @@ class SharedError:
         return 1.0 - 1.0 / np.sqrt(1.0 + self.variance * self.weight)
 
     def components(self, rows: Array) -> Array:
-        """Project deviations in units of noise, (..., m), on the shared error of each of g groups (runs, lines, points).
+        """Project deviations in units of noise, (..., m), on the shared error of each of g groups (such as runs).
 
         Returns:
             Inner products of the deviations with their change by a shared error of 1, (..., g).
@@ -64,7 +64,7 @@ class SharedError:
         return np.add.reduceat(rows * self.unit, self.starts, axis=-1)
 
     def whiten(self, rows: Array) -> Array:
-        """Whiten m deviations in units of noise, (..., m), by subtracting a share of the component each group shares."""
+        """Whiten deviations in units of noise, (..., m): subtract a share of the component that each group shares."""
         if not self.variance.any():
             return rows
         return rows - (self.components(rows) / self.weight * self.share)[..., self.group] * self.unit
