@@ -214,10 +214,9 @@ def misfit_warnings(model: Model, data_sets: Sequence[MeasuredTest], parameters:
     if excess_chi_square(chi_square, freedom) is None and not by_test:
         return []
     worst = max(by_test, key=lambda name: by_test[name], default="")
-    worst_words = f", {number(by_test[worst], 2)} in {worst}" if len(data_sets) > 1 and worst else ""
+    in_worst = f", {number(by_test[worst], 2)} in {worst}" if len(data_sets) > 1 and worst else ""
     return [
-        "the model misses the data by more than their noise (reduced chi-square "
-        f"{number(chi_square, 2)}{worst_words}): "
+        f"the model misses the data by more than their noise (reduced chi-square {number(chi_square, 2)}{in_worst}): "
         f"intervals are invalid, though standard errors are scaled up{advice}"
     ]
 

@@ -70,13 +70,8 @@ class FittedTests:
         model = self.solution.model
         axes = [*operating_conditions(model.bushing, self.data_sets)]
         if model.depends_on("temperature"):
-            kelvin = [
-                np.broadcast_to(
-                    REFERENCE if test.conditions.temperature is None else test.conditions.temperature,
-                    test.frequency.shape,
-                )
-                for test in self.data_sets
-            ]
+            pairs = [(test.conditions.temperature, test.frequency.shape) for test in self.data_sets]
+            kelvin = [np.broadcast_to(REFERENCE if value is None else value, shape) for value, shape in pairs]
             axes.append(np.concatenate(kelvin))
         return axes
 

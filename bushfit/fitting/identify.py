@@ -46,38 +46,36 @@ class _Combination(NamedTuple):
         formula: formula in the names of the model's parameters.
         value: function from parameter values by name, with omega [rad/s], to the modulus [Pa]; accepts complex values.
         names: names of the parameters in the formula.
-        open_with: names of parameters; the combination is reported if one of these is not determined.
+        open_with: names of parameters; the combination is reported if one is not determined. Empty: those in `names`.
         remark: meaning of the modulus.
     """
 
     formula: str
     value: Callable[[Mapping[str, Any]], Any]
     names: tuple[str, ...]
-    open_with: tuple[str, ...]
+    open_with: tuple[str, ...] = ()
     remark: str = ""
 
 
 _COMBINATIONS = (
-    _Combination("sigma_fmax/eps_half", lambda p: p["sigma_fmax"] / p["eps_half"], _FRICTION, _FRICTION),
+    _Combination("sigma_fmax/eps_half", lambda p: p["sigma_fmax"] / p["eps_half"], _FRICTION),
     _Combination(
         "mu + sigma_fmax/eps_half",
         lambda p: p["mu"] + p["sigma_fmax"] / p["eps_half"],
         ("mu", *_FRICTION),
-        ("mu", *_FRICTION),
-        " (the friction of small amplitudes)",
+        remark=" (the friction of small amplitudes)",
     ),
-    _Combination("m omega^alpha", lambda p: p["m"] * p["omega"] ** p["alpha"], _SPRINGPOT, _SPRINGPOT),
+    _Combination("m omega^alpha", lambda p: p["m"] * p["omega"] ** p["alpha"], _SPRINGPOT),
     _Combination(
         "m/2 omega^alpha sin(pi alpha/2)",
         lambda p: 0.5 * p["m"] * p["omega"] ** p["alpha"] * np.sin(np.pi * p["alpha"] / 2.0),
-        _SPRINGPOT,
         _SPRINGPOT,
     ),
     _Combination(
         "mu + m/2 omega^alpha cos(pi alpha/2)",
         lambda p: p["mu"] + 0.5 * p["m"] * p["omega"] ** p["alpha"] * np.cos(np.pi * p["alpha"] / 2.0),
         ("mu", *_SPRINGPOT),
-        _SPRINGPOT,
+        open_with=_SPRINGPOT,
     ),
 )
 
@@ -208,7 +206,7 @@ def _known_combinations(
     slow = measured_range(model, data_sets).frequency[0]
     values = {**model.values, "omega": 2.0 * np.pi * slow}
     for formula, function, names, open_with, remark in _COMBINATIONS:
-        if not (set(names) <= set(information.names) and set(open_with) & set(involved)):
+        if not (set(names) <= set(information.names) and set(open_with or names) & set(involved)):
             continue
         modulus = function(values)
         stepped = {name: function({**values, name: values[name] * (1.0 + 1j * _COMPLEX_STEP)}) for name in names}

@@ -71,15 +71,13 @@ class PreparedCampaign:
             FitError: a loop has no whole cycle, lacks rows or releases energy.
             ModelError: [fit] effects contains an unknown effect, or the same effect twice.
         """
+        fit, rig = campaign.fit, campaign.rig
         with error_location(campaign.path, place="[fit] effects"):
-            Model.with_defaults(None, with_base(campaign.fit.effects), {})
-        data = cls(
-            campaign,
-            tuple(prepare_loops(campaign.loops, campaign.rig, without_outliers=campaign.fit.loss != "linear")),
-            tuple(prepare_sweeps(campaign.sweeps, campaign.fit.residuals, campaign.rig)),
-            {name: (setting.min, setting.max) for name, setting in campaign.fit.parameters.items()},
-            constraints=constraints_of(campaign),
-        )
+            Model.with_defaults(None, with_base(fit.effects), {})
+        loops = prepare_loops(campaign.loops, rig, without_outliers=fit.loss != "linear")
+        sweeps = prepare_sweeps(campaign.sweeps, fit.residuals, rig)
+        bounds = {name: (setting.min, setting.max) for name, setting in fit.parameters.items()}
+        data = cls(campaign, tuple(loops), tuple(sweeps), bounds, constraints=constraints_of(campaign))
         return with_preload(data.with_rubber_conditions())
 
     def with_rubber_conditions(self) -> "PreparedCampaign":
@@ -242,8 +240,7 @@ class PreparedCampaign:
             chosen = []
             for tests in (self.loops, self.sweeps):
                 any_axial = any(test.direction.axis is Direction.AXIAL for test in tests)
-                left_out = [d for d in Direction if d is not Direction.AXIAL] if any_axial else []
-                chosen += [test for test in tests if test.direction.axis not in left_out]
+                chosen += [test for test in tests if not any_axial or test.direction.axis in (None, Direction.AXIAL)]
             return chosen
         with error_location(self.campaign.path):
             wanted = [place for name in places for place in get_places(str(name), self.campaign.specimens)]

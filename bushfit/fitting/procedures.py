@@ -114,11 +114,8 @@ def fit_joint(
                 "the closest fit, and their intervals include this error"
             )
     notes += unfitted_warnings(found.model, unused, NEXT)
-    result = replace(
-        _result(data, [found], notes=notes, unused=unused),
-        usable=expected_errors(found.model, found.minimised, unused, found),
-        model_error=error,
-    )
+    usable = expected_errors(found.model, found.minimised, unused, found)
+    result = replace(_result(data, [found], notes=notes, unused=unused), usable=usable, model_error=error)
     return replace(result, profile=profile95(found, result.covariance)) if profile else result
 
 

@@ -66,12 +66,10 @@ class _Profile:
     def fitted(self, coordinate: float) -> FitResult:
         """Fit the other parameters, with this parameter fixed at a coordinate."""
         if coordinate not in self.known:
-            near = self.known[min(self.known, key=lambda known: abs(known - coordinate))].model
-            problem = replace(
-                self.best.problem,
-                model=near.with_values({self.name: self.value(coordinate)}),
-                names=[name for name in self.best.names if name != self.name],
-            )
+            nearest = self.known[min(self.known, key=lambda known: abs(known - coordinate))]
+            model = nearest.model.with_values({self.name: self.value(coordinate)})
+            names = [name for name in self.best.names if name != self.name]
+            problem = replace(self.best.problem, model=model, names=names)
             # five to ten evaluations are the rule, and the tolerance is far below what the rise is compared with
             self.known[coordinate] = solve(problem, evaluations=100, tolerance=1e-7, strict=False)
         return self.known[coordinate]

@@ -174,11 +174,8 @@ def disturbed_steps(lines: Iterable[LineNoise]) -> list[float]:
     for line in lines:
         for step, square in line.squared_distances.items():
             points[step].append(square)
-    return [
-        step
-        for step, squares in points.items()
-        if len(squares) >= FEWEST_STEPS and chdtrc(2 * len(squares), sum(squares)) < _DISTURBED
-    ]
+    repeated = [(step, squares) for step, squares in points.items() if len(squares) >= FEWEST_STEPS]
+    return [step for step, squares in repeated if chdtrc(2 * len(squares), sum(squares)) < _DISTURBED]
 
 
 def to_unit_interval(values: Array) -> Array:
