@@ -1,7 +1,7 @@
 """One measured sweep with its noise: dynamic stiffness over frequency and amplitude."""
 
 from collections.abc import Hashable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -47,6 +47,13 @@ class MeasuredSweep(MeasuredBase):
         contradiction: sentence on a disagreement with an earlier test of the same points; None without one.
         model_error: standard deviation of the relative error of the model at an operating point, added to the noise in
             phase and in quadrature; repeats share the error.
+        order: index of the row of each of the n used points in the sweep, (n,).
+        frequency, amplitude, measured: frequency [Hz], zero-to-peak amplitude [m or rad] and complex stiffness [N/m or
+            N m/rad] of each point, (n,) each.
+        held_value: value that is constant in the run of each point, (n,): amplitude [m or rad], frequency [Hz] or
+            number of the run.
+        step: value that changes from point to point of the run, (n,): frequency [Hz] or amplitude [m or rad].
+        repeat: number of the repeat of each point, (n,).
     """
 
     sweep: Sweep
@@ -57,8 +64,24 @@ class MeasuredSweep(MeasuredBase):
     test_conditions: RubberConditions = UNKNOWN
     contradiction: str | None = None
     model_error: float = 0.0
+    order: Array = field(init=False, repr=False)
+    frequency: Array = field(init=False, repr=False)
+    amplitude: Array = field(init=False, repr=False)
+    held_value: Array = field(init=False, repr=False)
+    step: Array = field(init=False, repr=False)
+    repeat: Array = field(init=False, repr=False)
+    measured: Array = field(init=False, repr=False)
     kind = "sweep"
     components = ("storage", "loss")
+
+    def __post_init__(self) -> None:
+        sweep = self.sweep
+        order = np.lexsort((sweep.step, sweep.repeat, sweep.held_value)) if self.part is None else self.part
+        arrays = sweep.frequency, sweep.amplitude, sweep.held_value, sweep.step, sweep.repeat, sweep.stiffness
+        names = "frequency", "amplitude", "held_value", "step", "repeat", "measured"
+        for name, array in zip(names, arrays, strict=True):
+            object.__setattr__(self, name, array[order])
+        object.__setattr__(self, "order", order)
 
     @property
     def test(self) -> Sweep:
@@ -134,41 +157,8 @@ class MeasuredSweep(MeasuredBase):
         return replace(self, sweep=replace(self.sweep, stiffness=stiffness))
 
     @cached_property
-    def order(self) -> Array:
-        """Row index in the sweep of each point, (n,): sorted by run (held value, repeat), then by step."""
-        by_run = np.lexsort((self.sweep.step, self.sweep.repeat, self.sweep.held_value))
-        return by_run if self.part is None else self.part
-
-    @cached_property
-    def frequency(self) -> Array:
-        return self.sweep.frequency[self.order]
-
-    @cached_property
-    def amplitude(self) -> Array:
-        return self.sweep.amplitude[self.order]
-
-    @cached_property
     def conditions(self) -> RubberConditions:
         return self.test_conditions.select(self.order)
-
-    @cached_property
-    def held_value(self) -> Array:
-        """Value held constant in each point's run, (n,): amplitude [m or rad], frequency [Hz] or number of the run."""
-        return self.sweep.held_value[self.order]
-
-    @cached_property
-    def step(self) -> Array:
-        """Value stepped within the run of each point, (n,): frequency [Hz] or amplitude [m or rad]."""
-        return self.sweep.step[self.order]
-
-    @cached_property
-    def repeat(self) -> Array:
-        """Number of the repeat that each point of the sweep belongs to, (n,)."""
-        return self.sweep.repeat[self.order]
-
-    @cached_property
-    def measured(self) -> Array:
-        return self.sweep.stiffness[self.order]
 
     @cached_property
     def block_starts(self) -> Array:
