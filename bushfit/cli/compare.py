@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
 #: Value of the option --families if no names follow.
 _ALL = "all"
-#: p-value below which the command reports that a parameter differs.
-_CHANCE = 0.05
 
 
 @command_called(
@@ -110,11 +108,7 @@ def _print_comparison(output: Output, name: str, compared: ComparisonOutput) -> 
     else:
         different = []
         for label, comparison in zip(labels, compared.comparisons, strict=True):
-            names = comparison.differing
-            names += [row.name for row in comparison.parameters if row.holm is not None and row.holm < _CHANCE]
-            if not names and comparison.joint and comparison.joint[0] < _CHANCE:
-                names = ["all parameters together"]
-            if names:
+            if names := comparison.differing:
                 different.append(f"{label} differs from {first} in {', '.join(names)}")
         verdict = f"{'; '.join(different)}, by more than chance"
         action = "use each result for its own part; differences.csv lists stiffness and loss factor at each point"

@@ -14,7 +14,7 @@ from bushfit.effects import Level
 from bushfit.fitting.assess import lack_of_fit
 from bushfit.geometry import Specimen
 from bushfit.model.result import Result
-from bushfit.prediction.comparison import holm
+from bushfit.prediction.parameter_comparison import holm
 from bushfit.units import format_range, number
 
 #: Specimen whose modulus over strain is compared if the results have no direction in common.

@@ -7,7 +7,7 @@ from typing_extensions import Doc, TypedDict
 from bushfit.diagnosis.holdout import Skipped
 from bushfit.model.document import BushingTable
 from bushfit.model.result import Range
-from bushfit.prediction.comparison import ParameterContrast
+from bushfit.prediction.parameter_comparison import ParameterContrast
 from bushfit.reading.measurement import Source
 from bushfit.validation import Number
 

@@ -14,7 +14,8 @@ import pandas as pd
 
 from bushfit.errors import ModelError
 from bushfit.model.file import require_schema
-from bushfit.prediction.comparison import Comparison, Contrast, ParameterContrast, relative_difference
+from bushfit.prediction.comparison import Comparison, Contrast
+from bushfit.prediction.parameter_comparison import ParameterContrast, relative_difference
 from bushfit.report.compare_document import SCHEMA, ComparisonFile
 from bushfit.report.tables import band_columns, quantity_words, require_columns, response_headers
 from bushfit.units import display_unit, number, split_header

@@ -18,7 +18,8 @@ from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Range, Result
 from bushfit.prediction.bands import Band
-from bushfit.prediction.comparison import Comparison, ParameterContrast, compare, holm, with_holm
+from bushfit.prediction.comparison import Comparison, compare, with_holm
+from bushfit.prediction.parameter_comparison import ParameterContrast, holm
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import Undisturbed, undisturbed
 
