@@ -106,7 +106,7 @@ def amplitude_levels(request: ExportRequest) -> list[AmplitudeLevel]:
 
 
 def by_dof(level: AmplitudeLevel) -> Iterator[tuple[int, StiffnessTable]]:
-    """Yield the degrees of freedom (1 to 3 translations, 4 to 6 rotations) of a level, each with its table."""
+    """Yield each degree of freedom (1 to 3 translations, 4 to 6 rotations) with its table, for one amplitude level."""
     pairs = [(dof, table) for table in level for dof in (DOFS[table.direction] if table.amplitude else CARDANIC)]
     yield from sorted(pairs, key=lambda pair: pair[0])
 

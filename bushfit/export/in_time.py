@@ -141,7 +141,7 @@ def middle_point(prediction: Prediction) -> tuple[float, float]:
 def _values(
     request: ExportRequest, model: Model, arms: tuple[Arms, ...]
 ) -> tuple[tuple[FmuValue, ...], list[dict[str, str]]]:
-    """List the values of the FMU; and for each direction or specimen, the name of the FMU value of each parameter.
+    """List the values of the FMU, and the name of the value that each parameter has in each direction or specimen.
 
     If a parameter differs between places (directions or specimens), each place has a value `<parameter>.<place>`.
 

@@ -92,7 +92,12 @@ def _property(
 
 
 def _by_dof(names: Sequence[str], rows: Sequence[dict[int, str]]) -> list[str]:
-    """List the fields of a property: for each table, its name, then the entry of each of the six degrees of freedom."""
+    """List the fields of a property: the name of each table, then its entries for the six degrees of freedom.
+
+    Args:
+        names: names of the tables, such as K and GE.
+        rows: for each table, texts by degree of freedom, 1 to 6; missing ones stay empty.
+    """
     fields: list[str] = []
     for name, row in zip(names, rows, strict=True):
         fields += [*([""] if fields else []), name, *(row.get(dof, "") for dof in range(1, 7))]
@@ -100,7 +105,7 @@ def _by_dof(names: Sequence[str], rows: Sequence[dict[int, str]]) -> list[str]:
 
 
 def _card(name: str, fields: Sequence[str]) -> Iterator[str]:
-    """Yield the lines of a card: eight small fields per line, or four large ones if the name ends in "*"."""
+    """Yield the lines of a bulk data card: eight small fields per line, or four large ones if its name ends in "*"."""
     count, shape, begin = (4, ">16", "*") if name.endswith("*") else (8, "<8", "")
     padded = [*fields, *[""] * (-len(fields) % 8)]
     for start in range(0, len(padded), count):

@@ -186,7 +186,7 @@ def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float
 
 
 def qualified_size(branch: Branch) -> str:
-    """Name, in files and reports, of the parameter that the modulus of a viscoelastic branch is proportional to."""
+    """Name, in files, of the parameter that the modulus of a viscoelastic branch is proportional to."""
     qualified_names = {parameter.name: qualified_name(branch, parameter) for parameter in branch.parameters}
     assert branch.size is not None
     return qualified_names.get(branch.size, branch.size)

@@ -337,7 +337,7 @@ class Result:
 
     @property
     def undecided(self) -> list[str]:
-        """List with one warning if the tests do not rule out other models; otherwise empty."""
+        """Warning, as a list of one sentence, that the tests do not rule out other models; empty if they do."""
         if not self.alternatives:
             return []
         added = (sorted(set(alternative.model.effects) - {*self.model.effects}) for alternative in self.alternatives)

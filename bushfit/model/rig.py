@@ -22,7 +22,7 @@ STEPS_PER_CYCLE = 2048
 
 @dataclass(frozen=True)
 class Record:
-    """Recorded time [s], displacement [m or rad] and force [N or N m] of a simulated test, (n,) each."""
+    """Record of a simulated test: time [s], displacement [m or rad] and force [N or N m], (n,) each."""
 
     time: Array
     displacement: Array

@@ -149,10 +149,12 @@ def _add_slopes(
 def _differences_at(
     place: Place, model: Model, names: Sequence[str], respond: Callable[[Values], Array]
 ) -> tuple[Array, Array]:
-    """Response and derivatives by one-sided differences, 0 for parameters that have no influence in a direction.
+    """Response of a model in one direction and its derivatives by one-sided differences.
+
+    Derivatives by parameters of other directions, such as `stiffness_factor.radial`, are 0 and are not computed.
 
     Args:
-        place: direction or specimen.
+        place: direction or specimen of the response.
         model: model; the derivatives are taken at its parameter values.
         names: names of k parameters.
         respond: function from parameter values to the response, as of `differences`.

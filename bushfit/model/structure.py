@@ -74,9 +74,13 @@ class Structure:
 
 
 def in_groups(layers: Sequence[Layer]) -> list[list[Layer]]:
-    """Group adjacent layers whose amounts can be added up, such as two compliances in series.
+    """Group adjacent layers that act as one layer with the sum of their amounts, such as two compliances in series.
 
-    Other layers form groups of one. The order, from the rubber outward, is kept.
+    Args:
+        layers: layers from the rubber outward.
+
+    Returns:
+        Groups from the rubber outward; most consist of one layer.
     """
     return [list(group) for _, group in groupby(layers, key=lambda layer: layer.force if layer.adds else layer.name)]
 

@@ -18,7 +18,7 @@ from bushfit.model.result import Result
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """Predicted quantity at n operating points, with its 95 % band.
+    """Predicted quantity at n operating points or times, with its 95 % band.
 
     Args:
         value, low, high: prediction, and lower and upper end of its 95 % band, (n,) each.
@@ -105,7 +105,8 @@ class Uncertainty:
 
     Args:
         covariance: covariance of the k uncertain parameters of the model.
-        scale: factor of the parameters' errors at each point, (n,); below 1 where the error of the model replaces them.
+        scale: factor by which to multiply the errors of the parameters at each point, (n,): 1, or less within the
+            tested range if there is an error of the model, which replaces them.
         relative: complex relative errors of the stiffness by e independent errors of the model, (e, n); e is 0 or 2.
     """
 

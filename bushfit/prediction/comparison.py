@@ -51,6 +51,7 @@ class Contrast:
 
     @property
     def place(self) -> Place:
+        """Direction or specimen of the reference."""
         return self.reference.direction
 
 
@@ -248,13 +249,13 @@ def _distance_from_zero(band: Band) -> Array:
 
 
 def with_holm(comparisons: Sequence[Comparison]) -> list[Comparison]:
-    """Adjust the probabilities of all parameters of several comparisons for their number, see `holm`.
+    """Adjust the p-values of all parameters of several comparisons for their number, by Holm's method.
 
     Args:
-        comparisons: comparisons with the same reference.
+        comparisons: comparisons of several results with one reference.
 
     Returns:
-        The comparisons, with the attribute `holm` of each tested parameter.
+        The comparisons, with the adjusted p-value in the attribute `holm` of each tested parameter.
     """
     adjusted = iter(holm([row.p for comparison in comparisons for row in comparison.parameters if row.p is not None]))
     return [
@@ -269,11 +270,11 @@ def with_holm(comparisons: Sequence[Comparison]) -> list[Comparison]:
 
 
 def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
-    """Phrase on the differences beyond chance with their points, and on an upper limit at the other points.
+    """Phrase on significant differences with their operating points, and on an upper limit at the other points.
 
     Args:
         band: relative differences of |K| [%], or differences of the loss factor, with simultaneous 95 % bands, (n,).
-        unit: "%" for relative differences of |K|; "" for differences of the loss factor.
+        unit: " %" for relative differences of |K|; "" for differences of the loss factor.
         contrast: the compared stiffness, with its operating points.
     """
 

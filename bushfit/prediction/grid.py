@@ -137,15 +137,16 @@ def common_grid(
 
 
 def _limit(values: Array, ranges: Sequence[Any], count: int) -> Array:
-    """Select the values within all ranges, (n,).
-
-    If fewer than two are, the result is `count` even values over the range that all ranges share; without a shared
-    range, all values.
+    """Limit the frequencies or amplitudes of a grid to ranges that were tested.
 
     Args:
-        values: frequencies or amplitudes, (n,).
-        ranges: pairs of lowest and highest value.
-        count: number of values over the shared range.
+        values: frequencies [Hz] or amplitudes [m, rad or 1], (n,).
+        ranges: pairs of lowest and highest value, one per tested result.
+        count: number of values to make if fewer than two of the values are within all ranges.
+
+    Returns:
+        Values within all ranges; or `count` values in equal ratios over the common range; or, without a common range,
+        all values.
     """
     inside, low, high = _inside(values, ranges), max(low for low, _ in ranges), min(high for _, high in ranges)
     if low > high * (1 + MARGIN):
@@ -154,12 +155,12 @@ def _limit(values: Array, ranges: Sequence[Any], count: int) -> Array:
 
 
 def _inside(values: Array, ranges: Sequence[Any]) -> Array:
-    """Mask of the values, (n,), within all ranges (low, high), with a margin for inaccurate set points of the rig."""
+    """Select the values, (n,), within all ranges (low, high), with a margin for inaccurate set points of the rig."""
     return values[np.all([(values >= a * (1 - MARGIN)) & (values <= b * (1 + MARGIN)) for a, b in ranges], axis=0)]
 
 
 def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitude"]) -> Array:
-    """List the distinct frequencies or amplitudes of the sweeps of one direction.
+    """List the distinct frequencies or amplitudes at which the sweeps of one direction were measured.
 
     Args:
         sweeps: sweeps of one direction or specimen.
@@ -187,7 +188,7 @@ def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitu
 
 
 def _even(low: float, high: float, count: int) -> Array:
-    """Values from `low` to `high` in equal ratios, rounded to three digits."""
+    """Make `count` values from `low` to `high` in equal ratios, rounded to three digits; equal values are merged."""
     return _distinct(np.array([float(f"{x:.3g}") for x in np.geomspace(low, high, count)]))
 
 

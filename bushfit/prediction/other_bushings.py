@@ -81,7 +81,7 @@ def predict_each_bushing(
 
 
 def _inside(result: Result, test: MeasuredTest) -> Array:
-    """True for each operating point of a test at which |K| is within the 95 % band of a prediction and the noise."""
+    """True for each operating point of a test whose |K| is within the 95 % band of prediction and noise, (n,)."""
     ratio = test.measured / test.noise_free(result.model).measured
     errors = uncertainty(result, result.model, test.direction, test.frequency, test.amplitude, test.conditions)
     slopes = log_slopes(result.model, test, errors.covariance.names)

@@ -119,19 +119,19 @@ def compare_parameters(
 
 
 def exponent_of(name: str, parameter: Parameter) -> str | None:
-    """Name of the parameter that is the exponent in a parameter's unit, such as alpha for m [Pa s^alpha]; or None."""
+    """Name of the exponent in the unit of a parameter, also a parameter: "alpha" for m [Pa s^alpha]; None without."""
     match = _EXPONENT.search(parameter.unit)
     return match and "".join(name.rpartition(".")[:2]) + match[1]
 
 
 def quantities_of(result: Result, rows: Sequence[tuple[str, str | None]], omega: float) -> tuple[Array, Array]:
-    """Compute the quantities of a result to compare (parameters, or moduli at a frequency) and their derivatives.
+    """Compute the quantities of a result that are compared: parameters, and moduli such as m omega^alpha.
 
     Args:
         result: fitted result.
-        rows: for each of r quantities, the name of its parameter and of the parameter's exponent; None for the
-            parameter itself.
-        omega: angular frequency of the modulus of a parameter with an exponent [rad/s].
+        rows: names of two parameters for each of r quantities: m and its exponent alpha for the modulus m omega^alpha;
+            a parameter and None for the parameter itself.
+        omega: angular frequency of the moduli [rad/s].
 
     Returns:
         Quantities, or their logarithms if they are positive, (r,), and their derivatives by the k parameters of the
@@ -179,7 +179,7 @@ def joint_p_value(difference: Array, matrix: Array, freedom: Array) -> tuple[flo
 
 
 def holm(probabilities: Sequence[float]) -> list[float]:
-    """Adjust the p-values of several tests for their number (Holm 1979); the order is unchanged."""
+    """Adjust p-values for the number of tests by Holm's method (Scand. J. Statist. 6 (1979) 65); keeps their order."""
     order = np.argsort(probabilities)
     steps = np.asarray(probabilities)[order] * np.arange(len(order), 0, -1)
     adjusted = np.empty(len(order))

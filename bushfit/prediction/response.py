@@ -32,7 +32,7 @@ _FEWEST_PER_CYCLE = 20.0
 
 @dataclass(frozen=True, eq=False)
 class TimeResponse:
-    """Force over time for a displacement history.
+    """Predicted force over time for a displacement history, with figures of the motion.
 
     Args:
         direction: direction or specimen.

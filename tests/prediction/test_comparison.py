@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fits import joint_fit
-from scipy.stats import binom, false_discovery_control
+from scipy.stats import binom, false_discovery_control, norm
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
@@ -13,6 +13,7 @@ from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSe
 from bushfit.commands.compare import compare as compare_results
 from bushfit.commands.compare import compared_result
 from bushfit.effects.contract import Array
+from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.geometry import Bushing, Direction
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import FIVE, Model
@@ -71,12 +72,13 @@ def fits(campaigns) -> list[tuple[Result, Result, Result]]:
 
 
 def test_equal_bushings_differ_no_oftener_than_said(fits):
-    """By parameters (Holm), by all together, and by any word on stiffness or loss: 5 % of the pairs each."""
+    """By parameters (Holm), all together, any word on stiffness or loss, and the headline: 5 % of the pairs each."""
     found = [against(one, two) for one, two, _ in fits]
     alarms = {
         "a parameter, Holm": sum(any(row.holm is not None and row.holm < 0.05 for row in f.parameters) for f in found),
         "all together": sum(f.joint is not None and f.joint[0] < 0.05 for f in found),
         "words": sum(any("higher" in line or "lower" in line for line in f.sentences()) for f in found),
+        "headline": sum(bool(f.differing) for f in found),
     }
     assert max(alarms.values()) <= binom.isf(3e-3, len(fits), 0.05)  # more in 3 of a thousand
 
@@ -104,6 +106,36 @@ def test_known_differences_are_found_and_covered(fits, paper_model):
     assert np.mean(curves) >= 0.88
     assert np.mean(everywhere) >= 0.85
     assert all(seen)
+
+
+@pytest.mark.parametrize(
+    ("deviation", "joint", "named"),
+    [
+        (2.1, 0.2, []),  # stiffness differs at 3.6 %
+        (-2.1, 0.04, ["axial stiffness", "all parameters together"]),
+        (-2.4, 0.2, ["axial stiffness"]),  # at 1.6 %
+        (0.5, 0.04, []),
+        (0.5, 0.02, ["all parameters together"]),
+    ],
+)
+def test_the_headline_joins_two_tests(paper_model, deviation, joint, named):
+    """Hochberg's procedure: both at 5 %, or one at 2.5 %."""
+    one = known(paper_model, np.diag([1e8, 1e6, 1e-6, 1e4, 1e-8]))
+    found = against(one, one)
+    bands = [Band(*(np.array([x + end]) for end in (0.0, -1.96, 1.96)), np.ones((1, 1))) for x in (deviation, 0.0)]
+    contrast = replace(found.contrasts[0], stiffness=bands[0], loss_factor=bands[1])
+    assert replace(found, contrasts=(contrast,), joint=(joint, 5)).differing == named
+    unknown = replace(contrast, stiffness=replace(bands[0], root=np.empty((0, 1))), loss_factor=bands[1])
+    assert replace(found, contrasts=(replace(unknown, loss_factor=unknown.stiffness),), joint=None).differing == []
+
+
+@pytest.mark.parametrize(("length", "independent"), [(1e-3, 16), (1e3, 2)])
+def test_errors_of_the_model_are_as_many_as_their_length_permits(paper_model, length, independent):
+    """Real and imaginary part at each of eight points if the length is short; if it is long, one each."""
+    patch = Patch(("axial",), (10.0,), (0.01,), (0.05,), (0.05,), (0.01,), (0.01,))
+    result = Result(paper_model, model_error=Unnamed(0.05, (length, length), (patch,)))
+    widening = norm.ppf(0.5 * (1.0 + 0.95 ** (1.0 / independent))) / norm.ppf(0.975)
+    assert against(result, result).widening == pytest.approx(widening, rel=0.015)
 
 
 @pytest.mark.parametrize("freedom", [1e6, 12.0])
