@@ -83,10 +83,13 @@ class Claim:
         )
 
     def corrected(self, data: PreparedCampaign) -> PreparedCampaign:
-        """Campaign in which the mistake is corrected, in the tests or in the dimensions of the bushing.
+        """Correct the mistake, in the tests or in the dimensions of the bushing.
 
         Args:
             data: the campaign as it was read.
+
+        Returns:
+            The corrected campaign.
         """
         campaign = data.campaign
         if not self.tests:
@@ -199,7 +202,7 @@ def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
 
 @dataclass(frozen=True, eq=False)
 class ClaimScreening:
-    """Selection of the mistakes that are worth a fit, by the misfit of the paper's model to the corrected tests.
+    """Selection of the mistakes to be fitted, by the misfit of the paper's model to the corrected tests.
 
     Args:
         data: the campaign as it was read.

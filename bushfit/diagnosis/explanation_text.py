@@ -83,7 +83,11 @@ def claim_entries(
 
 
 def explanation_odds(finding: Finding, data: PreparedCampaign) -> Odds:
-    """Reported explanations with texts, probabilities and fitted models, the most probable first."""
+    """List the reported explanations with texts, probabilities and fitted models.
+
+    Returns:
+        Explanations, the most probable first.
+    """
     compositions = sorted(finding.reported, key=lambda composition: -composition.probability)
     sentences, models = [], []
     for composition in compositions:

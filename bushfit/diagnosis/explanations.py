@@ -1,4 +1,4 @@
-"""Explanations of a gap, each a name with columns and a prior: smooth curves, the compound's deviation, outliers.
+"""Explanations of a gap between model and tests: smooth curves, the compound's deviation, clusters of outliers.
 
 Smooth curves without a name and the compound's own deviation are Gaussian processes over ln frequency and ln strain
 (Kennedy and O'Hagan, 2001). No rubber follows a few parameters exactly. The deviation of the compound is the same
@@ -42,8 +42,8 @@ COMPOUND = "compound"
 #: Correlation lengths of the compound's deviation in ln frequency and ln strain: relaxation takes decades of frequency,
 #: and breakdown more than one of strain. Number of its patterns: with three to five levels more improve nothing.
 _COMPOUND_LENGTHS, _COMPOUND_PATTERNS = (8.0, 3.0), 12
-#: Share of the compound's deviation that changes over the shorter lengths of a smooth curve: yield and breakdown set in
-#: within a factor of 2 or 3 of the strain.
+#: Fraction of the compound's deviation that changes over the shorter lengths of a smooth curve: yield and breakdown set
+#: in within a factor of 2 or 3 of the strain.
 _COMPOUND_ROUGHNESS = 0.25
 #: Correlation lengths of a curve without a name in ln frequency and ln strain: smooth, and rough.
 _CURVE_LENGTHS = {"smooth": (1.5, 1.2), "rough": (0.5, 0.5)}
@@ -57,15 +57,16 @@ _PHASES = 32
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """One possible explanation of a gap between model and tests, with the change of the residuals that it would cause.
+    """Possible explanation of a gap between model and tests, with the changes of the residuals that it would cause.
 
     Args:
-        kind: "effect", "part" (of the tests that is faulty), "unnamed" (a curve) or "record" (a mistake); each kind
-            has a prior probability.
-        family: explanations that share a prior probability: an effect in all directions, or a kind of faulty part.
+        kind: "effect", "part" (faulty part of the tests), "unnamed" (smooth curve) or "record" (mistake in the record);
+            each kind has a prior probability, which its families share.
+        family: name of the explanations that share a prior probability: an effect in all directions, or a kind of
+            faulty part.
         name: name of the explanation.
-        group: columns of the explanation in the residuals; None for an explanation without columns, such as an effect
-            that replaces a branch and has to be refitted.
+        group: changes of the residuals by the explanation; None for an effect that has to be refitted, because it
+            replaces a branch of the model.
     """
 
     kind: str
@@ -78,11 +79,13 @@ class Explanation:
 class FaultyPart(Explanation):
     """Explanation of a gap by a fault of the tests: a frequency, level, repeat or loop whose points deviate together.
 
+    A level is the set of all points of a sweep at one constant amplitude, or at one constant frequency.
+
     Args:
         direction: direction or specimen of the first test.
-        frequency: lowest and highest frequency [Hz].
-        amplitude: lowest and highest amplitude, zero-to-peak [m or rad].
-        extreme: True for the smallest or largest level of a direction, where an effect of amplitude would look alike.
+        frequency: lowest and highest frequency of the faulty points [Hz].
+        amplitude: their smallest and largest amplitude, zero-to-peak [m or rad].
+        extreme: True for the smallest or largest level of a direction, which an effect of amplitude would change alike.
     """
 
     direction: Place
@@ -92,15 +95,12 @@ class FaultyPart(Explanation):
 
     @property
     def columns(self) -> Array:
-        """Derivatives of the n whitened residuals by the c errors of the faulty part, (c, n), one row for each error.
-
-        The errors are a relative gain, a phase [rad] and their slopes along the part.
-        """
+        """Changes of the n whitened residuals per unit of c errors: gain, phase [rad] and their slopes, (c, n)."""
         assert self.group is not None
         return self.group.whole
 
     def point_by_point(self) -> FaultyPart:
-        """Give every point of the faulty part an independent error, for faults other than a common shift or slope.
+        """Fault of the same points with an independent error of each, for faults other than a common shift or slope.
 
         Returns:
             Faulty part with one column for each residual of its points; a loop is returned unchanged.
@@ -114,7 +114,7 @@ class FaultyPart(Explanation):
         return replace(self, group=Group(columns, np.eye(rows.size), act_together=True))
 
     def distance(self, residual: Array) -> float:
-        """Root mean square deviation of the faulty part along its columns, in units of noise.
+        """Root mean square deviation of the faulty points from the model, in units of noise.
 
         Args:
             residual: whitened residuals of all tests, (n,).
@@ -126,10 +126,10 @@ class FaultyPart(Explanation):
 
 @dataclass(frozen=True, eq=False)
 class OutlierCluster(FaultyPart):
-    """Several outliers at one frequency, which were left out of the fit, as a sign of a disturbance there.
+    """Explanation of several outliers at one frequency, which were left out of the fit, by a disturbance there.
 
     Args:
-        outlier_distance: root mean square distance of the points from the model, in units of noise.
+        outlier_distance: root mean square distance of the outliers from the model, in units of noise.
         size: largest distance of a point from the model, |K_model - K_measured|/|K_measured|.
         log_odds: natural log of the odds of a disturbance, compared with single wrong rows that coincide by chance.
     """
@@ -143,10 +143,13 @@ class OutlierCluster(FaultyPart):
 
 
 def is_pattern(faulty_parts: Sequence[FaultyPart]) -> bool:
-    """Return True if suspected faults of the tests may be physics that the model lacks.
+    """True if suspected faults of the tests form a pattern, which may be physics that the model lacks.
 
-    These are faults at several frequencies, as of a resonance, at the smallest or largest level, as of a contact, or of
-    two loops of one direction, rate and amplitude, which repeat each other.
+    Patterns are faults at several frequencies, as by a resonance; at the smallest or largest level, as by a contact; or
+    of two loops of one direction, rate and amplitude, which repeat each other.
+
+    Returns:
+        True for a pattern.
     """
     if sum(part.family == "frequency" for part in faulty_parts) > 1 or any(part.extreme for part in faulty_parts):
         return True
@@ -207,7 +210,7 @@ def outlier_clusters(
 
 
 def compound(evidence: Evidence) -> Group | None:
-    """Explanation of a gap by a compound whose modulus deviates smoothly from the model's laws.
+    """Changes of the residuals by a compound whose modulus deviates smoothly from the model's laws.
 
     The relative deviation is a random function of frequency and strain, the same in all directions and specimens.
 
@@ -215,22 +218,24 @@ def compound(evidence: Evidence) -> Group | None:
         evidence: fitted model and tests.
 
     Returns:
-        Changes of the residuals, (c, n), and of the stiffness, (c, points), by independent patterns of the deviation,
-        of unit variance at each operating point, and by deviations of the shape of each loop. None without tests.
+        Group of independent patterns of the deviation, of unit variance at each operating point, and of deviations of
+        the shape of each loop; None without tests.
     """
     if not evidence.data_sets:
         return None
     limits = {"count": _COMPOUND_PATTERNS, "correlate": _compound_correlation}
-    columns, share = _process(evidence, evidence.data_sets, _COMPOUND_LENGTHS, **limits)
+    columns, changes = _smooth_changes(evidence, evidence.data_sets, _COMPOUND_LENGTHS, **limits)
     for loops in group_repeats(split_by_kind(evidence.data_sets)[0]):
-        columns = np.concatenate((columns, _shared_by(evidence, loops, compound_shapes)))
-    unit = np.zeros((len(columns), share.shape[-1]), dtype=complex)
-    unit[: len(share)] = share
+        columns = np.concatenate((columns, _repeat_changes(evidence, loops, compound_shapes)))
+    unit = np.zeros((len(columns), changes.shape[-1]), dtype=complex)
+    unit[: len(changes)] = changes
     return Group(columns, unit, act_together=True)
 
 
 def _compound_correlation(points: Array, nodes: Array) -> Array:
-    """Correlation of the compound's deviation at points (n, 2) and nodes (m, 2) in units of its lengths, (n, m).
+    """Correlation of the compound's deviation at points, (n, 2), with that at nodes, (m, 2); (n, m).
+
+    The columns are ln frequency and ln strain in units of the correlation lengths.
 
     >>> _compound_correlation(np.zeros((1, 2)), np.array([[0.0, 0.0], [0.0, 0.4]])).round(3)
     array([[1.   , 0.862]])
@@ -240,7 +245,7 @@ def _compound_correlation(points: Array, nodes: Array) -> Array:
 
 
 def compound_shapes(loop: MeasuredLoop) -> Array:
-    """Deviations of the force's shape from the model's laws, of a compound whose stiffness deviates by 100 %.
+    """Changes of the shape of a loop by a compound whose stiffness deviates from the model's laws by 100 %.
 
     Returns:
         Changes of the loop's whitened residuals by c independent deviations of one standard deviation, (c, size).
@@ -263,9 +268,9 @@ def compound_shapes(loop: MeasuredLoop) -> Array:
 
 
 def unnamed_curves(evidence: Evidence) -> list[Explanation]:
-    """List smooth curves over frequency and strain as explanations of a gap that no effect of the library explains.
+    """List smooth curves over frequency and strain, which explain a gap that no effect of the library explains.
 
-    A curve is a smooth complex relative change of the stiffness. All sweeps of one direction and temperature share it.
+    A curve is a smooth complex relative change of the stiffness that all sweeps of one direction and temperature share.
 
     Args:
         evidence: the fitted model and the tests.
@@ -278,76 +283,75 @@ def unnamed_curves(evidence: Evidence) -> list[Explanation]:
     groups: dict[str, Group] = {}
     directions = dict.fromkeys(str(sweep.direction) for sweep in sweeps)
     for roughness, lengths in _CURVE_LENGTHS.items() if sweeps else ():
-        columns, share = _process(evidence, sweeps, lengths, **_CURVE_PATTERNS)
+        columns, changes = _smooth_changes(evidence, sweeps, lengths, **_CURVE_PATTERNS)
         for direction in directions:
-            curves: dict[Hashable, list[MeasuredSweep]] = defaultdict(list)
+            by_temperature: dict[Hashable, list[MeasuredSweep]] = defaultdict(list)
             for sweep in sweeps:
                 if str(sweep.direction) == direction:
                     kelvin = sweep.sweep.temperature
-                    curves[None if kelvin is None else round(float(np.mean(kelvin)) / SAME_TEMPERATURE)].append(sweep)
-            parts = zip(*(_restricted(evidence, sweeps, c, columns, share) for c in curves.values()), strict=True)
-            residuals, changes = map(np.concatenate, parts)
-            groups[f"{roughness} {direction}"] = Group(residuals, changes, act_together=True)
+                    level = None if kelvin is None else round(float(np.mean(kelvin)) / SAME_TEMPERATURE)
+                    by_temperature[level].append(sweep)
+            masks = []  # of the residuals and of the points at which a curve acts
+            for chosen in by_temperature.values():
+                rows = np.zeros(columns.shape[-1], dtype=bool)
+                for sweep in chosen:
+                    rows[evidence.residual_rows[sweep]] = True
+                points = np.concatenate([np.full(sweep.frequency.size, sweep in chosen) for sweep in sweeps])
+                masks.append((rows, points))
+            groups[f"{roughness} {direction}"] = Group(
+                np.concatenate([columns * rows for rows, _ in masks]),
+                np.concatenate([changes * points for _, points in masks]),
+                act_together=True,
+            )
         if roughness == "rough" and len(directions) > 1:  # a smooth curve in all directions is the compound's
-            groups["rough all"] = Group(columns, share, act_together=True)
+            groups["rough all"] = Group(columns, changes, act_together=True)
     if loops:
         repeats = group_repeats(loops)
         shapes = block_diag(*[smooth_waves(np.arange(_PHASES) / _PHASES)] * len(repeats))
-        columns = np.concatenate([_shared_by(evidence, group, MeasuredLoop.smooth_changes) for group in repeats])
+        columns = np.concatenate([_repeat_changes(evidence, group, MeasuredLoop.smooth_changes) for group in repeats])
         groups["loops"] = Group(columns, shapes, act_together=True)
     return [Explanation("unnamed", "unnamed", name, group) for name, group in groups.items()]
 
 
-def _process(
+def _smooth_changes(
     evidence: Evidence, tests: Sequence[MeasuredTest], lengths: tuple[float, float], **limits: Any
 ) -> tuple[Array, Array]:
-    """Build a smooth relative change of the stiffness (Gaussian process of unit variance) over the points of tests.
+    """Patterns of a smooth relative change of the stiffness: a Gaussian process of unit variance over operating points.
 
     Args:
         evidence: fitted model and all tests.
-        tests: tests that share the process.
+        tests: tests in which the stiffness changes.
         lengths: correlation lengths in ln frequency and ln strain.
         limits: limits of the number of patterns, passed to `gaussian_process.patterns`.
 
     Returns:
-        Changes of the whitened residuals by q independent patterns in phase and in quadrature, (2 q, n), and their
-        complex relative changes of stiffness at the points of the tests, (2 q, points).
+        Changes of the n whitened residuals by q independent patterns in phase and in quadrature, (2 q, n), and the
+        complex relative changes of stiffness by these patterns at the points of `tests`, (2 q, points).
     """
     model = evidence.model
     points = [coordinates(test.frequency, test.amplitude * model.unit_strain(test.direction)) for test in tests]
     _, shapes = patterns(in_lengths(np.concatenate(points), lengths), **limits)
-    share = (shapes[:, None] * np.array([[1.0], [1.0j]])).reshape(-1, shapes.shape[-1])
-    columns = np.zeros((len(share), evidence.residual.size))
-    for test, change in zip(tests, np.split(share, np.cumsum([*map(len, points)])[:-1], axis=1), strict=True):
+    changes = (shapes[:, None] * np.array([[1.0], [1.0j]])).reshape(-1, shapes.shape[-1])
+    columns = np.zeros((len(changes), evidence.residual.size))
+    for test, change in zip(tests, np.split(changes, np.cumsum([*map(len, points)])[:-1], axis=1), strict=True):
         stiffness = model.stiffness(test.direction, test.frequency, test.amplitude, kind=test.kind)
         columns[:, evidence.residual_rows[test]] = test.residual_change(change * stiffness, model)
-    return columns, share
+    return columns, changes
 
 
-def _restricted(
-    evidence: Evidence, tests: Sequence[MeasuredTest], chosen: Sequence[MeasuredTest], columns: Array, share: Array
-) -> tuple[Array, Array]:
-    """Restrict a smooth relative change of the stiffness to some of the tests that it was built for.
+def _repeat_changes(
+    evidence: Evidence, loops: Sequence[MeasuredLoop], changes: Callable[[MeasuredLoop], Array]
+) -> Array:
+    """Changes of all n residuals by force errors that repeats of a loop share.
 
     Args:
         evidence: fitted model and all tests.
-        tests: tests over whose points the process was built.
-        chosen: tests in which the process acts.
-        columns: changes of the whitened residuals by each of c patterns, (c, n).
-        share: complex relative changes of the stiffness by each pattern at the points of `tests`, (c, points).
+        loops: repeats of a loop.
+        changes: function that returns the changes of the residuals of a loop by c force errors of unit amount, (c, m).
 
     Returns:
-        Both changes, set to 0 outside of the chosen tests, with unchanged shapes.
+        Changes of the residuals of all tests, (c, n).
     """
-    rows = np.zeros(columns.shape[-1], dtype=bool)
-    for test in chosen:
-        rows[evidence.residual_rows[test]] = True
-    points = np.concatenate([np.full(test.frequency.size, test in chosen) for test in tests])
-    return columns * rows, share * points
-
-
-def _shared_by(evidence: Evidence, loops: Sequence[MeasuredLoop], changes: Callable[[MeasuredLoop], Array]) -> Array:
-    """Change of n residuals of all tests by c force errors that repeats of a loop share, per unit amount, (c, n)."""
     by_loop = [changes(loop) for loop in loops]
     columns = np.zeros((len(by_loop[0]), evidence.residual.size))
     for loop, of_loop in zip(loops, by_loop, strict=True):

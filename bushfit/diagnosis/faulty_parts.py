@@ -1,4 +1,8 @@
-"""Faulty parts of the tests: a frequency, a level, a repeat, or a loop that disagrees with all others."""
+"""Faulty parts of the tests: a frequency, a level, a repeat, or a loop that disagrees with all others.
+
+A level is the set of all points of a sweep at one constant amplitude, or at one constant frequency. A fault is an error
+of gain and phase that all points of the part have in common; levels and repeats also have a slope of both.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -11,13 +15,13 @@ from bushfit.diagnosis.explanations import FaultyPart
 from bushfit.diagnosis.groups import Group
 from bushfit.effects.contract import Array
 from bushfit.fitting.measured_test import shown_amplitude
-from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, split_by_kind
+from bushfit.fitting.preparation import MeasuredSweep, split_by_kind
 
 #: Maximum number of neighbouring frequencies that one disturbance covers: mains hum and its sidebands.
 _WIDEST = 3
 #: Ratio of frequencies or of amplitudes up to which they are the same.
 _SAME = 1.05
-#: Relative changes of the stiffness at both ends of a part by errors of gain and phase, and by their slopes.
+#: Relative changes of the stiffness at both ends of a faulty part by errors of gain and phase, and by their slopes.
 _SLOPING = np.kron([[1.0, 1.0], [1.0, -1.0]], [[1.0], [1.0j]])
 #: Minimum number of frequencies in a campaign for one of them to be a suspect.
 _FEWEST_FREQUENCIES = 5
@@ -26,15 +30,13 @@ _MOST_FREQUENCIES = 100
 
 
 def find_faulty_parts(evidence: Evidence) -> list[FaultyPart]:
-    """List the parts of the tests whose points may all be wrong together: the suspects of a faulty measurement.
-
-    The points of a part share an error of gain and phase; levels and repeats also share a slope of both.
+    """List the parts of the tests that may be faulty, as explanations of a gap.
 
     Args:
         evidence: the fitted model and the tests.
 
     Returns:
-        Frequencies, levels, repeats and, if there are sweeps too, loops. Their columns do not depend on the model.
+        Frequencies, levels, repeats and, if there are sweeps too, loops.
     """
     loops, sweeps = split_by_kind(evidence.data_sets)
     faulty_parts = [*_frequencies(evidence, sweeps), *_levels(evidence, sweeps), *_repeats(evidence, sweeps)]
@@ -45,21 +47,21 @@ def find_faulty_parts(evidence: Evidence) -> list[FaultyPart]:
             act_together=True,
             covered_rows=(evidence.residual_rows[loop], evidence.residual.size),
         )
-        point = loop.prepared.frequency, loop.prepared.amplitude
-        others = (test for test in evidence.data_sets if test is not loop and test.direction == loop.direction)
-        part = FaultyPart("part", "loop", f"the loop {loop.name}", group, loop.direction, point[:1] * 2, point[1:] * 2)
-        faulty_parts.append(replace(part, extreme=not any(_covers(test, *point) for test in others)))
+        frequency, amplitude = loop.prepared.frequency, loop.prepared.amplitude
+        is_covered = any(
+            test.frequency.min() / _SAME <= frequency <= test.frequency.max() * _SAME
+            and test.amplitude.min() / _SAME <= amplitude <= test.amplitude.max() * _SAME
+            for test in evidence.data_sets
+            if test is not loop and test.direction == loop.direction
+        )
+        ends, name = ((frequency,) * 2, (amplitude,) * 2), f"the loop {loop.name}"
+        part = FaultyPart("part", "loop", name, group, loop.direction, *ends, extreme=not is_covered)
+        faulty_parts.append(part)
     return faulty_parts
 
 
-def _covers(test: MeasuredTest, frequency: float, amplitude: float) -> bool:
-    """True if an operating point [Hz; m or rad] lies within the range of a test."""
-    pairs = (frequency, test.frequency), (amplitude, test.amplitude)
-    return all(values.min() / _SAME <= value <= values.max() * _SAME for value, values in pairs)
-
-
-def _line_label(sweep: MeasuredSweep, point: int) -> str:
-    """Text that names the line (runs at one held amplitude or frequency) of a point, given by its index."""
+def _level_label(sweep: MeasuredSweep, point: int) -> str:
+    """Text that names the level of a point of a sweep, given by the index of the point."""
     if sweep.sweep.stepped == "frequency":
         return f"the {sweep.direction} level {shown_amplitude(sweep.direction, sweep.amplitude[point])}"
     if sweep.sweep.stepped == "amplitude":
@@ -68,35 +70,35 @@ def _line_label(sweep: MeasuredSweep, point: int) -> str:
 
 
 def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
-    """Suspected faults: each level of a direction with several levels, each repeat of a level with over two repeats."""
+    """Generate faults of each level of a direction with several levels, and of each of three or more repeats."""
     for sweep in sweeps:
         levels_of_direction = [np.unique(member.held_value) for member in sweeps if member.direction == sweep.direction]
         levels = np.concatenate(levels_of_direction)
         for level in np.unique(sweep.held_value):
             mask = sweep.held_value == level
-            label = _line_label(sweep, int(np.argmax(mask)))
+            label = _level_label(sweep, int(np.argmax(mask)))
             if levels.size > 1:  # in this file or in others
-                part = _part(evidence, "level", label, [sweep], [mask])
+                part = _common_fault(evidence, "level", label, [sweep], [mask])
                 yield replace(part, extreme=levels.size > 2 and level in (levels.min(), levels.max()))
             numbers = np.unique(sweep.repeat[mask])
             for number in numbers if numbers.size > 2 else ():
                 repeat = mask & (sweep.repeat == number)
-                yield _part(evidence, "repeat", f"repeat {number} of {label}", [sweep], [repeat])
+                yield _common_fault(evidence, "repeat", f"repeat {number} of {label}", [sweep], [repeat])
 
 
 def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
-    """Suspected faults: all points of one repeat, in one sweep, in all sweeps of a direction, or in all sweeps."""
+    """Generate faults of all points of one repeat, in one sweep, in all sweeps of a direction, or in all sweeps."""
     for _, label, members in _scopes(sweeps):
         if not all(np.unique(sweep.repeat).size > 1 for sweep in members):
             continue
         for number in sorted({int(repeat) for sweep in members for repeat in sweep.repeat}):
             chosen = [sweep.repeat == number for sweep in members]
             if all(mask.any() for mask in chosen):
-                yield _part(evidence, "repeat", f"repeat {number} of {label}", members, chosen)
+                yield _common_fault(evidence, "repeat", f"repeat {number} of {label}", members, chosen)
 
 
 def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
-    """Suspected faults: a disturbance at one or a few frequencies, in one sweep, one direction or all sweeps."""
+    """Generate faults of one or a few frequencies, in one sweep, in all sweeps of a direction, or in all sweeps."""
     steps = np.unique(np.concatenate([sweep.frequency for sweep in sweeps])) if sweeps else np.empty(0)
     if steps.size < _FEWEST_FREQUENCIES:
         return
@@ -113,14 +115,14 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterato
                 name = f"{' to '.join(f'{end:.4g}' for end in ends)} Hz in {location}, at every amplitude"
                 chosen = [np.any(of_sweep, axis=0) for of_sweep in zip(*masks[window], strict=True)]
                 unit = np.kron(np.eye(width), np.array([[1.0], [1.0j]]))
-                yield _part(evidence, "frequency", name, members, chosen, np.concatenate(columns[window]), unit)
+                yield _common_fault(evidence, "frequency", name, members, chosen, np.concatenate(columns[window]), unit)
 
 
 def _scopes(sweeps: Sequence[MeasuredSweep]) -> Iterator[tuple[str, str, Sequence[MeasuredSweep]]]:
-    """Groups of sweeps that may have a common fault: each sweep, all sweeps of a direction, and all sweeps.
+    """Generate the groups of sweeps that may have a common fault: each sweep, all of a direction, and all sweeps.
 
     Yields:
-        Text on the direction or file, text on the sweeps, and the sweeps.
+        Text on the location, such as a direction; text on the sweeps; and the sweeps.
     """
 
     def direction_of(sweep: MeasuredSweep) -> str:
@@ -138,7 +140,7 @@ def _scopes(sweeps: Sequence[MeasuredSweep]) -> Iterator[tuple[str, str, Sequenc
         yield "all directions", "every sweep", sweeps
 
 
-def _part(
+def _common_fault(
     evidence: Evidence,
     family: str,
     name: str,
@@ -147,7 +149,7 @@ def _part(
     columns: Array | None = None,
     unit: Array = _SLOPING,
 ) -> FaultyPart:
-    """Build a suspected fault of sweep points: a common error of gain and phase, and of their slopes.
+    """Build the explanation of a gap by common errors of sweep points: of gain and phase, and of their slopes.
 
     Args:
         evidence: the fitted model and the tests.
@@ -155,8 +157,9 @@ def _part(
         name: name of the fault for reports.
         sweeps: sweeps that have the fault.
         chosen: mask of the faulty points of each sweep, (n,) each.
-        columns: change of the whitened residuals by a unit of each of c other errors, (c, rows).
-        unit: complex relative change of the stiffness by a unit of each error, at the p ends of the part, (c, p).
+        columns: change of the whitened residuals of `sweeps` by a unit of each of c errors, (c, rows); None for gain,
+            phase and their slopes.
+        unit: complex relative change of the stiffness by a unit of each error at p points of the part, (c, p).
     """
     columns = _shift_columns(evidence, sweeps, chosen, sloping=True) if columns is None else columns
     frequency, amplitude = (
@@ -164,22 +167,25 @@ def _part(
         for axis in ("frequency", "amplitude")
     )
     ends = (float(frequency.min()), float(frequency.max())), (float(amplitude.min()), float(amplitude.max()))
-    group = Group(columns, unit, act_together=True, covered_rows=(_rows(evidence, sweeps), evidence.residual.size))
+    group = Group(columns, unit, act_together=True, covered_rows=(_row_span(evidence, sweeps), evidence.residual.size))
     return FaultyPart("part", family, name, group, sweeps[0].direction, *ends)
 
 
 def _shift_columns(
     evidence: Evidence, sweeps: Sequence[MeasuredSweep], chosen: Sequence[Array], sloping: bool = False
 ) -> Array:
-    """Change of the whitened residuals by an error of gain of 100 % and of phase of 1 rad, (2, rows).
+    """Change of the whitened residuals of sweeps by an error of gain of 100 % and of phase of 1 rad.
 
     Args:
         evidence: the fitted model and the tests.
-        sweeps: sweeps with the errors, whose residuals are `rows` in number.
+        sweeps: sweeps with the errors.
         chosen: mask of the points with the errors in each sweep, (n,) each.
-        sloping: True to add the same errors times a slope along the log of the stepped quantity: (4, rows).
+        sloping: True to add the same errors times a slope along the log of the stepped quantity.
+
+    Returns:
+        Changes of the residuals from the first to the last of `sweeps`, (2, rows), or (4, rows) with slopes.
     """
-    rows = _rows(evidence, sweeps)
+    rows = _row_span(evidence, sweeps)
     columns = np.zeros((2 + 2 * sloping, rows.stop - rows.start))
     for sweep, mask in zip(sweeps, chosen, strict=True):
         log_step = np.log(sweep.step)
@@ -192,7 +198,7 @@ def _shift_columns(
     return columns
 
 
-def _rows(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> slice:
+def _row_span(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> slice:
     """Slice of the residual vector from the first to the last row of the given sweeps."""
     slices = [evidence.residual_rows[sweep] for sweep in sweeps]
     return slice(min(rows.start for rows in slices), max(rows.stop for rows in slices))

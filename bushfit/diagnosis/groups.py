@@ -1,4 +1,4 @@
-"""Groups of residual columns with a prior, and the evidence of the tests for them."""
+"""Groups: changes of the residuals by one explanation of a gap, with a prior; and the evidence of tests for them."""
 
 from dataclasses import dataclass
 
@@ -12,14 +12,15 @@ _UNSEEN = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Changes of the residuals by one explanation of a gap, as columns with Gaussian amounts of zero mean.
+    """Changes of the residuals by one explanation of a gap: c columns, with Gaussian priors of their amounts.
 
     Args:
-        columns: change of the whitened residuals per unit amount of each column, (c, n).
-        unit: relative change of |K| per unit amount, (c,); complex at p operating points, (c, p), if `act_together`.
+        columns: change of the n whitened residuals per unit amount of each column, (c, n).
+        unit: relative change of |K| per unit amount of each column, (c,); complex, at p operating points, (c, p), if
+            `act_together`.
         act_together: True if all columns act at once with independent amounts of one prior size; False if exactly one
             column acts, each with equal probability.
-        sign: +1 if only positive amounts are possible, for groups in which one column acts; else 0.
+        sign: +1 if only positive amounts are possible (only without `act_together`); else 0.
         covered_rows: slice of the residuals that `columns` covers, and the number of all residuals; None for all.
     """
 
@@ -31,7 +32,7 @@ class Group:
 
     @property
     def whole(self) -> Array:
-        """Changes of all n residuals per unit amount of each column of the explanation, (c, n)."""
+        """Changes of all n residuals per unit amount of each column, (c, n)."""
         if self.covered_rows is None:
             return self.columns
         rows, count = self.covered_rows
@@ -41,10 +42,10 @@ class Group:
 
     @property
     def scaled(self) -> Array:
-        """Columns of the group over all residual rows, (c, n), for the computation of evidence.
+        """Changes of all n residuals for the computation of evidence, (c, n).
 
-        If exactly one column acts, each is scaled to a change of |K| by 100 %; a column that does not change |K|
-        becomes zero.
+        If exactly one column acts, each is that of a change of |K| by 100 %; a column that does not change |K| becomes
+        zero.
         """
         if self.act_together:
             return self.whole
@@ -54,15 +55,15 @@ class Group:
 
 @dataclass(frozen=True, eq=False)
 class GroupEvidence:
-    """Evidence of the tests for one explanation of a gap, a group of residual columns.
+    """Evidence of the tests for one explanation of a gap.
 
     Args:
-        log_evidence: natural log of the marginal likelihood of the tests with the group, averaged over the sizes of the
-            group's amounts and of the rig's errors.
-        size: relative change of |K| by the group, root mean square over the posterior.
+        log_evidence: natural log of the marginal likelihood of the tests with the explanation, averaged over the sizes
+            of its amounts and of the rig's errors.
+        size: relative change of |K| by the explanation, root mean square over the posterior.
         likeliest: most probable prior standard deviation of the amounts, relative to |K|, one of `priors.SIZES`.
-        with_compound: evidence for the group together with a smooth deviation of the rubber from the model's laws; None
-            if no such deviation is considered.
+        with_compound: evidence for the explanation together with a smooth deviation of the rubber from the model's
+            laws; None if no such deviation is considered.
     """
 
     log_evidence: float
@@ -72,10 +73,7 @@ class GroupEvidence:
 
     @property
     def total(self) -> float:
-        """Natural log of the marginal likelihood with the group, summed over both hypotheses on the compound.
-
-        The compound follows the model's laws, or deviates from them smoothly.
-        """
+        """Natural log of the marginal likelihood, summed over compounds that follow the model's laws or not."""
         if self.with_compound is None:
             return self.log_evidence
         return float(np.logaddexp(self.log_evidence, self.with_compound.log_evidence))

@@ -68,7 +68,11 @@ class DiagnosisWriter:
         return self.finding.reported[0] if self.finding.reported else None
 
     def diagnosis(self) -> Diagnosis:
-        """Build the diagnosis: verdict, effects, regions, hold-out, next test and the model to use."""
+        """Build the diagnosis with all texts.
+
+        Returns:
+            Verdict, effects, regions, hold-out, next test and the model to use.
+        """
         verdict, first = self.finding.verdict, self.first
         if verdict == "consistent":
             return self._build(verdict, _NOTHING, self.request.base)
