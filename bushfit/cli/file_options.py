@@ -189,7 +189,7 @@ def _pairs(texts: Sequence[str], option: str, example: str, roles: Sequence[str]
         role = role.strip().replace(" ", "_").replace("-", "_")
         if not (equals and value.strip() and role in roles):
             raise MeasurementError(
-                "not a column's role with a value",
+                "this is not ROLE=VALUE",
                 place=option,
                 found=f'"{text}"',
                 expected=f'such as "{example}"; roles: {", ".join(dict.fromkeys(roles))}',

@@ -148,13 +148,7 @@ def option_name(key: str) -> str:
 
 def direction_option(words: str) -> Parameter:
     """Create the option --direction for names of directions or specimens, with the help text `words`."""
-
-    def check(ctx: click.Context, parameter: click.Parameter, places: tuple[str, ...]) -> tuple[str, ...]:
-        if not all(place.strip() for place in places):
-            raise click.BadParameter("an empty text is not a direction", ctx, parameter)
-        return places
-
-    return option("--direction directions", "PLACE", words, type=str, multiple=True, callback=check)
+    return option("--direction directions", "PLACE", words, type=str, multiple=True)
 
 
 def file_option(name: str, words: str) -> Parameter:

@@ -28,13 +28,10 @@ def command(folder: Path, date: str | None, output: Output) -> None:
     Writes report.html, in place of an earlier one, or for a batch index.html.
     """
     from bushfit.report.page import folder_pages
-    from bushfit.report.results import Formats, ResultFile
 
     target = output.output or folder
     base = "" if output.output is None else f"{folder.resolve().as_uri()}/"
     day = calendar.today().isoformat() if date == "today" else date
-    pages = {name: page for file in folder_pages(folder, base, day) for name, page in Formats().encode(file).items()}
-    files = [ResultFile(name, "raw", page) for name, page in pages.items()]
-    replace(output, force=True).write(
-        target, files, {"pages": {str(target / name): len(page) for name, page in pages.items()}}
-    )
+    files = folder_pages(folder, base, day)
+    sizes = {str(target / f"{file.name}.html"): len(file.content.encode()) for file in files}
+    replace(output, force=True).write(target, files, {"pages": sizes})

@@ -191,7 +191,7 @@ def _compared(
     for places in columns:
         if len({place.motion for place in places}) > 1:
             found = ", ".join(f"{place}: {place.motion.words[0]}" for place in places)
-            raise ModelError("a place that is not one kind of motion in all", found=found, expected="one kind")
+            raise ModelError("the results have different kinds of motion", found=found, expected="one kind of motion")
         grids.append(requested_grid(common_grid(results, places, entries[0].sweeps), grid, places[0]))
     preloads = [requested_preloads(results[0], places[0], [preload])[0] if preload else None for places in columns]
     comparisons = with_holm(

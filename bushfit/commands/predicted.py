@@ -64,7 +64,7 @@ class PredictionOutput:
 
     @property
     def document(self) -> Mapping[str, Any]:
-        """Content of `predict --json`: tables of the predictions by direction, Maxwell arms, tests and warnings."""
+        """Content of `predict --json`: tables of predictions, resonances, static curves; Maxwell arms; warnings."""
         document: dict[str, Any] = {
             str(predictions[0].direction): table_columns(joined_table(prediction_table, predictions))
             for predictions in by_direction(self.predictions)

@@ -82,6 +82,6 @@ def _content(output: CommandOutput, name: str, kind: Kind) -> Any:
     files = {file.name: file for file in output.files if file.kind == kind}
     if name not in files:
         word = {"figure": "picture"}.get(kind, kind)
-        expected = "one of " + ", ".join(files) if files else f"an outcome with a {word}"
+        expected = "one of " + ", ".join(files) if files else f"an output with a {word}"
         raise BushfitError(f"there is no such {word}", found=name, expected=expected, hint=did_you_mean(name, files))
     return files[name].content

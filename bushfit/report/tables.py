@@ -326,7 +326,11 @@ def master_curve_table(shifted_sweeps: Sequence[ShiftedSweep]) -> pd.DataFrame:
 
 
 def bushings_table(bushings: Sequence[OtherBushings]) -> pd.DataFrame:
-    """Table of the errors with which a fit to the other bushings predicts each bushing; a row per bushing."""
+    """Table of the errors with which a fit to the other bushings predicts each bushing.
+
+    Returns:
+        A row per bushing: name, points, NRMSE, reduced chi-square, mean gap of |K|, share of points in the band.
+    """
     columns = ["bushing", "points", "NRMSE [%]", "chi2 [-]", "mean gap [%]", "in band [%]"]
     table = pd.DataFrame([astuple(row) for row in bushings], columns=columns)
     percent = [name for name in columns if "%" in name]

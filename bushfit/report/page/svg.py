@@ -93,7 +93,7 @@ def panel_axes(chart: Chart) -> Iterator[list[Any]]:
             yield [*(round(float(corner), 1) for corner in corners), *limits, *logarithmic, *labels]
 
 
-def _rewrite(root: ElementTree.Element, name: str) -> None:
+def _rewrite(root: ElementTree.Element, prefix: str) -> None:
     """Simplify an SVG: no metadata or style sheets, styles as attributes, short numbers, identifiers with a prefix."""
     for parent in list(root.iter()):
         for child in list(parent):
@@ -110,7 +110,7 @@ def _rewrite(root: ElementTree.Element, name: str) -> None:
                 element.set(key, value.removesuffix("px"))
         for key, new_key, form in ((_HREF, "href", "#{}"), ("clip-path", "clip-path", "url(#{})")):
             if reference := re.search(r"#([\w-]+)", element.attrib.pop(key, "")):
-                element.set(new_key, form.format(names.setdefault(reference[1], f"{name}{len(names)}")))
+                element.set(new_key, form.format(names.setdefault(reference[1], f"{prefix}{len(names)}")))
     for element in root.iter():
         identifier, decimals = element.attrib.pop("id", ""), 1
         if identifier in names:
