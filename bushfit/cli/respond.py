@@ -97,9 +97,9 @@ def print_response(output: Output, response: ResponseOutput) -> None:
     for part in response.responses:
         unit, factor = part.direction.display.force
         strain, rate = (abs(values).max() for values in (part.strain, part.strain_rate))
-        beyond = [f"{number(100.0 * share, 2)} %" for share in part.shares_beyond] if part.tested else ["", ""]
+        shares = [f"{number(100.0 * share, 2)} %" for share in part.shares_beyond] if part.tested else ["", ""]
         forces = [f"{number(factor * size, 4)} {unit}" for size in (part.peak, part.rms)]
-        strains = number(100.0 * strain, 3), beyond[0], number(rate, 3), beyond[1]
+        strains = number(100.0 * strain, 3), shares[0], number(rate, 3), shares[1]
         rows.append((str(part.direction), *forces, number(part.power, 3), *strains))
     heads = ("peak", "rms", "energy [J/s]", "strain [%]", "beyond tests", "rate [1/s]", "beyond tests")
     output.print_table("force, energy, and largest strain and rate", ("direction", *heads), rows)

@@ -291,11 +291,11 @@ def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> li
                 raise ModelError(f"{name} is not the same in all results", found="; ".join(labels), expected=expected)
             columns += map(list, zip(*places_of, strict=True))
         return columns
-    known = []
+    tested = []
     for result in results:
         default = [str(place) for place in default_places(result.model.bushing, result.specimens)]
-        known.append(list(result.measured.directions if result.measured else ()) or default)
-    common = [name for name in known[0] if all(name in places for places in known)]
+        tested.append(list(result.measured.directions if result.measured else ()) or default)
+    common = [name for name in tested[0] if all(name in places for places in tested)]
     places = [[result.place(name) for result in results] for name in common]
     matching = [bodies for bodies in places if all(body.motion is bodies[0].motion for body in bodies)]
     return matching or [[COMPOUND] * len(results)]

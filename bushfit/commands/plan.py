@@ -1,7 +1,7 @@
 """plan: tests that would reduce the uncertainty most, within what the rig can do."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
@@ -10,13 +10,13 @@ import numpy as np
 import pandas as pd
 
 from bushfit.campaign.campaign import Campaign, model_of
-from bushfit.campaign.schema import PredictSettings, RigSettings
+from bushfit.campaign.schema import RigSettings
 from bushfit.campaign.simulated import SimulatedLoop
 from bushfit.commands.fit import prepare_tests
 from bushfit.commands.predict import Numbers, grid_of
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError, did_you_mean
-from bushfit.geometry import Place, default_places, get_places
+from bushfit.geometry import default_places, get_places
 from bushfit.model.result import Result
 from bushfit.planning.campaign import campaign_toml
 from bushfit.planning.compound import guess_parameters
@@ -111,11 +111,17 @@ def plan(
     default = default_places(knowledge.model.bushing, () if knowledge.model.bushing else specimens)
     places = tuple(place for name in test_directions for place in get_places(name, specimens)) or tuple(default)
     grid = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
-    points = tuple(_wanted_points(Result(knowledge.model, specimens=knowledge.specimens), grid, campaign, default))
+    settings, sweeps = grid_settings(grid, campaign), campaign.sweeps if campaign else ()
+    wanted_places = [place for name in settings.directions or () for place in get_places(name, specimens)]
+    start, points = Result(knowledge.model, specimens=specimens), list[Points]()
+    for place in wanted_places or default:
+        axes = [np.unique(axis) for axis in requested_grid(default_grid(start, place, sweeps), settings, place)]
+        amplitude, frequency = np.meshgrid(axes[1], axes[0], indexing="ij")
+        points.append(Points(place, frequency.ravel(), amplitude.ravel()))
     rig = with_rig_class(campaign.rig if campaign else RigSettings(), knowledge.noise)
     named = (_targets(name, half, knowledge, points) for name, half in (targets or {}).items())
     wanted = tuple(chain.from_iterable(named))
-    request = PlanRequest(aim, hours, rig, places, points, tuple(parameters) or knowledge.names, wanted)
+    request = PlanRequest(aim, hours, rig, places, tuple(points), tuple(parameters) or knowledge.names, wanted)
     chosen = choose_tests(knowledge, request)
     document = plan_document(chosen)
     files = [ResultFile("plan", "json", document), ResultFile("plan", "table", partial(plan_sheet, chosen))]
@@ -140,28 +146,6 @@ def _knowledge(source: Campaign | Result | Knowledge, rivals: Sequence[str] | No
     if source.bushing and source.compound:
         return guess_parameters(source.bushing, source.compound)
     return from_result(Result(model_of(source), specimens=source.specimens))
-
-
-def _wanted_points(
-    result: Result, grid: PredictSettings, campaign: Campaign | None, default: Sequence[Place]
-) -> Iterator[Points]:
-    """Yield the operating points of the wanted predictions, one `Points` per direction.
-
-    The grid is that of the arguments, else that of [predict], else the default grid of `predict`.
-
-    Args:
-        result: fitted result or model.
-        grid: grid that the arguments state; None for the default of an axis.
-        campaign: campaign with a table [predict]; None without one.
-        default: directions or specimens if the grid states none.
-    """
-    settings = grid_settings(grid, campaign)
-    places = [place for name in settings.directions or () for place in get_places(name, result.specimens)]
-    for place in places or default:
-        usual = default_grid(result, place, campaign.sweeps if campaign else ())
-        frequencies, amplitudes = requested_grid(usual, settings, place)
-        amplitude, frequency = np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
-        yield Points(place, frequency.ravel(), amplitude.ravel())
 
 
 def _targets(name: str, half_width: float, knowledge: Knowledge, points: Sequence[Points]) -> list[Target]:

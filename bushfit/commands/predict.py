@@ -95,13 +95,9 @@ def predict(
     elif bushing:
         result, note = transfer_compound(result, bushing)
         notes, directions = (*notes, note), directions or [str(direction) for direction in _DIRECTIONS]
-    campaign = campaign and _assign_bushing(campaign, result)
-    if campaign and campaign.bushing and result.model.bushing and not result.bushings:
-        bodies = campaign.bushing, result.model.bushing
-        sizes, fitted_sizes = ((body.inner_radius, body.outer_radius, body.length) for body in bodies)
-        if not np.allclose(sizes, fitted_sizes, atol=0.0):
-            other = f"{result.name}: {campaign.path.name} tests a bushing of another shape, {campaign.bushing.name}"
-            notes = (*notes, f"{other}; --bushing {campaign.path.name} predicts that shape")
+    if campaign:
+        campaign, shape_notes = _assign_bushing(campaign, result)
+        notes = (*notes, *shape_notes)
     sweeps = campaign.sweeps if campaign else ()
     depends_on_temperature = result.model.depends_on("temperature")
     if temperature is not None and not depends_on_temperature:
@@ -170,9 +166,19 @@ def predict(
     return replace(output, files=prediction_files(output, drawn_sweeps, temperature, wide=wide))
 
 
-def _assign_bushing(campaign: Campaign, result: Result) -> Campaign:
-    """Assign the tests of a campaign to the one of several fitted bushings that has the campaign's geometry."""
+def _assign_bushing(campaign: Campaign, result: Result) -> tuple[Campaign, list[str]]:
+    """Assign the tests of a campaign to the one of several fitted bushings that has the campaign's geometry.
+
+    Returns:
+        The campaign, and a note if it tests another shape than that of a single fitted bushing.
+    """
     bushing, fitted = campaign.bushing, result.bushings
+    if bushing and result.model.bushing and not fitted:
+        both = bushing, result.model.bushing
+        sizes, fitted_sizes = ((body.inner_radius, body.outer_radius, body.length) for body in both)
+        note = f"{result.name}: {campaign.path.name} tests a bushing of another shape, {bushing.name}"
+        note += f"; --bushing {campaign.path.name} predicts that shape"
+        return campaign, [] if np.allclose(sizes, fitted_sizes, atol=0.0) else [note]
     bodies = [body for body in fitted if bushing and replace(bushing, name=body.name) == body]
     listed = {place.bushing for place in campaign.specimens if place.bushing}
     different = sorted({body.name for body in listed - {*fitted}} & {body.name for body in fitted})
@@ -182,11 +188,11 @@ def _assign_bushing(campaign: Campaign, result: Result) -> Campaign:
         expected = f"the geometry of {names} in the model"
         raise ModelError("the campaign tests another bushing", file=campaign.path, found=found, expected=expected)
     if not bodies:
-        return campaign
+        return campaign, []
     places = {place.axis: place for place in result.specimens if place.bushing == bodies[0]}
     loops = [replace(loop, direction=places.get(loop.direction.axis, loop.direction)) for loop in campaign.loops]
     sweeps = [replace(sweep, direction=places.get(sweep.direction.axis, sweep.direction)) for sweep in campaign.sweeps]
-    return replace(campaign, loops=tuple(loops), sweeps=tuple(sweeps))
+    return replace(campaign, loops=tuple(loops), sweeps=tuple(sweeps)), []
 
 
 def requested_preloads(result: Result, place: Place, preloads: Sequence[str]) -> list[Preload | None]:

@@ -158,21 +158,16 @@ def prediction_files(
                 title = f"{result.name}: {part[0].label if len(part) == 1 else part[0].direction}, static curve"
                 files.append(ResultFile(stem, "figure", partial(plots.prediction.static_figure, part, title)))
     if output.measured:
-        files.append(ResultFile("measured", "table", partial(measured_table, result, output.measured)))
+        parts = split_by_fit(result, output.measured)
+        make = partial(tables.sweeps_table, result.model, [sweep for part in parts for sweep in part])
+        use = np.repeat(["yes", "no"], [sum(sweep.frequency.size for sweep in part) for part in parts])
+        files.append(ResultFile("measured", "table", lambda: make().assign(fitted=use)))
     return files
 
 
 def by_direction(parts: Sequence[Part]) -> list[list[Part]]:
     """Group successive predictions or static curves of a direction or specimen; a group has one per preload."""
     return [list(group) for _, group in groupby(parts, key=attrgetter("direction"))]
-
-
-def measured_table(result: Result, sweeps: Sequence[MeasuredSweep]) -> pd.DataFrame:
-    """Table of measured sweeps beside the values of the model; sweeps to which the model was fitted come first."""
-    fitted, not_fitted = split_by_fit(result, sweeps)
-    counts = [sum(sweep.frequency.size for sweep in part) for part in (fitted, not_fitted)]
-    table = tables.sweeps_table(result.model, [*fitted, *not_fitted])
-    return table.assign(fitted=np.repeat(["yes", "no"], counts))
 
 
 def joined_table(make: Callable[[Part], pd.DataFrame], parts: Sequence[Part]) -> pd.DataFrame:

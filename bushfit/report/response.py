@@ -67,13 +67,13 @@ def response_figures(response: TimeResponse) -> dict[str, float | None]:
     Returns:
         Peak and rms force, energy, strain and strain rate by the keys of `respond --json`; None if not known.
     """
-    beyond = response.shares_beyond if response.tested else (None, None)
+    strain_share, rate_share = response.shares_beyond if response.tested else (None, None)
     return {
         "peak_force": response.peak,
         "rms_force": response.rms,
         "energy_per_second": response.power,
         "largest_strain": float(abs(response.strain).max()),
         "largest_strain_rate_per_s": float(abs(response.strain_rate).max()),
-        "share_of_time_above_tested_strain": beyond[0],
-        "share_of_time_above_tested_strain_rate": beyond[1],
+        "share_of_time_above_tested_strain": strain_share,
+        "share_of_time_above_tested_strain_rate": rate_share,
     }

@@ -85,8 +85,8 @@ def place_names(places: Iterable[Place]) -> list[str]:
     names: list[str] = []
     for place in places:
         name = folder_name(str(place))
-        taken = [other.casefold() for other in names]
-        names.append(name if name.casefold() not in taken else f"{name}_{len(names) + 1}")
+        earlier_names = [earlier.casefold() for earlier in names]
+        names.append(name if name.casefold() not in earlier_names else f"{name}_{len(names) + 1}")
     return names
 
 
