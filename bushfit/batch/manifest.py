@@ -178,10 +178,9 @@ def read_manifest(source: str, settings: RowSettings, *more: str) -> Manifest:
     elif path.suffix.lower() == ".toml":
         tables = parse_toml(path, "a manifest", _LARGEST_MANIFEST)
         bushings = tables.get("bushings")
-        sizes = (
-            [row for row in bushings if isinstance(row, dict) and "length" in row] if isinstance(bushings, list) else []
-        )
-        if sizes or not tables.keys().isdisjoint(("bushing", "specimens")):  # a campaign: a batch of one
+        tubes = bushings if isinstance(bushings, list) else []
+        has_sizes = any(isinstance(tube, dict) and "length" in tube for tube in tubes)
+        if has_sizes or not tables.keys().isdisjoint(("bushing", "specimens")):  # a campaign: a batch of one
             tables = {"bushings": [{"campaign": path.name}]}
         content = validate_tables(tables, path, ManifestFile)
         settings, points, entries = settings.with_defaults(content), content.at, list(content.bushings)

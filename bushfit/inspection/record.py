@@ -91,7 +91,6 @@ class Inspection:
         odd: one sentence for each oddity, such as an outlier.
         entry: further keys of the test's table in a campaign, with values as TOML gives them.
         measured: the test in SI.
-
         states_convention: True if the header of a sweep states zero-to-peak or peak-to-peak.
     """
 
