@@ -17,9 +17,8 @@ from bushfit.fitting.procedures import fit_joint, fit_two_step
 from bushfit.model.result import Result
 from bushfit.prediction.resonance import predict_resonance
 from bushfit.prediction.stiffness import predict
-from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.measurement import loss_factor
-from bushfit.reading.resonance import read_resonance
+from bushfit.reading.resonance import RESONANCE_COLUMNS, read_resonance
 from bushfit.reading.table import Table
 from bushfit.reduction.resonance import reduce_resonance
 from bushfit.simulation.measured import measure

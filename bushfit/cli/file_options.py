@@ -110,7 +110,8 @@ def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tes
         @wraps(function)
         def wrapped(**arguments: Any) -> Any:
             from bushfit.reading.displacements import DISPLACEMENT_COLUMNS
-            from bushfit.reading.headers import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
+            from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
+            from bushfit.reading.resonance import RESONANCE_COLUMNS
 
             roles = {
                 "tests": (*LOOP_COLUMNS, *SWEEP_COLUMNS),

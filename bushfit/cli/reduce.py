@@ -120,8 +120,7 @@ def _resonance_table(file: Path, test_options: Mapping[str, Any], shaker: Mappin
         shaker: texts of the options of a resonance test, such as the mass.
     """
     from bushfit.inspection.recognition import open_table
-    from bushfit.reading.headers import RESONANCE_COLUMNS
-    from bushfit.reading.resonance import is_resonance
+    from bushfit.reading.resonance import RESONANCE_COLUMNS, is_resonance
 
     is_stated = any(value is not None for value in shaker.values())
     try:

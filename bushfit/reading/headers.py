@@ -141,36 +141,6 @@ _SPELLINGS: dict[int, int | str] = {
 _NAME_END = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
 
 
-def _combined_names(body: str, quantity: str) -> list[str]:
-    """Column names that combine each name of a body, such as "base", with each name of a quantity, such as "phase"."""
-    parts = WORDS["resonance_parts"]
-    return [
-        name
-        for body_name in parts[body]
-        for word in parts[quantity]
-        for name in (f"{body_name} {word}", word + body_name)
-    ]
-
-
-#: Names of the columns of a resonance test (a mass on a mount on a shaker), by role.
-RESONANCE_COLUMNS: Mapping[str, Sequence[str]] = {
-    "frequency": SWEEP_COLUMNS["frequency"],
-    **{
-        f"{body}_{word}": _combined_names(body, word) for word in ("acceleration", "phase") for body in ("base", "mass")
-    },
-    **WORDS["resonance"],
-    **{
-        f"{body}_{part}": [
-            f"{name} {word}"
-            for name in _combined_names(body, "acceleration")
-            for word in WORDS["resonance_parts"][part]
-        ]
-        for body in ("base", "mass")
-        for part in ("real", "imaginary")
-    },
-}
-
-
 def of_motion(names: Mapping[str, Sequence[str]], motion: Motion) -> dict[str, Sequence[str]]:
     """Adapt column names to a kind of motion: in a test of strain, for example, G' names a modulus, not a stiffness.
 

@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from bushfit.effects.contract import Array
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
-from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.measurement import Source
-from bushfit.reading.resonance import ResonanceTest, read_resonance
+from bushfit.reading.resonance import RESONANCE_COLUMNS, ResonanceTest, read_resonance
 from bushfit.reading.table import Table
 from bushfit.reduction.resonance import MOST_POINTS, Resonance, reduce_resonance, shaken_response, transmissibility
 
