@@ -265,8 +265,8 @@ def prior_uses(solution: FitResult, covariance: Covariance) -> dict[str, PriorUs
 def prior_warnings(uses: Mapping[str, PriorUse]) -> list[str]:
     """Warnings about priors that the tests contradict, one sentence each."""
     return [
-        f"the tests contradict the prior of {name} ({use.source}): they differ by {number(abs(use.distance), 2)} "
-        "standard deviations (1.96 for 95 of 100 right priors); check the prior, or leave it out"
+        f"the tests contradict the prior of {name} ({use.source}) by {number(abs(use.distance), 2)} standard "
+        "deviations (at most 1.96 for 95 of 100 right priors): check the prior, or leave it out"
         for name, use in uses.items()
         if abs(use.distance) > Z95
     ]

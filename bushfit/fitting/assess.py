@@ -324,8 +324,8 @@ def temperature_warning(model: Model, data_sets: Sequence[MeasuredTest]) -> list
         return []
     tested = f"{warmest} was tested at {number(high, 3)} degC and {coldest} at {number(low, 3)} degC"
     return [
-        f"{tested}, {number(high - low, 3)} degC apart: this model has no effect of temperature, and another "
-        "named effect may be one; fit the tests of each temperature separately, or with --effect temperature"
+        f"{tested}, {number(high - low, 3)} degC apart. This model has no effect of temperature, and another "
+        "effect may stand for it: fit the tests of each temperature separately, or with --effect temperature"
     ]
 
 
@@ -339,7 +339,7 @@ def mixed_condition_warnings(data_sets: Sequence[MeasuredTest]) -> list[str]:
         One sentence for each condition that differs.
     """
     sentences = []
-    labels = {"specimen_number": "of specimens", "preload": "under preloads of"}
+    labels = {"specimen_number": "are of specimens", "preload": "were made under preloads of"}
     if preload_ranges(data_sets):  # a variable of the model, or without influence
         del labels["preload"]
     for key, words in labels.items():
@@ -351,8 +351,7 @@ def mixed_condition_warnings(data_sets: Sequence[MeasuredTest]) -> list[str]:
         if len(by_value) > 1:
             listed = ", ".join(f"{value} ({name})" for value, name in by_value.items())
             sentences.append(
-                f"the tests were made {words} {listed}, and one model is fitted to all: fit each group in a "
-                "campaign of its own"
+                f"the tests {words} {listed}, and one model is fitted to all: fit each group in a separate campaign"
             )
     return sentences
 

@@ -311,6 +311,6 @@ def wrong_clock(loop: Loop, coefficients: Array) -> str | None:
         return None
     return (
         f"{100 * outer:.2g} % of the rows lie beyond {_OUTER:g} of the amplitude, like those of {like} recorded "
-        f"evenly in time, but the {loop.direction.motion.words[0]} over time is {opposite}: where a file has no "
-        'time, rate means a triangle, and frequency with waveform = "sine" a sine'
+        f"evenly in time, but the {loop.direction.motion.words[0]} over time is {opposite}. For a file without time, "
+        'rate means a triangle, and frequency with waveform = "sine" means a sine'
     )

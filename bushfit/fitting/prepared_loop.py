@@ -129,11 +129,6 @@ class PreparedLoop:
         """True if the record has rows before the loop, whose deformation the rubber remembers."""
         return self.loop.part is not None and self.loop.part.first_row > 0
 
-    @property
-    def rounding(self) -> float:
-        """Half the distance of two rows [cycles]: tolerance within which a record has a whole number of cycles."""
-        return 0.5 * self.cycles / self.loop.time.size
-
     @cached_property
     def _motion(self) -> History:
         cycle = np.fft.irfft(0.5 * GRID * np.append(0.0, self.coefficients[1:]), GRID)
@@ -144,7 +139,7 @@ class PreparedLoop:
 
     @cached_property
     def _settling(self) -> History:
-        count = int(np.ceil(self.cycles - self.rounding))
+        count = int(np.ceil(self.cycles - 0.5 * self.cycles / self.loop.time.size))  # but for half a row
         motion = History.steady(np.tile(self._motion.value, count), self.frequency, cycles=count)
         return replace(motion, accuracy=_ACCURACY)
 
@@ -262,7 +257,8 @@ def _with_row_noise(prepared: PreparedLoop, loop_harmonics: LoopHarmonics) -> Pr
     """
     binned = prepared.force.size < prepared.loop.force.size
     turn = prepared.phase.astype(np.intp)
-    rows = (turn >= int(prepared.from_rest)) & (turn < int(prepared.cycles + prepared.rounding))
+    half_row = 0.5 * prepared.cycles / prepared.loop.time.size
+    rows = (turn >= int(prepared.from_rest)) & (turn < int(prepared.cycles + half_row))
     cycles = np.unique(turn[rows]).size
     if not cycles or np.count_nonzero(rows) < 32 * cycles:  # fewer resolve no correlation
         return prepared

@@ -224,17 +224,17 @@ def _without_springpot(data: PreparedCampaign, static: FitResult) -> str:
     """Warning that states by how many per cent leaving the springpot out changed the static parameters."""
     values = static.model.values
     try:
-        better, source = fit_two_step(data).result.model.values, "with m and alpha from this campaign's sweep"
+        better, source = fit_two_step(data).result.model.values, "With m and alpha from this campaign's sweep"
     except FitError:  # no sweep, or none that goes with the loops: a typical rubber tells as much as can be told
         ratio, alpha = _TYPICAL_SPRINGPOT
         fixed = {"m": ratio * values["mu"], "alpha": alpha}
         better = _fit_step(data, static.minimised, BASE, fixed).model.values
-        source = f"with the springpot of a typical filled rubber (m = {ratio} mu s^alpha, alpha = {alpha})"
+        source = f"With the springpot of a typical filled rubber (m = {ratio} mu s^alpha, alpha = {alpha})"
     changes = ", ".join(f"{name} by {100 * (better[name] / values[name] - 1):+.1f} %" for name in STATIC)
     return (
-        "m and alpha are not known yet, so the springpot was left out, and the other parameters include its "
-        f"stiffness and loss at the rate of the loop; {source} they change: {changes}. bushfit run alternates the "
-        "two fits, and bushfit fit fits all parameters together"
+        "m and alpha are not known yet, so the springpot was left out: the other parameters include its stiffness and "
+        f"loss at the rate of the loop. {source}, these parameters change: {changes}. bushfit run alternates the two "
+        "fits, and bushfit fit fits all parameters together"
     )
 
 

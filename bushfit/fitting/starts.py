@@ -88,7 +88,7 @@ def start_values(
         raise FitError(
             "the moduli of these tests are outside those of all rubbers",
             found=reasons[0],
-            hint="if these are the units and the dimensions, give start values in [fit] of the campaign",
+            hint="if units and dimensions are right, give start values in [fit] of the campaign",
         )
     return {**inside, **fixed}
 

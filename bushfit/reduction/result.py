@@ -137,16 +137,14 @@ class Reduction:
                     f"this changes |K| by up to {number(100 * steepest * np.abs(miss).max(), 2)} % (fits use the "
                     "reached amplitude)"
                 )
-        coarse = [step for step in steps if step.rows_per_cycle < _FEW_ROWS_PER_CYCLE]
-        if coarse:
+        if coarse := [step for step in steps if step.rows_per_cycle < _FEW_ROWS_PER_CYCLE]:
             worst = min(coarse, key=lambda step: step.rows_per_cycle)
             sentences.append(
                 f"{len(coarse)} of {len(steps)} points have fewer than {_FEW_ROWS_PER_CYCLE} rows per cycle "
                 f"({worst.rows_per_cycle:.3g} at {worst.frequency:.4g} Hz): harmonics above half the sampling rate "
                 "may fold onto the fundamental"
             )
-        bent = [step for step in steps if step.displacement_distortion > 0.02]  # rigs in order have less
-        if bent:
+        if bent := [step for step in steps if step.displacement_distortion > 0.02]:  # rigs in order have less
             worst = max(bent, key=lambda step: step.displacement_distortion)
             sentences.append(
                 f"the displacement is not a clean sine at {len(bent)} of {len(steps)} points: up to "
@@ -154,10 +152,8 @@ class Reduction:
                 f"{factor * worst.amplitude:.3g} {unit})"
             )
         rejected = [skip for skip in self.skipped if skip.steady]
-        sentences += [
-            f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s gives no point: {skip.why}"
-            for skip in rejected[:_MOST_LISTED]
-        ]
+        for skip in rejected[:_MOST_LISTED]:
+            sentences.append(f"{skip.name}, {skip.start:.4g} to {skip.end:.4g} s gives no point: {skip.why}")
         if len(rejected) > _MOST_LISTED:
             sentences.append(f"{len(rejected) - _MOST_LISTED} more parts give no point")
         return tuple(sentences)
