@@ -122,8 +122,9 @@ def test_the_right_model_of_a_loop_leaves_noise_alone(loop, paper_model):
     assert np.std(residual[counted]) == pytest.approx(1.0, abs=0.05)
     assert abs(np.corrcoef(residual[1:], residual[:-1])[0, 1]) < 0.06
     assert loop.relative_noise == pytest.approx(3e-3, rel=0.1)
-    weighed = loop.relative(paper_model) / loop.relative_noise * np.sqrt(loop.prepared.weight[counted])
-    np.testing.assert_allclose(np.abs(residual[counted]), weighed, rtol=1e-9)
+    relative = loop.relative_difference(paper_model)[0, counted]
+    weighed = relative / loop.relative_noise * np.sqrt(loop.prepared.weight[counted])
+    np.testing.assert_allclose(residual[counted], weighed, rtol=1e-9)
     assert np.array_equal(loop.distance(paper_model), np.abs(residual))
     assert np.max(np.abs(loop.noise_free(paper_model).residual(paper_model))) < 1e-9
 
