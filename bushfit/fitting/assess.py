@@ -339,7 +339,7 @@ def mixed_condition_warnings(data_sets: Sequence[MeasuredTest]) -> list[str]:
         One sentence for each condition that differs.
     """
     sentences = []
-    labels = {"specimen_number": "are of specimens", "preload": "were made under preloads of"}
+    labels = {"specimen_number": "of specimens", "preload": "under preloads of"}
     if preload_ranges(data_sets):  # a variable of the model, or without influence
         del labels["preload"]
     for key, words in labels.items():
@@ -351,7 +351,7 @@ def mixed_condition_warnings(data_sets: Sequence[MeasuredTest]) -> list[str]:
         if len(by_value) > 1:
             listed = ", ".join(f"{value} ({name})" for value, name in by_value.items())
             sentences.append(
-                f"the tests {words} {listed}, and one model is fitted to all: fit each group in a separate campaign"
+                f"the tests are {words} {listed}, and one model is fitted to all: fit each group in a separate campaign"
             )
     return sentences
 

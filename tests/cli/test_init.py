@@ -314,4 +314,4 @@ def test_tests_of_two_specimens_or_preloads_are_not_fitted_in_silence(bushfit, o
     stated = [f'{test.rstrip()}\n{key} = "{value}"\n' for test, value in zip(sweeps, ("0 mm", "5 mm"), strict=True)]
     campaign.write_text("[[".join([head, loop, *stated]), encoding="utf-8")
     done = bushfit("fit", campaign, "-o", own / "x", "--no-plots")
-    assert f"the tests were made {words} 0 mm (sweep_axial), 5 mm (sweep_radial)" in done.stderr
+    assert f"the tests are {words} 0 mm (sweep_axial), 5 mm (sweep_radial)" in done.stderr
