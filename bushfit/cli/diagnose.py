@@ -122,8 +122,8 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") 
     for line in (diagnosed.diagnosis.summary, *format_odds(diagnosed.document)):
         output.console.print(f"  {escape(line)}")
     if diagnosed.diagnosis.adopt:
-        first = " the first" if diagnosed.diagnosis.verdict == "ambiguous" else ""
-        output.console.print(f"  to adopt{first}: {escape(diagnosed.diagnosis.adopt)}")
+        cause = "the first" if diagnosed.diagnosis.verdict == "ambiguous" else "this"
+        output.console.print(f"  if you know that {cause} is the cause: {escape(diagnosed.diagnosis.adopt)}")
 
 
 def print_findings(output: Output, diagnosed: DiagnosisOutput) -> None:
@@ -166,7 +166,8 @@ def _print_effect(output: Output, effect: EffectEntry) -> None:
 
     console = output.console
     test = f" in {effect['test']}" if effect["test"] else ""
-    console.print(f"  [bold]{effect['name']}[/bold]{escape(test)} ({effect['level']}): {escape(effect['sentence'])}")
+    level = "bushing or rig" if effect["level"] == "unresolved" else effect["level"]
+    console.print(f"  [bold]{effect['name']}[/bold]{escape(test)} ({level}): {escape(effect['sentence'])}")
     for parameter, value, interval in effect_sizes(effect):
         console.print(f"    {parameter} = {value}, {f'95 % {interval}' if interval else 'no interval'}")
     if effect["twins"]:

@@ -144,13 +144,7 @@ def _form(correction: Unnamed, law: PowerLaw | None) -> str:
     """
     half = Z95 * correction.uncertainty * correction.largest
     largest, band = (number(100.0 * share, 2) for share in (correction.largest, half))
-    if law is None or not any(law.determined):
-        form = "its form is unknown"
-    elif law.is_likely:
-        form = law.sentence
-    else:
-        form = "it is not a power law of frequency and amplitude"
-        form += f"; nearest: {law.sentence}" if all(law.determined) else ""
+    form = law.sentence if law and law.is_likely and any(law.determined) else "its form is not a power law"
     return f"up to {largest} ± {band} % of |K|; {form}"
 
 

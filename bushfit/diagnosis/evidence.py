@@ -23,8 +23,8 @@ from bushfit.model.result import Result
 EVALUATIONS = 40
 #: Warning for a model with a smooth correction.
 _CORRECTED = (
-    "a smooth correction of the model closes a gap without a name: the parameters were fitted with it "
-    "and absorb the part of the gap that is smooth over more than a decade; their intervals are then invalid"
+    "a smooth correction closes a gap that no effect explains: "
+    "the parameters and their intervals contain a part of this gap"
 )
 
 

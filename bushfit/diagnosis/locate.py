@@ -99,19 +99,16 @@ def _describe_sweep_misfit(
     level = f"at every {fixed_axis}"
     if len(means) > 1 and np.ptp(means) >= _CHANGES * max(abs(mean) for mean in means):
         level += f", {_trend_word(means[0], means[-1])} with {fixed_axis}"
-    if len(touched) < len(lines):
-        level = "at " + ", ".join(lines[i].label for i in touched)
+    across = [i for i, piece in enumerate(pieces) if np.max(-np.sign(largest) * piece) > _STRONG * abs(largest)]
+    agreeing = [i for i in touched if i == worst or i not in across]
+    if len(agreeing) < len(lines):
+        level = "at " + ", ".join(lines[i].label for i in agreeing)
     unit, factor = ("Hz", 1.0) if line.stepped != "amplitude" else line.direction.display.displacement
     low, high = (factor * end for end in spans[line.stepped == "amplitude"])
     trend = _trend(line.stepped or "frequency", line.step, pieces[worst])
-    if len(touched) > 1 and line.stepped:
+    if len(agreeing) > 1 and line.stepped:
         trend = f"most at {line.label}, {trend} there"
-    across = [
-        line.label
-        for line, piece in zip(lines, pieces, strict=True)
-        if np.max(-np.sign(largest) * piece) > _STRONG * abs(largest)
-    ]
-    opposite = f"; {sides[1]} it at {', '.join(across)}" if across else ""
+    opposite = f"; {sides[1]} the model at {', '.join(lines[i].label for i in across)}" if across else ""
     return (
         f"measured {line.direction} {quantity} is up to {size} ({low:.3g} to {high:.3g} {unit}), {level}, {trend}"
         f"{opposite}"

@@ -72,8 +72,8 @@ _LAWS: tuple[tuple[float, float, float, tuple[Measure, ...], str], ...] = (
 )
 _MEASURES: dict[Measure, str] = {
     "stiffness": "the same stiffness in every direction",
-    "modulus": "a modulus over strain",
-    "gain": "a share of the stiffness",
+    "modulus": "the same modulus over strain",
+    "gain": "the same share of the stiffness in every direction",
 }
 _QUARTERS = {
     0: "in phase",
@@ -116,7 +116,7 @@ class PowerLaw:
         """Text on the law, such as "in quadrature, grows as f^0.8, independent of amplitude: acts like a damper"."""
         phase, low, high = self.phase_deg
         near = next((text for quarter, text in _QUARTERS.items() if low <= quarter <= high), "")
-        parts = [near or f"{number(phase, 2)} deg ahead of the displacement"]
+        parts = [near or f"phase {number(phase, 2)} deg"]
         if high - low > 2.0 * _PHASE_WIDTH:
             parts = ["at a phase that these tests do not determine"]
         powers = ((self.frequency_power, "f", "frequency"), (self.amplitude_power, "X", "amplitude"))
@@ -127,7 +127,7 @@ class PowerLaw:
                 parts.append(f"independent of {axis}")
             else:
                 parts.append(f"{'grows' if value > 0 else 'falls'} as {symbol}^{number(value, 2)}")
-        parts.append("as " + " or ".join(_MEASURES[measure] for measure in (self.measure, *self.alternatives)))
+        parts.append(" or ".join(_MEASURES[measure] for measure in (self.measure, *self.alternatives)))
         like = self._known_law() if all(self.determined) else ""
         return ", ".join(parts) + (f": acts like {like}" if like else "")
 

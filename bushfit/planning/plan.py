@@ -167,10 +167,10 @@ def explain_free_hours(search: PlanSearch, planned: Programme, missed: Sequence[
     if request.aim == "rivals" and search.hours < hours:
         reason = "these tests distinguish the rivals"
     elif missed and search.hours < hours:
-        reason = "no target that can be met is missed" if any(missed) else "all targets are met"
+        reason = "further runs would meet no missed target" if any(missed) else "all targets are met"
     if not planned.tests:
         needed = "would help" if any(missed) else "is needed"
-        return f"no test {needed}: {reason} from the tests so far, and all {number(hours, 3)} h remain free"
+        return f"no test {needed}: {reason}, and all {number(hours, 3)} h remain free"
     return (
         f"{number(planned.hours, 2)} of {number(hours, 3)} h are enough: {reason}, and {number(free, 2)} h remain free"
     )

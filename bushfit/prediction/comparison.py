@@ -297,11 +297,12 @@ def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
             if 1 < (count := int(sure.sum())) < sure.size:
                 parts[-1] += f" ({word} at {count} of {sure.size} points)"
             if sure.all() and not alike_all:
-                parts.append(f"at least {figures(bottom, word)}, at {_format_point(contrast, bottom)}")
+                smallest = f"{figures(bottom, word)} at {_format_point(contrast, bottom)}"
+                parts[-1] = f"{smallest}, up to {parts[-1]}"
     none = (band.low <= 0.0) & (band.high >= 0.0)
     if none.any():
         largest = number(float(np.maximum(-band.low, band.high)[none].max()), 2)
-        parts.append(f"{'elsewhere ' if parts else ''}no difference detected, and none above {largest}{unit}")
+        parts.append(f"{'elsewhere ' if parts else ''}no difference detected (up to {largest}{unit} is possible)")
     return ", ".join(parts)
 
 
