@@ -85,7 +85,7 @@ def test_what_the_diagnosis_says(measured):
     assert found.description is None
     assert "% of |K|" in found.summary.partition(";")[0], "the size comes first"
     document = found.to_document()
-    assert any("the parameters were fitted with it" in line for line in document["warnings"])
+    assert any("contain a part of this gap" in line for line in document["warnings"])
     assert complaints("diagnosis", json.loads(to_json(document)), whole=True) == []
     inside = predict(found.result, Direction.AXIAL, [45.0, 95.0], [LEVELS[1]]).stiffness
     assert np.all(inside.high - inside.value < 0.01 * inside.value)
