@@ -29,7 +29,7 @@ _EVALUATIONS = 400
 
 @dataclass(frozen=True, eq=False)
 class GapDescription:
-    """Description of a gap between model and tests that no known effect explains.
+    """Description of a gap between model and tests that no known effect explains, by a smooth correction of |K|.
 
     Args:
         after: model with its smooth correction of the stiffness, and the tests with loops replaced by their first
@@ -37,7 +37,7 @@ class GapDescription:
         fitted: fit of the parameters with the correction treated as a random error of the model.
         holdout: root mean square residuals of predicted runs inside the tested range, without and with the correction.
         power_law: nearest power law of frequency and amplitude; None if the tests show no power law.
-        sentence: text on the size and the form of the gap.
+        sentence: text on the size and the form of the gap, for the summary.
         evidence: text on the range of tests in which the correction is valid.
     """
 
@@ -62,9 +62,8 @@ def describe(
 ) -> GapDescription | None:
     """Describe the gap (measured minus modelled stiffness) by a correction smooth in ln frequency and ln strain.
 
-    The description states the power law of frequency and amplitude that is nearest to the correction.
-
-    The form of the gap within a cycle is unknown, so loops are represented by their first harmonic.
+    The description has the power law of frequency and amplitude that is nearest to the correction. Its form within a
+    cycle is unknown, so loops are represented by their first harmonic.
 
     Args:
         evidence: the fitted model and the tests.
@@ -74,8 +73,8 @@ def describe(
         bounds: limits of parameters inside their general limits.
 
     Returns:
-        The description; None if the correction does not raise the likelihood, if its error is larger than the gap, if
-        the model has a correction already, or if the first harmonics cannot be fitted.
+        The description; None without a valid correction: if it does not raise the likelihood or has an error larger
+        than the gap, if the model has a correction already, or if the first harmonics cannot be fitted.
     """
     if NAME in evidence.model.effects:
         return None
@@ -99,14 +98,13 @@ def describe(
 def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
     """Predict parts of the sweeps inside the tested range from the other parts, without and with the correction.
 
-    The parts are every third frequency (or other step), the middle level and the last repeat of the sweeps.
-
     Args:
         before: fit of the model without the correction.
         fitted: fit with the correction, treated as a random error of the model.
 
     Returns:
-        Root mean square residuals of the predicted parts without and with the correction.
+        Root mean square residuals, without and with the correction, of every third frequency (or amplitude, where that
+        is stepped), of the middle level and of the last repeat of the sweeps.
     """
     solution, tests = before.solution, before.data_sets
     chosen: dict[str, dict[MeasuredTest, Array]] = {}
@@ -125,10 +123,7 @@ def _hold_out_inside(before: Evidence, fitted: FitResult) -> HoldOut:
     both = [LeaveOut.from_fit(fit.jacobian[fit.moving], fit.residual) for fit in (solution, fitted)]
     residuals = dict[str, Array]()
     for name, by_sweep in chosen.items():
-        part = HoldOutPart(
-            name, [by_sweep.get(test, np.zeros(test.size // test.residuals_per_point, dtype=bool)) for test in tests]
-        )
-        rows = part.rows(tests)
+        rows = HoldOutPart.of_tests(name, by_sweep, tests).rows(tests)
         pairs = [(fit, np.pad(rows, (0, fit.residual.size - rows.size))) for fit in both]
         if not any(fit.undetermined(mask).any() for fit, mask in pairs):  # else the rest does not determine the model
             residuals[name] = np.array([fit.predicted(mask, np.arange(mask.size)) for fit, mask in pairs])

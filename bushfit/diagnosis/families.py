@@ -1,4 +1,7 @@
-"""Model families on one campaign: the paper's model, and others that replace its branches, fitted and held out."""
+"""Model families on one campaign: the paper's model, and others that replace its branches, fitted and compared.
+
+A family is a choice of effects for rate and for amplitude; each is fitted to all tests and predicts held-out tests.
+"""
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
@@ -9,7 +12,7 @@ import numpy as np
 from scipy.special import logsumexp, ndtr
 
 from bushfit.diagnosis.evidence import Evidence, fit
-from bushfit.diagnosis.holdout import HoldOut, Predicted, parts, predicted_parts
+from bushfit.diagnosis.holdout import HoldOut, Predicted, hold_out_parts, predicted_parts
 from bushfit.diagnosis.laplace import laplace
 from bushfit.effects import BASE, get_effect
 from bushfit.errors import FitError, ModelError
@@ -39,7 +42,7 @@ _BEYOND_LINEAR = 1.75
 
 @dataclass(frozen=True, eq=False)
 class FittedFamily:
-    """Model family (a choice of effects) fitted to a campaign and compared with the first family, the campaign's model.
+    """Model family fitted to a campaign, and compared with the first family: the campaign's model.
 
     Args:
         name: effects that the family adds or puts in place of branches, joined by +; for the first family, "paper" and
@@ -94,14 +97,14 @@ def known_families(model: Model, data_sets: Sequence[MeasuredTest]) -> tuple[str
         Names of families: names of effects joined by +.
     """
     warm = ["temperature"] if temperature_warning(model, data_sets) else []
-    rates, amplitudes = (["", *(name for name in laws if _fits(model, name))] for laws in (_RATE, _AMPLITUDE))
+    rates, amplitudes = (["", *(name for name in laws if _can_add(model, name))] for laws in (_RATE, _AMPLITUDE))
     found = [[*warm, *filter(None, pair)] for pair in product(rates, amplitudes)]
     possible = [names for names in found if not any({*get_effect(name).never_with} & {*names} for name in names)]
     return tuple("+".join(names) for names in possible if names)
 
 
-def _fits(model: Model, name: str) -> bool:
-    """Return True if the named effect can be added to a model, which must have the branch that the effect replaces."""
+def _can_add(model: Model, name: str) -> bool:
+    """True if the named effect can be added to a model, which must have the branch that the effect replaces."""
     return name not in model.effects and get_effect(name).replaces in (None, *model.effects)
 
 
@@ -112,7 +115,7 @@ def fit_families(
     fixed: Sequence[str],
     bounds: Bounds,
 ) -> tuple[list[FittedFamily], dict[str, float]]:
-    """Fit families to the tests and compare their held-out errors with those of the model itself.
+    """Fit model families to the tests, and compare their held-out errors with those of the model itself.
 
     Args:
         model: the model at its starting values.
@@ -154,7 +157,7 @@ def fit_families(
 def _chain(
     chains: Mapping[str, list[Evidence]], first: Evidence, name: str, fixed: Sequence[str], bounds: Bounds
 ) -> list[Evidence]:
-    """Fit a model family effect by effect, starting from the fits of a shorter family.
+    """Fit a model family effect by effect, starting from the fits of the family without its last effect.
 
     Args:
         chains: fits of the families so far, by name, each with one more effect than the fit before.
@@ -169,10 +172,10 @@ def _chain(
     before, _, last = name.rpartition("+")
     chain = [first] if not before else chains.get(before) or _chain(chains, first, before, fixed, bounds)
     effect, present = get_effect(last), chain[-1].model.effects
-    if not _fits(chain[-1].model, last):
+    if not _can_add(chain[-1].model, last):
         has = "the model has this effect already"
         problem = has if last in present else "the effect that this one replaces is not in the model"
-        laws = " or ".join(name for name in (*_RATE, *_AMPLITUDE) if _fits(chain[-1].model, name))
+        laws = " or ".join(name for name in (*_RATE, *_AMPLITUDE) if _can_add(chain[-1].model, name))
         raise ModelError(problem, found=last, expected=f"such as {laws}")
     solution = with_effect(chain[-1].solution, chain[-1].data_sets, effect, fixed, bounds)
     return [*chain, Evidence(solution, chain[-1].data_sets)]
@@ -196,7 +199,7 @@ def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bound
 def _gain(
     predictions: Mapping[str, Predicted], data_sets: Sequence[MeasuredTest]
 ) -> tuple[tuple[float, float, float] | None, float | None]:
-    """Reduction of the mean square held-out residual by a family, compared with the first family, and its p-value.
+    """Compute the reduction of the mean square held-out residual by a family, compared with the first family.
 
     Args:
         predictions: residuals of each held-out part by both families, by name of the part.
@@ -212,7 +215,7 @@ def _gain(
         parameters. Nonlinearity and estimated noise add to that, see `_BEYOND_LINEAR`.
     """
     disjoint, used_rows = list[Predicted](), np.zeros(sum(data_set.size for data_set in data_sets), dtype=bool)
-    for part in parts(data_sets):
+    for part in hold_out_parts(data_sets):
         rows = part.rows(data_sets)
         if part.name in predictions and not (rows & used_rows).any():  # no point counts twice
             disjoint.append(predictions[part.name])

@@ -1,7 +1,7 @@
 """Hold-out: prediction of each part of the tests from the rest, with and without the added effects.
 
-A line (an amplitude level, or a frequency where amplitudes are stepped), the top third of the steps, a direction and a
-loop are held out in turn.
+A level (all points of the sweeps at one constant amplitude, or at one constant frequency), the top third of the stepped
+values, a direction and a loop are held out in turn.
 
 Notes:
     Refitting without a part is one Gauss-Newton step from the full fit, which is exact where the model is linear over
@@ -10,7 +10,7 @@ Notes:
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -27,7 +27,7 @@ from bushfit.fitting.problem import FitResult
 from bushfit.progress import track
 from bushfit.reading.measurement import Stepped
 
-#: Share of all sweep points, with the highest stepped values (frequencies or amplitudes), that forms one part.
+#: Fraction of all sweep points, those with the highest stepped values (frequencies or amplitudes), that forms one part.
 _TOP = 1.0 / 3.0
 #: Names of the constant axis and of the stepped values of a sweep, by its stepped axis.
 _NAMES: dict[Stepped | None, tuple[str, str]] = {
@@ -39,7 +39,7 @@ _NAMES: dict[Stepped | None, tuple[str, str]] = {
 
 @dataclass(frozen=True, eq=False)
 class HoldOutPart:
-    """Points of the tests that are held out together.
+    """Points of the tests that are left out of a fit together and predicted from the rest.
 
     Args:
         name: name of the part, for reports.
@@ -49,14 +49,26 @@ class HoldOutPart:
     name: str
     points: Sequence[Array]
 
+    @classmethod
+    def of_tests(cls, name: str, chosen: Mapping[MeasuredTest, Array], tests: Sequence[MeasuredTest]) -> HoldOutPart:
+        """Build a part of all tests.
+
+        Args:
+            name: name of the part.
+            chosen: mask of the held-out points, (n,), of each test that has such points.
+            tests: all tests.
+        """
+        points = (chosen.get(test, np.zeros(test.size // test.residuals_per_point, dtype=bool)) for test in tests)
+        return cls(name, list(points))
+
     def rows(self, data_sets: Sequence[MeasuredTest]) -> Array:
-        """Mask of the rows of this part in the residual vector of all tests, (all residuals,)."""
+        """Mask of the residuals of this part among the n residuals of all tests, (n,)."""
         return np.concatenate(
             [np.tile(mask, data.residuals_per_point) for data, mask in zip(data_sets, self.points, strict=True)]
         )
 
     def rest(self, data_sets: Sequence[MeasuredTest]) -> list[MeasuredTest]:
-        """Tests that remain if this part is held out, with unchanged noise; tests held out entirely are omitted."""
+        """Tests without the held-out points, with unchanged noise; tests held out entirely are omitted."""
         remaining = [(data, mask) for data, mask in zip(data_sets, self.points, strict=True) if not mask.all()]
         return [data.without(np.flatnonzero(mask)).with_weight() if mask.any() else data for data, mask in remaining]
 
@@ -95,7 +107,7 @@ class Skipped:
 
 @dataclass(frozen=True)
 class HoldOut:
-    """Root mean square residuals of two models on parts of the tests, each predicted by a fit to the other parts.
+    """Errors of two models on held-out parts of the tests, each predicted by a fit to the other parts.
 
     Args:
         parts: results of the parts that were held out.
@@ -116,15 +128,15 @@ class HoldOut:
         """Compute the root mean square residuals by part and over all parts.
 
         Args:
-            residuals: by name of the part, predicted residuals of the models before and after (first axis), in units of
-                noise, and whitened by noise and prediction error (second axis), (2, 2, n).
+            residuals: by name of the part, residuals of the models before and after (first axis), in units of noise,
+                and whitened by noise and prediction error (second axis), (2, 2, n).
             skipped: parts that could not be held out.
         """
         residuals = {name: pair for name, pair in residuals.items() if pair.size}  # one frequency has no top third
         if not residuals:
             return cls((), tuple(skipped))
-        figures = {name: _figures(pair) for name, pair in residuals.items()}
-        overall = _figures(np.concatenate(list(residuals.values()), axis=-1))
+        figures = {name: _rms_values(pair) for name, pair in residuals.items()}
+        overall = _rms_values(np.concatenate(list(residuals.values()), axis=-1))
         return cls(tuple(HeldOut(name, *values) for name, values in figures.items()), tuple(skipped), *overall)
 
 
@@ -144,7 +156,7 @@ def hold_out(before: Evidence, after: Evidence, bounds: Bounds) -> HoldOut:
 
 
 def predicted_parts(before: Evidence, after: Evidence, bounds: Bounds) -> tuple[dict[str, Predicted], list[Skipped]]:
-    """Predict each part of the tests from the other parts by two models.
+    """Predict each part of the tests from the other parts, by a model without and a model with added effects.
 
     Args:
         before: fit without the added effects.
@@ -156,19 +168,20 @@ def predicted_parts(before: Evidence, after: Evidence, bounds: Bounds) -> tuple[
     """
     models = [(evidence, _leave_out(evidence.solution)) for evidence in dict.fromkeys((before, after))]
     predictions, skipped = dict[str, Predicted](), list[Skipped]()
-    for part in track("parts held out", list(parts(after.data_sets))):
+    for part in track("parts held out", hold_out_parts(after.data_sets)):
         attempts = [_predict(*model, part, bounds) for model in models]
-        pairs = [prediction for prediction in attempts if not isinstance(prediction, Skipped)]
-        if len(pairs) < len(models):
-            skipped.append(next(prediction for prediction in attempts if isinstance(prediction, Skipped)))
+        failures = [attempt for attempt in attempts if isinstance(attempt, Skipped)]
+        pairs = [attempt for attempt in attempts if not isinstance(attempt, Skipped)]
+        if failures:
+            skipped.append(failures[0])
             continue
         residuals, noise_gradients = zip(pairs[0], pairs[-1], strict=True)
         predictions[part.name] = Predicted(np.array(residuals), np.array(noise_gradients))
     return predictions, skipped
 
 
-def _figures(pair: Array) -> tuple[float, float, tuple[float, float]]:
-    """Root mean square of predicted residuals, (2 models: before and after, 2 units: noise, whitened, n).
+def _rms_values(pair: Array) -> tuple[float, float, tuple[float, float]]:
+    """Root mean square of residuals of two models in two units (noise, whitened), (2, 2, n).
 
     Returns:
         Values in units of noise before and after; and both whitened, in units of noise and prediction error.
@@ -178,13 +191,13 @@ def _figures(pair: Array) -> tuple[float, float, tuple[float, float]]:
 
 
 class Predicted(NamedTuple):
-    """Predictions of a held-out part by two models.
+    """Residuals of a held-out part, predicted by two models from the other parts of the tests.
 
     Args:
-        residuals: predicted residuals, in units of noise and whitened by the prediction error as well,
-            (2 models, 2, n).
-        noise_gradients: derivatives of half the sum of squares of the residuals in units of noise by the noise of each
-            row of all tests, (2 models, all rows); for the standard error of a comparison.
+        residuals: for each model, the n residuals in units of noise, and whitened by the prediction error as well,
+            (2, 2, n).
+        noise_gradients: for each model, the derivatives of half the sum of squares of the residuals in units of noise
+            by the noise of each of the m residuals of all tests, (2, m); for the standard error of a comparison.
     """
 
     residuals: Array
@@ -199,7 +212,7 @@ def _leave_out(solution: FitResult) -> LeaveOut:
 def _predict(
     evidence: Evidence, leave_out: LeaveOut, part: HoldOutPart, bounds: Bounds
 ) -> tuple[Array, Array] | Skipped:
-    """Predict a part of the tests from the other parts by one model; refit if one Gauss-Newton step is too long.
+    """Predict a part of the tests from the other parts by one model, with a refit if a Gauss-Newton step is too long.
 
     Args:
         evidence: fit to all tests.
@@ -208,15 +221,15 @@ def _predict(
         bounds: limits of parameters, for a fit to the remaining tests.
 
     Returns:
-        Residuals, plain and whitened by the prediction error, (2, n), with the derivatives of half the plain sum of
-        squares by the noise of each row, (all rows,); or the part as skipped, with the reason.
+        Residuals, in units of noise and whitened by the prediction error as well, (2, n), and the derivatives of half
+        the sum of squares of the former by the noise of each of all m residuals, (m,); or why the part is skipped.
     """
     solution, data_sets = evidence.solution, evidence.data_sets
     names, of_tests = solution.coordinates.names, part.rows(data_sets)
     rows = np.pad(of_tests, (0, solution.residual.size - of_tests.size))  # priors are not held out
-    if left_open := [names[solution.moving[i]] for i in np.flatnonzero(leave_out.undetermined(rows))]:
-        reason = f"the other tests do not determine {', '.join(left_open)}"
-        return Skipped(part.name, reason, tuple(dict.fromkeys(map(effect_name_of, left_open))))
+    if undetermined := [names[solution.moving[i]] for i in np.flatnonzero(leave_out.undetermined(rows))]:
+        reason = f"the other tests do not determine {', '.join(undetermined)}"
+        return Skipped(part.name, reason, tuple(dict.fromkeys(map(effect_name_of, undetermined))))
     is_step = leave_out.step(rows) is not None
     if not is_step:
         fixed = [name for name in evidence.model.parameters if name not in names]
@@ -233,49 +246,41 @@ def _predict(
 
 
 def _clusters(data_sets: Sequence[MeasuredTest], count: int) -> Array:
-    """Index of the sweep line or loop that each of `count` residuals belongs to; further ones, of priors, are alone."""
+    """Index of the level or loop of each of the first of `count` residuals; the others, of priors, are alone."""
     numbers, first = list[Array](), 0
     for data_set in data_sets:
-        line = np.zeros(data_set.size // data_set.residuals_per_point, dtype=int)
+        level = np.zeros(data_set.size // data_set.residuals_per_point, dtype=int)
         if isinstance(data_set, MeasuredSweep):
-            line = np.unique(data_set.held_value, return_inverse=True)[1]
-        numbers.append(np.tile(first + line, data_set.residuals_per_point))
-        first += int(line.max()) + 1
+            level = np.unique(data_set.held_value, return_inverse=True)[1]
+        numbers.append(np.tile(first + level, data_set.residuals_per_point))
+        first += int(level.max()) + 1
     of_tests = np.concatenate(numbers)
     return np.concatenate([of_tests, first + np.arange(count - of_tests.size)])
 
 
-def parts(data_sets: Sequence[MeasuredTest]) -> Iterator[HoldOutPart]:
-    """List the parts of the tests to hold out: lines, the top third of the steps, directions, and loops.
+def hold_out_parts(data_sets: Sequence[MeasuredTest]) -> list[HoldOutPart]:
+    """List the parts of the tests to hold out, which may overlap.
 
     Args:
         data_sets: the tests.
 
-    Yields:
-        Parts, which may overlap.
-
     Returns:
-        An iterator of parts.
+        Levels of sweeps, the top third of the stepped values, directions, and loops.
     """
-
-    def part(name: str, chosen: Mapping[MeasuredTest, Array]) -> HoldOutPart:
-        return HoldOutPart(
-            name, [chosen.get(data, np.zeros(data.size // data.residuals_per_point, dtype=bool)) for data in data_sets]
-        )
-
+    chosen = dict[str, Mapping[MeasuredTest, Array]]()
     loops, sweeps = split_by_kind(data_sets)
-    for stepped, (line_name, top) in _NAMES.items():
-        mine = [sweep for sweep in sweeps if sweep.sweep.stepped == stepped]
-        ranks = {sweep: np.unique(sweep.held_value, return_inverse=True)[1] for sweep in mine}
+    for stepped, (level_name, top) in _NAMES.items():
+        members = [sweep for sweep in sweeps if sweep.sweep.stepped == stepped]
+        ranks = {sweep: np.unique(sweep.held_value, return_inverse=True)[1] for sweep in members}
         for rank in range(max((int(r.max()) + 1 for r in ranks.values()), default=0)):
-            yield part(f"{line_name} {rank + 1}", {sweep: r == rank for sweep, r in ranks.items()})
-        if mine and top:
-            limit = np.quantile(np.concatenate([sweep.step for sweep in mine]), 1.0 - _TOP)
-            yield part(f"top third of the {top}", {sweep: sweep.step > limit for sweep in mine})
+            chosen[f"{level_name} {rank + 1}"] = {sweep: r == rank for sweep, r in ranks.items()}
+        if members and top:
+            limit = np.quantile(np.concatenate([sweep.step for sweep in members]), 1.0 - _TOP)
+            chosen[f"top third of the {top}"] = {sweep: sweep.step > limit for sweep in members}
     wholes = {data: np.ones(data.size // data.residuals_per_point, dtype=bool) for data in data_sets}
     for direction in dict.fromkeys(data.direction for data in data_sets):
-        members = {data: whole for data, whole in wholes.items() if data.direction == direction}
-        if len(members) < len(wholes):
-            yield part(f"{direction} direction", members)
-    for loop in loops if len(loops) > 1 else ():
-        yield part(f"loop {loop.name}", {loop: wholes[loop]})
+        in_direction = {data: whole for data, whole in wholes.items() if data.direction == direction}
+        if len(in_direction) < len(wholes):
+            chosen[f"{direction} direction"] = in_direction
+    chosen |= {f"loop {loop.name}": {loop: wholes[loop]} for loop in loops if len(loops) > 1}
+    return [HoldOutPart.of_tests(name, points, data_sets) for name, points in chosen.items()]

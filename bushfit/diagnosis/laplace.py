@@ -1,4 +1,4 @@
-"""Laplace's method for refitted effects: log prior density of their parameters, and their precision."""
+"""Prior of the parameters of a refitted effect, for the evidence by Laplace's method."""
 
 from math import log
 
@@ -15,7 +15,7 @@ _FINE, _SHARPEST = 1000, 0.01
 
 
 def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dict[str, float], float]:
-    """Compute the prior density of the parameters of a refitted effect, for the evidence by Laplace's method.
+    """Compute the prior density and precision of the parameters of a refitted effect.
 
     Args:
         name: name of the effect.
@@ -44,17 +44,21 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
         count = max(len(effect.parameters) - 2, 0)
         precisions = {qualified_name(effect, parameter): 0.5 for parameter in effect.parameters}
         return count * (0.5 * log(2.0 * np.pi) - log(3.0)), precisions, size
-    stated = [name for prior in model.constraints.priors for name in prior.names]
+    with_prior = [name for prior in model.constraints.priors for name in prior.names]
+    times = np.geomspace(SIZES[0], LARGEST, _FINE) / max(size, 1e-12)  # prior sizes of the amount, over the fitted one
     for parameter in effect.parameters:
         coordinate = qualified_name(effect, parameter)
-        if coordinate not in names or coordinate in stated:  # a stated prior is part of the likelihood
+        if coordinate not in names or coordinate in with_prior:  # a stated prior is part of the likelihood
             continue
         count += 1
         if parameter is effect.amount:
             amount = max(abs(model.values[coordinate] - (parameter.neutral or 0.0)) / parameter.typical, 1e-12)
             precision[coordinate] = 0.25 if parameter.log else 0.25 / amount**2
             error = (1.0 if parameter.log else 1.0 / amount) * np.sqrt(variances[names.index(coordinate)])
-            density += _of_amount(size, float(error)) - (0.0 if parameter.log else log(amount))
+            error = max(float(error), _SHARPEST)
+            exponent = -0.5 * np.square((times - 1.0) / error)
+            density += float(logsumexp(exponent)) - log(_FINE) - 0.5 * log(2.0 * np.pi) - log(error)
+            density -= 0.0 if parameter.log else log(amount)
             density -= 0.0 if parameter.neutral == parameter.bounds[0] else log(2.0)
             continue
         tried = shape_start_values(data_sets, model, parameter)
@@ -71,19 +75,3 @@ def laplace(name: str, evidence: Evidence, before: Evidence) -> tuple[float, dic
         else:
             precision[coordinate] = 12.0 / wide**2
     return density + 0.5 * count * log(2.0 * np.pi), precision, size
-
-
-def _of_amount(size: float, error: float) -> float:
-    """Natural log of the prior density of an effect's amount, averaged over the amount's Gaussian likelihood.
-
-    Args:
-        size: relative change of |K| by the fitted amount.
-        error: standard error of the amount, relative to the amount.
-
-    Returns:
-        Natural log of the density per relative change of the amount.
-    """
-    times = np.geomspace(SIZES[0], LARGEST, _FINE) / max(size, 1e-12)
-    error = max(error, _SHARPEST)
-    exponent = -0.5 * np.square((times - 1.0) / error)
-    return float(logsumexp(exponent)) - log(_FINE) - 0.5 * log(2.0 * np.pi) - log(error)

@@ -1,4 +1,4 @@
-"""The next test: the test that separates the explanations of a gap best per hour on the rig.
+"""The next test: the test that separates rival explanations of a gap best per hour on the rig.
 
 Candidates are tests of the bushing and tests of the fixture without it: empty, with a reference spring, or with a steel
 dummy. Each is ranked by its information on the right explanation per hour, within the limits of the rig; `plan` ranks
@@ -107,7 +107,7 @@ def deciding_test(
 
 
 def _candidates(data_sets: Sequence[MeasuredTest], bushing: Bushing | None) -> Iterator[NextTest]:
-    """List the candidate tests: dummies in place of the bushing, and the bushing in directions that were not swept."""
+    """Generate the candidate tests: of the fixture without the bushing, and of the bushing in directions not swept."""
     places = dict.fromkeys(data_set.direction for data_set in data_sets)
     for place, test in product(places, FIXTURE_TESTS):
         yield replace(test, place=place, sentence=test.sentence.format(place=place))
@@ -162,10 +162,7 @@ def remaining_entropy(odds: Sequence[float] | Array, distances: Array) -> Array:
 
 
 def _distances(test: NextTest, models: Sequence[Model], place: Place, frequency: Array, amplitude: Array) -> Array:
-    """Distance between the responses of each pair of models to a test: chi-square for its noise, (models, models).
-
-    The empty fixture is compared by its stiffness and the steel dummy by its compliance, both relative to the bushing,
-    because either is nearly zero and its logarithm has no meaning.
+    """Compute the chi-square between the responses of each pair of models to a test.
 
     Args:
         test: candidate test.
@@ -173,34 +170,27 @@ def _distances(test: NextTest, models: Sequence[Model], place: Place, frequency:
         place: direction or specimen.
         frequency: [Hz], (n,).
         amplitude: zero-to-peak [m or rad, or strain], (n,).
+
+    Returns:
+        Chi-square for the noise of the test, (models, models). The empty fixture is compared by its stiffness and the
+        steel dummy by its compliance, because either is nearly zero and its logarithm has no meaning.
     """
     if test.mounted is None:
         responses = [np.log(model.stiffness(place, frequency, amplitude)) for model in models]
     else:
         reference = np.abs(models[0].stiffness(place, frequency, amplitude)).mean()
-        measured = [
-            _fixture(model, place, test.mounted * reference).stiffness(place, frequency, amplitude) / reference
-            for model in models
-        ]
+        measured = []
+        for model in models:  # with a spring in place of the bushing
+            rig = [effect.name for effect in model.records if effect.level is Level.INSTRUMENT]
+            modulus = min(test.mounted * reference / model.stiffness_per_modulus(place), _LARGEST_MODULUS)
+            fixture = Model.with_defaults(model.bushing, ("elastic", *rig), {**model.values, "mu": modulus})
+            measured.append(fixture.stiffness(place, frequency, amplitude) / reference)
         if test.mounted == _SPRING:
             responses = [np.log(ratio) for ratio in measured]
         else:
             responses = [1.0 / ratio if test.mounted == _DUMMY else ratio for ratio in measured]
     stacked = np.array(responses)
     return np.sum(np.square(np.abs(stacked[:, None] - stacked)), axis=-1) / _NOISE**2
-
-
-def _fixture(model: Model, place: Place, stiffness: float) -> Model:
-    """Model of an elastic spring in place of the bushing, with the rig effects of another model.
-
-    Args:
-        model: model with the rig effects.
-        place: direction or specimen.
-        stiffness: stiffness of the spring [N/m or N m/rad].
-    """
-    rig = [effect.name for effect in model.records if effect.level is Level.INSTRUMENT]
-    values = {**model.values, "mu": min(stiffness / model.stiffness_per_modulus(place), _LARGEST_MODULUS)}
-    return Model.with_defaults(model.bushing, ("elastic", *rig), values)
 
 
 def _points(test: NextTest, data_sets: Sequence[MeasuredTest]) -> tuple[Array, Array, Place]:

@@ -7,7 +7,7 @@ import pytest
 from rigged import INERTIA, LEVELS, SHARED, SLIP, TWO, Effects
 
 from bushfit.diagnosis.evidence import fit
-from bushfit.diagnosis.holdout import hold_out, parts
+from bushfit.diagnosis.holdout import hold_out, hold_out_parts
 from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.record import MisfitRegion
 from bushfit.fitting.coordinates import residual
@@ -90,7 +90,7 @@ def test_the_gap_is_that_of_a_refit(measured, fitted, hidden, effects, which):
     30 %."""
     evidence = fitted(measured(hidden, SHARED), *effects)
     (found,) = [part for part in hold_out(evidence, evidence, {}).parts if part.part == which]
-    (part,) = [part for part in parts(evidence.data_sets) if part.name == which]
+    (part,) = [part for part in hold_out_parts(evidence.data_sets) if part.name == which]
     refitted = fit(evidence.model, part.rest(evidence.data_sets), (), {}).model
     expected = np.sqrt(np.mean(residual(refitted, evidence.data_sets)[part.rows(evidence.data_sets)] ** 2))
     as_fitted = np.sqrt(np.mean(evidence.residual[part.rows(evidence.data_sets)] ** 2))
@@ -103,7 +103,7 @@ def test_the_prediction_s_own_error_is_that_of_a_sandwich_of_runs_and_loops(meas
     """In full, by parameters: A^-1 M A^-1, M of what each run and each loop of the rest pulls, and at least A."""
     evidence, which = fitted(measured(INERTIA, SHARED)), "amplitude level 3"
     (found,) = [part for part in hold_out(evidence, evidence, {}).parts if part.part == which]
-    rows = next(part for part in parts(evidence.data_sets) if part.name == which).rows(evidence.data_sets)
+    rows = next(part for part in hold_out_parts(evidence.data_sets) if part.name == which).rows(evidence.data_sets)
     slopes, left = evidence.solution.jacobian, evidence.residual
     pairs = [
         (data, getattr(data, "held_value", np.zeros(data.size // data.residuals_per_point)))
