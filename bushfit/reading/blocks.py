@@ -61,8 +61,7 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
         groups, rows = _stacked(source, layout, vocabulary)
     if len(groups) < 2:
         return _with_complex_parts(source, layout)
-    last = [lines[-1].content if lines else "" for lines in groups]
-    titles = [(text if isinstance(text, str) else " ".join(map(str, text))).strip() for text in last]
+    titles = [lines[-1].text if lines else "" for lines in groups]
     labels = [labels_above(lines) | labels_in_names(title) for lines, title in zip(groups, titles, strict=True)]
     added = _label_columns(labels, titles, titles if are_sides else [], vocabulary.roles(layout.headers))
     width, numbers = len(layout.headers), [number for number, *_ in rows]

@@ -58,6 +58,11 @@ class Line(NamedTuple):
     number: int
     content: Content
 
+    @property
+    def text(self) -> str:
+        """Text of the line; of a row, its cells separated by blanks."""
+        return self.content.strip() if isinstance(self.content, str) else " ".join(map(str, self.content)).strip()
+
 
 @dataclass(frozen=True, kw_only=True)
 class FileFormat:

@@ -77,6 +77,8 @@ _WORD_STARTS = {start: Direction(name) for name, starts in WORDS["direction"].it
 #: Direction by its abbreviation in names; in headers rad is a unit.
 _SHORT = {"ax": Direction.AXIAL, "rad": Direction.RADIAL, "tors": Direction.TORSION, "tor": Direction.TORSION}
 _LETTERS = re.compile(r"[^\W\d_]+")
+#: Starts of words in remarks that may change what a test means.
+_REMARKS = tuple(WORDS["remarks"]["starts"])
 #: Word that is not a unit after a number.
 _WORD = re.compile(r"(?<![a-z\d.,])(?:[a-z]+)")
 
@@ -196,12 +198,16 @@ def labels_above(lines: Iterable[Line]) -> Labels:
 
 def _convention_in_line(line: Line) -> AmplitudeConvention | None:
     """Convention of amplitudes in a line such as "all amplitudes pk-pk"; None in a line on something else."""
-    text = line.content if isinstance(line.content, str) else " ".join(map(str, line.content))
-    words = set(map(plain, _LETTERS.findall(text)))
+    words = set(map(plain, _LETTERS.findall(line.text)))
     if words & _WORDS["force"] or not any(word.startswith(tuple(_WORDS["motion"])) for word in words):
         return None
     doubled = any(word.startswith(name) for word in words for name in PEAK_TO_PEAK_NAMES if len(name) > 3)
-    return "peak-to-peak" if doubled else split_convention(text)[1]
+    return "peak-to-peak" if doubled else split_convention(line.text)[1]
+
+
+def is_remark(text: str) -> bool:
+    """Return True if a text may change what a test means, such as "2 bushings in parallel", but states no key."""
+    return any(plain(word).startswith(_REMARKS) for word in _LETTERS.findall(text))
 
 
 def _label_in_line(line: Line) -> Labels:

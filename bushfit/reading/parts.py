@@ -30,6 +30,8 @@ _DIMENSION = re.compile(rb'<(?:\w+:)?dimension ref="(?:[A-Z]+\d+:)?([A-Z]+)(\d+)
 _NOT_COMPUTED = re.compile(
     rb"(?:</(?:\w+:)?f>|<(?:\w+:)?f\b[^<>]*/>)\s*(?:<(?:\w+:)?v\s*/>|<(?:\w+:)?v>\s*</(?:\w+:)?v>)?\s*</(?:\w+:)?c>"
 )
+#: Row of a sheet of an xlsx workbook that is hidden, by a user or a filter.
+_HIDDEN_ROW = re.compile(rb'<(?:\w+:)?row (?=[^>]*\bhidden="(?:1|true)")[^>]*\br="(\d+)"')
 #: Largest number of parts that an error lists; chosen: a line or two.
 _MOST_LISTED = 12
 _ONE_GROUP = "a test needs its channels in one group, at one rate and of one length: resample those that differ"
@@ -141,7 +143,7 @@ def _sheets(data: bytes) -> Sequence[tuple[Sheet, bool]]:
         visible_names = {
             sheet.name for sheet in book.sheets_metadata if sheet.visible == calamine.SheetVisibleEnum.Visible
         }
-        sheets, cells_left = [], _MOST_CELLS
+        sheets, cells_left = list[tuple[Sheet, bool]](), _MOST_CELLS
         for name in book.sheet_names:
             sheet = book.get_sheet_by_name(name)
             cells_left -= sheet.height * sheet.width
@@ -149,7 +151,9 @@ def _sheets(data: bytes) -> Sequence[tuple[Sheet, bool]]:
                 raise OverflowError(f'more, with sheet "{name}"')
             content = [_row(row) for row in sheet.to_python(skip_empty_area=False)]
             lacks_values = lambda: any(map(_NOT_COMPUTED.search, contents))  # noqa: E731
-            sheets.append((Sheet(name, content, lacks_values), name in visible_names or not visible_names))
+            rows = _HIDDEN_ROW.findall(contents[len(sheets)]) if len(contents) == len(book.sheet_names) else ()
+            part = Sheet(name, content, lacks_values, hidden=tuple(map(int, rows)))
+            sheets.append((part, name in visible_names or not visible_names))
         return sheets
     except (calamine.CalamineError, zipfile.BadZipFile, OSError, NotImplementedError, RuntimeError) as error:
         raise ValueError(str(error)) from error
@@ -176,7 +180,7 @@ def _xml_of_sheets(data: bytes) -> list[bytes]:
                 column = 26 * column + letter - 64
             if column * int(match[2]) > _MOST_CELLS:
                 raise OverflowError(f"{match[2].decode()} rows of {column} columns in {name}")
-    return list(contents.values())
+    return [contents[name] for name in sorted(contents, key=lambda name: (len(name), name))]
 
 
 def _row(cells: Sequence[object]) -> list[str | float]:

@@ -45,6 +45,7 @@ class Text:
     sheet: None = None
     layout: None = None
     numeric: frozenset[int] = frozenset()
+    hidden: tuple[int, ...] = ()
 
     def head(self) -> list[Line]:
         """Return the first non-empty lines of the text, which can contain the header."""
@@ -151,6 +152,7 @@ class Sheet:
         numeric: indices of columns that contain only numbers.
         above: lines above the table, such as those above the first block, or properties of a recording.
         numbers: line number in the file of each row, if the rows were rearranged below the header; None for a sheet.
+        hidden: numbers of the rows that the workbook hides.
     """
 
     sheet: str
@@ -161,6 +163,7 @@ class Sheet:
     numeric: frozenset[int] = frozenset()
     above: Sequence[Line] = ()
     numbers: Sequence[int] | None = None
+    hidden: Sequence[int] = ()
 
     def head(self) -> list[Line]:
         """Return the lines above the table, and the first non-empty rows, which can contain the header."""

@@ -2,6 +2,7 @@
 
 import csv
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -32,7 +33,7 @@ from bushfit.reading.headers import (
 from bushfit.reading.labelled import Rows, find_labels, select_rows
 from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
 from bushfit.reading.measurement import Floats
-from bushfit.reading.names import Labels, labels_above
+from bushfit.reading.names import Labels, is_remark, labels_above
 from bushfit.reading.numerals import ALL_NUMERALS
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, RowSource, Sheet
@@ -40,6 +41,8 @@ from bushfit.reading.times import clock
 from bushfit.reading.wide import unpivot
 
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
+#: Largest number of characters of a remark that is quoted.
+_LONGEST_QUOTE = 100
 #: Rows that are converted at a time if pandas cannot read them; chosen: their texts take a few MiB.
 _CHUNK_ROWS = 1 << 16
 
@@ -135,6 +138,23 @@ class Table(Cells):
     def labels_above(self) -> Labels:
         """Labels in the lines above the table, such as a temperature."""
         return labels_above(line for line in self.source.head() if line.number < self.layout.header_line)
+
+    @cached_property
+    def remarks(self) -> tuple[str, ...]:
+        """Sentences on lines above the table, marked rows and hidden rows that may change what the test means."""
+        above = (line for line in self.source.head() if line.number < self.layout.header_line)
+        sentences = [
+            f'line {line.number} is not understood: "{line.text[:_LONGEST_QUOTE]}"'
+            for line in above
+            if is_remark(line.text)
+        ]
+        texts = Counter(cell for row in self.first_rows for cell in row if isinstance(cell, str) and cell[:1].isalpha())
+        sentences += [
+            f'{count} rows are marked "{cell[:_LONGEST_QUOTE]}"' for cell, count in texts.items() if is_remark(cell)
+        ]
+        if hidden := [number for number in self.source.hidden if number > self.layout.header_line]:
+            sentences.append(f"{len(hidden)} rows from row {hidden[0]} on are hidden in the workbook, and are read too")
+        return tuple(sentences)
 
     @cached_property
     def sampling_rate(self) -> float | None:
@@ -297,7 +317,7 @@ class Table(Cells):
             refuse_other_columns(table, left_out, Vocabulary(of_motion(self.names, self.motion), {}))
         values = {role: np.concatenate(parts.pop(role)) for role in wanted}
         count = len(next(iter(values.values())))
-        notes = (*self.notes, *table.note_left_out(left_out, count))
+        notes = (*self.notes, *self.remarks, *table.note_left_out(left_out, count))
         if count < fewest_rows:
             faulty = ((line, cells) for line, cells, fault in left_out if fault in ("doubtful", "missing"))
             if row := next(faulty, None):
