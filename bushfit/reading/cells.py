@@ -47,6 +47,7 @@ class Cells:
         selected: positions of the rows of the test among those of `all_rows`, from 0; None for all.
         needed: indices of columns that must contain a number; a row without one is not a row of data.
         clocks: indices of columns that contain times as texts, such as 20:07:10.
+        marks: cell that marks a missing value, such as -9999, by index of its column; all copies of a table share it.
     """
 
     opened: OpenedFile
@@ -56,6 +57,7 @@ class Cells:
     selected: frozenset[int] | None = field(default=None, kw_only=True)
     needed: frozenset[int] = field(default=frozenset(), kw_only=True)
     clocks: frozenset[int] = field(default=frozenset(), kw_only=True)
+    marks: dict[int, str | float] = field(default_factory=dict, kw_only=True)
 
     @property
     def file(self) -> Path:
@@ -91,8 +93,9 @@ class Cells:
 
     @cached_property
     def first_row(self) -> Sequence[str | float]:
-        """Cells of the first row of data in the table; empty cells if there is none."""
-        return next((cells for _, cells in self.rows()), [""] * len(self.headers))
+        """Cells of the first row of data in the table, with numbers if there is one; empty cells without rows."""
+        rows = (row for row in self.first_rows if is_row(list(map(str, row))))
+        return next(rows, self.first_rows[0])
 
     @cached_property
     def first_rows(self) -> list[Sequence[str | float]]:
@@ -134,6 +137,8 @@ class Cells:
         if self.layout.delimiter == " " and not texts[-1] and is_row(texts):
             return "doubtful"  # a cell is missing, and all behind it are displaced
         for index in self.needed:
+            if self.marks and cells[index] == self.marks.get(index):
+                return "missing"
             if isinstance(cells[index], str) and not is_like_number(texts[index]):
                 if index in self.clocks and clock(texts[index]) is not None:
                     continue
@@ -168,7 +173,7 @@ class Cells:
             All columns that begin with a number are parsed as numbers: a summary row such as "Mean" then fails, as it
             must. Texts in front of these columns are searched for such words.
         """
-        if self.selected is not None or self.clocks & indices:
+        if self.selected is not None or not indices.isdisjoint((*self.clocks, *self.marks)):
             return None
         if isinstance(block, Channels) and block.numeric >= indices:
             return {index: block.arrays[index] for index in indices}
@@ -191,7 +196,7 @@ class Cells:
         Returns:
             For each column its texts or numbers, and the index among them of each of the n rows of data, (n,).
         """
-        if isinstance(block, Text) and self.layout.delimiter != " " and b'"' not in block.data:
+        if isinstance(block, Text) and self.layout.delimiter != " " and not self.marks and b'"' not in block.data:
             is_clean = (block.before, self.needed) in block.clean or self.parse(block, self.needed) is not None
             types = dict.fromkeys(indices, "category")
             frame = block.frame(self.layout, types, len(self.headers), ".") if is_clean else None

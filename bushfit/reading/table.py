@@ -41,6 +41,8 @@ from bushfit.reading.times import clock
 from bushfit.reading.wide import unpivot
 
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
+#: Smallest ratio of nines that mark a missing value to the largest other number; chosen: outliers are rarely nines.
+_MARK_RATIO = 3.0
 #: Largest number of characters of a remark that is quoted.
 _LONGEST_QUOTE = 100
 #: Rows that are converted at a time if pandas cannot read them; chosen: their texts take a few MiB.
@@ -316,6 +318,9 @@ class Table(Cells):
         if left_out:
             refuse_other_columns(table, left_out, Vocabulary(of_motion(self.names, self.motion), {}))
         values = {role: np.concatenate(parts.pop(role)) for role in wanted}
+        if marks := table._marks_for_missing(wanted, values):
+            self.marks.update(marks)
+            return self.read(wanted, fewest_rows=fewest_rows)
         count = len(next(iter(values.values())))
         notes = (*self.notes, *self.remarks, *table.note_left_out(left_out, count))
         if count < fewest_rows:
@@ -332,6 +337,28 @@ class Table(Cells):
                 with np.errstate(over="ignore"):
                     values[role] = column.scale * column.logarithm ** (values[role] / column.scale)
         return values, notes
+
+    def _marks_for_missing(self, wanted: Mapping[str, Column], values: Mapping[str, Floats]) -> dict[int, str | float]:
+        """Find numbers that mark missing values: nines beyond all others, or -1 beside positive numbers.
+
+        Args:
+            wanted: columns by role, with their factors to SI.
+            values: values in SI by role, (n,) each.
+
+        Returns:
+            Cell with such a number, as in the file, by index of its column.
+        """
+        marks: dict[int, str | float] = {}
+        for role, column in wanted.items():
+            for row in {int(values[role].argmin()), int(values[role].argmax())} if values[role].size else ():
+                number = float(values[role][row] / column.scale)
+                if number != -1.0 and (abs(number) < 99.0 or not set(f"{abs(number):.9g}") <= set("9.")):
+                    continue
+                others = values[role][values[role] != values[role][row]] / column.scale
+                is_apart = abs(number) > _MARK_RATIO * np.abs(others).max(initial=0.0)
+                if others.size > values[role].size / 2 and (others.min() > 0.0 if number == -1.0 else is_apart):
+                    marks[column.index] = next(islice(self.rows(), row, None))[1][column.index]
+        return marks
 
     def needing(self, wanted: Mapping[str, Column]) -> "Table":
         """Copy of the table in which only rows with a number in each wanted column are data."""
