@@ -1,5 +1,6 @@
 """Roles of the columns of a table, from their names and units together."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
@@ -38,6 +39,8 @@ _AGREEMENT = 0.02
 _ALONG = 0.999
 #: Relative difference up to which force over displacement agrees with a stiffness; chosen: other channels differ more.
 _STIFFNESS_AGREEMENT = 0.1
+#: Number of a stated multiple of a unit, such as 200 N for the force of 1 V.
+_MULTIPLE = re.compile(r"^\d+\.?\d*(?=\s+[^\W\d_])")
 #: Roles that are ignored, without an error, if two different columns have them: other columns can replace them.
 _REPLACEABLE = ("force_amplitude", "damping_coefficient", "damping_ratio", "relative_error", "temperature")
 #: Roles that state the loss of a sweep.
@@ -100,8 +103,9 @@ def classify(
             del roles[role]
         else:
             roles[role] = _preferred(cells, roles[role], column)
-    if "amplitude_reached" in roles and "amplitude" not in roles:
-        roles["amplitude"] = replace(roles.pop("amplitude_reached"), role="amplitude")
+    for role in ("amplitude_reached", "acceleration"):
+        if role in roles and "amplitude" not in roles:
+            roles["amplitude"] = replace(roles.pop(role), role="amplitude")
     notes, unused = _add_by_unit(cells, roles, names, motion)
     if {"displacement", "force"} <= {*roles} and "displacement" not in columns:
         for column in (one for one in unused if _moves_along(cells, roles["displacement"], one)):
@@ -173,7 +177,8 @@ def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | No
         index: index of the column.
         stated_unit: unit that the user states; None without one.
     """
-    stated, in_row = (parse_unit(text) for text in (stated_unit or "", cells.layout.units[index]))
+    multiple = _MULTIPLE.sub(r"x \g<0>", stated_unit or "")
+    stated, in_row = (parse_unit(text) for text in (multiple, cells.layout.units[index]))
     in_header = parse_unit(heading.unit or "")
     texts = [stated[0]] if stated_unit else sorted({in_header[0], in_row[0]} - {""})
     conventions = {stated[1] or part for part in (heading.convention, in_header[1], in_row[1], stated[1]) if part}
@@ -264,7 +269,7 @@ def _add_by_unit(
     usual = Vocabulary.shared(of_motion({**LOOP_COLUMNS, **SWEEP_COLUMNS}, motion), {}, {})
     free: dict[Column, set[str]] = {}
     for index, header in enumerate(cells.headers):
-        if not header or usual.heading(header) is not None:
+        if not (header or cells.layout.units[index]) or usual.heading(header) is not None:
             continue
         name, unit, convention = split_unit(header)  # after the check, because unknown words import pint
         words = {plain(word) for word in name.replace("_", " ").replace("/", " ").split()}
@@ -294,7 +299,8 @@ def _add_by_unit(
         if len(fitting) == 1:
             roles[role] = replace(fitting[0], role=role)
             del free[fitting[0]]
-            notes.append(f'"{fitting[0].header}" is read as the {role.replace("_", " ")} by its unit')
+            header = f'"{fitting[0].header}"' if fitting[0].header else f"column {fitting[0].index + 1}"
+            notes.append(f"{header} is read as the {role.replace('_', ' ')} by its unit")
     if "time" in names and "time" not in roles:
         stamps = [column for column in free if clock(str(cells.first_row[column.index])) is not None]
         roles |= {"time": replace(stamps[0], role="time")} if len(stamps) == 1 else {}
@@ -305,9 +311,9 @@ def _moves_along(cells: Cells, first: Column, second: Column) -> bool:
     """Return True if a second column records the motion of a displacement in another size, as an extensometer does."""
     if not (first.unit and second.unit and units.is_compatible(second.unit, first.unit)):
         return False
-    numbers = _first_numbers(cells, (first, second)) * [
-        units.si_factor(unit, first.unit) for unit in (first.unit, second.unit)
-    ]
+    start = cells.parse(next(cells.blocks()), frozenset((first.index, second.index)))  # far beyond the first rows
+    numbers = np.array([start[first.index], start[second.index]]).T if start else _first_numbers(cells, (first, second))
+    numbers = numbers * [units.si_factor(unit, first.unit) for unit in (first.unit, second.unit)]
     spans = [float(np.ptp(values)) for values in numbers.T] if len(numbers) else [0.0, 0.0]
     if min(spans) <= 0.0 or abs(spans[1] / spans[0] - 1.0) <= _AGREEMENT:
         return False

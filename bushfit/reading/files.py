@@ -30,8 +30,8 @@ _QUOTED_LINE_END = re.compile(rb'(?:^|(?<=[,;\t\r\n]))"[^"\r\n,;\t]+(?:\r?\n[^"\
 _LEAST_ZERO_SHARE = 0.3
 #: Largest number of runs of non-ASCII bytes that are compared; chosen: many times those of a header.
 _MOST_RUNS = 1 << 16
-#: Encodings that are detected only by known column names: Japanese, Korean, Central European, Cyrillic.
-_RARE = ("cp932", "cp949", "cp1250", "cp1251")
+#: Encodings that are detected only by known column names: Japanese, Korean, Central European, Cyrillic, Turkish.
+_RARE = ("cp932", "cp949", "cp1250", "cp1251", "cp1254")
 #: Known column names with non-ASCII letters; chosen: two characters or more, which do not occur by chance.
 _KNOWN_WORDS = frozenset(
     word.lower()

@@ -59,6 +59,7 @@ PAIRS = (
     *AGREEING_PAIRS,
     *(("stiffness", "loss_stiffness"), ("storage_stiffness", "damping_coefficient")),
     *(("stiffness", "damping_coefficient"), ("stiffness", "damping_ratio"), ("storage_stiffness", "damping_ratio")),
+    *(("storage_compliance", "loss_compliance"), ("compliance", "phase"), ("compliance", "loss_factor")),
     *(("force_amplitude", "phase"), ("force_amplitude", "loss_factor"), ("force_amplitude", "damping_ratio")),
 )
 #: SI units of the roles that do not depend on the motion; other roles are ratios.
@@ -72,7 +73,7 @@ _UNITS_OF_MOTION = {
 #: Starts of the names of an angular frequency.
 _ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsa", "角频率")
 #: Channel of a test rig in brackets: "Load(Linear:Load) (kN)".
-_CHANNEL = re.compile(r"\([^()]*[:|][^()]*\)")
+_CHANNEL = re.compile(r"\((?:[^()]|\([^()]*\))*[:|](?:[^()]|\([^()]*\))*\)")
 #: Loss factor written as a function, with brackets that do not contain a unit.
 _TAN = re.compile(r"(?i)\btan\s*\(\s*(delta|d|δ)\s*\)")
 #: Logarithm of a quantity: "log10 f [Hz]", "lg(G') [Pa]", "log10(K*/(N/m))". The base of a plain log is not known.
@@ -98,6 +99,12 @@ _TRAVEL = re.compile(r"s\s*/")
 _TWO_PRIMES = re.compile(r"(?<![^\W_])([A-Za-z])\"")
 #: Words that do not change the meaning of a channel.
 _ASIDES = re.compile(r"\b(?:axial|radial|torsional|measured|actual|gemessen|mesure|medido|ist)\b")
+#: Words for the mean of several parts, which do not change the meaning of a stiffness or its loss.
+_MEANS = re.compile(
+    r"\b(?:mean|average|avg|mittel(?:wert)?|medel(?:varde)?|moyenne?|media|promedio|gemiddelde?|srednia|prumer|ortalama)\b"
+)
+#: Footnote marks in a name.
+_FOOTNOTES = str.maketrans("", "", "\u00b9\u00b2\u00b3\u2070\u2074\u2075\u2076\u2077\u2078\u2079\u2020\u2021")
 #: Units with which the symbol f cannot mean a role, by role.
 _UNITS_NOT_F = {"force": ("Hz",), "frequency": ("N", "N m")}
 #: Roles that a column without a unit does not have, whatever its name.
@@ -108,6 +115,8 @@ _UNITS_OF = {
     for role, entries in WORDS["units_of"].items()
     for name, *si in (entry.split() for entry in entries)
 }
+#: Roles of the stiffness and its loss, of which a column may contain the mean of several parts.
+OF_MEANS = frozenset(role for pair in AGREEING_PAIRS for role in pair)
 #: Names of an amplitude that imply peak-to-peak.
 PEAK_TO_PEAK_NAMES = frozenset(WORDS["counting"]["peak_to_peak"])
 #: Parts of the patterns of conventions: ends of words, and the end of a unit to which one may be joined ("mmpp").
@@ -160,6 +169,8 @@ def si_unit(role: str, motion: Motion) -> str:
         return str(getattr(motion, _UNITS_OF_MOTION[role]))
     if role == "damping_coefficient":
         return "Pa*s" if motion is STRAINING else motion.stiffness_unit.replace("/", "*s/", 1)
+    if role.endswith("compliance"):
+        return {"N/m": "m/N", "Pa": "1/Pa"}.get(motion.stiffness_unit, "rad/N/m")
     if role.endswith("phase"):
         return "rad"
     return "m/s^2" if role.startswith(("base_", "mass_")) else _UNITS.get(role, "1")
@@ -274,9 +285,11 @@ class Vocabulary:
             bare = plain(name)
             implied: AmplitudeConvention | None = "peak-to-peak" if bare in PEAK_TO_PEAK_NAMES else convention
             amplitudes = [bare + "amplitude"] * bool(implied) + ["amplitude"] * (bare in PEAK_TO_PEAK_NAMES)
+            without_mean = plain(_MEANS.sub("", _folded(name)))
             for word in (
                 bare,
                 plain(_ASIDES.sub("", _folded(name))),
+                *([without_mean] if OF_MEANS.intersection(self._roles.get(without_mean, ())) else []),
                 *amplitudes,
                 *self._names_with_symbol(name, unit),
             ):
@@ -368,7 +381,7 @@ def parse_unit(text: str) -> tuple[str, AmplitudeConvention | None, float]:
 @lru_cache(maxsize=1 << 15)  # the vocabularies have five thousand names
 def plain(name: str) -> str:
     """Normalise a name for comparison: only letters, digits and ' | *, in lower case without accents."""
-    letters = re.sub(r"[^\w'|*]|_", "", _folded(name.translate(_SPELLINGS)).replace("ß", "ss"))
+    letters = re.sub(r"[^\w'|*]|_", "", _folded(name.translate(_FOOTNOTES).translate(_SPELLINGS)).replace("ß", "ss"))
     return letters.replace("ae", "a").replace("oe", "o").replace("ue", "u")
 
 

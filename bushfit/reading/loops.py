@@ -64,6 +64,11 @@ def read_loop(
             else "take force_sign = -1 out of the campaign",
         )
     if "time" in values:
+        copies = np.all([np.diff(values[role]) == 0.0 for role in ("time", "displacement", "force")], axis=0)
+        if copies.any() and np.array_equal(copies, np.diff(values["time"]) <= 0.0):
+            values = {role: np.delete(numbers, np.flatnonzero(copies) + 1) for role, numbers in values.items()}
+            notes += (f"{np.count_nonzero(copies)} rows that repeat the row before them are left out",)
+            displacement, force = values["displacement"], values["force"]
         time, more = increasing_time(table, wanted["time"], values["time"])
         notes = (*notes, *more)
     else:
@@ -114,7 +119,8 @@ def loop_columns(table: Table, direction: Place, test: LoopFile) -> dict[str, Co
     if "time" in table.roles:
         wanted["time"] = time_column(table, direction)
     elif not test.states_time:
-        hint = 'or state rate = "10 mm/min", or frequency = "0.1 Hz" and waveform = "sine", or '
+        rate = table.quantity_above("m/s") or "10 mm/min"
+        hint = f'or state rate = "{rate}", or frequency = "0.1 Hz" and waveform = "sine", or '
         hint += 'sampling_rate = "100 Hz", in the campaign'
         table.column("time", direction, hint)
     return wanted

@@ -230,7 +230,8 @@ def _label_in_line(line: Line) -> Labels:
         values: dict[str, Any] = {key: cells[1]} if is_value else {}
         return Labels(**values)
     if key in _SAMPLING:
-        for form in (" ".join(cells[1:3]), f"{cells[1]} {unit or ('Hz' if key == 'sampling_rate' else '')}"):
+        usual = "Hz" if key == "sampling_rate" else "s" if plain(name) == "wfincrement" else ""
+        for form in (" ".join(cells[1:3]), f"{cells[1]} {unit or usual}"):
             match = _NUMBER_AND_UNIT.fullmatch(form)
             if match and units.is_compatible(rate_unit := _SAMPLES.sub(r"\1Hz", match["unit"]), _SAMPLING[key]):
                 return Labels(sampling=f"{match['number']} {rate_unit}")

@@ -24,6 +24,8 @@ _MOST_CELLS = 10_500_000
 _MOST_BYTES = 1 << 30
 #: First bytes of workbooks: of a zip archive (newer formats), and of the older formats of Office.
 _WORKBOOKS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")
+#: First bytes of web pages, which some programs save as .xls, and the number of bytes that are searched for them.
+_WEB_PAGES, _FIRST_BYTES = (b"<html", b"<!doctype html", b"<table"), 100
 #: Last cell of a sheet of an xlsx workbook, near the start of its XML.
 _DIMENSION = re.compile(rb'<(?:\w+:)?dimension ref="(?:[A-Z]+\d+:)?([A-Z]+)(\d+)"')
 #: Cell with a formula but no value, as written by programs that do not compute formulas.
@@ -91,6 +93,9 @@ def open_file(file: Path, file_format: FileFormat) -> OpenedFile:
     if not parts and name:
         expected = "a workbook, or a file with groups of channels"
         raise MeasurementError("this is not a workbook", file=file, found=f'sheet = "{name}"', expected=expected)
+    if data[:_FIRST_BYTES].lstrip(b"\xef\xbb\xbf \t\r\n").lower().startswith(_WEB_PAGES):
+        advice = "open it in a spreadsheet program, and save it as xlsx or CSV"
+        raise MeasurementError("this is a web page", file=file, found="HTML", expected="a table", hint=advice)
     if not parts:
         text, encoding = to_utf8(data, file, file_format.encoding)
         return OpenedFile(file, checksum, file_format, [Text(join_quoted(text), encoding)])

@@ -22,11 +22,7 @@ _THROUGHOUT = 0.95
 _AGREEMENT = 0.02
 #: Next steps for quantities from which the user can compute a column, by kind of quantity.
 _WAYS_ON = {
-    "compliance": "a complex compliance is the reciprocal of the stiffness: write K* = 1 / J*, with its real and "
-    "imaginary part or its magnitude and phase, into columns of the file",
     "decrement": 'divide the logarithmic decrement by pi, and write the quotient as "loss factor [-]" into the file',
-    "acceleration": "divide the amplitude of the acceleration by (2 pi f)^2, turn its phase by 180 deg, and write the "
-    "displacement into the file",
     "period": 'write the reciprocal of the period as "frequency [Hz]" into the file',
     "quality": 'write the reciprocal of the quality factor as "loss factor [-]" into the file',
 }
@@ -114,10 +110,11 @@ def with_positive_loss(
             )
         corrected["phase"] = np.angle(-np.exp(1j * phase)) if automatic or test.force_sign == -1 else phase
     size = np.median(values.get("storage_stiffness", values.get("stiffness", np.ones(1))))
-    for role in ("phase", "loss_factor", "loss_stiffness", "damping_coefficient", "damping_ratio"):
+    sizes = {"loss_stiffness": size, "loss_compliance": np.median(values.get("storage_compliance", np.ones(1)))}
+    for role in ("phase", "loss_factor", "damping_coefficient", "damping_ratio", *sizes):
         if role not in corrected or role not in columns:
             continue
-        share = corrected[role] / (size if role == "loss_stiffness" else 1.0)
+        share = corrected[role] / sizes.get(role, 1.0)
         automatic = test.phase_sign is None and np.mean(share < -LEAST_LOSS_FACTOR) > _THROUGHOUT
         if automatic:
             notes.append(
@@ -138,10 +135,14 @@ def complex_stiffness(pair: tuple[str, str], values: Mapping[str, Floats]) -> tu
 
     Notes:
         K* = K' + i K'' with K'' = 2 pi f c of a damping coefficient c, and tan delta = 2 zeta of a damping ratio zeta.
-        A force amplitude F at a displacement amplitude x gives |K*| = F / x. The loss factor is NaN from a phase of
-        90 deg on.
+        A force amplitude F at a displacement amplitude x gives |K*| = F / x. A complex compliance J' - i J'' is the
+        reciprocal of the stiffness. The loss factor is NaN from a phase of 90 deg on.
     """
     size, loss = values[pair[0]], values[pair[1]]
+    if pair[0] == "storage_compliance":
+        return np.reciprocal(size - 1j * loss), loss / size
+    if pair[0] == "compliance":
+        size = 1.0 / size
     if pair[0] == "force_amplitude":
         size = size / values["amplitude"]
     if pair[1] in ("loss_stiffness", "damping_coefficient"):

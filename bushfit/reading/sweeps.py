@@ -24,6 +24,7 @@ from bushfit.reading.table import Table
 #: Roles whose values must be positive.
 _POSITIVE = (
     *("frequency", "amplitude", "amplitude_reached", "stiffness", "storage_stiffness", "force_amplitude"),
+    *("compliance", "storage_compliance"),
     "relative_error",
 )
 #: Smallest number of rows of a sweep; chosen: fewer show no dependence on frequency or amplitude.
@@ -82,6 +83,9 @@ def read_sweep(
     values, notes = table.read(columns, fewest_rows=_FEWEST_SWEEP_ROWS)
     table = table.needing(columns)
     table.check_positive(_POSITIVE, columns, values)
+    if "amplitude" in columns and columns["amplitude"].role == "acceleration":
+        values["amplitude"] /= (2.0 * np.pi * values["frequency"]) ** 2
+        notes += (f'"{columns["amplitude"].header}" is an acceleration: its amplitude is divided by (2 pi f)^2',)
     for role, value in constants.items():
         if role in columns:
             table.refuse(

@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -43,6 +44,8 @@ from bushfit.reading.wide import unpivot
 _EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
 #: Smallest ratio of nines that mark a missing value to the largest other number; chosen: outliers are rarely nines.
 _MARK_RATIO = 3.0
+#: Quantity in a line above a table: "1 V = 200 N", "Crosshead speed: 10 mm/min".
+_QUANTITY = re.compile(r"[=:]\s*(\d+(?:[.,]\d+)?)\s*([^\s\d,;]+(?:\s*/\s*[^\s\d,;]+)?)")
 #: Largest number of characters of a remark that is quoted.
 _LONGEST_QUOTE = 100
 #: Rows that are converted at a time if pandas cannot read them; chosen: their texts take a few MiB.
@@ -158,6 +161,13 @@ class Table(Cells):
             sentences.append(f"{len(hidden)} rows from row {hidden[0]} on are hidden in the workbook, and are read too")
         return tuple(sentences)
 
+    def quantity_above(self, unit: str) -> str | None:
+        """Return the only quantity with the dimension of an SI unit behind = or : in the lines above the table."""
+        above = (line.text for line in self.source.head() if line.number < self.layout.header_line)
+        matches = (match for text in above for match in _QUANTITY.finditer(text) if units.is_compatible(match[2], unit))
+        texts = dict.fromkeys(f"{match[1].replace(',', '.')} {match[2]}" for match in matches)
+        return next(iter(texts)) if len(texts) == 1 else None
+
     @cached_property
     def sampling_rate(self) -> float | None:
         """Sampling rate [Hz] that a line above the table states clearly, in the notation of its numbers; else None."""
@@ -239,13 +249,22 @@ class Table(Cells):
                 f"the {label} has no unit",
                 expected=f"{quantity}, such as {example}{', or an angular frequency, such as rad/s' * angular}",
                 hint=f'write "{column.header} [{"rad/s" if angular else example}]" in the header, '
-                f'or units = {{ {role} = "{example}" }} in the campaign{alternative}',
+                f'or units = {{ {role} = "{self.quantity_above(expected) or example}" }} in the campaign{alternative}',
             )
         unit = column.unit or "1"
         foreign_units = ("m", "rad", "N/m", "N*m/rad") if self.motion is STRAINING else ("1", "Pa")
         is_foreign = any(units.is_compatible(unit, foreign_unit) for foreign_unit in foreign_units)
         if is_foreign and role in OF_MOTION and "force" not in role:
             self.refuse_other_motion(role, [column.header])
+        if units.is_compatible(unit, "V") and not units.is_compatible(unit, expected):
+            raise unclear(
+                f"the {label} is in volts",
+                expected=units.describe_unit(expected),
+                hint=f"state the {label} of one volt, such as units = "
+                f'{{ {role} = "{self.quantity_above(expected) or f"200 {example}"}" }} in the campaign',
+            )
+        if role == "amplitude" and units.is_compatible(unit, "m/s^2") and expected == "m":
+            return replace(column, role="acceleration", scale=units.si_factor(unit, "m/s^2"))
         with error_location(self.file, place):
             if expected == "Hz" and is_angular(column.header, unit):
                 per_second = "rad/s" if units.is_compatible(unit, "rad/s") else "Hz"
