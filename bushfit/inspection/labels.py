@@ -147,7 +147,7 @@ def _constant_quantity(
 
 
 def wrong_labels(
-    labels: Labels, direction: Place, amplitudes: Sequence[float], frequencies: Sequence[float]
+    labels: Labels, direction: Place, amplitudes: Sequence[float], frequencies: Sequence[float], sampling: float = 0.0
 ) -> Iterator[str]:
     """Warn where the name of a file states an amplitude or a frequency that the file does not contain.
 
@@ -157,6 +157,7 @@ def wrong_labels(
 
         amplitudes: zero-to-peak amplitudes in the file [m, rad or strain].
         frequencies: frequencies in the file [Hz].
+        sampling: sampling rate of a record [Hz], which its name may state; 0 for a sweep.
 
     Returns:
         One sentence for each wrong label.
@@ -170,7 +171,8 @@ def wrong_labels(
         labelled = labels.of_dimension(expected)
         factors = [ZERO_TO_PEAK[label.convention or "zero-to-peak"] for label in labelled]
         sizes = [factor * parse_quantity(label.text, expected) for label, factor in zip(labelled, factors, strict=True)]
-        ratios = np.divide.outer(np.array(sizes), np.asarray(values))
+        expected_values = [*values, sampling] if sampling and expected == "Hz" else values
+        ratios = np.divide.outer(np.array(sizes), np.asarray(expected_values))
         if not labelled or np.any(np.abs(ratios - 1.0) <= _AGREEMENT):
             continue
         is_double = name == "amplitude" and np.any(np.abs(ratios - 2.0) <= 2.0 * _AGREEMENT)

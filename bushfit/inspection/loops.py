@@ -56,6 +56,11 @@ _FEWEST_RIPPLE_ROWS = 200
 _LONGEST_CYCLE = 3000.0
 
 
+def sampling_rate(history: Loop) -> float:
+    """Return the usual sampling rate of a record [Hz]."""
+    return 1.0 / float(np.median(np.diff(history.time)))
+
+
 def describe_sampling(history: Loop) -> str:
     """Describe the time steps of a record.
 
@@ -190,7 +195,9 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
     force, to_force = display_unit(*units.force, half_force)
     half_motion = np.ptp(loop.displacement) / 2.0
     amplitude, mean_motion, mean_force = prepared.amplitude, prepared.coefficients[0].real, float(prepared.force.mean())
-    noise = number(100 * prepared.noise / half_force, 2)
+    noise = f"{number(100 * prepared.noise / half_force, 2)} % of half the {names[1]} range, per row"
+    if prepared.noise > half_force:
+        noise = "not known: the record is no steady loop"
     facts = {
         "cycles": f"{prepared.cycles:.3g}, {'the first from rest' if prepared.from_rest else 'treated as steady'}",
         "frequency": f"{prepared.frequency:.4g} Hz, {waveform(prepared.coefficients)}",
@@ -199,7 +206,7 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
         # down to the last digit of the amplitude: what lies below is noise
         f"mean {names[0]}": f"{format_aligned([to_length * amplitude, to_length * mean_motion], 4)[1]} {length}",
         f"mean {names[1]}": f"{format_aligned([to_force * half_force, to_force * mean_force], 4)[1]} {force}",
-        "noise": f"{noise} % of half the {names[1]} range, per row{prepared.correlation_text}",
+        "noise": noise + prepared.correlation_text * (prepared.noise <= half_force),
     }
     sizes = (np.array([size]) for size in (prepared.frequency, amplitude, half_force / amplitude))
     if means := recorded_means(prepared):
@@ -207,13 +214,18 @@ def describe_loop(loop: Loop, labels: Labels) -> Findings:
         is_position = len(means) > 1 and abs(mean_motion) > _MOST_SOFTENING * at_mean_force
         facts["preload"] = means[-1 if is_position else 0].text(loop.direction)
     odd = [
-        *wrong_labels(labels, loop.direction, [amplitude, half_motion], [prepared.frequency]),
+        *wrong_labels(labels, loop.direction, [amplitude, half_motion], [prepared.frequency], sampling_rate(loop)),
         *implausible_sizes(loop.direction, *sizes),
         *odd_channels(loop),
         *prepared.notes,
         *changing_cycles(prepared),
         *ripple(prepared),
     ]
+    if prepared.cycles < 1.5 and abs(mean_motion) > 0.9 * half_motion:
+        odd.append(
+            f"one loading and unloading from {number(to_length * loop.displacement[0], 3)} {length}: a static curve is "
+            "read as a loop about its mean; record three cycles or more, of which the first settle the rubber"
+        )
     if prepared.frequency * _LONGEST_CYCLE < 1.0:  # longer than any laboratory waits: what may the file say instead?
         mistakes = [mistake.in_words(prepared.loop) for mistake in MISTAKES.values() if mistake.time < 1.0]
         minutes = number(1.0 / prepared.frequency / 60.0, 2)
@@ -251,7 +263,7 @@ def describe_history(history: Loop, labels: Labels) -> Findings:
         "sampling": f"{describe_sampling(history)}, {rows:.3g} rows per cycle at least",
         "noise": f"{100 * max(step.gain_error for step in steps):.2g} % of |K| at most, a point",
     }
-    labelled = wrong_labels(labels, history.direction, levels, frequencies)
+    labelled = wrong_labels(labels, history.direction, levels, frequencies, sampling_rate(history))
     notes = history.source.notes if history.source else ()
     return facts, [*notes, *labelled, *odd_channels(history), *reduction.warnings]
 
@@ -284,7 +296,8 @@ def describe_programme(record: Loop, loops: Sequence[Loop], labels: Labels) -> F
         "programme": f"{len(loops)} loops in one record: {', '.join(sizes)} {unit} at {', '.join(rates)} Hz, "
         f"{' to '.join(ends)} cycles used of each; {100 * left_out:.2g} % of the rows left out"
     }
-    odd = [*wrong_labels(labels, record.direction, amplitudes, frequencies), *odd_channels(record)]
+    labelled = wrong_labels(labels, record.direction, amplitudes, frequencies, sampling_rate(record))
+    odd = [*labelled, *odd_channels(record)]
     for place, (loop, prepared) in enumerate(zip(loops, prepared_loops, strict=True), start=1):
         rest = loop.part.left_out if loop.part else None
         size, course = number(factor * prepared.amplitude, 4), waveform(prepared.coefficients)

@@ -11,8 +11,8 @@ from bushfit.units import display_unit, number
 
 #: Smallest and largest frequency of a test [Hz]; chosen: from one cycle a month to ultrasound.
 FREQUENCIES = (4e-7, 1e5)
-#: Smallest and largest amplitude [m, rad or -], force [N, N m or Pa] and stiffness by kind of motion; chosen: far beyond
-#: those of rubber parts and their laboratories.
+#: Smallest and largest amplitude [m, rad or -], force [N, N m or Pa] and stiffness by kind of motion; chosen: far
+#: beyond those of rubber parts and their laboratories.
 _AMPLITUDES = {TRANSLATION: (1e-8, 0.2), ROTATION: (1e-7, 4.0), STRAINING: (1e-8, 5.0)}
 _FORCES = {TRANSLATION: (0.0, 2e5), ROTATION: (0.0, 1e5), STRAINING: (0.0, 1e9)}
 _STIFFNESSES = {TRANSLATION: (1e4, 1e11), ROTATION: (1e-3, 1e9), STRAINING: (1e4, 1e10)}
@@ -34,12 +34,15 @@ def implausible_sizes(place: Place, frequency: Array, amplitude: Array, stiffnes
     quantities = (
         ("frequency", "Hz", frequency, FREQUENCIES),
         ("strain" if motion is STRAINING else "amplitude", motion.displacement_unit, amplitude, _AMPLITUDES[motion]),
-        (f"{motion.words[1]} amplitude", motion.force_unit, amplitude * stiffness, _FORCES[motion]),
         (motion.words[2], motion.stiffness_unit, stiffness, _STIFFNESSES[motion]),
+        (f"{motion.words[1]} amplitude", motion.force_unit, amplitude * stiffness, _FORCES[motion]),
     )
+    has_warned = False
     for name, unit, values, (lowest, highest) in quantities:
         positive = values[values > 0.0]
-        if positive.size and (np.min(positive) < lowest or np.max(positive) > highest):
+        is_consequence = name.endswith(" amplitude") and has_warned
+        if positive.size and (np.min(positive) < lowest or np.max(positive) > highest) and not is_consequence:
+            has_warned = True
             ends = [float(np.min(positive)), float(np.max(positive))]
             shown_unit, factor = ("%", 100.0) if unit == "1" else display_unit(unit, 1.0, math.sqrt(ends[0] * ends[1]))
             found, expected = (

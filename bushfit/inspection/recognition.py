@@ -15,7 +15,6 @@ from bushfit.reading.headers import LOOP_COLUMNS, PAIRS, SWEEP_COLUMNS, Vocabula
 from bushfit.reading.labelled import Rows
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.names import direction_of_file
-from bushfit.reading.numerals import is_like_number
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.resonance import RESONANCE_COLUMNS, is_resonance
 from bushfit.reading.stiffness import hint_for_convertible_columns, refuse_ambiguous_damping
@@ -78,8 +77,6 @@ def recognize_table(file: Path, test_options: Mapping[str, Any]) -> tuple[Table,
     lacking = missing_role(best, is_sweep=is_sweep) or "force"
     units = {"displacement": "m", "force": "N", "stiffness": "N/m", "storage_stiffness": "N/m", "phase": "rad"}
     advice = hint_for_convertible_columns(best)
-    if len(best.headers) > 2 and all(is_like_number(header) for header in best.headers[1:]):
-        advice = "the table has a row for each quantity: exchange its rows and columns"
     column = best.columns_key(lacking, units.get(lacking, "1"))
     raise best.header_error(
         "the columns are not those of a test",

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from itertools import islice, pairwise
+from itertools import groupby, islice, pairwise, zip_longest
 
 from bushfit import units
 from bushfit.errors import UnitError
@@ -73,6 +73,29 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     ]
     layout = replace(layout, headers=(*layout.headers, *added), units=(*layout.units, *[""] * len(added)))
     return _with_complex_parts(Sheet(source.sheet or "", content, numbers=numbers), layout)
+
+
+def exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
+    """Exchange rows and columns of tables with a row for each quantity, such as "f [Hz]; 1; 2; 5".
+
+    Args:
+        source: lines or rows of the file.
+        layout: layout of the file if it is read as a table with a column for each quantity.
+        vocabulary: known column names.
+
+    Returns:
+        Sheet with the exchanged tables, below the lines above each; None if there is no such table.
+    """
+    rows = [list(map(str, cells_of(line, layout.delimiter))) for line in source.head()]
+    content, is_exchanged = list[Sequence[str]](), False
+    for is_table, run in groupby(rows, key=lambda cells: len(cells) > 3 and all(map(is_like_number, cells[1:]))):
+        lines = list(run)
+        roles = vocabulary.roles([cells[0] for cells in lines]) if is_table else set()
+        if "frequency" in roles and len(roles) > 2:
+            is_exchanged = True
+            lines = [list(cells) for cells in zip_longest(*lines, fillvalue="")]
+        content += lines
+    return Sheet(source.sheet or "", content) if is_exchanged else None
 
 
 def _is_one_block(source: Text, layout: Layout) -> bool:
@@ -150,7 +173,7 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
 
 def _label_columns(
     labels: Sequence[Labels], titles: Sequence[str], parts: Sequence[str], roles: set[str]
-) -> dict[str, list[str]]:
+) -> dict[str, list[str | float]]:
     """Columns to add to a table, so that its rows show the block from which they come.
 
     Args:
@@ -160,21 +183,20 @@ def _label_columns(
         roles: roles for which the blocks have a column already.
 
     Returns:
-        One text per block, by header: quantities that all blocks state, direction, part, and number of the block.
+        One text or number per block, by header: quantities that all blocks state, direction, part, and block number.
     """
-    columns: dict[str, list[str]] = {}
+    columns: dict[str, list[str | float]] = {}
     for role, expected in (("amplitude", "m"), ("amplitude", "rad"), ("amplitude", "1"), ("frequency", "Hz")):
         quantities = [label.of_dimension(expected) for label in labels]
         if role not in roles and all(len(matches) == 1 for matches in quantities):
             kinds = {(matches[0].unit, matches[0].convention) for matches in quantities}
             if len(kinds) == 1:
                 unit, convention = kinds.pop()
-                texts = [matches[0].text.split()[0] for matches in quantities]
-                columns[f"{role}{COUNTED[convention]} [{unit}]"] = texts
+                columns[f"{role}{COUNTED[convention]} [{unit}]"] = [float(q[0].text.split()[0]) for q in quantities]
     if "temperature" not in roles and all(label.temperature for label in labels):
         degrees = [str(label.temperature).partition(" ") for label in labels]
         if len({unit for *_, unit in degrees}) == 1:
-            columns[f"temperature [{degrees[0][2]}]"] = [number for number, *_ in degrees]
+            columns[f"temperature [{degrees[0][2]}]"] = [float(number) for number, *_ in degrees]
     directions = [named_direction([title], short=True) for title in titles]
     if all(directions):
         columns["direction"] = [str(direction) for direction in directions]

@@ -284,7 +284,7 @@ def _add_by_unit(
         if role in roles or role not in names or (role == "phase" and _LOSSES & set(roles)):
             continue
         is_beside_stiffness = role in ("frequency", "amplitude", "phase")
-        if is_beside_stiffness and not {"stiffness", "storage_stiffness", "force_amplitude"} & set(roles):
+        if is_beside_stiffness and not {"stiffness", "storage_stiffness", "force_amplitude", "compliance"} & set(roles):
             continue
         if motion is STRAINING and (role == "force_amplitude" or not (qualifier or is_beside_stiffness)):
             continue  # a ratio or a pressure may be any quantity

@@ -294,10 +294,12 @@ def _likeliest(
     rows = [(mark, split(lines[end].content, mark)) for mark in delimiters]
     rows = [(mark, cells) for mark, cells in rows if len(cells) > 1 and all(map(is_like_number, cells))] or rows
     for delimiter, row in rows:
-        for index in reversed(before):
-            cells = split(lines[index].content, delimiter)
-            if len(row) == len(cells) and not is_units_row([cell.strip("[]() ") for cell in cells]):
-                return index, delimiter, cells
+        cells = {index: split(lines[index].content, delimiter) for index in reversed(before)}
+        are_units = {index: is_units_row([cell.strip("[]() ") for cell in cells[index]]) for index in cells}
+        fitting = [index for index in cells if len(row) == len(cells[index]) and not are_units[index]]
+        if fitting:
+            index = next((index for index in fitting if are_units.get(index + 1)), fitting[0])
+            return index, delimiter, cells[index]
     delimiter, row = max(rows, key=lambda entry: len(entry[1]))
     return end, delimiter, row
 

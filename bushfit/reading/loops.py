@@ -67,7 +67,9 @@ def read_loop(
         copies = np.all([np.diff(values[role]) == 0.0 for role in ("time", "displacement", "force")], axis=0)
         if copies.any() and np.array_equal(copies, np.diff(values["time"]) <= 0.0):
             values = {role: np.delete(numbers, np.flatnonzero(copies) + 1) for role, numbers in values.items()}
-            notes += (f"{np.count_nonzero(copies)} rows that repeat the row before them are left out",)
+            count = np.count_nonzero(copies)
+            repeated = f"{count} rows that repeat the rows" if count > 1 else "1 row that repeats the row"
+            notes += (f"{repeated} before, with its time, left out",)
             displacement, force = values["displacement"], values["force"]
         time, more = increasing_time(table, wanted["time"], values["time"])
         notes = (*notes, *more)

@@ -200,13 +200,15 @@ def check_stiffness(
             hint=f'if these are ratios, write "[-]" for "[{column.unit}]" in the header',
         )
     low, high = _LOSS_FACTORS
+    likelier = {"phase": "rad" if column.unit != "rad" else "deg", "loss_factor": "%"}.get(pair[1])
+    other_unit = f', perhaps units = {{ {pair[1]} = "{likelier}" }} in the campaign' if likelier else ""
     table.refuse(
         ~((loss_factor >= low) & (loss_factor <= high)),
         column,
         "no bushing has this loss",
         f"a loss factor (loss over storage stiffness) from {low:g} to {high:g}",
-        "check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]; or is it 90 deg less the loss? "
-        "Beyond the resonance of a moving mass, delete the rows from the file.",
+        f"check the unit: a phase in deg or rad, a loss factor in % or as a ratio [-]{other_unit}; or is it 90 deg "
+        "less the loss? Beyond the resonance of a moving mass, delete the rows from the file",
     )
     for redundant_pair in AGREEING_PAIRS:
         if redundant_pair == pair or not set(redundant_pair) <= set(values):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bushfit import units
 from bushfit.errors import MeasurementError, UnitError, error_location
 from bushfit.geometry import STRAINING, TRANSLATION, Motion, Place, strain_factor_of_files
-from bushfit.reading.blocks import combined, refuse_other_columns
+from bushfit.reading.blocks import combined, exchange_rows, refuse_other_columns
 from bushfit.reading.cells import Cells, FaultyRow
 from bushfit.reading.classification import classify
 from bushfit.reading.headers import (
@@ -100,21 +100,26 @@ class Table(Cells):
         file_format, columns = opened.stated, dict(columns or {})
         numbered = {role: "\0" if text.isdecimal() else text for role, text in columns.items()}
         vocabulary = Vocabulary.shared(of_motion(names, motion), numbered, stated_units or {})
+        in_headers = {role: text for role, text in columns.items() if not text.isdecimal()}
+        all_names = Vocabulary.shared(of_motion(names, motion), in_headers, stated_units or {})
 
         def lay_out(source: RowSource) -> tuple[RowSource, Layout]:
             """Return rows and layout of the table in a part of the file; blocks and wide tables become long."""
             delimiter = "" if isinstance(source, Sheet) else DELIMITERS.get(file_format.delimiter or "")
+            stated_line = file_format.header_line
             layout = source.layout or find_layout(
-                source.head(), vocabulary, delimiter=delimiter, header_line=file_format.header_line
+                source.head(), all_names, delimiter=delimiter, header_line=stated_line
             )
-            may_be_wide = "amplitude" in names and file_format.header_line is None
-            if may_be_wide and (wide := unpivot(source, opened.file, vocabulary, layout)):
-                return wide
+            if "amplitude" in names and stated_line is None:
+                if exchanged := exchange_rows(source, layout, all_names):
+                    source, layout = exchanged, find_layout(exchanged.head(), all_names, delimiter="")
+                if wide := unpivot(source, opened.file, vocabulary, layout):
+                    return wide
             return combined(source, layout, vocabulary)
 
         try:
             layouts = {id(part): lay_out(part) for part in opened.parts}
-            part = opened.choose(lambda part: len(vocabulary.roles(layouts[id(part)][1].headers) - {"time"}) > 1)
+            part = opened.choose(lambda part: len(all_names.roles(layouts[id(part)][1].headers) - {"time"}) > 1)
         except csv.Error as error:
             raise MeasurementError("the table cannot be read", file=opened.file, found=str(error)) from error
         source, layout = layouts[id(part)]

@@ -117,6 +117,8 @@ def find_steps(history: Loop, fewest: int) -> tuple[list[Step], list[SkippedStre
         if keeps_changing(edges, parts):
             skipped.append(SkippedStretch(history.name, float(edges[0]), float(edges[-1]), _CHANGING, True))
             continue
+        if max(part.stop - part.start for part in parts) < fewest <= edges.size - 3:
+            parts = [slice(1, edges.size - 2)]  # without the cycles in which the motion starts and stops
         for part in parts:
             inside = slice(run.start + part.start, run.start + part.stop)
             start, end, count = float(edges[part.start]), float(edges[part.stop]), part.stop - part.start

@@ -12,7 +12,7 @@ IN_LOOP = [
     ("a tenth of a cycle", kept(12), "loop.csv: the loop does not contain a whole cycle", "export the whole cycle, or several"),
     ("binary", lambda _: b"\x00\x01\x02" * 100, "loop.csv, line 1: this is not text", 'export it as "CSV UTF-8", or state encoding = "..." in the campaign'),
     ("a workbook cut short", lambda _: b"PK\x03\x04" + b"x" * 100, "loop.csv: the workbook cannot be read", "save it again as xlsx"),
-    ("a web page", lambda _: "<html><body>503 Service Unavailable</body></html>\n", "loop.csv, line 1: there is only one column", 'a header row such as "time [s],displacement [mm],force [N]", separated by comma,'),
+    ("a web page", lambda _: "<html><body>503 Service Unavailable</body></html>\n", "loop.csv: this is a web page", "save it as xlsx or CSV"),
     ("no header", lambda lines: text(lines[1:]), "loop.csv, line 1: there is no header", 'a header row such as "time [s],displacement [mm],force [N]"'),
     ("no units", every("time [s],displacement [mm],force [N]", "time,displacement,force"), 'loop.csv, line 1, column "displacement": the displacement has no unit', 'write "displacement [mm]" in the header, or units = { displacement = "mm" } in the'),
     ("unknown unit", every("force [N]", "force [Nn]"), 'loop.csv, line 1, column "force [Nn]": unknown unit', "a unit such as mm, N, kN/mm, deg, Hz or %"),

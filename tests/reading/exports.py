@@ -212,7 +212,7 @@ EXPORTS: dict[str, Export] = {
         sweep("Frequenz [Hz]|Wegamplitude SS [mm]|Kraftamplitude SS [N]|Phasenwinkel [°]", F, 2 * A, 2 * K * A, PHASE, mark=";").replace(".", ",")
     ),
     "tan(delta)/%": Export(sweep("f/Hz|A/mm|K*/(N/mm)|tan(delta)/%", F, A, K, 100 * ETA)),
-    "rows and columns exchanged": Export("Frequency [Hz],5,10,20,40\nStiffness [N/mm],594,608,627,640\nLoss factor,0.1,0.11,0.12,0.13\n", None, ["exchange its rows and columns"]),
+    "rows and columns exchanged": Export("Frequency [Hz],5,10,20,40\nStiffness [N/mm],594,608,627,640\nLoss factor,0.1,0.11,0.12,0.13\n", None, ["the amplitude of this test is not stated"]),
     "a quality factor": Export(sweep(USUAL + "Q [-]", F, A, K, 1 / ETA), None, ["the columns are not those of a test"]),
     "logarithms of a DMA": Export(
         sweep("log10(f/Hz)|Strain [%]|log10 G' [Pa]|log10 G'' [Pa]", np.log10(F), 10 * A, np.log10(1e6 * G.real), np.log10(1e6 * G.imag)), reference=MODULUS
@@ -275,7 +275,7 @@ EXPORTS: dict[str, Export] = {
         sweep("f [Hz]|A [mm]|K* [dB]|Phase [deg]", F, A, 20 * np.log10(K), PHASE), stated={"units": {"stiffness": "N/mm"}}
     ),
     "complex numbers": Export(sweep("f [Hz]|A [mm]|K* [N/mm]", F, A, [f"{k.real:.6f} + {k.imag:.6f}i" for k in STIFFNESS], mark=";")),
-    "a compliance": Export(sweep("f [Hz]|A [mm]|J' [mm/N]|J'' [mm/N]", F, A, 1 / K, 1 / K), None, ["K* = 1 / J*"]),
+    "a compliance": Export(sweep("f [Hz]|A [mm]|J' [mm/N]|J'' [mm/N]", F, A, (1 / STIFFNESS).real, -(1 / STIFFNESS).imag)),
     "a decrement": Export(sweep(USUAL + "Log. decrement [-]", F, A, K, np.pi * ETA), None, ["by pi"]),
     "carets": Export(sweep(USUAL + "tan delta", F, A, K, ETA, mark="^")),
     "dynamic motion and force": Export(sweep("Freq./Hz|Weg dyn. SS/mm|Kraft dyn. SS/N|Verlustwinkel/Grad", F, 2 * A, 2 * K * A, PHASE, mark=";").replace("Freq.", "Freq").replace("dyn.", "dyn")),
@@ -296,7 +296,7 @@ EXPORTS: dict[str, Export] = {
         for encoding, header, last in (
             ("cp932", "周波数[Hz]|振幅[mm]|動ばね定数[N/mm]|損失係数", ETA), ("gb18030", "频率(Hz)|振幅(mm)|动刚度(N/mm)|损耗角(°)", PHASE),
             ("cp1250", "Częstotliwość [Hz]|Amplituda [mm]|Sztywność dynamiczna [N/mm]|Kąt strat [°]", PHASE),
-            ("cp1251", "Частота, Гц|Амплитуда, мм|Жёсткость, Н/мм|Угол потерь, град", PHASE), ("cp1252", "Fréquence [Hz]|Amplitude crête [mm]|Raideur [N/mm]|Facteur de perte", ETA),
+            ("cp1254", "Frekans [Hz]|Genlik [mm]|Dinamik rijitlik [N/mm]|Kayıp faktörü", ETA), ("cp1251", "Частота, Гц|Амплитуда, мм|Жёсткость, Н/мм|Угол потерь, град", PHASE), ("cp1252", "Fréquence [Hz]|Amplitude crête [mm]|Raideur [N/mm]|Facteur de perte", ETA),
         )
     },
     "JIS K 6394": Export(
@@ -396,9 +396,84 @@ EXPORTS: dict[str, Export] = {
         "Amplitude 0.2 mm (double amplitude)\n" + sweep("f [Hz]|K* [N/mm]|tan delta", F[:5], K[:5], ETA[:5]),
         reference={"frequency": F[:5], "amplitude": 1e-3 * A[:5], "stiffness": 1e3 * STIFFNESS[:5]},
     ),
-    "a complex compliance": Export(sweep("f [Hz]|A [mm]|Compliance real [mm/kN]|Compliance imag [mm/kN]", F, A, K, K), None, ["K* = 1 / J*"]),
-    "a receptance": Export(sweep("f [Hz]|Receptance x/F [mm/kN]|Phase x/F [deg]", F, 1e3 / K, -PHASE), None, ["K* = 1 / J*"]),
-    "an acceleration": Export(sweep("f [Hz]|Accel amplitude (g pk)|Force amplitude (N pk)|Phase (deg)", F, A, A * K, PHASE - 180), None, ["(2 pi f)^2"]),
+    "a complex compliance": Export(
+        sweep("f [Hz]|A [mm]|Compliance real [mm/kN]|Compliance imag [mm/kN]", F, A, 1e3 * (1 / STIFFNESS).real, 1e3 * (1 / STIFFNESS).imag),
+        words=["opposite sign"],
+    ),
+    "a receptance": Export(sweep("f [Hz]|A [mm]|Receptance x/F [mm/kN]|Phase x/F [deg]", F, A, 1e3 / K, -PHASE), words=["opposite sign"]),
+    "an acceleration": Export(
+        sweep("f [Hz]|Accel amplitude (g pk)|Force amplitude (N pk)|Phase (deg)", F, 1e-3 * A * (2 * np.pi * F) ** 2 / 9.80665, A * K, PHASE - 180),
+        words=["is an acceleration"],
+    ),
+    # a wrong unit in a header, numbers in volts or digits, marks for missing values
+    "a wrong unit in a header": Export(
+        sweep("Frequency [Hz]|Amplitude [mm]|K* [kN/mm]|Phase (rad)", F, A, K, PHASE), words=["is read in N/mm, as stated, and not in kN/mm"],
+        stated={"units": {"stiffness": "N/mm", "phase": "deg"}},
+    ),
+    "a phase whose unit cannot be": Export(sweep("Frequency [Hz]|Amplitude [mm]|K* [kN/mm]|Phase (rad)", F, A, K, PHASE), None, ['--unit "phase=deg"']),
+    "a stiffness that no rig can move": Export(
+        sweep("f [Hz]|A [mm]|K* [kN/mm]|tan delta", F, A, K, ETA), words=["force amplitude", "is the unit in the header right?"],
+        reference={"stiffness": 1e6 * STIFFNESS},
+    ),
+    "volts": Export("1 V = 0.1 mm\n1 V = 200 N\n" + loop("t [s]|displacement [V]|force [V]", TIME, 10 * DISPLACEMENT, FORCE / 200), None, ['"displacement=0.1 mm"']),
+    "volts, as the hint says": Export(
+        "1 V = 0.1 mm\n1 V = 200 N\n" + loop("t [s]|displacement [V]|force [V]", TIME, 10 * DISPLACEMENT, FORCE / 200), "loop", (),
+        {"units": {"displacement": "0.1 mm", "force": "200 N"}},
+    ),
+    "digits": Export(
+        "Kanal 2 Weg 1 digit = 0,0005 mm\n" + loop("t [s]|Kanal 1 [N]|Kanal 2", TIME, FORCE, 2000 * DISPLACEMENT), None, ['"displacement=0.0005 mm"'],
+        {"columns": {"displacement": "Kanal 2"}},
+    ),
+    "a speed above": Export("Crosshead speed: 12,5 mm/min\n" + loop("displacement [mm]|force [N]", DISPLACEMENT, FORCE), None, ['rate = "12.5 mm/min"']),
+    **{
+        f"a loop with {mark} for missing values": Export(
+            loop("time [s]|displacement [mm]|force [N]", *np.insert([TIME, DISPLACEMENT, FORCE], 7, [[0.325, 0.2, float(mark)]], axis=1)), "loop", ["1 row left out"]
+        )
+        for mark in ("-9999", "99999")
+    },
+    **{
+        f"a sweep with {mark} for missing values": Export(
+            sweep(USUAL + "tan delta", *np.insert([F, A, K, ETA], 7, [[15, 0.5, k, eta]], axis=1)), words=["1 row left out"]
+        )
+        for mark, k, eta in (("9999", 9999, 9999), ("-1", 1400, -1))
+    },
+    "large values are no marks": Export(
+        sweep("f [Hz]|A [mm]|K* [N/mm]|tan delta", F, A, K * 999.0 / K.max(), ETA), reference={"stiffness": 999e3 * STIFFNESS / K.max()}
+    ),
+    # remarks that change the meaning, and names in the languages of laboratories
+    **{
+        f"remark: {line}": Export(f"{line}\n" + loop(), "loop", [f'line 1 is not understood: "{line}"'])
+        for line in ("2 bushings in parallel", "Zwei Buchsen parallel geprüft", "group delay 6.7 ms, NOT compensated", "cycles 1-2 are conditioning")
+    },
+    "marked rows": Export(sweep(USUAL + "tan delta|Note", F, A, K, ETA, ["conditioning"] * 2 + ["ok"] * 8), words=['2 rows are marked "conditioning"']),
+    "texts below the units": Export(
+        "Zeit  1 - Messrate\tCH 1 Kraft U10\tCH 2 Weg WA20\ns\tkN\tmm\nRate 100 Hz\tBE 10 Hz\tBE 10 Hz\n"
+        + "\n".join(table([], TIME, FORCE / 1e3, DISPLACEMENT)[1:]), "loop", ["BE 10 Hz"],
+    ),
+    "a time without a name": Export("path,,Disp/Out1,Force/Out1\nunit,s,mm,N\n" + "\n".join(table([], [""] * 600, TIME, DISPLACEMENT, FORCE, mark=",")[1:]), "loop", ["column 2"]),
+    "wf_increment": Export("wf_increment = 5.0E-2\n" + loop("Displacement|Force", DISPLACEMENT, FORCE).replace("\n", "\nmm\tN\n", 1), "loop", ["20 a second"]),
+    "a channel in brackets": Export(loop("Total Time (s)|Position(8800MT (0,1):Position) (mm)|Load(8800MT (0,1):Load) (kN)", TIME, DISPLACEMENT, FORCE / 1e3), "loop"),
+    "rows that repeat": Export(
+        loop("time [s]|displacement [mm]|force [N]", *np.repeat([TIME, DISPLACEMENT, FORCE], [1 + (n == 200) for n in range(600)], axis=1)), "loop",
+        ["1 row that repeats"],
+    ),
+    "means and deviations of parts": Export(
+        sweep("Frekvens (Hz)|Amplitud (mm)|Styvhet medel (N/mm)|Styvhet std (N/mm)|Förlustfaktor medel|Förlustfaktor std", F, A, K, 0 * F + 20, ETA, 0 * F + 0.004)
+    ),
+    "a range that is peak to peak": Export(sweep("Frekvence [Hz]|Rozkmit síly [N]|Rozkmit [mm]|Ztrátový úhel [°]", F, 2 * A * K, 2 * A, PHASE)),
+    "a footnote": Export("| f / Hz | Amplitude¹ / mm | K′ / kN/mm | K″ / kN/mm |\n|--:|--:|--:|--:|\n" + "".join(
+        f"| {f:g} | {a:g} | {k.real / 1e3:.9f} | {k.imag / 1e3:.9f} |\n" for f, a, k in zip(F, A, STIFFNESS, strict=True)
+    )),
+    "a row for each quantity": Export("".join(
+        f"Amplituda drgań (0–szczyt);{a};mm\n" + "".join(
+            f"{name};{';'.join(f'{value:.9g}' for value in values[a == A])}\n"
+            for name, values in (("Częstotliwość [Hz]", F), ("Sztywność dynamiczna |K*| [kN/mm]", K / 1e3), ("Kąt stratności [°]", PHASE))
+        )
+        for a in (0.1, 0.5)
+    ).replace(".", ",")),
+    "the number of a column below two header rows": Export(
+        sweep("f [Hz]|A [mm]|K* [N/mm]|delta [°]|K* [N/mm]|delta [°]", F, A, K, PHASE, 2 * K, PHASE), stated={"columns": {"stiffness": "3", "phase": "4"}}
+    ),
     **{
         f"no time below {line}": Export(f"{line}\n" + loop("displacement [mm]|force [N]", DISPLACEMENT, FORCE), kind, words)
         for line, kind, words in (
