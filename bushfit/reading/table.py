@@ -264,7 +264,7 @@ class Table(Cells):
         if units.is_compatible(unit, "V") and not units.is_compatible(unit, expected):
             raise unclear(
                 f"the {label} is in volts",
-                expected=units.describe_unit(expected),
+                expected=f"{quantity}, such as {example}",
                 hint=f"state the {label} of one volt, such as units = "
                 f'{{ {role} = "{self.quantity_above(expected) or f"200 {example}"}" }} in the campaign',
             )
