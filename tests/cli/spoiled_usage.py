@@ -179,6 +179,7 @@ MANIFESTS = [
     ("manifest.toml", "max_effects = 1\n" + ROW, "max_effects", "has no effect", "commands fit"),
     ("manifest.csv", "campaign,directions,commands\na.toml,axial,fit\nb.toml,axial,diagnose", "b.toml", "directions", "commands diag"),
     ("manifest.toml", ROW + 'commands = ["run", "fit"]', "commands", "run includes the other commands", "found: run, fit"),
+    ("manifest.toml", ROW + 'commands = ["fit", "predict"]\nmodel = "model.json"', "model", "this setting has no effect here", "--command diagnose too, or leave model out"),
     ("manifest.toml", ROW + 'commands = ["run"]\neffects = ["inertia"]', "effects", "no effect", "try: leave effects out"),
     ("manifest.toml", ROW + 'effects = ["inertai"]', "bushings #1.effects #1", 'did you mean "inertia"?'),
     ("manifest.toml", 'at = ["axial 25 Hz"]\n' + ROW, "at", "not an operating point", "axial 25 Hz"),

@@ -172,7 +172,8 @@ def test_tests_are_read_back(form, direction, tmp_path):
 
 def test_cells_of_a_text_have_seven_digits_and_run_nothing():
     table = pd.DataFrame({"x [mm]": [1.0 / 3.0, np.nan], "n": [-3, 4], "=run": ["\r=1+1", 'a "b", c']})
-    assert to_csv(table) == b'x [mm],n,\'=run\n0.3333333,-3,\' =1+1\n,4,"a ""b"", c"\n'
+    table["v"] = pd.Series([None, 2.5], dtype=object)
+    assert to_csv(table) == b'x [mm],n,\'=run,v\n0.3333333,-3,\' =1+1,\n,4,"a ""b"", c",2.5\n'
     commas = to_bytes("t", TABLE, "decimal-comma")
     assert commas.startswith(b"\xef\xbb\xbfx [mm], low;n;'=text\n0,3333333;1;'=1+1\n;2;\"a; b, c\"\n-1e-12;3;Pr")
     assert [escape_formula(text) for text in RUN] == [f"'{text}" for text in RUN]
