@@ -397,10 +397,7 @@ def split_unit(header: str) -> tuple[str, str | None, AmplitudeConvention | None
 
 
 def _splits(text: str) -> Iterator[tuple[str, str | None, bool]]:
-    """Yield each way to split a header, such as "force_N", into name and unit, and True if the split is certain.
-
-    The unit is None for the header as a whole; a split is certain if the unit is in brackets, or None.
-    """
+    """Yield each split of a header, such as "force_N", into name and unit or None, and True with brackets or None."""
     name, unit = units.split_header(text)
     yield name, unit, True
     if unit is None:
