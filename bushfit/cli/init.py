@@ -336,7 +336,8 @@ class Questions:
         """Ask for the value of an option that an error names.
 
         Args:
-            key: campaign key, and the column role for a header or unit, such as ("column", "force"), or "".
+            key: key of the option and, for the header or unit of a column, the role of the column, such as ("column",
+                "force"); ("rate", "") for other options.
             error: error to print above the question.
 
         Returns:

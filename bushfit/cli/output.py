@@ -169,7 +169,7 @@ class Output:
     def print_table(
         self, title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], *, text_columns: int = 1
     ) -> None:
-        """Print a table; if it is wider than the terminal, each row as a list of its cells.
+        """Print a table, or if it is wider than the terminal a list of cells for each of its rows.
 
         Args:
             title: title above the table.

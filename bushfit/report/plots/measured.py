@@ -80,7 +80,7 @@ def sweep_groups(table: pd.DataFrame, result: Result) -> list[SweepGroup]:
         result: model, which gives the specimens by their names.
 
     Returns:
-        Groups in the order of the table. The curves of a group differ in the held amplitude or frequency, and in part,
+        Groups in the order of the table. The curves of a group differ in the fixed amplitude or frequency, and in part,
         temperature or preload if tests differ in these.
     """
     groups, order = [], [*dict.fromkeys(table["direction"])]

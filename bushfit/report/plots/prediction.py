@@ -138,8 +138,8 @@ def refine_prediction(
         rig: True to include the effects of the rig, as in the tests.
 
     Returns:
-        Prediction on the finer grid, which contains the frequencies and amplitudes of the given one; the given one if
-        it has a large motion, which takes too long to repeat.
+        Prediction on the finer grid, which contains the given frequencies and amplitudes. A prediction of a vibration
+        on a large motion takes too long to repeat, and is returned unchanged.
     """
     if prediction.over:
         return prediction
@@ -227,7 +227,7 @@ def points_near(table: pd.DataFrame | None, header: str, levels: Array) -> list[
         levels: predicted amplitudes or frequencies in the unit of that column, (k,).
 
     Returns:
-        Rows of the table for each of them, empty if it was not measured, (k,).
+        Rows of the table at each predicted amplitude or frequency, empty if it was not measured, (k,).
     """
     if table is None:
         return [pd.DataFrame({"outlier": []})] * levels.size
