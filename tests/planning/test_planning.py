@@ -238,6 +238,7 @@ def test_a_rig_without_limits_and_an_error_of_the_model_are_told(root):
     assert model.startswith("the errors of the stiffness include the model error, up to ")
     assert all(row["planned"] > 0.01 for row in found.document["stiffness"].values())
     points = found.plan.request.points
+    assert points[0].amplitude.max() < 1e-2 < points[0].frequency.min(), "m and Hz"
     errors = found.plan.planned.stiffness
     assert errors.size == sum(part.frequency.size for part in points)
     first = errors[: points[0].frequency.size]
