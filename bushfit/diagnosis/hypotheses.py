@@ -18,6 +18,7 @@ from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import LEVELS
 from bushfit.diagnosis.propose import Proposal, proposals
 from bushfit.diagnosis.rig_errors import RigErrors, in_scatter_units, rig_errors
+from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -224,7 +225,30 @@ class SearchState:
         The probabilities of both cases are added.
         """
         total = float(np.logaddexp(self.linear.log_evidence, self.linear.log_evidence_with_compound))
-        return self.log_prior + self.log_density + total
+        return self.log_weight + total
+
+    @cached_property
+    def log_weight(self) -> float:
+        """Natural log of the prior probability of these explanations times the prior density of all parameters.
+
+        Notes:
+            The prior of the rubber's parameters is uniform in what they change of the tests, in units of noise
+            (Jeffreys, 1946): density |J J^T|^(1/2), where J are the derivatives of the residuals. A density uniform in
+            the logarithms would reward fits in which a parameter has no influence, such as mu near zero. If an effect
+            replaces a branch, its best determined parameters count in place of those of the branch.
+        """
+        solution, added = self.bare.solution, [get_effect(name) for name in self.effects]
+        replacing = {qualified_name(e, parameter) for e in added if e.replaces for parameter in e.parameters}
+        of_rubber = [name not in self.precision or name in replacing for name in solution.coordinates.names]
+        volume = np.linalg.svd(solution.jacobian[of_rubber], compute_uv=False)
+        count = len(self.tests.base.solution.coordinates.names)
+        return self.log_prior + self.log_density + float(np.sum(np.log(np.maximum(volume[:count], 1e-12))))
+
+    @property
+    def likeliest_deviation(self) -> float:
+        """Likeliest standard deviation of the compound's deviation, relative to |K|; 0 if none is more probable."""
+        linear = self.linear
+        return linear.deviation[1] if linear.log_evidence_with_compound > linear.log_evidence else 0.0
 
     def free_columns(self, deviation: float) -> Array | None:
         """Changes of the residuals by faulty parts of the tests and the compound, left free in refits of effects.
@@ -295,7 +319,7 @@ class SearchState:
             plain = replace(plain, faulty_parts=(*plain.faulty_parts, explanation))
         else:
             plain = replace(plain, unnamed=explanation.name)
-        log_prior = self.log_prior + self.log_density + log_odds
+        log_prior = self.log_weight + log_odds
         extended = [
             replace(
                 plain,
@@ -324,7 +348,7 @@ class SearchState:
         smooth deviation of the rubber compound from the model's laws.
         """
         linear, tests = self.linear, self.tests
-        log_prior = self.log_prior + self.log_density
+        log_prior = self.log_weight
         plain = Hypothesis(
             self.effects,
             tests.claim,

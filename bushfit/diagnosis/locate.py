@@ -92,27 +92,27 @@ def _describe_sweep_misfit(
     worst = max(touched, key=lambda i: float(np.abs(pieces[i]).max()))
     largest = max(pieces[worst].tolist(), key=abs)
     sides = ("above", "below") if largest > 0 else ("below", "above")
-    size = f"{number(100 * abs(largest), 2)} % of |K| {sides[0]} the model"
     line = lines[worst]
     fixed_axis = {"frequency": "amplitude", "amplitude": "frequency", None: "run"}[line.stepped]
-    means = [float(np.mean(piece)) for piece in pieces]
-    level = f"at every {fixed_axis}"
-    if len(means) > 1 and np.ptp(means) >= _CHANGES * max(abs(mean) for mean in means):
-        level += f", {_trend_word(means[0], means[-1])} with {fixed_axis}"
     across = [i for i, piece in enumerate(pieces) if np.max(-np.sign(largest) * piece) > _STRONG * abs(largest)]
     agreeing = [i for i in touched if i == worst or i not in across]
-    if len(agreeing) < len(lines):
-        level = "at " + ", ".join(lines[i].label for i in agreeing)
+    is_everywhere = len(agreeing) == len(lines)
+    levels = f"every {fixed_axis}" if is_everywhere else ", ".join(lines[i].label for i in agreeing)
     unit, factor = ("Hz", 1.0) if line.stepped != "amplitude" else line.direction.display.displacement
     low, high = (factor * end for end in spans[line.stepped == "amplitude"])
+    sentences = [
+        f"measured {line.direction} {quantity} is up to {number(100 * abs(largest), 2)} % of |K| {sides[0]} the model "
+        f"({low:.3g} to {high:.3g} {unit}, at {levels})"
+    ]
+    means = [float(np.mean(piece)) for piece in pieces]
+    if across:
+        sentences.append(f"It is {sides[1]} the model at {', '.join(lines[i].label for i in across)}")
+    elif is_everywhere and len(means) > 1 and np.ptp(means) >= _CHANGES * max(abs(mean) for mean in means):
+        sentences.append(f"The gap {_trend_verb(means[0], means[-1])} with {fixed_axis}")
     trend = _trend(line.stepped or "frequency", line.step, pieces[worst])
-    if len(agreeing) > 1 and line.stepped:
-        trend = f"most at {line.label}, {trend} there"
-    opposite = f"; {sides[1]} the model at {', '.join(lines[i].label for i in across)}" if across else ""
-    return (
-        f"measured {line.direction} {quantity} is up to {size} ({low:.3g} to {high:.3g} {unit}), {level}, {trend}"
-        f"{opposite}"
-    )
+    several = len(agreeing) > 1 and line.stepped
+    sentences.append(f"The gap is largest at {line.label}, where it {trend}" if several else f"The gap {trend}")
+    return ". ".join(sentences)
 
 
 def _trend(stepped: str, step: Array, misfit: Array) -> str:
@@ -124,25 +124,25 @@ def _trend(stepped: str, step: Array, misfit: Array) -> str:
         misfit: measured minus model storage or loss stiffness, relative to |K|, (n,).
     """
     if np.var(misfit) < _FLAT * np.mean(np.square(misfit)):
-        return f"nearly constant over {stepped}"
+        return f"is nearly constant over {stepped}"
     shapes = {
         f"with the logarithm of {stepped}": np.log(step),
         f"in proportion to {stepped}": step,
         f"with the square of {stepped}": step**2,
     }
     shape = max(shapes, key=lambda words: abs(float(np.corrcoef(shapes[words], misfit)[0, 1])))
-    return f"{_trend_word(float(misfit[np.argmin(step)]), float(misfit[np.argmax(step)]))} {shape}"
+    return f"{_trend_verb(float(misfit[np.argmin(step)]), float(misfit[np.argmax(step)]))} {shape}"
 
 
-def _trend_word(first: float, last: float) -> str:
-    """Word for a misfit that grows, fades or changes sign: "growing", "fading", "going from above to below".
+def _trend_verb(first: float, last: float) -> str:
+    """Verb for a misfit that grows, fades or changes sign: "grows", "fades", "goes from above to below the model".
 
     Args:
         first, last: measured minus model stiffness, relative to |K|, at both ends of a line.
     """
     if first * last < 0.0 and min(abs(first), abs(last)) > _FLAT * max(abs(first), abs(last)):
-        return f"going from {'above to below' if first > 0.0 else 'below to above'}"
-    return "growing" if abs(last) > abs(first) else "fading"
+        return f"goes from {'above to below' if first > 0.0 else 'below to above'} the model"
+    return "grows" if abs(last) > abs(first) else "fades"
 
 
 def _loop_regions(evidence: Evidence) -> Iterator[MisfitRegion]:

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from bushfit.diagnosis.evidence import EVALUATIONS, Evidence
-from bushfit.diagnosis.propose import Proposal
 from bushfit.effects import qualified_name
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
@@ -31,17 +30,17 @@ _FIRST = 16
 
 def refitted(
     evidence: Evidence,
-    proposed: Sequence[Proposal],
+    models: Mapping[str, Model],
     start: Mapping[str, float],
     fixed: Sequence[str],
     bounds: Bounds,
     columns: Array | None = None,
 ) -> dict[str, Evidence]:
-    """Fit proposed effects, each with all parameters of the model.
+    """Fit models with proposed effects, all parameters of each model together.
 
     Args:
-        evidence: the fitted model without the effects.
-        proposed: effects with their starting values.
+        evidence: fit with the tests.
+        models: models at their starting values, by the name of the effect.
         start: further starting values, by parameter.
         fixed: names of parameters that are not fitted.
         bounds: limits of parameters inside their general limits.
@@ -54,11 +53,11 @@ def refitted(
     tests: Sequence[MeasuredTest] = evidence.data_sets
     if columns is not None:
         tests = CorrelatedTests(evidence.data_sets, CommonError(columns))
-    for proposal in proposed:
-        limits = {**within_reach(proposal.model, evidence.data_sets), **bounds}
-        start_values = {name: value for name, value in start.items() if name in proposal.model.values}
+    for name, model in models.items():
+        limits = {**within_reach(model, evidence.data_sets), **bounds}
+        start_values = {parameter: value for parameter, value in start.items() if parameter in model.values}
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
-            fits[proposal.name] = fit_from(proposal.model.with_values(start_values), tests, fixed, limits)
+            fits[name] = fit_from(model.with_values(start_values), tests, fixed, limits)
     running, best = list(fits), 0.0
     for _ in track("evaluations of effects", range(1, EVALUATIONS)):
         for name in running:

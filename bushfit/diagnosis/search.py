@@ -32,6 +32,8 @@ _SETTLED = 8
 _CLAIMS, _FAULTY_PARTS = 4, 2
 #: Natural log of the odds below its state within which an effect is refitted; for time.
 _SLIGHT = 3.0
+#: Number of rivals that are refitted from the values of the most probable state in each round; for time.
+_RIVALS = 6
 #: Attributes of a test that a record determines at each point.
 _RECORDED = ("measured", "amplitude", "frequency")
 #: Reduced chi-square above which the gap has distorted the parameters too much to start a refit from their values.
@@ -70,6 +72,7 @@ class Search:
             fresh = list[SearchState]()
             for state in track("with one more", beam):
                 fresh += self._grow(state, depth)
+            fresh = self._with_common_start([*beam, *fresh])[len(beam) :]
             if depth == 0:
                 fresh += self._corrected_records()
             followed = [h for h in self._known.values() if h.unnamed in ("", COMPOUND) and not h.levels]
@@ -170,7 +173,7 @@ class Search:
         """
         scores = {p.name: p.score for p in state.proposals if state.key | {p.name} not in self._visited}
         prior = {p.name: self._log_prior(p) for p in state.proposals}
-        base = state.log_prior + state.log_density - state.log_posterior
+        base = state.log_weight - state.log_posterior
         gains = {
             e.name: base + prior[e.name] + evidence.total
             for e, evidence in state.explanation_evidence
@@ -195,14 +198,12 @@ class Search:
         request = self.request
         if not names or len(state.effects) >= request.max_effects:
             return []
-        proposed = [proposal for proposal in state.proposals if proposal.name in names]
+        models = {proposal.name: proposal.model for proposal in state.proposals if proposal.name in names}
         start = request.start if not state.effects and state.evidence.reduced_chi_square > _BENT else {}
         grown: dict[str, SearchState] = {}
-        linear = state.linear
-        likeliest = linear.deviation[1] if linear.log_evidence_with_compound > linear.log_evidence else 0.0
-        for deviation in dict.fromkeys((likeliest, 0.0)):
+        for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
             columns = state.free_columns(deviation)
-            fits = refitted(state.evidence, proposed, start, request.fixed, request.bounds, columns)
+            fits = refitted(state.evidence, models, start, request.fixed, request.bounds, columns)
             for name, evidence in fits.items():
                 candidate = self._register(self._with_effect(state, name, evidence, depth))
                 if name not in grown or candidate.log_posterior > grown[name].log_posterior:
@@ -237,8 +238,8 @@ class Search:
             scattered_part = part.point_by_point()
             (scattered,) = state.weigh([scattered_part])
             better, worth = (scattered_part, scattered) if scattered.total > shifted.total else (part, shifted)
-            log_prior = state.log_prior + self._log_prior(part) - log(depth + 1)
-            improves = log_prior + state.log_density + worth.total > state.log_posterior
+            log_odds = self._log_prior(part) - log(depth + 1)
+            improves = state.log_weight + log_odds + worth.total > state.log_posterior
             if not improves or state.key | {part.name} in self._visited:
                 continue
             evidence = state.evidence
@@ -249,7 +250,7 @@ class Search:
                 state,
                 evidence=evidence,
                 faulty_parts=(*state.faulty_parts, better),
-                log_prior=log_prior,
+                log_prior=state.log_prior + log_odds,
                 amounts=(*state.amounts, worth.likeliest),
                 change=max(state.change, worth.size),
             )
@@ -268,10 +269,41 @@ class Search:
                 if not all(has_used_parameters(effect, model) for effect in model.records):
                     continue
                 evidence = fit(model, data_sets, request.fixed, {**within_reach(model, data_sets), **request.bounds})
-                shorter = SearchState.of_tests(state.tests, request)
-                for order, effect_name in enumerate(effect for effect in state.effects if effect != name):
-                    shorter = self._with_effect(shorter, effect_name, evidence, order)
-                yield self._register(shorter)
+                yield self._register(self._with_fit(state, tuple(e for e in state.effects if e != name), evidence))
+
+    def _with_fit(self, state: SearchState, effects: Sequence[str], evidence: Evidence) -> SearchState:
+        """State of the search that consists of a fit with the given effects, to the tests of another state."""
+        fitted = replace(SearchState.of_tests(state.tests, self.request), evidence=evidence)
+        for order, name in enumerate(effects):
+            fitted = self._with_effect(fitted, name, evidence, order)
+        return fitted
+
+    def _with_common_start(self, states: Sequence[SearchState]) -> list[SearchState]:
+        """Refit the rivals of the most probable state from its values, so that all are compared at one minimum.
+
+        A rubber that deviates from the model's laws has several fits of almost equal misfit. An effect is not to be
+        preferred because its fit alone found the best of these.
+
+        Args:
+            states: states of one round of the search.
+
+        Returns:
+            The states, the refitted where a refit is more probable.
+        """
+        states = list(states)
+        leader = max(states, key=lambda state: state.log_posterior)
+        near = [n for n, state in enumerate(states) if state is not leader and not state.faulty_parts]
+        near.sort(key=lambda n: -states[n].log_posterior)
+        for n in near[:_RIVALS] if leader.likeliest_deviation and not leader.faulty_parts else ():
+            state, values = states[n], leader.evidence.model.values
+            model = state.evidence.model
+            model = model.with_values({name: value for name, value in values.items() if name in model.values})
+            columns = state.free_columns(leader.likeliest_deviation)
+            fits = refitted(state.evidence, {"": model}, {}, self.request.fixed, self.request.bounds, columns)
+            for evidence in fits.values():
+                candidate = self._register(self._with_fit(state, state.effects, evidence))
+                states[n] = max(state, candidate, key=lambda rival: rival.log_posterior)
+        return states
 
     def _corrected_records(self) -> Iterator[SearchState]:
         """States of the starting model fitted to the tests with one mistake in the record corrected, the best first."""

@@ -139,10 +139,12 @@ def _single(first: Composition, nothing: float, leads: Sequence[str]) -> Finding
     if first.may_mislead or not (names or best.claim or first.unnamed):
         return Finding("unexplained", nothing, (first,), leads)
     curve = best.unnamed not in ("", COMPOUND) and best.last_change >= (1.0 - LEAST_NAMED_SHARE) * best.change
-    compensated = best.claim and (best.effects or best.faulty_parts)  # a mistake has to close the gap alone
+    # a mistake has to close the gap alone, but for what the rubber does
+    rig_effects = any(get_effect(name).level != Level.MATERIAL for name in best.effects)
+    compensated = best.claim and (rig_effects or best.faulty_parts)
     if not (names or best.claim) or curve or compensated or best.p_value < DOES_NOT_FIT:
         return Finding("described", nothing, (first,), leads)
-    partly = first.unnamed or best.levels or first.faulty_parts
+    partly = first.unnamed or best.levels or first.faulty_parts or (best.claim and best.effects)
     return Finding("partly" if partly else "named", nothing, (first,), names=names)
 
 
