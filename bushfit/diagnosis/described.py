@@ -57,9 +57,7 @@ class GapDescription:
         return Description(law.phase_deg, law.frequency_power, law.amplitude_power, law.sentence)
 
 
-def describe(
-    evidence: Evidence, rig: RigSettings, start: Mapping[str, float], fixed: Sequence[str], bounds: Bounds
-) -> GapDescription | None:
+def describe(evidence: Evidence, rig: RigSettings, start: Mapping[str, float], bounds: Bounds) -> GapDescription | None:
     """Describe the gap (measured minus modelled stiffness) by a correction smooth in ln frequency and ln strain.
 
     The description has the power law of frequency and amplitude that is nearest to the correction. Its form within a
@@ -69,7 +67,6 @@ def describe(
         evidence: the fitted model and the tests.
         rig: stated accuracy class of the rig (gain and phase errors).
         start: starting values read from the data, for a model whose parameters the gap has distorted.
-        fixed: names of parameters that are not fitted.
         bounds: limits of parameters inside their general limits.
 
     Returns:
@@ -82,6 +79,7 @@ def describe(
     if correction is None or correction.uncertainty >= 1.0:
         return None
     harmonic = tuple(test.fundamental() for test in evidence.data_sets)
+    fixed = [name for name in evidence.model.values if name not in evidence.solution.coordinates.names]
     try:
         base = fit_from(evidence.model, harmonic, fixed, bounds).run(_EVALUATIONS).solution
         base = fit_from(base.model, harmonic, (*fixed, *base.at_bound), bounds).run(_EVALUATIONS).solution

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
+from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.fitting.agreement import expected_errors, misfits, prior_uses, prior_warnings
 from bushfit.fitting.assess import covariance, measured_range, quality, temperature_warning
@@ -16,6 +17,7 @@ from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.preparation import MeasuredTest, sources
 from bushfit.fitting.problem import FitResult
 from bushfit.fitting.procedures import fit_warnings
+from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 
@@ -79,6 +81,20 @@ class Evidence:
         independent = sum(data_set.independent_count for data_set in self.data_sets)
         return self.chi_square + self.parameters * float(np.log(independent))
 
+    def covariance_of(self, effects: Collection[str]) -> Covariance:
+        """Covariance of the parameters of named effects, from the fit with errors that tests share, if there is one."""
+        found = self.joint or self.solution
+        full = np.linalg.pinv(found.jacobian @ found.jacobian.T, rcond=1e-12, hermitian=True)
+        full *= max(found.chi_square / max(found.residual.size - len(full), 1), 1.0)  # what the fit misses
+        names = [
+            name
+            for name in (qualified_name(effect, p) for effect in map(get_effect, effects) for p in effect.parameters)
+            if name in found.coordinates.names and name not in found.at_bound
+        ]
+        chosen = [found.coordinates.names.index(name) for name in names]
+        slopes = found.coordinates.slopes(self.model.values)[chosen]
+        return Covariance(tuple(names), full[np.ix_(chosen, chosen)] * np.outer(slopes, slopes))
+
     @cached_property
     def span(self) -> Array:
         """Orthonormal basis of the residuals that the parameters of the model can absorb, (n, k)."""
@@ -120,6 +136,7 @@ def result_of(
     lacking: bool = True,
     corrected: FitResult | None = None,
     rig: RigSettings = UNSTATED,
+    fixed: Covariance | None = None,
 ) -> Result:
     """Build the result of a fit, with its uncertainty; a parameter at a bound is treated as fixed.
 
@@ -131,6 +148,7 @@ def result_of(
         lacking: True if the model lacks something, so that a smooth error of the model is estimated.
         corrected: fit together with a smooth correction of the model; None if the model has no correction.
         rig: stated accuracy class of the rig (gain and phase errors).
+        fixed: covariance of parameters that the fit kept fixed; None if these are exact.
 
     Returns:
         The model with covariance, quality, range, warnings and expected error.
@@ -141,7 +159,7 @@ def result_of(
         solution, error = with_model_error(solution, bounds, rig)
         model = solution.model
     stage = solution.stage(solution.at_bound)
-    cov = covariance(solution.model, [stage], smooth_error=solution.smooth_error)
+    cov = covariance(solution.model, [stage], fixed, smooth_error=solution.smooth_error)
     priors = prior_uses(solution, cov)
     return Result(
         model,

@@ -29,6 +29,7 @@ from bushfit.diagnosis.verdict import Composition, Finding, decide_verdict
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
+from bushfit.model.covariance import Covariance
 from bushfit.model.result import Result
 from bushfit.units import display_unit, format_aligned, number
 
@@ -86,11 +87,20 @@ class DiagnosisWriter:
         """Diagnosis in which named effects explain the gap, or part of it with a description of the rest."""
         request, names = self.request, self.finding.names
         states = [h.state for h in self.hypotheses if h.refitted and set(h.effects) >= set(names)]
-        state = min(states, key=lambda state: len(state.effects) > len(names))
-        model = state.evidence.model
-        for name in state.effects:
-            model = model if name in names else model.without(name)
-        after = fit(model, state.evidence.data_sets, request.fixed, request.bounds)
+        known, fixed = None, request.fixed
+        if self.finding.verdict == "partly" and first.unnamed:  # without the compound's deviation amounts are distorted
+            state, model = states[0], request.base.model
+            known = state.evidence.covariance_of(names)
+            for name in names:
+                parameters = [qualified_name(get_effect(name), parameter) for parameter in get_effect(name).parameters]
+                values = {key: value for key, value in state.evidence.model.values.items() if key in parameters}
+                model, fixed = model.with_effect(name, values), [*fixed, *values]
+        else:
+            state = min(states, key=lambda state: len(state.effects) > len(names))
+            model = state.evidence.model
+            for name in state.effects:
+                model = model if name in names else model.without(name)
+        after = fit(model, state.evidence.data_sets, fixed, request.bounds)
         base, plain = self._with_free_gains(request.base), self._with_free_gains(after)
         company = " with the other named effects" if len(names) > 1 else ""
         why = f"lowers chi-square by {base.chi_square - plain.chi_square:.0f}{company}; "
@@ -105,8 +115,9 @@ class DiagnosisWriter:
                 max(fitted.chi_square / sum(test.residual_count for test in fitted.data_sets) - 1.0, 0.0)
                 for fitted in (base, plain)
             ]
-            share = number(100.0 * (1.0 - excess[1] / excess[0] if excess[0] else 1.0), 2)
-            summary = f"{' and '.join(names)} {'explains' if len(names) == 1 else 'explain'} {share} % of the gap"
+            share = 100.0 * (1.0 - excess[1] / excess[0] if excess[0] else 1.0)
+            part = f"{number(share, 2)} %" if share >= 1.0 else "part"
+            summary = f"{' and '.join(names)} {'explains' if len(names) == 1 else 'explain'} {part} of the gap"
             rest = [part.name for part in first.faulty_parts] + [LEVELS] * first.best.levels
             if not first.best.levels and (gap := self._described(after)):
                 entries.append(NamedCause(UNNAMED, gap.evidence))
@@ -122,6 +133,7 @@ class DiagnosisWriter:
             places=first.best,
             gap=gap,
             holdout=holdout,
+            known=known,
         )
         absent = tuple(name for name in names if _may_be_absent(name, diagnosis.result))
         if holdout and (absent or (holdout.after or 0.0) > LARGEST_CLOSED_GAP):
@@ -134,11 +146,10 @@ class DiagnosisWriter:
 
     def _described(self, evidence: Evidence) -> GapDescription | None:
         """Describe the gap of a fit by a smooth correction; None if effects are excluded or no correction is valid."""
-        request = self.request
-        if not request.max_effects:
-            return None
-        fitted = self._with_free_gains(evidence)
-        return describe(fitted, request.data.campaign.rig, request.start, request.fixed, request.bounds)
+        request, fitted = self.request, self._with_free_gains(evidence)
+        return (
+            describe(fitted, request.data.campaign.rig, request.start, request.bounds) if request.max_effects else None
+        )
 
     def _mistaken_record(self, first: Composition) -> Diagnosis:
         """Diagnosis in which a mistake in the record explains the gap; the model to use is unchanged."""
@@ -219,6 +230,7 @@ class DiagnosisWriter:
         next_test: str = "",
         gap: GapDescription | None = None,
         holdout: HoldOut | None = None,
+        known: Covariance | None = None,
     ) -> Diagnosis:
         """Build the diagnosis with regions, hold-out, candidates and the model to use.
 
@@ -232,6 +244,7 @@ class DiagnosisWriter:
             next_test: advice on the next test; "" for the usual confirmation of the first entry.
             gap: description of a gap without a name; None without one.
             holdout: residuals of held-out tests, if they were computed before.
+            known: covariance of parameters of effects that `after` kept fixed; None without any.
         """
         base, after, bounds = (
             self._with_free_gains(self.request.base),
@@ -254,7 +267,7 @@ class DiagnosisWriter:
         resolved, corrected = {*base.model.effects} - {*self.unresolved}, gap.fitted if gap else None
         regions = tuple(sorted((*at_fault, *find_regions(base)), key=lambda region: -region.excess))
         odds = explanation_odds(self.finding, self.request.data)
-        result = odds.averaged(result_of(after, bounds, resolved, lacking=lacking, corrected=corrected))
+        result = odds.averaged(result_of(after, bounds, resolved, lacking=lacking, corrected=corrected, fixed=known))
         amounts = filter(None, (_format_amount(entry.name, result) for entry in entries))
         return Diagnosis(
             verdict,
@@ -281,7 +294,8 @@ class DiagnosisWriter:
             return evidence
         if evidence not in self._refitted:
             data_sets = with_gain_weighting(evidence.data_sets, weigh=False)
-            self._refitted[evidence] = fit(evidence.model, data_sets, self.request.fixed, self.request.bounds)
+            fixed = [name for name in evidence.model.values if name not in evidence.solution.coordinates.names]
+            self._refitted[evidence] = fit(evidence.model, data_sets, fixed, self.request.bounds)
         return self._refitted[evidence]
 
     def _notes(self) -> list[str]:

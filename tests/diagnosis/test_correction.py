@@ -61,7 +61,7 @@ def evidence(measured, fitted) -> Evidence:
 
 @pytest.fixture(scope="module")
 def described(evidence) -> GapDescription:
-    found = describe(evidence, RigSettings(), evidence.model.values, (), {})
+    found = describe(evidence, RigSettings(), evidence.model.values, {})
     assert found is not None
     return found
 
