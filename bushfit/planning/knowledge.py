@@ -178,8 +178,8 @@ def _add_effects(plain: Evidence, names: Sequence[str], fixed: Sequence[str], bo
     Returns:
         Fit with each effect by its name; effects without influence on these tests are omitted.
     """
-    proposed = [proposal for proposal in proposals(plain, (), fixed) if proposal.name in names]
-    return refitted(plain, proposed, {}, fixed, bounds)
+    models = {proposal.name: proposal.model for proposal in proposals(plain, (), fixed) if proposal.name in names}
+    return refitted(plain, models, {}, fixed, bounds)
 
 
 def undecided_effects(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
