@@ -122,7 +122,10 @@ def test_the_headline_joins_two_tests(paper_model, deviation, joint, named):
     """Hochberg's procedure: both at 5 %, or one at 2.5 %."""
     one = known(paper_model, np.diag([1e8, 1e6, 1e-6, 1e4, 1e-8]))
     found = against(one, one)
-    bands = [Band(*(np.array([x + end]) for end in (0.0, -1.96, 1.96)), np.ones((1, 1))) for x in (deviation, 0.0)]
+    half = (1.96, 9.0) if deviation > 0.0 else (9.0, 1.96)  # the end away from zero does not matter
+    bands = [
+        Band(np.array([x]), np.array([x - half[0]]), np.array([x + half[1]]), np.ones((1, 1))) for x in (deviation, 0.0)
+    ]
     contrast = replace(found.contrasts[0], stiffness=bands[0], loss_factor=bands[1])
     assert replace(found, contrasts=(contrast,), joint=(joint, 5)).differing == named
     unknown = replace(contrast, stiffness=replace(bands[0], root=np.empty((0, 1))), loss_factor=bands[1])
