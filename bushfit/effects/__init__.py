@@ -256,7 +256,7 @@ def get_parameter(name: str) -> Parameter:
 
 
 def effects_for_places(places: Iterable[str]) -> dict[str, Effect]:
-    """Effects that a search considers for tests of the given directions and specimens.
+    """Effects that `diagnose` considers for tests of the given directions and specimens.
 
     Args:
         places: names of the tested directions and specimens. The axial direction, or else the first name, is the

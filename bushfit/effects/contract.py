@@ -48,7 +48,7 @@ ForceBelow = Callable[[History], Array]
 
 @dataclass(frozen=True)
 class StiffnessBelow:
-    """Steady response of the bushing and the layers inside a given layer.
+    """Steady response without a layer and those around it: an argument of `Layer.stiffness`.
 
     Args:
         stiffness: (omega [rad/s], amplitude [m or rad]) -> complex dynamic stiffness.
@@ -161,14 +161,14 @@ class Setting:
 
 @dataclass(frozen=True)
 class Condition:
-    """Operating condition that a modifier may depend on.
+    """Operating points and test for which a modifier changes parameter values: an argument of `Modifier.adjust`.
 
     Args:
         setting: the test.
         omega: angular frequency [rad/s], (..., n).
         amplitude, strain: displacement amplitude [m or rad] and equivalent strain amplitude [1], (..., n).
-        stiffness: function from parameter values to the complex stiffness of the bushing [N/m or N m/rad].
-        moduli: names of the moduli and stresses; if all are scaled by a factor, so is the stiffness.
+        stiffness: function from parameter values to the complex stiffness of the rubber [N/m or N m/rad], (..., n).
+        moduli: names of all moduli and stresses of the model; the stiffness is proportional to them.
     """
 
     setting: Setting

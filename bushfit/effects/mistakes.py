@@ -120,6 +120,7 @@ class Mistake(Effect):
         return not _is_of_rubber(modulus, strain) and _is_of_rubber(factor * modulus, self.displacement * strain)
 
     def _direction(self, place: Place) -> Place:
+        """True direction of a test that states `place`."""
         return (other_direction(place) if self.swaps else None) or place
 
     def corrected_bushing(self, bushing: Bushing) -> Bushing:

@@ -165,9 +165,9 @@ def _differences_resolved(reached: Array, missing: Array) -> bool:
 
 
 class _AndersonMixing:
-    """Anderson mixing of a fixed-point iteration (D. G. Anderson, J. ACM 12 (1965) 547).
+    """Anderson mixing (D. G. Anderson, J. ACM 12 (1965) 547), by which the solution for the force needs few iterations.
 
-    It stores the last few differences between rounds in a ring buffer.
+    Keeps the last three differences between iterations of the force and of its proposed change.
     """
 
     def __init__(self, shape: tuple[int, ...]) -> None:

@@ -62,6 +62,7 @@ class Patch:
     temperature_K: Row = ()  # noqa: N815
 
     def __post_init__(self) -> None:
+        """Raise a ValueError for lists of unequal length, a node without motion, or a negative deviation."""
         lists = (self.frequency_Hz, self.strain, self.in_phase, self.in_quadrature, self.temperature_K or self.strain)
         sizes = {len(values) for values in (*lists, self.in_phase_error, self.in_quadrature_error)}
         if len(sizes) > 1 or sizes == {0}:
@@ -87,8 +88,8 @@ class Unnamed:
         size: standard deviation of the Gaussian process, relative to |K|.
         lengths: correlation lengths in ln frequency and ln strain; a change of temperature is converted to
             the change of frequency that shifts the time scale equally.
-        patches: corrections of the directions; a direction without a patch has the correction 0, with an error of the
-            size of the gap.
+        patches: corrections of the directions; a direction without a patch has the correction 0, with the standard
+            deviation `far_deviation`.
     """
 
     size: Number
@@ -96,6 +97,7 @@ class Unnamed:
     patches: tuple[Patch, ...]
 
     def __post_init__(self) -> None:
+        """Raise a ValueError for a correction without patches, or without a size or length above 0."""
         if not self.patches:
             raise ValueError(ModelError("a correction without values", expected="a patch for each direction"))
         if min(self.size, *self.lengths) <= 0.0:
@@ -130,9 +132,9 @@ class Unnamed:
         return self.largest / _DEVIATIONS
 
     def with_untested(self, place: Place) -> "Unnamed":
-        """Extend an error of the rubber to an untested direction of the bushing: its rubber is the same.
+        """Apply the correction to an untested direction of the bushing too, because its rubber is the same.
 
-        Another body keeps the error of the gap's size, and so does a bushing whose directions have different errors.
+        Unchanged for another bushing or specimen, and if the tested directions have different corrections.
         """
         patch, body = self.patches[0], {f"{place.body} {axis}".strip() for axis in Direction}
         if len(self.patches) > 1 or str(place) in patch.directions or body.isdisjoint(patch.directions):
@@ -171,6 +173,7 @@ class Unnamed:
 
 
 def _correction(setting: Setting, omega: Array, amplitude: Array) -> Array:
+    """Complex correction c of the stiffness, relative to K, at angular frequencies [rad/s] and amplitudes, (..., n)."""
     assert setting.unnamed is not None  # a model with this effect has its data
     return setting.unnamed.evaluate(setting, omega, amplitude)[0]
 

@@ -267,4 +267,5 @@ def add_variables(variables: ET.Element, model: TimeModel, displays: Mapping[str
 
 
 def _xml_text(text: str) -> str:
+    """Replace characters that XML does not allow by underscores."""
     return _NO_XML.sub("_", text)

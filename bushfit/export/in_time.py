@@ -149,6 +149,9 @@ def _values(
         request: predictions and settings of the export.
         model: model in the export, without effects of the rig.
         arms: Maxwell arms that replace viscoelastic effects.
+
+    Returns:
+        Values, constants first; and for each place, name of the value by qualified parameter name.
     """
     places = request.places
     local_values = [

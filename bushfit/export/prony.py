@@ -86,6 +86,7 @@ def prony_series(request: ExportRequest) -> list[PronySeries]:
         strain = shear_strain(request, amplitude)
 
         def beyond_rest(omega: Array, strain: float = strain) -> Array:
+            """Complex modulus at angular frequencies [rad/s], minus the long-term modulus [Pa]."""
             return model.stiffness(COMPOUND, omega / (2.0 * np.pi), strain, conditions=request.conditions) - long_term
 
         arms = fitted_arms(beyond_rest, band, request.accuracy, spring=long_term, overhang_factor=_BEYOND, closest=True)

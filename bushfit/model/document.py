@@ -133,6 +133,7 @@ class FitTable(Quality):
     usable: Annotated[tuple[ExpectedError, ...], Field(description="Expected error by direction or specimen.")] = ()
 
     def __post_init__(self) -> None:
+        """Raise a ValueError for a range that is incomplete or not ascending, or a measure of quality below zero."""
         if self.strain and not self.frequency_Hz:
             raise ValueError(ModelError("a key is missing", place="frequency_Hz", expected="frequency_Hz = ..."))
         for key in ("frequency_Hz", "strain", "temperature_K"):

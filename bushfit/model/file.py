@@ -223,6 +223,7 @@ def versions() -> dict[str, str]:
 
 
 def _require_object(document: object, file: Path | None, kind: str) -> dict[str, Any]:
+    """Return parsed JSON that is an object; otherwise raise a ModelError that says it is not `kind`, "a model"."""
     if isinstance(document, dict):
         return document
     found = _KINDS.get(type(document), "null")
@@ -247,10 +248,12 @@ def _read_json(file: Path) -> Any:
 
 
 def _refuse_constant(constant: str) -> NoReturn:
+    """Raise a ValueError for NaN or Infinity in a JSON file."""
     raise ValueError(f"{constant}, which is not a number")
 
 
 def _refuse_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Convert the keys and values of a JSON object to a dictionary; raise a ValueError if a key occurs twice."""
     table = dict(pairs)
     if len(table) < len(pairs):
         keys = [key for key, _ in pairs]

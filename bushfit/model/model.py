@@ -52,6 +52,7 @@ class Model:
     constraints: Constraints = field(default=UNCONSTRAINED, compare=False)
 
     def __post_init__(self) -> None:
+        """Compute the values of tied parameters, and check all values."""
         object.__setattr__(self, "effects", tuple(self.effects))
         tied_values = self.constraints.tied_values(self.values)
         object.__setattr__(self, "values", MappingProxyType(tied_values))
@@ -84,6 +85,7 @@ class Model:
             )
 
     def __reduce__(self) -> tuple[Any, ...]:
+        """Support copies and pickles: the read-only mapping of the values has none."""
         return Model, (self.bushing, self.effects, dict(self.values), self.unnamed, self.constraints)
 
     @cached_property

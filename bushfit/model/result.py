@@ -256,6 +256,7 @@ class CampaignTable:
     logo: Annotated[str, Field(max_length=100_000)] | None = None
 
     def __post_init__(self) -> None:
+        """Raise a ValueError for a logo that is not a PNG or SVG as a data URI."""
         if self.logo is not None and not _PICTURE.fullmatch(self.logo):
             expected = "data:image/png;base64, or data:image/svg+xml;base64, and the picture"
             raise ValueError(ModelError("this is not a picture", place="logo", found=self.logo, expected=expected))

@@ -138,6 +138,7 @@ def stack_force(model: Model, setting: Setting, values: Values, layers: Sequence
         return factor * stress
 
     def wrap(below: ForceBelow, group: Sequence[Layer]) -> ForceBelow:
+        """Build the function for the force outside a group of layers from that for the force inside."""
         layer, layer_values = as_one_layer(group, values)
         return lambda displacement: layer.force(layer_values, below, displacement, setting)
 

@@ -103,7 +103,7 @@ def as_one_layer(group: Sequence[Layer], values: Values) -> tuple[Layer, Values]
 
 
 def values_for_effect(effect: Effect, values: Values) -> Values:
-    """Parameter values for the functions of an effect: all by full name, and its own also by the name after the dot."""
+    """Parameter values for the functions of an effect: all by full name, those of the effect also by short name."""
     if effect.name in BASE:
         return values
     return {**values, **{parameter.name: values[qualified_name(effect, parameter)] for parameter in effect.parameters}}

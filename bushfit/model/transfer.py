@@ -18,9 +18,10 @@ FACTOR_SPREAD = 0.03
 
 
 def factor_spread(result: Result) -> float | None:
-    """Standard deviation from 1 of the factor on a bushing's stiffness, by the priors of the fitted bushings.
+    """Standard deviation of bushings' stiffness relative to their formula, by the priors of the fitted bushings.
 
-    None if no bushing has a free factor.
+    Returns:
+        Root mean square deviation of their stiffness factors from 1 [1]; None if no bushing has a free factor.
     """
     names = [f"stiffness_factor.{bushing.name}" for bushing in result.bushings]
     priors = [result.priors[name] for name in names if name in result.priors]

@@ -51,7 +51,7 @@ _AGREEMENT = 1.4
 
 
 def consequence_of(warning: str) -> str:
-    """Return the sentence of `uses.toml` that states the consequence of a warning for the use of the numbers."""
+    """Return the sentence of `uses.toml` on what a warning means for the use of the numbers."""
     return next(use for pattern, use in _USES.items() if re.search(pattern, warning))
 
 

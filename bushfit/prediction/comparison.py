@@ -228,6 +228,7 @@ def with_model_patterns(result: Result, predictions: Sequence[Prediction]) -> li
     ends = np.cumsum([prediction.frequency.size for prediction in predictions])[:-1]
 
     def spread(band: Band, shape: Array) -> Band:
+        """Replace the two errors of the model in a band by one for each pattern, (q, n), and part."""
         errors = (shape[:, None] * band.root[-2:]).reshape(-1, shape.shape[1])
         return replace(band, root=np.concatenate((band.root[:-2], errors)))
 
@@ -279,6 +280,7 @@ def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:
     """
 
     def figures(i: int, word: str) -> str:
+        """Difference at one point without sign, its interval, and "higher" or "lower"."""
         value, ends = abs(band.value[i]), sorted((abs(band.low[i]), abs(band.high[i])))
         digits = int(np.clip(np.floor(np.log10(value)) - np.floor(np.log10(ends[1] - ends[0])) + 1, 2, _MOST_DIGITS))
         texts = format_aligned([value, *ends], digits)
