@@ -22,7 +22,7 @@ from bushfit.diagnosis.holdout import HoldOut, hold_out
 from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis
 from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.next_test import deciding_test
-from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP
+from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP, NAMED
 from bushfit.diagnosis.record import Diagnosis, MisfitRegion, NamedCause
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Composition, Finding, decide_verdict
@@ -202,6 +202,8 @@ class DiagnosisWriter:
         """Diagnosis without a named effect: described by a correction, or unexplained, or with a faulty test."""
         finding, best = self.finding, self.first.best if self.first else None
         leads = f"; leads: {' and '.join(finding.leads)}" if finding.leads else ""
+        if best and best.claim and self.first.probability >= NAMED:  # type: ignore[union-attr]
+            leads = f"; check first whether {best.claim.sentence(self.request.data)}"
         at_fault = " and ".join(part.name for part in best.faulty_parts) if best else ""
         is_fault = best is not None and finding.verdict == "unexplained"
         if not is_fault and (gap := self._described(self.request.base)):
