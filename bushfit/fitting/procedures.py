@@ -135,17 +135,13 @@ def fit_static(data: PreparedCampaign, springpot: Result | None = None) -> Resul
     Raises:
         FitError: there is no loop, or the data cannot support the fit.
     """
-    uncertainty, notes = None, []
-    fixed = {name: data.given_values[name] for name in DYNAMIC if name in data.given_values}
-    if springpot:
-        fixed = {name: springpot.model.values[name] for name in DYNAMIC}
-        uncertainty = springpot.covariance.restricted(DYNAMIC)
+    values = springpot.model.values if springpot else data.given_values
+    fixed = {name: values[name] for name in DYNAMIC if name in values}
     if len(fixed) < len(DYNAMIC):
         found = _fit_without_springpot(data)
-        notes = [_without_springpot(data, found)]
-    else:
-        found = _fit_step(data, data.static_loops(), BASE, fixed)
-    return _result(data, [found], uncertainty, notes)
+        return _result(data, [found], notes=[_springpot_warning(data, found)])
+    uncertainty = springpot.covariance.restricted(DYNAMIC) if springpot else None
+    return _result(data, [_fit_step(data, data.static_loops(), BASE, fixed)], uncertainty)
 
 
 def fit_dynamic(data: PreparedCampaign, static: Result) -> Result:
@@ -220,7 +216,7 @@ def _fit_without_springpot(data: PreparedCampaign) -> FitResult:
     return _fit_step(data, data.static_loops(), ("elastic", "friction"), {})
 
 
-def _without_springpot(data: PreparedCampaign, static: FitResult) -> str:
+def _springpot_warning(data: PreparedCampaign, static: FitResult) -> str:
     """Warning that states by how many per cent leaving the springpot out changed the static parameters."""
     values = static.model.values
     try:

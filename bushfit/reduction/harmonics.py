@@ -192,9 +192,8 @@ class HarmonicFit:
         sums *= 2.0 / np.maximum(rows_in, 1.0)
         cosines, sines = np.split(np.arange(_DRIFT_TERMS, len(solution)), 2)
         coefficients = np.vstack((solution[:1], solution[cosines] + 1j * solution[sines])).T
-        variance = np.diag(covariance)
-        noise_power, freedom = variance[cosines] + variance[sines], max(time.size - len(solution), 1)
-        return cls(frequency, coefficients, noise_power, freedom, squares, sums)
+        noise_power = np.diag(covariance)[cosines] + np.diag(covariance)[sines]
+        return cls(frequency, coefficients, noise_power, max(time.size - len(solution), 1), squares, sums)
 
     def errors(self) -> Floats:
         """Compute the standard errors of the complex stiffness K = F/X of the fundamentals.

@@ -87,13 +87,11 @@ def steady_sines(history: Loop) -> list[tuple[float, float, int]]:
     cycles = Cycles.find(history.time, history.displacement)
     found = []
     for run in cycles.runs():
-        edges = cycles.edges[run.start : run.stop + 1]
-        size = cycles.range[run] / 2.0
-        for part in steady_pieces(edges, np.log(size)):
-            count = part.stop - part.start
-            if count > 1:
+        edges, amplitude = cycles.edges[run.start : run.stop + 1], cycles.range[run] / 2.0
+        for part in steady_pieces(edges, np.log(amplitude)):
+            if (count := part.stop - part.start) > 1:
                 frequency = count / float(edges[part.stop] - edges[part.start])
-                found.append((frequency, float(np.median(size[part])), count))
+                found.append((frequency, float(np.median(amplitude[part])), count))
     return found
 
 
