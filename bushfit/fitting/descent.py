@@ -244,7 +244,7 @@ class Descent:
         return bend
 
     def _length(self, step: Array) -> float:
-        """Length of a step in units of noise, correlations of the parameters ignored."""
+        """Length of a step of the coordinates, (k,): root sum of squares of each parameter's change of the residuals."""
         return float(np.sqrt(np.diag(self._normal[0]) @ np.square(step)))
 
 

@@ -173,8 +173,8 @@ class Discrepancy:
         tests: fitted model and its tests, with p operating points.
         groups: groups of directions or specimens; the members of a group share one error.
         lengths: correlation lengths in ln frequency and ln strain.
-        nodes: for each group, indices of the operating points that are its nodes, (m,).
-        shapes: principal patterns of the process at the operating points, (q, p).
+        nodes: for each group, indices of the m operating points that represent the process (its nodes), (m,).
+        shapes: relative error at the operating points by each of q independent patterns of the process, (q, p).
         sizes: candidate standard deviations of the process, relative to |K|, ascending, (s,).
     """
 

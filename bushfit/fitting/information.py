@@ -51,7 +51,7 @@ class FisherInformation:
 
     @classmethod
     def from_tests(cls, model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> "FisherInformation":
-        """Compute the Fisher information of tests on parameters of a model.
+        """Compute the Fisher information of tests on relative changes of a model's parameters.
 
         Args:
             model: model at whose values the information is computed.

@@ -77,12 +77,12 @@ class SweepNoise:
     excess_warnings: Mapping[str, str] = field(default_factory=dict)
 
     def scatter(self, name: str, held_values: Array, step: Array) -> Array:
-        """Standard deviation from point to point of gain and phase at points of a sweep, (2, n).
+        """Standard deviation of relative gain and of phase [rad] from point to point, at n points of a sweep, (2, n).
 
         Args:
             name: name of the sweep.
-            held_values: value held constant at each point, (n,).
-            step: value of the stepped quantity at each point, (n,).
+            held_values: amplitude [m or rad] or frequency [Hz] that is constant in the run of each point, (n,).
+            step: frequency [Hz] or amplitude [m or rad] that changes along the run, (n,).
         """
         of_lines = {line: self.random[name, float(line)] for line in np.unique(held_values)}
         exponent, reference = self.slopes.get(name, (0.0, 1.0))

@@ -56,7 +56,7 @@ def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
 
     Args:
         residual: distance of each row from the curve, (n,).
-        recorded: recorded values of the channel, (n,).
+        recorded: recorded displacement or force of each row, (n,).
         limit: distance from which on a row is far, in the unit of the residual.
 
     Returns:
@@ -79,7 +79,10 @@ def are_outliers(residual: Array, recorded: Array, limit: float) -> Array:
 
 
 def are_stuck(recorded: Array) -> Array:
-    """Mask of the rows in which a noisy channel repeats the value of the row before in an improbably long run.
+    """Mask of the rows in which a noisy displacement or force repeats the row before in an improbably long run.
+
+    Args:
+        recorded: displacement or force of each row, (n,).
 
     Returns:
         Mask of the stuck rows, (n,).

@@ -111,7 +111,7 @@ def steady_spans(loop: Loop, time: Floats, motion: Floats) -> list[SteadySpan]:
         motion: displacement without outliers [m or rad], (n,).
 
     Returns:
-        Parts in order; empty if there are fewer than three strokes.
+        Parts in order; empty if there are fewer than three strokes (motions from one turning point to the next).
 
     Raises:
         MeasurementError: there are cycles, but no two of them are alike.
