@@ -244,7 +244,7 @@ class Descent:
         return bend
 
     def _length(self, step: Array) -> float:
-        """Length of a step of the coordinates, (k,): root sum of squares of each parameter's change of the residuals."""
+        """Length of a step, (k,): root sum of squares of the residuals' changes by each of the k parameters alone."""
         return float(np.sqrt(np.diag(self._normal[0]) @ np.square(step)))
 
 

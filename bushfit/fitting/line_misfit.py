@@ -42,7 +42,7 @@ class LineMisfit:
 
     @property
     def step(self) -> Array:
-        """Frequency [Hz] or amplitude [m or rad] of each point of the sweep's line, whichever changes along it, (n,)."""
+        """Frequency [Hz] or amplitude [m or rad] of each point of the line, whichever changes along it, (n,)."""
         return self.amplitude if self.stepped == "amplitude" else self.frequency
 
     @property
