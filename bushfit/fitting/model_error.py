@@ -70,7 +70,7 @@ _MAXIMUM_ROUNDS, _SETTLED = 12, 0.02
 def with_model_error(
     plain_fit: FitResult, bounds: Bounds, rig: RigSettings = UNSTATED, *, smooth: bool = False, certain: bool = False
 ) -> tuple[FitResult, Unnamed | None]:
-    """Refit a model that misses its tests with a model error added to the noise; a model that fits is unchanged.
+    """Refit a model that misses its tests, with an error of the model added to the noise; one that fits is unchanged.
 
     Args:
         plain_fit: least-squares fit with the noise alone.
@@ -163,7 +163,7 @@ def likeliest_model_error(model: Model, data_sets: Sequence[MeasuredTest], names
     variance = np.concatenate([part.variance for part in parts])
 
     def cost(log_size: float) -> float:
-        """Minus twice the log of the restricted likelihood, given the natural log of the size.
+        """Minus twice the log of the restricted likelihood, given the natural log of the model error's size.
 
         Returns:
             The value, up to a constant.

@@ -206,7 +206,7 @@ def _from_neighbours(values: Array, starts: Array, window: int) -> Array:
 
     Args:
         values: deviations, complex (n,).
-        starts: index of the first point of each block.
+        starts: index of the first point of each block (run).
         window: number of values in each median.
     """
     sizes, local = np.diff(starts, append=values.size), np.zeros_like(values)
