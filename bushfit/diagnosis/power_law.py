@@ -1,10 +1,11 @@
-"""Power law of frequency and amplitude nearest to a gap without a name, beside all parameters.
+"""Power law of frequency and amplitude nearest to a gap that no known effect explains.
 
 Notes:
-    The term is A e^(i phi) (f/f0)^p (X/X0)^q. For each pair of powers on a grid its two parts, in phase and in
-    quadrature, are a group of columns around the parameters of the most probable pair. The evidence of each pair and
-    its amounts form the posterior from which phase and powers are drawn. A smooth process of any form, weighed in the
-    same way, decides whether the gap is a power law at all.
+    The power law is a stiffness A e^(i phi) (f/f0)^p (X/X0)^q that is added to the model (a term) and fitted together
+    with all parameters. For each pair of powers p and q on a grid, its parts in phase and in quadrature are a group of
+    columns around the parameters of the most probable pair. The evidence of each pair and its amounts form the
+    posterior from which phase and powers are drawn. The evidence of smooth curves of any form decides whether the gap
+    is a power law at all.
 """
 
 from __future__ import annotations
@@ -34,12 +35,13 @@ from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
 from bushfit.units import number
 
-#: Unit of a term: N/m (or N m/rad) over displacement, Pa over strain, or shares of the stiffness over strain.
+#: Unit of the added stiffness: N/m (or N m/rad) over displacement, Pa over strain, or a ratio to the model's stiffness
+#: over strain.
 Measure = Literal["stiffness", "modulus", "gain"]
 #: A value and the ends of its 95 % interval.
 Interval = tuple[float, float, float]
 
-#: Natural log of the odds below the best at which a size of the rig's errors is left out (a twentieth); for time.
+#: Natural log of the odds below the best at which a noise case is left out (a twentieth); for time.
 _NEAR = 3.0
 #: Largest power, of either sign; chosen: beyond, a term acts at one end of the tests only.
 _LARGEST_POWER = 4.0
@@ -86,7 +88,7 @@ _QUARTERS = {
 
 @dataclass(frozen=True, eq=False)
 class PowerLaw:
-    """Power law A e^(i phi) (f/f0)^p (X/X0)^q of the stiffness missing from a model, with 95 % intervals.
+    """Power law A e^(i phi) (f/f0)^p (X/X0)^q of the stiffness that a model lacks, with 95 % intervals.
 
     Args:
         measure: unit of A with the highest evidence: stiffness, modulus or share of the model's stiffness.
@@ -106,7 +108,7 @@ class PowerLaw:
 
     @property
     def determined(self) -> list[bool]:
-        """Three flags: True if the tests determine the phase, the power of frequency and the power of amplitude."""
+        """True for each of phase, power of frequency and power of amplitude that the tests determine."""
         widths = (_PHASE_WIDTH, _POWER_WIDTH, _POWER_WIDTH)
         intervals = (self.phase_deg, self.frequency_power, self.amplitude_power)
         return [high - low < 2.0 * width for (_, low, high), width in zip(intervals, widths, strict=True)]
@@ -149,13 +151,13 @@ class PowerLaw:
 class Term:
     """Complex stiffness that is added to a model at p operating points, to find the power law of a gap.
 
-    The points are those of all tests except tests of coupons. Functions take the values of the added stiffness at the
-    points as complex numbers in the unit `measure`; a shape is a set of such values, to be multiplied by an amount.
+    The points are those of all tests except tests of coupons. A value is the added stiffness at the points in the unit
+    `measure`, (p,); a shape is such a value before the multiplication by an amount.
 
     Args:
         evidence: the fitted model and the tests.
-        measure: unit of the term: stiffness [N/m or N m/rad], shear modulus [Pa], or share of the model's stiffness
-            [1].
+        measure: unit of the added stiffness: stiffness [N/m or N m/rad], shear modulus [Pa], or ratio to the model's
+            stiffness [1].
     """
 
     evidence: Evidence
@@ -192,21 +194,21 @@ class Term:
         )
 
     def unit(self, model: Model) -> Array:
-        """Stiffness that one unit of the term's measure adds at each of the p operating points [N/m or N m/rad]."""
+        """Stiffness that one unit of `measure` adds at each of the p operating points, (p,) [N/m or N m/rad]."""
         if self.measure == "gain":
             return self.stiffness(model)
         per_unit = model.stiffness_per_modulus if self.measure == "modulus" else lambda _: 1.0
         return np.concatenate([np.full(test.frequency.size, per_unit(test.direction)) for test, _ in self.tests])
 
     def scaled(self, shapes: Array, model: Model) -> Array:
-        """Scale c shapes of an added stiffness, (c, p), so that the largest change by each is 100 % of |K|."""
+        """Scale c shapes of the added stiffness, (c, p), so that the largest change by each is 100 % of |K|."""
         return shapes / np.abs(shapes * self.unit(model) / self.stiffness(model)).max(axis=-1)[:, None]
 
     def residual(self, value: Array, model: Model) -> Array:
         """Whitened residuals of a model with an added stiffness, model minus measured in units of noise, (n,).
 
         Args:
-            value: complex values of the added stiffness at the p operating points, in the unit of the term, (p,).
+            value: added stiffness at the operating points, in the unit `measure`, (p,).
             model: model without the added stiffness.
         """
         residuals, added = self.evidence.solution.problem.residual(model), value * self.unit(model)
@@ -215,16 +217,16 @@ class Term:
         return residuals
 
     def linearised(self, model: Model, value: Array, shapes: Array) -> tuple[Array, Array, Array]:
-        """Linearise the whitened residuals around a model plus a term.
+        """Linearise the whitened residuals around a model with the added stiffness.
 
         Args:
             model: model at its current parameters.
-            value: complex values of the term at the points, (p,).
-            shapes: shapes of c terms at the points, (c, p).
+            value: added stiffness at the operating points, (p,).
+            shapes: c shapes of the added stiffness, (c, p).
 
         Returns:
-            Residuals extrapolated to no term, (n,); derivatives by the coordinates of the parameters, (k, n); and by
-            the amounts of each shape in phase and in quadrature, (c, 2, n).
+            Residuals extrapolated to no added stiffness, (n,); derivatives by the coordinates of the parameters,
+            (k, n); and by the amounts of each shape in phase and in quadrature, (c, 2, n).
         """
         names, place = self.evidence.solution.coordinates.names, self.evidence.residual_rows
         added, changes = value * self.unit(model), np.concatenate((shapes, 1j * shapes)) * self.unit(model)
@@ -284,10 +286,10 @@ def nearest_power_law(
 
 @dataclass(frozen=True, eq=False)
 class _Grid:
-    """Grid of g pairs of powers of frequency and amplitude, with their evidence.
+    """Grid of g pairs of powers of frequency and amplitude, with the evidence of the tests for each pair.
 
     Args:
-        measure: unit of the term.
+        measure: unit of the added stiffness.
         linear: linear model with one group (in phase and in quadrature) for each pair.
         powers: powers of frequency and amplitude, (g, 2).
         step: spacing of the grid along each axis, (2,); 0 along an axis on which the tests do not differ.
@@ -328,7 +330,7 @@ class _Grid:
 
 
 def _settled_grid(fitted: Evidence, term: Term, plain: LinearModel, model: Model, bounds: Bounds) -> _Grid | None:
-    """Find the power law nearest to the gap: narrow a grid of powers about the most probable pair, step by step.
+    """Narrow a grid of powers about the most probable pair, step by step, with the parameters of the model.
 
     After each step the parameters of the model and the amount of the power law are fitted again.
 

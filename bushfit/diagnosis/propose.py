@@ -1,4 +1,4 @@
-"""Missing effects: every effect of the library, ranked by a score test before any refit.
+"""Proposals: the effects of the library that a model lacks, ranked by a score test before any refit.
 
 Notes:
     The score is the decrease of chi-square in a linear model: the residuals projected on the effect's sensitivity,
@@ -34,12 +34,13 @@ _STEP = 1e-5
 class Proposal(Explanation):
     """Effect of the library that the model lacks, with its expected decrease of chi-square before any refit.
 
-    The group has one column for each set of shape parameters tried; it is None if the effect replaces a branch.
+    A shape parameter is a parameter of an effect other than its amount, such as the frequency of a resonance. The group
+    has one column for each set of shape parameters tried; it is None if the effect replaces a branch.
 
     Args:
-        model: model with the effect at the best shape parameters and zero amount (or the suggested amount if the amount
-            is fitted in its logarithm), as a start for a refit. An effect that replaces a branch starts from values
-            that the branch suggests.
+        model: model with the effect as a start for a refit: at the best shape parameters and zero amount (or the
+            suggested amount if the amount is fitted in its logarithm). An effect that replaces a branch starts from
+            values that the branch suggests.
         score: decrease of chi-square if the model were linear.
         visible: True if the tests could distinguish the effect from a change of the model's parameters.
     """
@@ -50,7 +51,7 @@ class Proposal(Explanation):
 
 
 def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str]) -> list[Proposal]:
-    """Rank every effect of the library that the model lacks.
+    """Rank the effects of the library that a fitted model lacks by their expected decrease of chi-square.
 
     Args:
         evidence: the fitted model and the tests.
@@ -61,12 +62,10 @@ def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str
         One proposal for each effect, at its best shape parameters, the highest score first.
     """
     relative_noise = np.zeros(evidence.residual.size)
-    for test, place in evidence.residual_rows.items():
-        relative_noise[place] = test.relative_noise
-    ranked = []
-    for effect in missing_effects(
-        evidence.model, shared_labels(test.direction for test in evidence.data_sets), excluded
-    ):
+    for test, rows in evidence.residual_rows.items():
+        relative_noise[rows] = test.relative_noise
+    ranked, places = [], shared_labels(test.direction for test in evidence.data_sets)
+    for effect in missing_effects(evidence.model, places, excluded):
         family = effect.name.partition(".")[0]
         if effect.replaces is not None:
             if effect.replaces in evidence.model.effects and (start := _replacement(evidence, effect, fixed)):
@@ -78,13 +77,13 @@ def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str
         columns = np.pad(columns, ((0, 0), (0, evidence.residual.size - columns.shape[1])))  # rows of priors
         gains, amounts, visible = scores(evidence, columns)
         amount = effect.amount
-        sense = 1 if amount.neutral == amount.bounds[0] else 0
-        gains = np.where((amounts > 0.0) | (sense == 0), gains, 0.0)
+        sign = 1 if amount.neutral == amount.bounds[0] else 0
+        gains = np.where((amounts > 0.0) | (sign == 0), gains, 0.0)
         best = int(np.argmax(gains))
         suggested = float(np.clip(amounts[best] * amount.typical, *amount.bounds))
         shape = shapes[best] | ({qualified_name(effect, amount): suggested} if amount.log else {})
         model = evidence.model.with_effect(effect.name, shape)
-        group = Group(columns, np.abs(columns * relative_noise).max(axis=1), act_together=False, sign=sense)
+        group = Group(columns, np.abs(columns * relative_noise).max(axis=1), act_together=False, sign=sign)
         ranked.append(
             Proposal("effect", family, effect.name, group, model, float(gains[best]), visible=bool(visible.any()))
         )
@@ -92,15 +91,15 @@ def proposals(evidence: Evidence, excluded: Collection[str], fixed: Sequence[str
 
 
 def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
-    """Score possible changes of the residuals by the decrease of chi-square if each is fitted with the parameters.
+    """Compute the decrease of chi-square if each of c changes of the residuals is fitted together with the parameters.
 
     Args:
         evidence: the fitted model and the tests.
-        columns: changes of the whitened residuals per unit amount, (c, n).
+        columns: changes of the n whitened residuals per unit amount, (c, n).
 
     Returns:
-        Decrease of chi-square, best amount, and True for columns that are visible, (c,) each. Decrease and amount are 0
-        for columns that the model's parameters absorb.
+        Decrease of chi-square, best amount, and True for visible changes, (c,) each. Decrease and amount are 0 for
+        changes that the model's parameters absorb.
     """
     lengths = np.linalg.norm(columns, axis=1)
     lengths = np.where(lengths > 0.0, lengths, 1.0)
@@ -113,7 +112,7 @@ def scores(evidence: Evidence, columns: Array) -> tuple[Array, Array, Array]:
 
 
 def has_used_parameters(effect: Effect, model: Model) -> bool:
-    """True if a model has all parameters of other effects that an effect uses."""
+    """True if a model has the parameters of its branches on which the law of an effect depends."""
     return not (isinstance(effect, Branch) and {*effect.uses} - {*model.values})
 
 
@@ -143,7 +142,7 @@ def missing_effects(model: Model, places: Collection[str], excluded: Collection[
 
 
 def _replacement(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> tuple[Model, float] | None:
-    """Replace a branch of the model by an effect, at the starting values with the smallest chi-square after one step.
+    """Replace a branch of a fitted model by an effect, at the starting values with the best expected fit.
 
     Args:
         evidence: the fitted model and the tests.
@@ -167,10 +166,11 @@ def _replacement(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> tu
 def sensitivity(
     model: Model, data_sets: Sequence[MeasuredTest], effect: Effect
 ) -> tuple[list[dict[str, float]], Array]:
-    """Compute the sensitivity of the tests to a missing effect on a grid of its shape parameters.
+    """Differentiate the residuals of tests by the amount of a missing effect, on a grid of its shape parameters.
 
-    The derivative is the difference between a small amount and none in the same call, so that iterative solutions have
-    the same error in both. Shapes without a finite response, as within free play, are left out.
+    A shape parameter is any other than the amount, such as the frequency of a resonance. The derivative is the
+    difference between a small amount and none in the same call, so that iterative solutions have the same error in
+    both. Shapes without a finite response, as within free play, are left out.
 
     Args:
         model: the fitted model.
@@ -178,8 +178,8 @@ def sensitivity(
         effect: the missing effect.
 
     Returns:
-        Values of the shape parameters by name, and the change of the whitened residuals per typical amount of the
-        effect at each of them, (shapes, n).
+        Sets of shape parameters by name, and the change of the n whitened residuals by a typical amount of the effect
+        for each set, (shapes, n).
     """
     bare, model = model, model.with_effect(effect.name)
     axes = {

@@ -35,7 +35,7 @@ _LEAST_TOLD = 0.01
 
 @dataclass(frozen=True)
 class DiagnosisSettings:
-    """Settings of a diagnosis.
+    """Settings of a diagnosis: the options of the command diagnose.
 
     Args:
         max_effects: maximum number of added effects.
@@ -62,7 +62,7 @@ class MisfitRegion:
         frequency: lowest and highest frequency [Hz].
         amplitude: lowest and highest amplitude, zero-to-peak [m or rad, or strain].
         component: "storage" or "loss" stiffness of sweeps, or "force" of a loop.
-        excess: root mean square of the smooth part of measured minus model, in units of the noise of this part.
+        excess: root mean square of the smooth misfit, measured minus model, in units of its noise.
         reading: description of the region as a sentence.
     """
 
@@ -77,7 +77,7 @@ class MisfitRegion:
 
 @dataclass(frozen=True)
 class NamedCause:
-    """Effect or mistake in the record that was named, or the first of a set that the tests cannot distinguish.
+    """Effect or mistake in the record that a diagnosis names, or the first of a set that the tests cannot distinguish.
 
     Args:
         name: name of the effect or mistake.
@@ -109,7 +109,7 @@ class Odds:
         nothing: probability that nothing is missing beyond noise and tolerance.
         explanations: text and probability (if anything is missing) of each explanation, the most probable first.
         models: fitted model of each explanation; None for an explanation that was not fitted.
-        labels: names of the parts of each explanation, joined by " + ".
+        labels: names of the effects, mistakes and faults of each explanation, joined by " + ".
         are_alternatives: True if the tests cannot decide between the explanations, so that each is an alternative.
     """
 
@@ -129,16 +129,12 @@ class Odds:
             The result with, for each other explanation, the squared difference of its parameters times its probability
             added to the covariance; and with the explanations as alternatives if the tests cannot distinguish them.
         """
-        cov = result.covariance
-        current_values = np.array([result.model.values[name] for name in cov.names])
+        cov, current = result.covariance, result.model.values
         matrix, alternatives = cov.matrix.copy(), list[Alternative]()
         for (_, probability), model in zip(self.explanations, self.models, strict=True):
             if model is None:
                 continue
-            difference = (
-                np.array([model.values.get(name, value) for name, value in zip(cov.names, current_values, strict=True)])
-                - current_values
-            )
+            difference = np.array([model.values.get(name, current[name]) - current[name] for name in cov.names])
             matrix += (1.0 - self.nothing) * probability * np.outer(difference, difference)
             if self.are_alternatives:
                 alternatives.append(Alternative(model, (1.0 - self.nothing) * probability))
@@ -147,7 +143,7 @@ class Odds:
 
 @dataclass(frozen=True)
 class CandidateResult:
-    """Candidate effect or mistake with its score, refit and probability, and the reason for the decision.
+    """Effect or mistake that a diagnosis considered, with its score, refit and probability: a row of candidates.csv.
 
     Args:
         name: name of the effect or mistake.
@@ -168,7 +164,7 @@ class CandidateResult:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """Result of a diagnosis.
+    """Result of a diagnosis: verdict, explanation, misfit before and after, next test and the model to use.
 
     Args:
         verdict: verdict in one word, such as "named".
@@ -262,9 +258,20 @@ class Diagnosis:
         return to_json_data(document, DiagnosisFile)
 
     def _effect(self, named: NamedCause) -> EffectEntry:
-        effect, model = get_candidate(named.name), self.result.model
+        """Entry of diagnosis.json for a named effect or mistake, with its fitted parameters."""
+        effect, model, covariance = get_candidate(named.name), self.result.model, self.result.covariance
         fitted_values = {candidate.name: candidate.parameters for candidate in self.candidates}
         values = model.values if named.name in model.effects else fitted_values.get(named.name, {})
+        parameters: dict[str, SizeEntry] = {}
+        for name, value in values.items():
+            if effect_name_of(name) == named.name:
+                interval = self.result.interval(name) if name in model.values else None
+                parameters[name] = {
+                    "value": value,
+                    "stderr": covariance.stderr(name) if name in model.values else None,
+                    "ci95": None if interval is None else list(interval),
+                    "unit": get_parameter(name).unit,
+                }
         return {
             "name": named.name,
             "level": level_of(named.name),
@@ -273,23 +280,9 @@ class Diagnosis:
             "test": named.test,
             "sentence": named.sentence or effect.sentence,
             "correction": named.correction or None,
-            "parameters": {
-                name: self._parameter(name, value)
-                for name, value in values.items()
-                if effect_name_of(name) == named.name
-            },
+            "parameters": parameters,
             "evidence": named.evidence,
             "alternatives": list(named.alternatives),
-        }
-
-    def _parameter(self, name: str, value: float) -> SizeEntry:
-        in_model = name in self.result.model.values
-        interval = self.result.interval(name) if in_model else None
-        return {
-            "value": value,
-            "stderr": self.result.covariance.stderr(name) if in_model else None,
-            "ci95": None if interval is None else list(interval),
-            "unit": get_parameter(name).unit,
         }
 
 
@@ -307,7 +300,7 @@ def format_probability(probability: float) -> str:
 
 
 def format_odds(document: Mapping[str, Any]) -> list[str]:
-    """Format the probabilities of a diagnosis.
+    """Format the probabilities of the explanations in a diagnosis as lines of text.
 
     Args:
         document: content of diagnosis.json.
