@@ -17,9 +17,9 @@ from bushfit.fitting.procedures import fit_joint, fit_two_step
 from bushfit.model.result import Result
 from bushfit.prediction.resonance import predict_resonance
 from bushfit.prediction.stiffness import predict
+from bushfit.reading.finding import find_table
 from bushfit.reading.measurement import loss_factor
 from bushfit.reading.resonance import RESONANCE_COLUMNS, read_resonance
-from bushfit.reading.table import Table
 from bushfit.reduction.resonance import reduce_resonance
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import undisturbed
@@ -146,7 +146,7 @@ def test_its_resonances_and_the_reduced_files(campaign, compound, row, root):
     for level, acceleration in LEVELS.items():
         for name, stated in MASSES.items():
             file, mass = f"shaker_{level}_{name}.csv", stated + DISCS
-            found = reduce_resonance(read_resonance(Table.open(folder / file, RESONANCE_COLUMNS), mount), mass)
+            found = reduce_resonance(read_resonance(find_table(folder / file, RESONANCE_COLUMNS), mount), mass)
             shaken = predict_resonance(compound, mount, mass, acceleration * GRAVITY, None)
             peaks[level, name] = found.peak[0], shaken.peak[0]
             kept = pd.read_csv(folder / "reduced" / file)

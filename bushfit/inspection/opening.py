@@ -17,11 +17,12 @@ from bushfit.inspection.loops import describe_history, describe_loop, describe_p
 from bushfit.inspection.recognition import recognize_table, test_direction, tested_body
 from bushfit.inspection.record import ColumnDescription, Findings, Inspection, Kind
 from bushfit.inspection.sweeps import describe_sweep
-from bushfit.reading.headers import LOOP_COLUMNS, PAIRS, SWEEP_COLUMNS
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.layout import DELIMITERS
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reading.names import NO_LABELS, Labels
+from bushfit.reading.roles import PAIRS
 from bushfit.reading.source import Channels, Sheet
 from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep

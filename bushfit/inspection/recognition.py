@@ -11,12 +11,14 @@ from typing import Any
 from bushfit.campaign.bodies import SpecimenSettings
 from bushfit.errors import BushfitError, NoTestError, quote_path
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
-from bushfit.reading.headers import LOOP_COLUMNS, PAIRS, SWEEP_COLUMNS, Vocabulary, of_motion
+from bushfit.reading.finding import find_table
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
 from bushfit.reading.labelled import Rows
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.names import direction_of_file
 from bushfit.reading.parts import OpenedFile, open_file
 from bushfit.reading.resonance import RESONANCE_COLUMNS, is_resonance
+from bushfit.reading.roles import PAIRS, of_motion
 from bushfit.reading.stiffness import hint_for_convertible_columns, refuse_ambiguous_damping
 from bushfit.reading.table import Table
 from bushfit.validation import validate_tables
@@ -197,4 +199,4 @@ def open_table(
     }
     rows = Rows(test_options.get("direction"), test_options.get("specimen_number"), test_options.get("rows", {}))
     opened = file if isinstance(file, OpenedFile) else open_content(file, test_options)
-    return Table.open(opened, names, relevant["columns"], relevant["units"], None, motion, rows if any(rows) else None)
+    return find_table(opened, names, relevant["columns"], relevant["units"], None, motion, rows if any(rows) else None)

@@ -21,14 +21,13 @@ from bushfit.reading.headers import (
     Heading,
     Vocabulary,
     is_angular,
-    of_motion,
     parse_unit,
     plain,
-    si_unit,
     split_convention,
     split_unit,
 )
 from bushfit.reading.numerals import is_like_number, plainest_value
+from bushfit.reading.roles import of_motion, si_unit
 from bushfit.reading.times import clock
 
 #: Smallest similarity, from 0 to 1, of a header that is suggested for a missing one; chosen: one word of two suffices.

@@ -8,12 +8,12 @@ import numpy as np
 
 from bushfit.errors import MeasurementError, error_location
 from bushfit.geometry import TRANSLATION, Direction, Place, Specimen, get_places
+from bushfit.reading.finding import find_table
 from bushfit.reading.headers import LOOP_COLUMNS
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import increasing_time, time_column
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import direction_of_file
-from bushfit.reading.table import Table
 
 #: Names of the columns of a displacement history, by role: time, a displacement in each direction, or one in any.
 DISPLACEMENT_COLUMNS: Mapping[str, Sequence[str]] = {
@@ -86,7 +86,7 @@ def read_displacements(
     """
     named_places = get_places(direction, specimens) if direction else []
     motion = named_places[0].motion if len({place.axis for place in named_places}) == 1 else None
-    table = Table.open(file, DISPLACEMENT_COLUMNS, columns, units, file_format, motion or TRANSLATION)
+    table = find_table(file, DISPLACEMENT_COLUMNS, columns, units, file_format, motion or TRANSLATION)
     headed = [axis for axis in Direction if str(axis) in table.roles]
     places = named_places or [place for axis in headed for place in get_places(axis, specimens)]
     roles = {place: str(place.axis) for place in places if place.axis in headed}

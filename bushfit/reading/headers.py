@@ -11,7 +11,6 @@ from types import MappingProxyType
 from typing import Literal
 
 from bushfit import units
-from bushfit.geometry import STRAINING, Direction, Motion
 
 #: Known words in column headers, names and labels, from words.toml, by table and key.
 WORDS: Mapping[str, Mapping[str, Sequence[str]]] = tomllib.loads(
@@ -27,20 +26,6 @@ ROW_COLUMNS = {
     "specimen_number": WORDS["above"]["specimen_number"],
     "run": [*SWEEP_COLUMNS["repeat"], "block"],
 }
-#: Names of columns in a test of strain and modulus, by role; they replace those of loops and sweeps.
-_STRAINING = {role: names for role, names in WORDS["straining"].items() if role != "amplitude_of"} | {
-    "amplitude": [
-        *SWEEP_COLUMNS["amplitude"],
-        *(
-            form.format(name)
-            for name in WORDS["straining"]["displacement"]
-            for form in WORDS["straining"]["amplitude_of"]
-        ),
-        *WORDS["straining"]["amplitude"],
-    ]
-}
-#: Roles whose names depend on the motion: displacement or strain, force or stress, stiffness or modulus.
-OF_MOTION = (*_STRAINING, "amplitude_reached", "force_amplitude", "damping_coefficient")
 #: Convention by which an amplitude is stated.
 AmplitudeConvention = Literal["zero-to-peak", "peak-to-peak", "rms"]
 #: Factor that converts an amplitude to zero-to-peak, by its convention.
@@ -49,27 +34,6 @@ ZERO_TO_PEAK: dict[AmplitudeConvention, float] = {"zero-to-peak": 1.0, "peak-to-
 COUNTED: dict[AmplitudeConvention | None, str] = {
     "peak-to-peak": " p-p", "zero-to-peak": " 0-p", "rms": " rms", None: ""
 }  # fmt: skip
-#: Pairs of columns that determine a complex stiffness and must agree, in order of preference.
-AGREEING_PAIRS = (
-    *(("stiffness", "loss_factor"), ("stiffness", "phase"), ("storage_stiffness", "loss_stiffness")),
-    *(("storage_stiffness", "loss_factor"), ("storage_stiffness", "phase")),
-)
-#: All pairs of columns that determine a complex stiffness, in order of preference.
-PAIRS = (
-    *AGREEING_PAIRS,
-    *(("stiffness", "loss_stiffness"), ("storage_stiffness", "damping_coefficient")),
-    *(("stiffness", "damping_coefficient"), ("stiffness", "damping_ratio"), ("storage_stiffness", "damping_ratio")),
-    *(("storage_compliance", "loss_compliance"), ("compliance", "phase"), ("compliance", "loss_factor")),
-    *(("force_amplitude", "phase"), ("force_amplitude", "loss_factor"), ("force_amplitude", "damping_ratio")),
-)
-#: SI units of the roles that do not depend on the motion; other roles are ratios.
-_UNITS = {"time": "s", "frequency": "Hz", "temperature": "K"}
-#: Roles by the attribute of a motion that is their SI unit.
-_UNITS_OF_MOTION = {
-    **dict.fromkeys(("displacement", "amplitude", "amplitude_reached", *Direction), "displacement_unit"),
-    **dict.fromkeys(("force", "force_amplitude"), "force_unit"),
-    **dict.fromkeys(("stiffness", "storage_stiffness", "loss_stiffness"), "stiffness_unit"),
-}
 #: Starts of the names of an angular frequency.
 _ANGULAR = ("angular", "angfreq", "omega", "ω", "kreisfrequenz", "pulsa", "角频率")
 #: Channel of a test rig in brackets: "Load(Linear:Load) (kN)".
@@ -116,7 +80,7 @@ _UNITS_OF = {
     for name, *si in (entry.split() for entry in entries)
 }
 #: Roles of the stiffness and its loss, of which a column may contain the mean of several parts.
-OF_MEANS = frozenset(role for pair in AGREEING_PAIRS for role in pair)
+_OF_MEANS = frozenset(("stiffness", "storage_stiffness", "loss_stiffness", "loss_factor", "phase"))
 #: Names of an amplitude that imply peak-to-peak.
 PEAK_TO_PEAK_NAMES = frozenset(WORDS["counting"]["peak_to_peak"])
 #: Parts of the patterns of conventions: ends of words, and the end of a unit to which one may be joined ("mmpp").
@@ -148,32 +112,6 @@ _SPELLINGS: dict[int, int | str] = {
 }
 #: End of a name before a unit without brackets: "force_N", "Kraft in N", "F / kN", "load, N".
 _NAME_END = re.compile(r"\s+in\s+|\s*/\s*|\s*,\s*|\s+|_")
-
-
-def of_motion(names: Mapping[str, Sequence[str]], motion: Motion) -> dict[str, Sequence[str]]:
-    """Adapt column names to a kind of motion: in a test of strain, for example, G' names a modulus, not a stiffness.
-
-    Args:
-        names: usual column names, by role such as "stiffness".
-        motion: kind of motion: translation, rotation or strain.
-
-    Returns:
-        Column names by role.
-    """
-    return {role: _STRAINING.get(role, usual) if motion is STRAINING else usual for role, usual in names.items()}
-
-
-def si_unit(role: str, motion: Motion) -> str:
-    """Return the SI unit of a role such as "force" in a test of a kind of motion; "1" for a ratio."""
-    if role in _UNITS_OF_MOTION:
-        return str(getattr(motion, _UNITS_OF_MOTION[role]))
-    if role == "damping_coefficient":
-        return "Pa*s" if motion is STRAINING else motion.stiffness_unit.replace("/", "*s/", 1)
-    if role.endswith("compliance"):
-        return {"N/m": "m/N", "Pa": "1/Pa"}.get(motion.stiffness_unit, "rad/N/m")
-    if role.endswith("phase"):
-        return "rad"
-    return "m/s^2" if role.startswith(("base_", "mass_")) else _UNITS.get(role, "1")
 
 
 @dataclass(frozen=True)
@@ -289,7 +227,7 @@ class Vocabulary:
             for word in (
                 bare,
                 plain(_ASIDES.sub("", _folded(name))),
-                *([without_mean] if OF_MEANS.intersection(self._roles.get(without_mean, ())) else []),
+                *([without_mean] if _OF_MEANS.intersection(self._roles.get(without_mean, ())) else []),
                 *amplitudes,
                 *self._names_with_symbol(name, unit),
             ):

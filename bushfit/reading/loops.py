@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from bushfit.geometry import Place
+from bushfit.reading.finding import find_table
 from bushfit.reading.headers import LOOP_COLUMNS, Column
 from bushfit.reading.labelled import Rows, note_not_understood
 from bushfit.reading.measurement import Floats, Loop
@@ -44,7 +45,7 @@ def read_loop(
         MeasurementError, UnitError: the file, a column, a unit or a value cannot be used.
     """
     rows = Rows(test.direction, test.specimen_number, test.rows, shared)
-    table = Table.open(file, LOOP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
+    table = find_table(file, LOOP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
     stated_rate = None if test.states_time or "time" in table.roles else table.sampling_rate
     test = replace(test, sampling_rate=stated_rate) if stated_rate else test
     wanted = loop_columns(table, direction, test)

@@ -6,8 +6,9 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from bushfit.reading.headers import AGREEING_PAIRS, OF_MOTION, PAIRS, WORDS, Column, Vocabulary
+from bushfit.reading.headers import WORDS, Column, Vocabulary
 from bushfit.reading.measurement import Complex, Floats
+from bushfit.reading.roles import AGREEING_PAIRS, OF_MOTION, PAIRS
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.table import Table
 

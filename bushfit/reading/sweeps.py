@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from bushfit import units as si
 from bushfit.geometry import Place, strain_factor_of_files
-from bushfit.reading.headers import AGREEING_PAIRS, SWEEP_COLUMNS, ZERO_TO_PEAK, AmplitudeConvention, Column, si_unit
+from bushfit.reading.finding import find_table
+from bushfit.reading.headers import SWEEP_COLUMNS, ZERO_TO_PEAK, AmplitudeConvention, Column
 from bushfit.reading.labelled import Rows, column_texts, note_not_understood
 from bushfit.reading.measurement import SAME_TEMPERATURE, Floats, Sweep
 from bushfit.reading.parts import OpenedFile
 from bushfit.reading.preload import parse_preload
+from bushfit.reading.roles import AGREEING_PAIRS, si_unit
 from bushfit.reading.runs import runs_of
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.stiffness import check_stiffness, complex_stiffness, stiffness_pair, with_positive_loss
@@ -70,7 +72,7 @@ def read_sweep(
         MeasurementError, UnitError: the file, a column, a unit or a value cannot be used.
     """
     rows = Rows(test.direction, test.specimen_number, test.rows, shared)
-    table = Table.open(file, SWEEP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
+    table = find_table(file, SWEEP_COLUMNS, test.columns, test.units, test, direction.motion, rows)
     pair = stiffness_pair(table)
     constants: dict[str, float] = {}
     if test.at_frequency is not None:

@@ -1,6 +1,5 @@
 """Table of a test: columns classified by name and unit, and their numbers in SI."""
 
-import csv
 import math
 import re
 from collections import Counter
@@ -8,40 +7,24 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bushfit import units
-from bushfit.errors import MeasurementError, UnitError, error_location
+from bushfit.errors import UnitError, error_location
 from bushfit.geometry import STRAINING, TRANSLATION, Motion, Place, strain_factor_of_files
-from bushfit.reading.blocks import combined, exchange_rows, refuse_other_columns
+from bushfit.reading.blocks import refuse_other_columns
 from bushfit.reading.cells import Cells, FaultyRow
-from bushfit.reading.classification import classify
-from bushfit.reading.headers import (
-    LOOP_COLUMNS,
-    OF_MOTION,
-    PAIRS,
-    SWEEP_COLUMNS,
-    Column,
-    Vocabulary,
-    is_angular,
-    of_motion,
-    si_unit,
-    split_convention,
-)
-from bushfit.reading.labelled import Rows, find_labels, select_rows
-from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Column, Vocabulary, is_angular, split_convention
+from bushfit.reading.labelled import find_labels
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import Labels, is_remark, labels_above
 from bushfit.reading.numerals import ALL_NUMERALS
-from bushfit.reading.parts import OpenedFile, open_file
+from bushfit.reading.roles import OF_MOTION, of_motion, si_unit
 from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, RowSource, Sheet
 from bushfit.reading.times import clock
-from bushfit.reading.wide import unpivot
 
-_EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
 #: Smallest ratio of nines that mark a missing value to the largest other number; chosen: outliers are rarely nines.
 _MARK_RATIO = 3.0
 #: Quantity in a line above a table: "1 V = 200 N", "Crosshead speed: 10 mm/min".
@@ -65,84 +48,6 @@ class Table(Cells):
     names: Mapping[str, Sequence[str]]
     motion: Motion
     notes: tuple[str, ...] = field(default=(), kw_only=True)
-
-    @classmethod
-    def open(
-        cls,
-        file: Path | OpenedFile,
-        names: Mapping[str, Sequence[str]],
-        columns: Mapping[str, str] | None = None,
-        stated_units: Mapping[str, str] | None = None,
-        file_format: FileFormat | None = None,
-        motion: Motion = TRANSLATION,
-        rows: Rows | None = None,
-    ) -> "Table":
-        """Open a test file, find its table, and classify the columns; numbers are read later, with `read`.
-
-        Args:
-            file: path of a text in any dialect, a workbook or a recording, or the opened file. There may be other lines
-                above the header, and a row of units below it.
-            names: usual column names by role such as "force": LOOP_COLUMNS, SWEEP_COLUMNS or RESONANCE_COLUMNS.
-            columns: header, or number from 1, of columns with unusual names, by role.
-            stated_units: units that the file does not state, by role.
-            file_format: format of the file as the user states it; default detected.
-            motion: kind of motion; columns of a test of strain and modulus have other names.
-            rows: criteria that select the rows of the test; default all rows.
-
-        Returns:
-            Table with its columns by role.
-
-        Raises:
-            MeasurementError: the file, its table, the header or the selected rows are missing, or roles are unclear.
-            UnitError: two different units for one column.
-        """
-        opened = file if isinstance(file, OpenedFile) else open_file(file, file_format or FileFormat())
-        file_format, columns = opened.stated, dict(columns or {})
-        numbered = {role: "\0" if text.isdecimal() else text for role, text in columns.items()}
-        vocabulary = Vocabulary.shared(of_motion(names, motion), numbered, stated_units or {})
-        in_headers = {role: text for role, text in columns.items() if not text.isdecimal()}
-        all_names = Vocabulary.shared(of_motion(names, motion), in_headers, stated_units or {})
-
-        def lay_out(source: RowSource) -> tuple[RowSource, Layout]:
-            """Return rows and layout of the table in a part of the file; blocks and wide tables become long."""
-            delimiter = "" if isinstance(source, Sheet) else DELIMITERS.get(file_format.delimiter or "")
-            stated_line = file_format.header_line
-            layout = source.layout or find_layout(
-                source.head(), all_names, delimiter=delimiter, header_line=stated_line
-            )
-            if "amplitude" in names and stated_line is None:
-                if exchanged := exchange_rows(source, layout, all_names):
-                    source, layout = exchanged, find_layout(exchanged.head(), all_names, delimiter="")
-                if wide := unpivot(source, opened.file, vocabulary, layout):
-                    return wide
-            return combined(source, layout, vocabulary)
-
-        try:
-            layouts = {id(part): lay_out(part) for part in opened.parts}
-            part = opened.choose(lambda part: len(all_names.roles(layouts[id(part)][1].headers) - {"time"}) > 1)
-        except csv.Error as error:
-            raise MeasurementError("the table cannot be read", file=opened.file, found=str(error)) from error
-        source, layout = layouts[id(part)]
-        if file_format.header_line not in (None, layout.header_line):
-            found = f"header_line = {file_format.header_line}"
-            problem, hint = "there is no header on this line", "lines count from 1"
-            raise MeasurementError(problem, file=opened.file, found=found, hint=hint)
-        table = cls(opened, source, layout, names, motion)
-        if len(table.headers) < 2:
-            expected = f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks"
-            raise table.header_error("there is only one column", expected=expected)
-        if layout.headerless and not any(text.isdecimal() for text in columns.values()):
-            tests = (("time", "displacement", "force"), ("frequency", "amplitude", "stiffness", "loss_factor"))
-            entries = [", ".join(f'{role} = "{n}"' for n, role in enumerate(test, 1)) for test in tests]
-            ways = " or ".join(f"columns = {{ {entry} }}" for entry in entries)
-            hint = f"name the columns by their numbers in the campaign, and their units: {ways}"
-            raise table.header_error("there is no header", found=None, expected=_EXPECTED_HEADER, hint=hint)
-        roles, notes, clocks = classify(table, names, motion, vocabulary, columns, stated_units or {})
-        essential = ({"displacement", "force"}, *(set(pair) for pair in PAIRS))
-        present = next((pair for pair in essential if pair <= set(roles)), set(roles) & {"displacement", "force"})
-        needed = frozenset(roles[role].index for role in present)
-        table = replace(table, roles=roles, notes=(*layout.notes, *notes), clocks=clocks, needed=needed)
-        return replace(table, selected=select_rows(table, table.row_labels, rows)) if rows else table
 
     @cached_property
     def labels_above(self) -> Labels:

@@ -11,13 +11,13 @@ from machines import MACHINES
 from bushfit import units
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction, Specimen
+from bushfit.reading.finding import find_table
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import read_loop
 from bushfit.reading.measurement import Floats, Loop, Sweep
 from bushfit.reading.stated import LoopFile, SweepFile
 from bushfit.reading.sweeps import read_sweep
-from bushfit.reading.table import Table
 
 PEAK_TO_PEAK = [
     "Amplitude pk-pk [mm]", "amplitude (p-p) (mm)", "Amplitude peak-to-peak [mm]", "amplitude_pp_mm",
@@ -68,7 +68,7 @@ def test_the_symbol_of_a_stiffness_is_one_by_its_unit(header, index, tmp_path):
     file = tmp_path / "sweep.csv"
     row = ",".join(["1.5"] * (header.partition("\n")[0].count(",") + 1))
     file.write_text("\n".join([header, *[row] * 3]))
-    column = Table.open(file, SWEEP_COLUMNS).roles.get("stiffness")
+    column = find_table(file, SWEEP_COLUMNS).roles.get("stiffness")
     assert (column and column.index) == index
 
 
@@ -83,7 +83,7 @@ def test_the_symbol_of_a_stiffness_is_one_by_its_unit(header, index, tmp_path):
 )
 def test_the_header_names_most_columns_unless_it_is_stated(text, stated, line, headers, tmp_path):
     (tmp_path / "loop.csv").write_text(text)
-    found = Table.open(tmp_path / "loop.csv", LOOP_COLUMNS, file_format=FileFormat(**stated)).layout
+    found = find_table(tmp_path / "loop.csv", LOOP_COLUMNS, file_format=FileFormat(**stated)).layout
     assert (found.header_line, found.headers) == (line, headers)
 
 
@@ -110,7 +110,7 @@ def test_what_can_be_read_in_two_ways_is_refused(case, tmp_path):
     rows = [f"{n}.001;{n}.002;{n}.003" if "." in cells else f"{n},001;{n},002;{n},003" for n in range(2, 12)]
     file = tmp_path / "loop.csv"
     file.write_text("\n".join(["time [s];displacement [mm];force [N]", cells, *rows]))
-    table = Table.open(file, LOOP_COLUMNS, file_format=FileFormat(**stated))  # type: ignore[arg-type]
+    table = find_table(file, LOOP_COLUMNS, file_format=FileFormat(**stated))  # type: ignore[arg-type]
     wanted = {"force": table.column("force", Direction.AXIAL)}
     if force is None:
         with pytest.raises(MeasurementError, match=r"two ways[\s\S]*decimal = "):

@@ -12,11 +12,11 @@ from texts import refused, sweep_from
 
 from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
+from bushfit.reading.finding import find_table
 from bushfit.reading.measurement import Sweep
 from bushfit.reading.resonance import RESONANCE_COLUMNS, ResonanceTest, is_resonance, read_resonance
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.sweeps import read_sweep
-from bushfit.reading.table import Table
 from bushfit.reduction.resonance import transmissibility
 
 FREQUENCIES = ("5", "15", "25", "35")
@@ -186,7 +186,7 @@ def written(folder: Path, header: str, *columns: np.ndarray) -> Path:
 
 
 def read(file: Path, base_acceleration: float | None = None) -> ResonanceTest:
-    table = Table.open(file, RESONANCE_COLUMNS)
+    table = find_table(file, RESONANCE_COLUMNS)
     assert is_resonance(table)
     return read_resonance(table, Direction.AXIAL, base_acceleration)
 

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from bushfit.effects.contract import Array
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
+from bushfit.reading.finding import find_table
 from bushfit.reading.measurement import Source
 from bushfit.reading.resonance import RESONANCE_COLUMNS, ResonanceTest, read_resonance
-from bushfit.reading.table import Table
 from bushfit.reduction.resonance import MOST_POINTS, Resonance, reduce_resonance, shaken_response, transmissibility
 
 #: [kg] and [m/s^2]: the paper's bushing then has its resonance near 165 Hz, at some 0.1 mm.
@@ -107,7 +107,7 @@ def test_the_measured_mount(root):
         tables = [f"data/measured/epdm_70/shaker_{level}_{mass}g.csv" for level in ("01g", "1g")]
         low, high = (
             reduce_resonance(
-                read_resonance(Table.open(root / table, RESONANCE_COLUMNS), Direction.AXIAL), 1e-3 * (mass + DISCS)
+                read_resonance(find_table(root / table, RESONANCE_COLUMNS), Direction.AXIAL), 1e-3 * (mass + DISCS)
             )
             for table in tables
         )

@@ -1,0 +1,96 @@
+"""Search for the table of a test in a file: its part, layout, columns and rows."""
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from bushfit.errors import MeasurementError
+from bushfit.geometry import TRANSLATION, Motion
+from bushfit.reading.blocks import combined, exchange_rows
+from bushfit.reading.classification import classify
+from bushfit.reading.headers import Vocabulary
+from bushfit.reading.labelled import Rows, select_rows
+from bushfit.reading.layout import DELIMITERS, FileFormat, Layout, find_layout
+from bushfit.reading.parts import OpenedFile, open_file
+from bushfit.reading.roles import PAIRS, of_motion
+from bushfit.reading.source import RowSource, Sheet
+from bushfit.reading.table import Table
+from bushfit.reading.wide import unpivot
+
+_EXPECTED_HEADER = 'a header row such as "time [s],displacement [mm],force [N]"'
+
+
+def find_table(
+    file: Path | OpenedFile,
+    names: Mapping[str, Sequence[str]],
+    columns: Mapping[str, str] | None = None,
+    stated_units: Mapping[str, str] | None = None,
+    file_format: FileFormat | None = None,
+    motion: Motion = TRANSLATION,
+    rows: Rows | None = None,
+) -> Table:
+    """Find the table of a test in a file, and the roles of its columns; its numbers are read later, by `Table.read`.
+
+    Args:
+        file: path of a text in any dialect, a workbook or a recording, or the opened file. There may be other lines
+            above the header, and a row of units below it.
+        names: usual column names by role such as "force": LOOP_COLUMNS, SWEEP_COLUMNS or RESONANCE_COLUMNS.
+        columns: header, or number from 1, of columns with unusual names, by role.
+        stated_units: units that the file does not state, by role.
+        file_format: format of the file as the user states it; default detected.
+        motion: kind of motion; columns of a test of strain and modulus have other names.
+        rows: criteria that select the rows of the test; default all rows.
+
+    Returns:
+        Table with its columns by role.
+
+    Raises:
+        MeasurementError: the file, its table, the header or the selected rows are missing, or roles are unclear.
+        UnitError: two different units for one column.
+    """
+    opened = file if isinstance(file, OpenedFile) else open_file(file, file_format or FileFormat())
+    file_format, columns = opened.stated, dict(columns or {})
+    numbered = {role: "\0" if text.isdecimal() else text for role, text in columns.items()}
+    vocabulary = Vocabulary.shared(of_motion(names, motion), numbered, stated_units or {})
+    in_headers = {role: text for role, text in columns.items() if not text.isdecimal()}
+    all_names = Vocabulary.shared(of_motion(names, motion), in_headers, stated_units or {})
+
+    def lay_out(source: RowSource) -> tuple[RowSource, Layout]:
+        """Return rows and layout of the table in a part of the file; blocks and wide tables become long."""
+        delimiter = "" if isinstance(source, Sheet) else DELIMITERS.get(file_format.delimiter or "")
+        stated_line = file_format.header_line
+        layout = source.layout or find_layout(source.head(), all_names, delimiter=delimiter, header_line=stated_line)
+        if "amplitude" in names and stated_line is None:
+            if exchanged := exchange_rows(source, layout, all_names):
+                source, layout = exchanged, find_layout(exchanged.head(), all_names, delimiter="")
+            if wide := unpivot(source, opened.file, vocabulary, layout):
+                return wide
+        return combined(source, layout, vocabulary)
+
+    try:
+        layouts = {id(part): lay_out(part) for part in opened.parts}
+        part = opened.choose(lambda part: len(all_names.roles(layouts[id(part)][1].headers) - {"time"}) > 1)
+    except csv.Error as error:
+        raise MeasurementError("the table cannot be read", file=opened.file, found=str(error)) from error
+    source, layout = layouts[id(part)]
+    if file_format.header_line not in (None, layout.header_line):
+        found = f"header_line = {file_format.header_line}"
+        problem, hint = "there is no header on this line", "lines count from 1"
+        raise MeasurementError(problem, file=opened.file, found=found, hint=hint)
+    table = Table(opened, source, layout, names, motion)
+    if len(table.headers) < 2:
+        expected = f"{_EXPECTED_HEADER}, separated by comma, semicolon, tab, | or blanks"
+        raise table.header_error("there is only one column", expected=expected)
+    if layout.headerless and not any(text.isdecimal() for text in columns.values()):
+        tests = (("time", "displacement", "force"), ("frequency", "amplitude", "stiffness", "loss_factor"))
+        entries = [", ".join(f'{role} = "{n}"' for n, role in enumerate(test, 1)) for test in tests]
+        ways = " or ".join(f"columns = {{ {entry} }}" for entry in entries)
+        hint = f"name the columns by their numbers in the campaign, and their units: {ways}"
+        raise table.header_error("there is no header", found=None, expected=_EXPECTED_HEADER, hint=hint)
+    roles, notes, clocks = classify(table, names, motion, vocabulary, columns, stated_units or {})
+    essential = ({"displacement", "force"}, *(set(pair) for pair in PAIRS))
+    present = next((pair for pair in essential if pair <= set(roles)), set(roles) & {"displacement", "force"})
+    needed = frozenset(roles[role].index for role in present)
+    table = replace(table, roles=roles, notes=(*layout.notes, *notes), clocks=clocks, needed=needed)
+    return replace(table, selected=select_rows(table, table.row_labels, rows)) if rows else table
