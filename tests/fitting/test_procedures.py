@@ -93,6 +93,11 @@ def test_radial_sweep_follows_from_axial_tests(measured, result):
     assert loss < 0.01
 
 
+def test_without_directions_a_fit_uses_the_axial_tests(measured):
+    assert {test.direction for test in measured.data_sets} == {Direction.AXIAL, Direction.RADIAL}
+    assert {test.direction for test in measured.select_tests(None)} == {Direction.AXIAL}
+
+
 def test_passes_agree_and_settle_where_plain_passes_would(measured):
     found = fit_two_step(measured)
     before, last = found.passes[-2], found.passes[-1]
