@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
-from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.fitting.agreement import expected_errors, misfits, prior_uses, prior_warnings
 from bushfit.fitting.assess import covariance, measured_range, quality, temperature_warning
@@ -81,19 +80,14 @@ class Evidence:
         independent = sum(data_set.independent_count for data_set in self.data_sets)
         return self.chi_square + self.parameters * float(np.log(independent))
 
-    def covariance_of(self, effects: Collection[str]) -> Covariance:
-        """Covariance of the parameters of named effects, from the fit with errors that tests share, if there is one."""
-        found = self.joint or self.solution
-        full = np.linalg.pinv(found.jacobian @ found.jacobian.T, rcond=1e-12, hermitian=True)
-        full *= max(found.chi_square / max(found.residual.size - len(full), 1), 1.0)  # what the fit misses
-        names = [
-            name
-            for name in (qualified_name(effect, p) for effect in map(get_effect, effects) for p in effect.parameters)
-            if name in found.coordinates.names and name not in found.at_bound
-        ]
-        chosen = [found.coordinates.names.index(name) for name in names]
-        slopes = found.coordinates.slopes(self.model.values)[chosen]
-        return Covariance(tuple(names), full[np.ix_(chosen, chosen)] * np.outer(slopes, slopes))
+    def covariance_of(self, names: Collection[str]) -> Covariance:
+        """Covariance of named parameters, from the fit with errors that tests share, if there is one."""
+        fitted = self.joint or self.solution
+        full = np.linalg.pinv(fitted.jacobian @ fitted.jacobian.T, rcond=1e-12, hermitian=True)
+        full *= max(fitted.chi_square / max(fitted.residual.size - len(full), 1), 1.0)  # what the fit misses
+        slopes = fitted.coordinates.slopes(self.model.values)
+        covariance = Covariance(fitted.coordinates.names, full * np.outer(slopes, slopes))
+        return covariance.restricted([name for name in names if name not in fitted.at_bound])
 
     @cached_property
     def span(self) -> Array:

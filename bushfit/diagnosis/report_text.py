@@ -90,11 +90,12 @@ class DiagnosisWriter:
         known, fixed = None, request.fixed
         if self.finding.verdict == "partly" and first.unnamed:  # without the compound's deviation amounts are distorted
             state, model = states[0], request.base.model
-            known = state.evidence.covariance_of(names)
             for name in names:
-                parameters = [qualified_name(get_effect(name), parameter) for parameter in get_effect(name).parameters]
-                values = {key: value for key, value in state.evidence.model.values.items() if key in parameters}
-                model, fixed = model.with_effect(name, values), [*fixed, *values]
+                model = model.with_effect(name)
+            added = {
+                key: state.evidence.model.values[key] for key in model.values if key not in request.base.model.values
+            }
+            model, fixed, known = model.with_values(added), [*fixed, *added], state.evidence.covariance_of(added)
         else:
             state = min(states, key=lambda state: len(state.effects) > len(names))
             model = state.evidence.model
@@ -115,7 +116,7 @@ class DiagnosisWriter:
                 max(fitted.chi_square / sum(test.residual_count for test in fitted.data_sets) - 1.0, 0.0)
                 for fitted in (base, plain)
             ]
-            share = 100.0 * (1.0 - excess[1] / excess[0] if excess[0] else 1.0)
+            share = 100.0 * (1.0 - excess[1] / excess[0]) if excess[0] else 100.0
             part = f"{number(share, 2)} %" if share >= 1.0 else "part"
             summary = f"{' and '.join(names)} {'explains' if len(names) == 1 else 'explain'} {part} of the gap"
             rest = [part.name for part in first.faulty_parts] + [LEVELS] * first.best.levels

@@ -15,13 +15,13 @@ from math import log
 import numpy as np
 
 from bushfit.diagnosis.claims import ClaimScreening, claims
-from bushfit.diagnosis.evidence import Evidence, fit
+from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart, OutlierCluster
 from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, SearchState, Tests
 from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.propose import has_used_parameters
-from bushfit.diagnosis.refit import refit_with_free_columns, refitted, within_reach
+from bushfit.diagnosis.refit import refit_with_free_columns, refitted
 from bushfit.diagnosis.verdict import decide_verdict
 from bushfit.errors import FitError, ModelError
 from bushfit.progress import track
@@ -260,16 +260,13 @@ class Search:
         """Yield the refitted state without each earlier effect, which the last effect may make unnecessary."""
         if state.faulty_parts:
             return
-        data_sets, request = state.evidence.data_sets, self.request
-        for name in state.effects[:-1]:
-            if state.key - {name} in self._visited:
+        shorter = {name: state.evidence.model.without(name) for name in state.effects[:-1]}
+        for name, model in shorter.items():
+            if state.key - {name} in self._visited or not all(has_used_parameters(e, model) for e in model.records):
                 continue
-            with suppress(FitError, ModelError):  # no response without it
-                model = state.evidence.model.without(name)
-                if not all(has_used_parameters(effect, model) for effect in model.records):
-                    continue
-                evidence = fit(model, data_sets, request.fixed, {**within_reach(model, data_sets), **request.bounds})
-                yield self._register(self._with_fit(state, tuple(e for e in state.effects if e != name), evidence))
+            fits = refitted(state.evidence, {name: model}, {}, self.request.fixed, self.request.bounds)
+            for evidence in fits.values():
+                yield self._register(self._with_fit(state, [e for e in state.effects if e != name], evidence))
 
     def _with_fit(self, state: SearchState, effects: Sequence[str], evidence: Evidence) -> SearchState:
         """State of the search that consists of a fit with the given effects, to the tests of another state."""
@@ -295,11 +292,9 @@ class Search:
         near = [n for n, state in enumerate(states) if state is not leader and not state.faulty_parts]
         near.sort(key=lambda n: -states[n].log_posterior)
         for n in near[:_RIVALS] if leader.likeliest_deviation and not leader.faulty_parts else ():
-            state, values = states[n], leader.evidence.model.values
-            model = state.evidence.model
-            model = model.with_values({name: value for name, value in values.items() if name in model.values})
-            columns = state.free_columns(leader.likeliest_deviation)
-            fits = refitted(state.evidence, {"": model}, {}, self.request.fixed, self.request.bounds, columns)
+            state, start = states[n], leader.evidence.model.values
+            model, columns = state.evidence.model, state.free_columns(leader.likeliest_deviation)
+            fits = refitted(state.evidence, {"": model}, start, self.request.fixed, self.request.bounds, columns)
             for evidence in fits.values():
                 candidate = self._register(self._with_fit(state, state.effects, evidence))
                 states[n] = max(state, candidate, key=lambda rival: rival.log_posterior)
