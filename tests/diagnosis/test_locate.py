@@ -51,6 +51,7 @@ def test_trends(where_of, effects, direction, component, trend):
     assert where.reading.startswith(f"measured {direction} {part} is up to ")
     assert "% of |K| below the model" in where.reading
     assert trend in where.reading
+    assert max(len(sentence.split()) for sentence in where.reading.split(". ")) <= 25
     assert "at every amplitude" in where.reading
     assert where.frequency[1] == pytest.approx(155.0)
     assert where.frequency[0] > 90.0

@@ -210,6 +210,8 @@ def told(finding: Finding) -> dict[str, float]:
         ({"loop:1 mm+loop:2 mm": 0.99, "": 0.01}, "unexplained", {"part: loop": 1.0}),
         ({"loop:1 mm+loop:1 mm again": 0.99, "": 0.01}, "described", {"unnamed": 1.0}),
         ({"peak_to_peak": 0.99, "": 0.01}, "named", {"peak_to_peak": 1.0}),
+        ({"peak_to_peak+kraus": 0.99, "": 0.01}, "partly", {"kraus+peak_to_peak": 1.0}),
+        ({"peak_to_peak+kraus+compound": 0.99, "": 0.01}, "partly", {"peak_to_peak+unnamed": 1.0}),
     ],
     ids=str,
 )

@@ -5,6 +5,7 @@ Points left out that meet at one frequency tell of a disturbance there; points t
 
 import json
 from dataclasses import replace
+from math import log
 
 import numpy as np
 import pytest
@@ -27,6 +28,8 @@ from rigged import (
 )
 
 from bushfit.campaign.campaign import Campaign
+from bushfit.campaign.schema import RigSettings
+from bushfit.diagnosis import hypotheses
 from bushfit.diagnosis.explanations import outlier_clusters
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import BASE
@@ -70,6 +73,17 @@ def test_what_one_place_alone_shows_is_to_be_measured_again(measured, tamper, pl
     assert place in diagnosis.where[0].reading
     assert diagnosis.next_test == f"measure again: {place}"
     assert diagnosis.odds.labels[0] == f"fault: {place}"
+
+
+def test_a_parameter_without_influence_is_no_gain(measured, fitted):
+    """The rubber's parameters have the same posterior in any unit, and a fit in which one hardly acts wins nothing."""
+    evidence = fitted(measured(INERTIA, SHARED))
+    state = hypotheses.SearchState.of_tests(hypotheses.Tests(evidence, RigSettings(), log(0.5)), request=None)  # type: ignore[arg-type]
+    expected, bare = state.log_posterior, state.bare
+    slack = replace(state)
+    scaled = bare.solution.jacobian * np.array([[1e-2], [1.0], [30.0], [1.0], [1.0]])
+    vars(slack)["bare"] = replace(bare, solution=replace(bare.solution, jacobian=scaled))
+    assert slack.log_posterior == pytest.approx(expected, abs=1e-3)
 
 
 def test_a_loop_at_an_amplitude_of_its_own_may_deviate_by_a_law(measured):
