@@ -166,7 +166,7 @@ class Table(Cells):
         is_foreign = any(units.is_compatible(unit, foreign_unit) for foreign_unit in foreign_units)
         if is_foreign and role in OF_MOTION and "force" not in role:
             self.refuse_other_motion(role, [column.header])
-        if units.is_compatible(unit, "V") and not units.is_compatible(unit, expected):
+        if not units.is_compatible(unit, expected) and units.is_compatible(unit, "V"):  # pint is slow to import
             raise unclear(
                 f"the {label} is in volts",
                 expected=f"{quantity}, such as {example}",
