@@ -244,15 +244,14 @@ def add_variables(variables: ET.Element, model: TimeModel, displays: Mapping[str
     """
 
     count, rows = _OFFSET + len(model.values), list[tuple[str, int, dict[str, str], str, dict[str, str]]]()
-    for index, place in enumerate(model.places):
-        displacement, force, _ = place.motion.words
-        length, newton = place.motion.displacement_unit, place.motion.force_unit
-        display = {"displayUnit": displays[length].name} if length in displays else {}
+    for index, place in enumerate(model.places, start=count):
+        units = place.motion.displacement_unit, place.motion.force_unit
+        length, newton = ({"displayUnit": displays[unit].name} if unit in displays else {} for unit in units)
+        displacement, force = (f"{word}.{place}" for word in place.motion.words[:2])
         attributes = {"causality": "input", "variability": "continuous"}
-        rows.append((f"{displacement}.{place}", count + index, attributes, length, {**display, "start": "0"}))
-        display = {"displayUnit": displays[newton].name} if newton in displays else {}
+        rows.append((displacement, index, attributes, units[0], {**length, "start": "0"}))
         attributes = {"causality": "output", "variability": "continuous", "initial": "calculated"}
-        rows.append((f"{force}.{place}", count + len(model.places) + index, attributes, newton, display))
+        rows.append((force, index + len(model.places), attributes, units[1], newton))
     for reference, value in enumerate(model.values, start=_OFFSET):
         attributes = {"description": _xml_text(value.meaning), "causality": "local", "variability": "constant"}
         real = {"start": repr(value.value)}

@@ -128,7 +128,7 @@ def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:
         rows, lists = defaultdict[str, list[str]](list), []
         for outlier in outliers:
             if (robust or outlier.column == "displacement") == is_excluded:
-                rows[outlier.source].append(str(outlier.row))
+                rows[f"{outlier.file or outlier.test}, {outlier.column}"].append(str(outlier.row))
         for file, numbers in rows.items():
             more = f" and {len(numbers) - _MOST_NAMED} more" if len(numbers) > _MOST_NAMED else ""
             lists.append(f"{file} row{'s' if len(numbers) > 1 else ''} {', '.join(numbers[:_MOST_NAMED])}{more}")

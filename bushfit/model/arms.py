@@ -157,18 +157,13 @@ def model_arms(
     parts: dict[str, list[str]] = {}
     for branch in model.structure.viscoelastic:
         parts.setdefault(qualified_size(branch), []).append(branch.name)
-    found = (
-        fitted_arms(
-            partial(part_modulus, model, size, conditions=conditions),
-            band,
-            accuracy,
-            stands_for=" and ".join(names),
-            size=size,
-        )
-        for size, names in parts.items()
-        if model.values[size]
-    )
-    return tuple(replace(part, conditions=conditions) for part in found)
+    fitted = []
+    for size, names in parts.items():
+        if model.values[size]:
+            modulus = partial(part_modulus, model, size, conditions=conditions)
+            arms = fitted_arms(modulus, band, accuracy, stands_for=" and ".join(names), size=size)
+            fitted.append(replace(arms, conditions=conditions))
+    return tuple(fitted)
 
 
 def arm_rows(model: Model, arms: Sequence[Arms]) -> list[tuple[str, float, float]]:
@@ -204,11 +199,8 @@ def part_modulus(model: Model, size: str, omega: Array, conditions: RubberCondit
     Returns:
         Complex modulus [Pa], (n,).
     """
-    still, values, reduced = (
-        np.zeros_like(omega),
-        values_under(model, conditions),
-        omega * model.shift_factor(conditions),
-    )
+    still, values = np.zeros_like(omega), values_under(model, conditions)
+    reduced = omega * model.shift_factor(conditions)
     branches = (branch for branch in model.structure.viscoelastic if qualified_size(branch) == size)
     return np.asarray(sum(branch.modulus(values_for_effect(branch, values), reduced, still) for branch in branches))
 

@@ -158,11 +158,6 @@ class Outlier:
     column: str
     distance: Number
 
-    @property
-    def source(self) -> str:
-        """Data file (or test name) and column of the outlier, for messages that list the rows."""
-        return f"{self.file or self.test}, {self.column}"
-
 
 @dataclass(frozen=True)
 class PriorUse:

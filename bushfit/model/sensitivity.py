@@ -7,6 +7,7 @@ the cost of central differences, and accurate to a millionth, which is enough fo
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import cast
 
 import numpy as np
@@ -51,14 +52,8 @@ def stiffness_and_slopes(
     array([[0.3634+0.j]])
     """
     if not model.only_branches:
-        return _differences_at(
-            direction,
-            model,
-            names,
-            lambda values: model.stiffness(
-                direction, frequency, amplitude, kind=kind, values=values, conditions=conditions
-            ),
-        )
+        respond = partial(model.stiffness, direction, frequency, amplitude, kind=kind, conditions=conditions)
+        return _differences_at(direction, model, names, respond)
     test = 2.0 * np.pi * frequency, amplitude * model.unit_strain(direction)
     modulus, slopes = np.zeros(frequency.size), np.zeros((len(names), frequency.size), dtype=complex)
     for branch in model.structure.branches:
@@ -83,15 +78,10 @@ def force_and_slopes(
     Returns:
         Force [N or N m], (n,), and its derivatives per SI unit of each parameter, (k, n).
     """
+    respond = partial(model.force, direction, displacement, kind="loop", conditions=conditions)
     if not model.only_branches:
-        return _differences_at(
-            direction,
-            model,
-            names,
-            lambda values: model.force(direction, displacement, kind="loop", values=values, conditions=conditions),
-        )
-    force = model.force(direction, displacement, kind="loop", conditions=conditions)
-    return force, force_slopes_of_branches(model, direction, displacement, names)
+        return _differences_at(direction, model, names, respond)
+    return respond(), force_slopes_of_branches(model, direction, displacement, names)
 
 
 def force_slopes_of_branches(model: Model, direction: Place, displacement: History, names: Sequence[str]) -> Array:
@@ -147,7 +137,7 @@ def _add_slopes(
 
 
 def _differences_at(
-    place: Place, model: Model, names: Sequence[str], respond: Callable[[Values], Array]
+    place: Place, model: Model, names: Sequence[str], respond: Callable[..., Array]
 ) -> tuple[Array, Array]:
     """Response of a model in one direction and its derivatives by one-sided differences.
 
@@ -157,14 +147,14 @@ def _differences_at(
         place: direction or specimen of the response.
         model: model; the derivatives are taken at its parameter values.
         names: names of k parameters.
-        respond: function from parameter values to the response, as of `differences`.
+        respond: function of the keyword argument `values`, parameter values, that gives the response.
 
     Returns:
         Response, (n,), and its derivatives per SI unit of each parameter, (k, n).
     """
     labels = place.labels if isinstance(place, Specimen) else (str(place),)
     local = [i for i, name in enumerate(names) if place_suffix(name) in (None, *labels)]
-    response, local_slopes = differences(model, [names[i] for i in local], respond)
+    response, local_slopes = differences(model, [names[i] for i in local], lambda values: respond(values=values))
     slopes = np.zeros((len(names), response.size), dtype=response.dtype)
     slopes[local] = local_slopes
     return response, slopes

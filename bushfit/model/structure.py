@@ -65,9 +65,9 @@ class Structure:
             tuple(effect for effect in records if isinstance(effect, Modifier)),
             tuple(effect for effect in records if isinstance(effect, Layer)),
             tuple(
-                qualified_name(b, parameter)
-                for b in branches
-                for parameter in b.parameters
+                qualified_name(branch, parameter)
+                for branch in branches
+                for parameter in branch.parameters
                 if parameter.unit.startswith("Pa")
             ),
         )
@@ -96,10 +96,9 @@ def as_one_layer(group: Sequence[Layer], values: Values) -> tuple[Layer, Values]
         The layer, and the values with the summed amount.
     """
     first, layer_values = group[0], [values_for_effect(layer, values) for layer in group]
-    return first, {
-        **layer_values[0],
-        **({first.adds: sum(values_of_layer[first.adds] for values_of_layer in layer_values)} if first.adds else {}),
-    }
+    if not first.adds:
+        return first, layer_values[0]
+    return first, {**layer_values[0], first.adds: sum(values_of_one[first.adds] for values_of_one in layer_values)}
 
 
 def values_for_effect(effect: Effect, values: Values) -> Values:

@@ -174,11 +174,9 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[str]:
 def _compressible(result: Result, bushing: Bushing, direction: Place) -> Iterator[str]:
     """Yield a warning if a bulk modulus of 2 GPa would lower the radial stiffness by more than 1 %."""
     place = direction if direction.axis is Direction.RADIAL else Direction.RADIAL
-    stiffness_decrease = (
-        bushing.correction.stiffness_decrease(result.model.values.get("mu", 0.0)) if bushing.correction else 0.0
-    )
-    if stiffness_decrease > _NOTED_LOWERING:
-        percent = number(100.0 * stiffness_decrease, 2)
+    decrease = bushing.correction.stiffness_decrease(result.model.values.get("mu", 0.0)) if bushing.correction else 0.0
+    if decrease > _NOTED_LOWERING:
+        percent = number(100.0 * decrease, 2)
         yield (
             f"{place}: the model assumes incompressible rubber; a bulk modulus of 2 GPa would lower "
             f"the radial stiffness of this shape by {percent} %"

@@ -75,14 +75,11 @@ class Comparison:
     @cached_property
     def bands(self) -> dict[str, Band]:
         """Differences of stiffness and loss factor with pointwise 95 % bands, by names such as "axial stiffness"."""
-        return {
-            f"{contrast.place} {name}": band
-            for contrast in self.contrasts
-            for name, band in (
-                (contrast.place.motion.words[2], contrast.stiffness),
-                ("loss factor", contrast.loss_factor),
-            )
-        }
+        bands = {}
+        for contrast in self.contrasts:
+            bands[f"{contrast.place} {contrast.place.motion.words[2]}"] = contrast.stiffness
+            bands[f"{contrast.place} loss factor"] = contrast.loss_factor
+        return bands
 
     @cached_property
     def largest_errors(self) -> Array:
@@ -181,25 +178,14 @@ def compare(
     frequencies = np.concatenate([frequency for frequency, _ in grids])
     middle = float(np.sqrt(frequencies.min() * frequencies.max()))
     parameters, joint = compare_parameters(reference, compared, middle)
-    sides = [
-        with_model_patterns(
-            result,
-            [
-                predict(result, pair[side], *grid, preload=preload)
-                for pair, grid, preload in zip(places, grids, preloads or [None] * len(places), strict=True)
-            ],
-        )
-        for side, result in enumerate((reference, compared))
-    ]
-    contrasts = [
-        Contrast(
-            one,
-            two,
-            two.stiffness.logarithm().minus(one.stiffness.logarithm()),
-            two.loss_factor.minus(one.loss_factor),
-        )
-        for one, two in zip(*sides, strict=True)
-    ]
+    sides, points = [], list(zip(places, grids, preloads or [None] * len(places), strict=True))
+    for side, result in enumerate((reference, compared)):
+        predictions = [predict(result, pair[side], *grid, preload=preload) for pair, grid, preload in points]
+        sides.append(with_model_patterns(result, predictions))
+    contrasts = []
+    for one, two in zip(*sides, strict=True):
+        stiffness = two.stiffness.logarithm().minus(one.stiffness.logarithm())
+        contrasts.append(Contrast(one, two, stiffness, two.loss_factor.minus(one.loss_factor)))
     files = {source.sha256 for source in compared.inputs}
     shared = tuple(str(source.file) for source in reference.inputs if source.sha256 in files)
     return Comparison(parameters, joint, tuple(contrasts), shared)
@@ -232,13 +218,10 @@ def with_model_patterns(result: Result, predictions: Sequence[Prediction]) -> li
         errors = (shape[:, None] * band.root[-2:]).reshape(-1, shape.shape[1])
         return replace(band, root=np.concatenate((band.root[:-2], errors)))
 
+    pairs = zip(predictions, np.split(block_diag(*shapes), ends, axis=1), strict=True)
     return [
-        replace(
-            prediction,
-            stiffness=spread(prediction.stiffness, shape),
-            loss_factor=spread(prediction.loss_factor, shape),
-        )
-        for prediction, shape in zip(predictions, np.split(block_diag(*shapes), ends, axis=1), strict=True)
+        replace(one, stiffness=spread(one.stiffness, shape), loss_factor=spread(one.loss_factor, shape))
+        for one, shape in pairs
     ]
 
 
@@ -259,15 +242,11 @@ def with_holm(comparisons: Sequence[Comparison]) -> list[Comparison]:
         The comparisons, with the adjusted p-value in the attribute `holm` of each tested parameter.
     """
     adjusted = iter(holm([row.p for comparison in comparisons for row in comparison.parameters if row.p is not None]))
-    return [
-        replace(
-            comparison,
-            parameters=tuple(
-                row if row.p is None else replace(row, holm=next(adjusted)) for row in comparison.parameters
-            ),
-        )
-        for comparison in comparisons
-    ]
+    changed = []
+    for comparison in comparisons:
+        rows = (row if row.p is None else replace(row, holm=next(adjusted)) for row in comparison.parameters)
+        changed.append(replace(comparison, parameters=tuple(rows)))
+    return changed
 
 
 def _describe_difference(band: Band, unit: str, contrast: Contrast) -> str:

@@ -7,7 +7,7 @@ without the effect; such effects are called unresolved.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -137,18 +137,10 @@ def predict(
         preload,
     )
     bands |= {"if_rigs": rigs, "measured": measured, "preload": conditions.preload, "over": over}
-    together = (
-        extrapolations(
-            result,
-            direction,
-            np.array([over.frequency or frequency.min()]),
-            np.array([abs(over.displacement) + amplitude.max()]),
-            temperature,
-            f"{direction}, with the large motion",
-        )
-        if over
-        else ()
-    )
+    together: Iterable[str] = ()
+    if over:
+        point = np.array([over.frequency or frequency.min()]), np.array([abs(over.displacement) + amplitude.max()])
+        together = extrapolations(result, direction, *point, temperature, f"{direction}, with the large motion")
     return replace(bushings, **bands, warnings=(*warnings, *together, *untimed))
 
 
