@@ -1,4 +1,4 @@
-"""Hypotheses: sets of explanations, and the states of model and tests around which they are weighed."""
+"""Hypotheses (sets of explanations of a gap), and the fitted models around which their evidence is computed."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.rig_class import ASSUMED, class_errors
 
-#: Natural log of the odds below the best at which a node (sizes of the rig's errors) is left out; chosen for time: a
-#: node of relative weight e^-8 changes no verdict.
+#: Natural log of the odds below the best at which a noise case is left out; chosen for time: a case of relative weight
+#: e^-8 changes no verdict.
 _NEAR = 8.0
 
 
@@ -70,7 +70,8 @@ class Hypothesis:
         levels: True if errors of amplitude levels are larger than the accuracy class of the rig allows.
         log_posterior: natural log of prior times evidence, not normalised.
         change: largest relative change of |K| by any of the explanations.
-        last_change: relative change of |K| by the last explanation if its evidence is linear; 0 if it was refitted.
+        last_change: relative change of |K| by the last explanation if its evidence is that of the linear model; 0 if it
+            was refitted.
         state: step of the search (fitted model) that has exactly these explanations, or all but the last.
         compound_deviates: True if the compound deviates from the model's laws in addition.
     """
@@ -105,7 +106,7 @@ class Hypothesis:
 
 @dataclass(frozen=True, eq=False)
 class Tests:
-    """Tests as recorded, or with one mistake in the record corrected, and the starting model fitted to these tests.
+    """Tests as recorded, or with one mistake in the record corrected, with the starting model fitted to them.
 
     Args:
         base: fit of the starting model; its residuals are whitened by scatter and by errors that points share.
@@ -163,9 +164,9 @@ class Tests:
 
 @dataclass(frozen=True, eq=False)
 class SearchState:
-    """Step of the search: a model fitted with some effects and faulty parts of the tests, open to further explanations.
+    """Step of the search: a model fitted with some effects and faulty parts of the tests.
 
-    The evidence for each further explanation is computed by linearising the residuals around this fit.
+    The evidence for each further explanation follows from the residuals linearised around this fit.
 
     Args:
         tests: tests with their record, as read or corrected.
@@ -174,7 +175,8 @@ class SearchState:
         log_prior: natural log of the prior probability of the set of explanations.
         effects: names of the effects that were added.
         faulty_parts: faulty parts of the tests, whose points may deviate together.
-        precision: prior precision by fitting coordinate of the effects; infinite for a shape at an end of its range.
+        precision: prior precision (inverse variance) by fitting coordinate of the effects; infinite for a shape
+            parameter at an end of its range.
         log_density: natural log of the prior density of these coordinates, with the factor of Laplace's method.
         amounts: prior standard deviation of each faulty part's deviation, relative to |K|.
         change: largest relative change of |K| by the effects and faulty parts.

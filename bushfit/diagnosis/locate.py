@@ -1,4 +1,7 @@
-"""Regions in which model and measurement disagree: smooth misfit per line and part, ranked, as sentences."""
+"""Regions of frequency and amplitude in which model and measurement disagree, ranked, as sentences.
+
+A line is a run of a sweep at one constant amplitude, or at one constant frequency.
+"""
 
 from collections.abc import Iterator, Sequence
 

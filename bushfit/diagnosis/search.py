@@ -1,4 +1,4 @@
-"""Sets of explanations, grown one at a time from the most probable: each weighed by the evidence of the tests.
+"""Search for the most probable sets of explanations of a gap, which grow by one explanation at a time.
 
 The evidence of effects comes from refits of all parameters, by Laplace's method; that of faulty parts and of curves
 without a name comes from a linear model.
@@ -41,7 +41,10 @@ _BENT = 1.5
 
 
 class Search:
-    """Beam search over sets of explanations of the gap between a fitted model and the tests."""
+    """Beam search over sets of explanations of the gap between a fitted model and the tests.
+
+    A state of the search is a model fitted with some explanations; the search extends the most probable states.
+    """
 
     def __init__(self, request: DiagnosisRequest) -> None:
         self.request = request
@@ -137,7 +140,7 @@ class Search:
                 self._known[candidate.key] = candidate
 
     def _with_outlier_cluster(self, hypothesis: Hypothesis, part: OutlierCluster) -> Hypothesis:
-        """Add to a hypothesis a disturbance at a frequency where several outliers were left out."""
+        """Extend a hypothesis by a disturbance at a frequency where several outliers were left out."""
         log_posterior = hypothesis.log_posterior + self._meeting_odds + part.log_odds
         if hypothesis.change > self.request.tolerance:
             change = max(hypothesis.change, part.size)
@@ -164,7 +167,7 @@ class Search:
         yield from self._with_faulty_parts(state, depth)
 
     def _promising(self, state: SearchState, by_evidence: int, by_score: int) -> list[str]:
-        """Names of the effects that are most promising as additions to a state of the search, to refit them.
+        """Select the effects to refit as additions to a state of the search.
 
         Args:
             state: state that the effects are added to.
@@ -301,7 +304,7 @@ class Search:
         return states
 
     def _corrected_records(self) -> Iterator[SearchState]:
-        """States of the starting model fitted to the tests with one mistake in the record corrected, the best first."""
+        """Generate the states with one mistake in the record corrected, the most promising mistake first."""
         data, base = self.request.data, self.request.base
         possible = claims(data, self.request.without)
         for claim in track("mistakes put right", list(ClaimScreening(data).best(possible, _CLAIMS))):

@@ -1,4 +1,4 @@
-"""Decide the verdict from the probabilities of explanations."""
+"""Verdict of a diagnosis, decided from the probabilities of the explanations of the gap."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from bushfit.effects.contract import Level
 
 @dataclass(frozen=True, eq=False)
 class Composition:
-    """Explanation of a gap by a set of effects, faults and mistakes, merged from all hypotheses with these parts.
+    """Explanation of a gap by a set of effects, faults and mistakes (its parts), merged from all hypotheses with them.
 
     Args:
         probability: probability of these parts if anything is missing.
@@ -43,7 +43,7 @@ class Composition:
 
     @property
     def parts(self) -> frozenset[str]:
-        """Names of the effects, kinds of faulty test parts and other parts of the explanation."""
+        """Names of the effects, mistakes and kinds of faults of the explanation; "unnamed" for a smooth curve."""
         best = self.best
         marks = [f"part: {part.family}" for part in self.faulty_parts] + ["levels"] * best.levels
         marks += ["unnamed"] * self.unnamed + ([str(best.claim.mistake.name)] if best.claim else [])
@@ -61,7 +61,7 @@ class Composition:
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """Verdict on the gap between model and tests, with its probabilities.
+    """Verdict on the gap between model and tests, with the explanations to report and their probabilities.
 
     Args:
         verdict: verdict in one word.
@@ -129,7 +129,7 @@ def _single(first: Composition, nothing: float, leads: Sequence[str]) -> Finding
     """Decide the verdict if one explanation is nearly certain.
 
     Args:
-        first: the explanation.
+        first: the nearly certain explanation.
         nothing: probability that nothing is missing.
         leads: names of effects that reduce the gap but do not explain it.
     """
@@ -149,7 +149,7 @@ def _single(first: Composition, nothing: float, leads: Sequence[str]) -> Finding
 
 
 def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
-    """Names of effects of the most probable hypothesis that nearly all hypotheses, by probability, contain.
+    """Names of the effects of the most probable hypothesis that nearly all hypotheses, by probability, also have.
 
     Args:
         pairs: hypotheses and their posterior probabilities, the most probable first.
@@ -163,7 +163,7 @@ def _leads(pairs: Sequence[tuple[Hypothesis, float]]) -> tuple[str, ...]:
 
 
 class _Parts(NamedTuple):
-    """Effects, faults and mistake of a hypothesis, by which hypotheses are merged into compositions.
+    """Effects, faults and mistake of a hypothesis; hypotheses with equal parts are merged into one explanation.
 
     Args:
         effects: names of the effects.
@@ -179,11 +179,7 @@ class _Parts(NamedTuple):
 
     @classmethod
     def of_hypothesis(cls, hypothesis: Hypothesis) -> _Parts:
-        """Effects, faulty parts and mistake that a hypothesis names.
-
-        Effects of the rubber are not named if the hypothesis includes a smooth deviation of the compound, because the
-        deviation could imitate them.
-        """
+        """Parts of a hypothesis; without effects of the rubber if a deviation of the compound could imitate them."""
         effects = frozenset(
             name
             for name in hypothesis.effects
@@ -211,16 +207,16 @@ def _subsets(names: frozenset[str]) -> list[frozenset[str]]:
 
 
 def compose(pairs: Sequence[tuple[Hypothesis, float]]) -> list[Composition]:
-    """Merge hypotheses that consist of the same explanations, with or without a deviation of the compound.
+    """Merge hypotheses with the same parts, with or without a deviation of the compound, into explanations to report.
 
-    A set of explanations that is less probable than a subset of it is merged with the subset; an effect that is a
-    limiting case of another is merged with that effect. Faulty parts of the same kinds are merged.
+    A set of parts that is less probable than a subset of it is merged with the subset; an effect that is a limiting
+    case of another is merged with that effect. Faulty parts of the same kinds are merged.
 
     Args:
         pairs: hypotheses and their posterior weights, the most probable first.
 
     Returns:
-        Compositions, the most probable first, whose probabilities sum to one.
+        Explanations, the most probable first, whose probabilities sum to one.
     """
     best: dict[_Parts, Hypothesis] = {}
     total: dict[_Parts, float] = defaultdict(float)
