@@ -177,11 +177,11 @@ def _column_of(cells: Cells, heading: Heading, index: int, stated_unit: str | No
         stated_unit: unit that the user states; None without one.
     """
     multiple = _MULTIPLE.sub(r"x \g<0>", stated_unit or "")
-    stated, in_row = (parse_unit(text) for text in (multiple, cells.layout.units[index]))
+    from_user, in_row = (parse_unit(text) for text in (multiple, cells.layout.units[index]))
     in_header = parse_unit(heading.unit or "")
-    texts = [stated[0]] if stated_unit else sorted({in_header[0], in_row[0]} - {""})
-    conventions = {stated[1] or part for part in (heading.convention, in_header[1], in_row[1], stated[1]) if part}
-    logarithm = stated[2] or in_row[2] or in_header[2] or heading.logarithm
+    texts = [from_user[0]] if stated_unit else sorted({in_header[0], in_row[0]} - {""})
+    conventions = {from_user[1] or part for part in (heading.convention, in_header[1], in_row[1], from_user[1]) if part}
+    logarithm = from_user[2] or in_row[2] or in_header[2] or heading.logarithm
     unit, convention = next(iter(texts), None), next(iter(conventions), None)
     column = Column(heading.role, unit, convention, logarithm, header=cells.headers[index], index=index)
     if len(texts) > 1 or len(conventions) > 1:

@@ -175,7 +175,11 @@ class Vocabulary:
     def shared(
         cls, names: Mapping[str, Sequence[str]], columns: Mapping[str, str], stated_units: Mapping[str, str]
     ) -> "Vocabulary":
-        """Return a vocabulary from a cache, because building one is slow; arguments as those of the class."""
+        """Return a vocabulary from a cache, because building one is slow.
+
+        Args:
+            names, columns, stated_units: as for the class.
+        """
         usual = tuple((role, tuple(words)) for role, words in names.items())
         return _shared(usual, tuple(columns.items()), tuple(stated_units.items()))
 
@@ -233,8 +237,8 @@ class Vocabulary:
             ):
                 for role in self._roles.get(word, ()):
                     is_unit = units.is_unit if role != "temperature" else units.kelvin_scale
-                    known = unit or (unit_below and parse_unit(unit_below)[0]) or unit_below
-                    fitting = role in self._stated_units or fits(word, role, known)
+                    column_unit = unit or (unit_below and parse_unit(unit_below)[0]) or unit_below
+                    fitting = role in self._stated_units or fits(word, role, column_unit)
                     if (certain or is_unit(unit or "")) and fitting:
                         return Heading(role, unit, implied, logarithm)
         return None

@@ -51,7 +51,11 @@ def same_text(text: str, reference: str) -> bool:
 
 
 def column_texts(cells: Cells, *indices: int) -> list[ColumnTexts]:
-    """Texts of columns, one entry for each index; an empty or merged cell has the text of the cell above."""
+    """Texts of columns; an empty or merged cell has the text of the cell above.
+
+    Returns:
+        One entry for each index.
+    """
     code_by_text: list[dict[str, int]] = [{} for _ in indices]
     parts = [[np.empty(0, dtype=np.intp)] for _ in indices]
     for block in cells.blocks() if indices else ():

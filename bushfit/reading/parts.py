@@ -61,6 +61,9 @@ class OpenedFile:
         Args:
             is_usable: function that returns True if a part can contain the table.
 
+        Returns:
+            The only part that is usable.
+
         Raises:
             MeasurementError: no part, or more than one, is usable.
         """

@@ -189,7 +189,15 @@ class Table(Cells):
         return column is not None and units.is_compatible(column.unit or "1", expected)
 
     def columns_key(self, role: str, unit: str) -> str:
-        """Suggest campaign keys for a missing column: 'columns = { force = "F1" }' for unused headers with its unit."""
+        """Suggest campaign keys for a missing column, such as 'columns = { force = "F1" }', for the hint of an error.
+
+        Args:
+            role: role of the missing column, such as "force".
+            unit: its SI unit.
+
+        Returns:
+            Keys for up to three unused headers with a unit of this dimension.
+        """
         usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS}, {})
         free = [
             (header, split_convention(units.split_header(split_convention(header)[0])[1] or in_row)[0])
@@ -283,9 +291,9 @@ class Table(Cells):
                 number = float(values[role][row] / column.scale)
                 if number != -1.0 and (abs(number) < 99.0 or not set(f"{abs(number):.9g}") <= set("9.")):
                     continue
-                others = values[role][values[role] != values[role][row]] / column.scale
-                is_apart = abs(number) > _MARK_RATIO * np.abs(others).max(initial=0.0)
-                if others.size > values[role].size / 2 and (others.min() > 0.0 if number == -1.0 else is_apart):
+                rest = values[role][values[role] != values[role][row]] / column.scale
+                is_apart = abs(number) > _MARK_RATIO * np.abs(rest).max(initial=0.0)
+                if rest.size > values[role].size / 2 and (rest.min() > 0.0 if number == -1.0 else is_apart):
                     marks[column.index] = next(islice(self.rows(), row, None))[1][column.index]
         return marks
 
