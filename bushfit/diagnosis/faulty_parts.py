@@ -70,7 +70,7 @@ def _level_label(sweep: MeasuredSweep, point: int) -> str:
 
 
 def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
-    """Generate faults of each level of a direction with several levels, and of each of three or more repeats."""
+    """Generate suspected faults: each level of a direction with several levels, each of three or more repeats."""
     for sweep in sweeps:
         levels_of_direction = [np.unique(member.held_value) for member in sweeps if member.direction == sweep.direction]
         levels = np.concatenate(levels_of_direction)
@@ -87,7 +87,7 @@ def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fau
 
 
 def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
-    """Generate faults of all points of one repeat, in one sweep, in all sweeps of a direction, or in all sweeps."""
+    """Generate suspected faults: each repeat, in one sweep, in all sweeps of a direction, or in all sweeps."""
     for _, label, members in _scopes(sweeps):
         if not all(np.unique(sweep.repeat).size > 1 for sweep in members):
             continue
@@ -98,7 +98,7 @@ def _repeats(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fa
 
 
 def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[FaultyPart]:
-    """Generate faults of one or a few frequencies, in one sweep, in all sweeps of a direction, or in all sweeps."""
+    """Generate suspected faults: one to three frequencies, in one sweep, all sweeps of a direction, or all sweeps."""
     steps = np.unique(np.concatenate([sweep.frequency for sweep in sweeps])) if sweeps else np.empty(0)
     if steps.size < _FEWEST_FREQUENCIES:
         return

@@ -330,7 +330,7 @@ class _Grid:
 
 
 def _settled_grid(fitted: Evidence, term: Term, plain: LinearModel, model: Model, bounds: Bounds) -> _Grid | None:
-    """Narrow a grid of powers about the most probable pair, step by step, with the parameters of the model.
+    """Find the powers of frequency and amplitude nearest to a gap, on a grid that narrows about the likeliest pair.
 
     After each step the parameters of the model and the amount of the power law are fitted again.
 

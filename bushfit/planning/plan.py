@@ -216,6 +216,5 @@ def plan_warnings(search: PlanSearch, planned: Programme, missed: Sequence[str |
     if planned.rival_chi_square is not None and planned.rival_chi_square < RIVALS_APART:
         yield (
             f"the expected chi-square between the nearest rivals is {number(planned.rival_chi_square, 2)}, less "
-            "than the "
-            f"{number(RIVALS_APART, 3)} that distinguishes them in nine of ten cases"
+            f"than the {number(RIVALS_APART, 3)} that distinguishes them in nine of ten cases"
         )

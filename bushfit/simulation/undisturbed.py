@@ -242,7 +242,10 @@ def _clean_record(truth: Model, test: SimulatedRecord, seed: list[int]) -> rig.R
 
 
 def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Array:
-    """Simulate the complex stiffness of a sweep without noise [N/m or N m/rad], (levels, steps)."""
+    """Simulate the complex stiffness of a sweep without noise [N/m or N m/rad], (levels, steps).
+
+    A level is a constant amplitude or frequency, at which the sweep steps through the other quantity.
+    """
     points = (values.ravel() for values in test.points)
     conditions = RubberConditions(test.temperature, preload=test.static)
     stiffness = rig.dynamic_stiffness(
