@@ -22,7 +22,7 @@ from bushfit.diagnosis.holdout import HoldOut, hold_out
 from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis
 from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.next_test import deciding_test
-from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP, NAMED
+from bushfit.diagnosis.priors import LARGEST_CLOSED_GAP
 from bushfit.diagnosis.record import Diagnosis, MisfitRegion, NamedCause
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Composition, Finding, decide_verdict
@@ -203,7 +203,7 @@ class DiagnosisWriter:
         """Diagnosis without a named effect: described by a correction, or unexplained, or with a faulty test."""
         finding, best = self.finding, self.first.best if self.first else None
         leads = f"; leads: {' and '.join(finding.leads)}" if finding.leads else ""
-        if best and best.claim and self.first.probability >= NAMED:  # type: ignore[union-attr]
+        if best and best.claim and len({c.best.claim and c.best.claim.key for c in finding.reported}) == 1:
             leads = f"; check first whether {best.claim.sentence(self.request.data)}"
         at_fault = " and ".join(part.name for part in best.faulty_parts) if best else ""
         is_fault = best is not None and finding.verdict == "unexplained"
@@ -213,8 +213,7 @@ class DiagnosisWriter:
             return self._build("described", summary, gap.after, [NamedCause(UNNAMED, gap.evidence)], gap=gap)
         summary, advice = "no known effect closes the gap" + leads, ""
         if at_fault:
-            several = len(best.faulty_parts) > 1  # type: ignore[union-attr]
-            summary = f"measure again first: {at_fault} deviate{'s' * (not several)} from all other tests"
+            summary = f"measure again first: {at_fault}; all other tests disagree with this part"
         elif is_fault:
             summary = "the levels disagree by more than the class of the rig, and nothing else is missing"
             advice = "measure the levels again in another session, or state the class of the rig (gain_error under "
@@ -259,7 +258,7 @@ class DiagnosisWriter:
         at_fault = list[MisfitRegion]()
         for part in places.faulty_parts if places else ():
             kind, component = ("loop", "force") if part.family == "loop" else ("sweep", "storage")
-            reading = f"{part.name} deviates by {number(100 * places.change, 2)} % from all other tests"  # type: ignore[union-attr]
+            reading = f"{part.name}: a deviation of {number(100 * places.change, 2)} % from all other tests"  # type: ignore[union-attr]
             excess = part.distance(base.residual)
             at_fault.append(
                 MisfitRegion(part.direction, kind, part.frequency, part.amplitude, component, excess, reading)

@@ -95,7 +95,7 @@ def explain_miss(search: PlanSearch, goal: TargetSensitivity) -> str | None:
         return f"no test so far or {origin} covers this: {sentence}"
     if not goal.met(limit):
         reached, reason = format_half_width(goal.half_width(limit)), goal.explain_limit(problem.knowledge, limit)
-        return f"no available test meets it, {UNLIMITED_RUNS} runs of each would reach {reached}: {reason}"
+        return f"no available test meets it; {UNLIMITED_RUNS} runs of each would reach {reached}: {reason}"
     if goal.met(covariance(counts)):
         return None
 

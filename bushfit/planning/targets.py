@@ -175,7 +175,7 @@ class TargetSensitivity:
         if variance[worst] > 0.25 * self.variances(knowledge.covariance)[worst]:
             remaining = f"{name}, which no available test determines well enough"
         size, cause = max(
-            (Z95 * float(self.model_error[worst]), "the model error: no test reduces it, but naming its cause may"),
+            (Z95 * float(self.model_error[worst]), "the model error: no test reduces it; diagnose may name its cause"),
             (
                 float(self.undecided[worst]),
                 "explanations that the tests cannot distinguish: bushfit diagnose states the next test",
