@@ -22,8 +22,8 @@ def command(folder: Path, date: str | None, output: Output) -> None:
 
     Show, print or mail the page: it is a single file that needs no network. The page shows part and tests, verdict,
     expected error, prediction and measurement, parameters with intervals, differences between tests and model, the
-    next test, and the origin of the numbers. All numbers come from the JSON and CSV files in DIR. run and diagnose
-    write the page by themselves.
+    next test, and the origin of the numbers. All numbers come from the JSON and CSV files in DIR. The
+    commands run and diagnose also write this page.
 
     Writes report.html, in place of an earlier one, or for a batch index.html.
     """

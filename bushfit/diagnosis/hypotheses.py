@@ -211,7 +211,7 @@ class SearchState:
 
     @cached_property
     def linear(self) -> LinearModel:
-        """Linear model of the residuals around the fit for all sizes of the rig's errors, to compute evidence with."""
+        """Residuals linearised at the fit, from which the evidence is computed for each noise case of the rig."""
         tests, solution = self.tests, self.bare.solution
         precision = np.array([self.precision.get(name, 0.0) for name in solution.coordinates.names])
         moves = np.isfinite(precision)

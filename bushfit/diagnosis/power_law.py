@@ -307,7 +307,7 @@ class _Grid:
 
     @property
     def share(self) -> Array:
-        """Posterior probability of each pair of powers, (g,)."""
+        """Posterior probability of each of the g pairs of exponents of frequency and amplitude, (g,)."""
         return np.exp(self.log_evidences - logsumexp(self.log_evidences))
 
     @property

@@ -42,14 +42,16 @@ class Products:
 
 @dataclass(frozen=True, eq=False)
 class ProjectedColumns:
-    """Residuals of a fitted model, and columns of what may explain them: parameters, rig, compound, further groups.
+    """Residuals of a fitted model, and residual columns of what may explain them, without what the parameters explain.
+
+    A residual column is the change of the residuals by an explanation of unit size.
 
     Args:
         residual: residuals in units of the scatter from point to point, (n,).
         jacobian: derivatives of the residuals by the parameters and by the deviations of faulty parts, (k, n).
         precision: prior precision of each row of the Jacobian, 0 for a flat prior, (k,).
-        rig: errors of the rig, with the noise cases: assumptions on the sizes of these errors and of the compound's
-            deviation from the model's laws.
+        rig: errors of the rig. Each of its noise cases assumes a size of these errors and of the compound's deviation
+            from the model's laws.
         groups: candidate explanations, each a group of residual columns.
         chosen_cases: indices of the noise cases to average over; None for all.
         compound: columns of the compound's deviation at unit size, part of every hypothesis; None without a deviation.

@@ -272,7 +272,13 @@ class Search:
                 yield self._register(self._with_fit(state, [e for e in state.effects if e != name], evidence))
 
     def _with_fit(self, state: SearchState, effects: Sequence[str], evidence: Evidence) -> SearchState:
-        """State of the search that consists of a fit with the given effects, to the tests of another state."""
+        """Fit the model with these effects to the tests of `state`, and return the fit as a state of the search.
+
+        Args:
+            state: state with the tests.
+            effects: names of the effects, added one after the other.
+            evidence: linear estimates of the evidence of all candidates, from which the fits start.
+        """
         fitted = replace(SearchState.of_tests(state.tests, self.request), evidence=evidence)
         for order, name in enumerate(effects):
             fitted = self._with_effect(fitted, name, evidence, order)

@@ -24,10 +24,10 @@ class Composition:
     """Explanation of a gap by a set of effects, faults and mistakes (its parts), merged from all hypotheses with them.
 
     Args:
-        probability: probability of these parts if anything is missing.
+        probability: probability of these parts, given that something is missing in the model.
         best: most probable hypothesis with these parts.
-        names: effects in the set; with a deviation of the compound no effects of the rubber, which the deviation
-            includes.
+        names: effects in the set. If the set has a deviation of the compound, effects of the rubber are not listed,
+            because the deviation includes them.
         unnamed: True if a curve without a name, or a deviation of the compound, is part of the explanation.
     """
 

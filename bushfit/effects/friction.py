@@ -171,7 +171,7 @@ def modulus_sensitivities(p: Values, omega: Array, strain: Array) -> dict[str, A
 
 
 def _stroke(start: Any, sign: Any, distance: Any) -> tuple[Any, Any, Any]:
-    """Friction stress u, relative to sigma_fmax, along one stroke, the motion between two turning points (Eq. 5).
+    """Friction stress u, relative to sigma_fmax, along one stroke, the motion between two turning points.
 
     Args:
         start: relative stress u_s at the turning point where the stroke begins.
@@ -179,7 +179,10 @@ def _stroke(start: Any, sign: Any, distance: Any) -> tuple[Any, Any, Any]:
         distance: strain d since the turning point, relative to eps_half, not negative.
 
     Returns:
-        u, and two terms that its derivatives use: v and v + d.
+        u, and two terms that its derivatives use: v = 1 - sign u_s and v + d.
+
+    Notes:
+        u = u_s + sign d v/(v + d), Eq. 5 of Garcia Tarrago et al. (2007).
     """
     room = 1.0 - sign * start
     reach = room + distance

@@ -128,7 +128,7 @@ class MeasuredLoop(MeasuredBase):
         return replace(self, prepared=replace(self.prepared, noise=relative * self.prepared.half_range))
 
     def with_model_error(self, size: float) -> Self:
-        """Return the test with a model error of this standard deviation, relative to half the force range or |K|."""
+        """Return the loop with this standard deviation of the model error, relative to half the force range."""
         test = replace(self, model_error=size)
         test.__dict__["_unit_error"] = self._unit_error
         return test

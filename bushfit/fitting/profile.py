@@ -59,7 +59,7 @@ class _Profile:
     known: dict[float, FitResult]
 
     def value(self, coordinate: float) -> float:
-        """Value of the parameter [SI] at a coordinate."""
+        """Value of the parameter [SI] for a coordinate of the fit: ln of a positive parameter, else the parameter."""
         (value,) = Coordinates.of_parameters(self.best.model, [self.name]).values([coordinate]).values()
         return float(np.clip(value, *self.best.model.parameters[self.name].bounds))  # exp(log(bound)) may lie beyond it
 

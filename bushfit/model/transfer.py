@@ -18,10 +18,11 @@ FACTOR_SPREAD = 0.03
 
 
 def factor_spread(result: Result) -> float | None:
-    """Standard deviation of bushings' stiffness relative to their formula, by the priors of the fitted bushings.
+    """Standard deviation of the stiffness of bushings relative to their formula, from the priors of their factors.
 
     Returns:
-        Root mean square deviation of their stiffness factors from 1 [1]; None if no bushing has a free factor.
+        Root mean square distance from 1 of the stiffness factors that the campaign's priors expect [1]; None if no
+        bushing has a free factor.
     """
     names = [f"stiffness_factor.{bushing.name}" for bushing in result.bushings]
     priors = [result.priors[name] for name in names if name in result.priors]

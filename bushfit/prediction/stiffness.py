@@ -40,14 +40,14 @@ class Prediction:
         direction: direction or specimen.
         frequency: frequency of each point [Hz], (n,).
         amplitude: zero-to-peak amplitude of each point [m, rad or 1], (n,).
-        stiffness: magnitude |K| [N/m or N m/rad].
+        stiffness: magnitude |K| [N/m, N m/rad or, of a specimen with a strain amplitude, Pa].
         loss_factor: K''/K' [1].
-        storage_stiffness, loss_stiffness: K' and K'' [N/m or N m/rad].
+        storage_stiffness, loss_stiffness: K' and K'', in the unit of |K|.
         warnings: sentences on directions, frequencies and strains that were not fitted, on excluded effects of the rig,
             and on unresolved effects.
-        if_rigs: prediction if the unresolved effects belong to the rig, which the bands include; None without
-            unresolved effects.
-        measured: measured complex stiffness at these points, mean of the repeats [N/m or N m/rad], (n,); nan at a
+        if_rigs: prediction if the unresolved effects belong to the rig, not to the bushing; the bands include it, too.
+            None without unresolved effects.
+        measured: measured complex stiffness at these points, mean of the repeats, in the unit of |K|, (n,); nan at a
             point without a measurement; None without sweeps.
         preload: preload of all points; None if the tests of this direction did not have several.
         over: slow large motion or static offset under the harmonic; None for the harmonic alone.

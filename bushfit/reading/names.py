@@ -206,7 +206,7 @@ def _convention_in_line(line: Line) -> AmplitudeConvention | None:
 
 
 def is_remark(text: str) -> bool:
-    """Return True if a text may change what a test means, such as "2 bushings in parallel", but states no key."""
+    """Return True if a text in a file may change what a test means but has no key of a campaign: "2 in parallel"."""
     return any(plain(word).startswith(_REMARKS) for word in _LETTERS.findall(text))
 
 

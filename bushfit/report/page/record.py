@@ -108,10 +108,14 @@ def report_record(files: Sequence[ResultFile], folder: Path | None = None) -> Re
 def _tests(tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
     """Select the tables of measured and modelled tests: `gap`, `sweeps`, `loops`, and validation records.
 
-    Missing tables of sweeps and loops are taken from the table of the gap (measured minus model), if there is one.
+    A diagnosis writes no tables of sweeps and loops. Its table of the gap has the same columns, with a row for each
+    point of a sweep and each row of a loop.
 
     Args:
         tables: tables of a result by file name.
+
+    Returns:
+        The selected tables by file name; rows of the gap where tables `sweeps` and `loops` are missing.
     """
     tested = {name: tables[name] for name in ("gap", "sweeps", "loops") if name in tables}
     if "gap" in tested:
