@@ -153,8 +153,7 @@ def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
             if is_same or layout.is_repeated(cells):
                 is_new = True
                 continue
-            is_units = is_units_row([cell.strip("[]() ") for cell in cells])
-            if rows and (is_summary_row(cells) or is_units or layout.is_header(cells, vocabulary)):
+            if rows and (is_summary_row(cells) or is_units_row(cells) or layout.is_header(cells, vocabulary)):
                 rows.append((line.number, cells, len(groups) - 1))  # left out later, or refused
                 continue
             if is_note or not is_row(cells):

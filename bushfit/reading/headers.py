@@ -257,13 +257,8 @@ class Vocabulary:
 
 
 @lru_cache(maxsize=64)
-def _shared(
-    names: tuple[tuple[str, tuple[str, ...]], ...],
-    columns: tuple[tuple[str, str], ...],
-    stated_units: tuple[tuple[str, str], ...],
-) -> Vocabulary:
-    """Vocabulary from arguments that can be the key of a cache; see `Vocabulary.shared`."""
-    return Vocabulary(dict(names), dict(columns), dict(stated_units))
+def _shared(*entries: tuple[tuple[str, Any], ...]) -> Vocabulary:
+    return Vocabulary(*map(dict, entries))
 
 
 def fits(word: str, role: str, unit: str | None) -> bool:

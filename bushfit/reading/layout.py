@@ -295,7 +295,7 @@ def _likeliest(
     rows = [(mark, cells) for mark, cells in rows if len(cells) > 1 and all(map(is_like_number, cells))] or rows
     for delimiter, row in rows:
         cells = {index: split(lines[index].content, delimiter) for index in reversed(before)}
-        are_units = {index: is_units_row([cell.strip("[]() ") for cell in cells[index]]) for index in cells}
+        are_units = {index: is_units_row(cells[index]) for index in cells}
         fitting = [index for index in cells if len(row) == len(cells[index]) and not are_units[index]]
         if fitting:
             index = next((index for index in fitting if are_units.get(index + 1)), fitting[0])
@@ -353,7 +353,7 @@ def _below_headers(header: str, row: str) -> list[str]:
 
 def is_units_row(cells: Sequence[str]) -> bool:
     """Return True if at least half of the non-empty cells are units and no cell is a number other than the unit 1."""
-    filled = [split_convention(cell)[0] for cell in cells if cell]
+    filled = [split_convention(cell.strip("[]() "))[0] for cell in cells if cell.strip("[]() ")]
     has_numbers = any(is_like_number(cell) and cell != "1" for cell in filled)
     return not has_numbers and 0 < len(filled) <= 2 * sum(units.is_unit(cell) for cell in filled)
 

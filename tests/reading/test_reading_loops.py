@@ -50,6 +50,37 @@ def test_a_quote_left_open_in_a_remark_takes_no_rows(first, last, tmp_path):
     assert np.array_equal(loop.force, loop_from(LOOP, tmp_path).force)
 
 
+def test_a_force_of_the_other_sign_is_turned(tmp_path):
+    loop = loop_from(LOOP, tmp_path)
+    text = "\n".join(
+        [
+            LOOP_HEADER,
+            *(
+                f"{t:.9g},{1e3 * x:.9g},{-f:.9g}"
+                for t, x, f in zip(loop.time, loop.displacement, loop.force, strict=True)
+            ),
+        ]
+    )
+    turned = loop_from(text, tmp_path, force_sign=-1)
+    np.testing.assert_allclose(turned.force, loop.force, rtol=1e-6, atol=1e-6)
+    with pytest.raises(BushfitError, match="the force falls where the displacement rises"):
+        loop_from(LOOP, tmp_path, force_sign=-1)
+
+
+@pytest.mark.parametrize("count", [24, 30])
+def test_rates_count_steps_and_not_rows(count, tmp_path):
+    """Of few rows: a rate from n rows in n - 1 steps would be 4 % off, beyond the agreement with a stated rate."""
+    time = np.arange(count) / 20.0
+    rows = "\n".join(f"{t:.9g},{np.sin(12 * t):.6f},{100 * np.sin(12 * t + 0.1):.6f}" for t in time)
+    loop = loop_from(f"Sampling rate: 20 Hz\ntime,displacement [mm],force [N]\n{rows}\n", tmp_path)
+    np.testing.assert_allclose(loop.time, time, atol=1e-9)
+    rounded = "\n".join(
+        f"{np.floor(10 * t) / 10:.1f},{np.sin(12 * t):.6f},{100 * np.sin(12 * t + 0.1):.6f}" for t in time
+    )
+    loop = loop_from(f"time [s],displacement [mm],force [N]\n{rounded}\n", tmp_path)
+    assert "at 20 Hz" in loop.source.notes[-1]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("lead", ["# rig 3\n\n", '\ufeffOperator "A"\nPrüfstand 3\n'])
 def test_a_large_file_reads_like_a_small_one(lead, tmp_path):
