@@ -90,11 +90,6 @@ def bomb(file: Path) -> None:
         book.create_dataset("run1/x", (1, 1 << 40), "f8", chunks=(1, 1 << 20))
 
 
-def of_compliances(file: Path) -> None:
-    responses = recordings.at_nodes([1e-6 - 1e-7j, 1e-6], [5.0, 10.0], "axial 0.1 mm", "displacement", "force")
-    pyuff.UFF(str(file)).write_sets([MILLIMETRES, *responses], "overwrite")
-
-
 #: Files that cannot be used, and what their error says.
 SPOILED: list[tuple[str, Callable[[Path], object], tuple[str, ...]]] = [
     ("rates.mf4", of_two_rates, ("no group holds such a table", '"at 100 Hz", "at 20 Hz"', "resample")),
@@ -109,7 +104,6 @@ SPOILED: list[tuple[str, Callable[[Path], object], tuple[str, ...]]] = [
     ("empty.mf4", lambda file: file.write_bytes(b""), ("the file is empty",)),
     ("scalars.mat", lambda file: savemat(file, {"a": 1.0, "b": "text"}), ("holds no channels", "table2struct")),
     ("modes.unv", lambda file: pyuff.UFF(str(file)).write_sets([MILLIMETRES], "overwrite"), ("dataset 58",)),
-    ("nodes.unv", of_compliances, ("frequency, displacement over force, phase",)),
     ("bomb.mat", bomb, ("cannot be read", "it unpacks to 1099511627776 values")),
     *((f"cut.{ending}", cut(ending), ("file cannot be read", "cut short")) for ending in recordings.WRITERS),
 ]  # fmt: skip
