@@ -86,6 +86,8 @@ def exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> 
     Returns:
         Sheet with the exchanged tables, below the lines above each; None if there is no such table.
     """
+    if not any(map(is_like_number, layout.headers)):
+        return None
     rows = [list(map(str, cells_of(line, layout.delimiter))) for line in source.head()]
     content, is_exchanged = list[Sequence[str]](), False
     for is_table, run in groupby(rows, key=lambda cells: len(cells) > 3 and all(map(is_like_number, cells[1:]))):

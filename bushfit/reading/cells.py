@@ -22,6 +22,8 @@ from bushfit.reading.times import clock
 _MOST_LEFT_OUT = 0.1
 #: Number of first rows that are examined; chosen: a long record need not be read completely.
 _FIRST = 1000
+#: Largest number of rows of texts between the units and the first numbers.
+_MOST_TEXT_ROWS = 8
 #: Largest number of lines that a note lists.
 _MOST_LISTED = 4
 #: Rows with an unknown word instead of a number that are always left out; chosen: a mean, a deviation, a range.
@@ -94,8 +96,8 @@ class Cells:
     @cached_property
     def first_row(self) -> Sequence[str | float]:
         """Cells of the first row of data in the table, with numbers if there is one; empty cells without rows."""
-        rows = (row for row in self.first_rows if is_row(list(map(str, row))))
-        return next(rows, self.first_rows[0])
+        rows = [cells for _, cells in islice(self.rows(), _MOST_TEXT_ROWS)] or [[""] * len(self.headers)]
+        return next((row for row in rows if is_row(list(map(str, row)))), rows[0])
 
     @cached_property
     def first_rows(self) -> list[Sequence[str | float]]:

@@ -65,11 +65,11 @@ def read_loop(
             else "take force_sign = -1 out of the campaign",
         )
     if "time" in values:
-        copies = np.all([np.diff(values[role]) == 0.0 for role in ("time", "displacement", "force")], axis=0)
-        if copies.any() and np.array_equal(copies, np.diff(values["time"]) <= 0.0):
-            values = {role: np.delete(numbers, np.flatnonzero(copies) + 1) for role, numbers in values.items()}
-            count = np.count_nonzero(copies)
-            repeated = f"{count} rows that repeat the rows" if count > 1 else "1 row that repeats the row"
+        stuck = values["time"][1:] <= values["time"][:-1]
+        copies = np.flatnonzero(stuck) + 1
+        if copies.size and all(np.array_equal(x[copies], x[copies - 1]) for x in values.values()):
+            values = {role: np.delete(numbers, copies) for role, numbers in values.items()}
+            repeated = f"{copies.size} rows that repeat the rows" if copies.size > 1 else "1 row that repeats the row"
             notes += (f"{repeated} before, with its time, left out",)
             displacement, force = values["displacement"], values["force"]
         time, more = increasing_time(table, wanted["time"], values["time"])

@@ -18,9 +18,10 @@ from bushfit.reading.blocks import refuse_other_columns
 from bushfit.reading.cells import Cells, FaultyRow
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Column, Vocabulary, is_angular, split_convention
 from bushfit.reading.labelled import find_labels
+from bushfit.reading.layout import Line
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import Labels, is_remark, labels_above
-from bushfit.reading.numerals import ALL_NUMERALS
+from bushfit.reading.numerals import ALL_NUMERALS, is_like_number
 from bushfit.reading.roles import OF_MOTION, of_motion, si_unit
 from bushfit.reading.source import LARGEST_VALUE, LEAST_VALUE, RowSource, Sheet
 from bushfit.reading.times import clock
@@ -50,20 +51,22 @@ class Table(Cells):
     notes: tuple[str, ...] = field(default=(), kw_only=True)
 
     @cached_property
+    def lines_above(self) -> list[Line]:
+        """Non-empty lines above the table."""
+        return [line for line in self.source.head() if line.number < self.layout.header_line]
+
+    @cached_property
     def labels_above(self) -> Labels:
         """Labels in the lines above the table, such as a temperature."""
-        return labels_above(line for line in self.source.head() if line.number < self.layout.header_line)
+        return labels_above(self.lines_above)
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
         """Sentences on lines above the table, marked rows and hidden rows that may change what the test means."""
-        above = (line for line in self.source.head() if line.number < self.layout.header_line)
-        sentences = [
-            f'line {line.number} is not understood: "{line.text[:_LONGEST_QUOTE]}"'
-            for line in above
-            if is_remark(line.text)
-        ]
-        texts = Counter(cell for row in self.first_rows for cell in row if isinstance(cell, str) and cell[:1].isalpha())
+        remarks = ((line.number, line.text[:_LONGEST_QUOTE]) for line in self.lines_above if is_remark(line.text))
+        sentences = [f'line {number} is not understood: "{text}"' for number, text in remarks]
+        rows = [] if all(is_like_number(str(cell)) for cell in self.first_row) else self.first_rows
+        texts = Counter(cell for row in rows for cell in row if isinstance(cell, str) and cell[:1].isalpha())
         sentences += [
             f'{count} rows are marked "{cell[:_LONGEST_QUOTE]}"' for cell, count in texts.items() if is_remark(cell)
         ]
@@ -73,8 +76,8 @@ class Table(Cells):
 
     def quantity_above(self, unit: str) -> str | None:
         """Return the only quantity with the dimension of an SI unit behind = or : in the lines above the table."""
-        above = (line.text for line in self.source.head() if line.number < self.layout.header_line)
-        matches = (match for text in above for match in _QUANTITY.finditer(text) if units.is_compatible(match[2], unit))
+        matches = (match for line in self.lines_above for match in _QUANTITY.finditer(line.text))
+        matches = (match for match in matches if units.is_compatible(match[2], unit))
         texts = dict.fromkeys(f"{match[1].replace(',', '.')} {match[2]}" for match in matches)
         return next(iter(texts)) if len(texts) == 1 else None
 
@@ -286,7 +289,7 @@ class Table(Cells):
             Cell with such a number, as in the file, by index of its column.
         """
         marks: dict[int, str | float] = {}
-        for role, column in wanted.items():
+        for role, column in ((role, column) for role, column in wanted.items() if role != "time"):
             for row in {int(values[role].argmin()), int(values[role].argmax())} if values[role].size else ():
                 number = float(values[role][row] / column.scale)
                 if number != -1.0 and (abs(number) < 99.0 or not set(f"{abs(number):.9g}") <= set("9.")):
