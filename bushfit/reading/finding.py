@@ -51,26 +51,24 @@ def find_table(
     """
     opened = file if isinstance(file, OpenedFile) else open_file(file, file_format or FileFormat())
     file_format, columns = opened.stated, dict(columns or {})
-    numbered = {role: "\0" if text.isdecimal() else text for role, text in columns.items()}
-    vocabulary = Vocabulary.shared(of_motion(names, motion), numbered, stated_units or {})
-    in_headers = {role: text for role, text in columns.items() if not text.isdecimal()}
-    all_names = Vocabulary.shared(of_motion(names, motion), in_headers, stated_units or {})
+    named = {role: text for role, text in columns.items() if not text.isdecimal()}
+    vocabulary = Vocabulary.shared(of_motion(names, motion), named, stated_units or {})
 
     def lay_out(source: RowSource) -> tuple[RowSource, Layout]:
         """Return rows and layout of the table in a part of the file; blocks and wide tables become long."""
         delimiter = "" if isinstance(source, Sheet) else DELIMITERS.get(file_format.delimiter or "")
         stated_line = file_format.header_line
-        layout = source.layout or find_layout(source.head(), all_names, delimiter=delimiter, header_line=stated_line)
+        layout = source.layout or find_layout(source.head(), vocabulary, delimiter=delimiter, header_line=stated_line)
         if "amplitude" in names and stated_line is None:
-            if exchanged := exchange_rows(source, layout, all_names):
-                source, layout = exchanged, find_layout(exchanged.head(), all_names, delimiter="")
+            if exchanged := exchange_rows(source, layout, vocabulary):
+                source, layout = exchanged, find_layout(exchanged.head(), vocabulary, delimiter="")
             if wide := unpivot(source, opened.file, vocabulary, layout):
                 return wide
         return combined(source, layout, vocabulary)
 
     try:
         layouts = {id(part): lay_out(part) for part in opened.parts}
-        part = opened.choose(lambda part: len(all_names.roles(layouts[id(part)][1].headers) - {"time"}) > 1)
+        part = opened.choose(lambda part: len(vocabulary.roles(layouts[id(part)][1].headers) - {"time"}) > 1)
     except csv.Error as error:
         raise MeasurementError("the table cannot be read", file=opened.file, found=str(error)) from error
     source, layout = layouts[id(part)]

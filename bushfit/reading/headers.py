@@ -257,8 +257,12 @@ class Vocabulary:
 
 
 @lru_cache(maxsize=64)
-def _shared(*entries: tuple[tuple[str, Any], ...]) -> Vocabulary:
-    return Vocabulary(*map(dict, entries))
+def _shared(
+    names: tuple[tuple[str, tuple[str, ...]], ...],
+    columns: tuple[tuple[str, str], ...],
+    stated_units: tuple[tuple[str, str], ...],
+) -> Vocabulary:
+    return Vocabulary(dict(names), dict(columns), dict(stated_units))
 
 
 def fits(word: str, role: str, unit: str | None) -> bool:
