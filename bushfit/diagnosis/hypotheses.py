@@ -321,25 +321,18 @@ class SearchState:
             plain = replace(plain, faulty_parts=(*plain.faulty_parts, explanation))
         else:
             plain = replace(plain, unnamed=explanation.name)
-        log_prior = self.log_weight + log_odds
-        extended = [
-            replace(
+        bent, extended = evidence.with_compound, list[Hypothesis]()
+        for case in (evidence, bent) if bent and np.isfinite(bent.log_evidence) else (evidence,):
+            new = replace(
                 plain,
-                log_posterior=log_prior + evidence.log_evidence,
-                change=max(self.change, evidence.size),
-                last_change=evidence.size,
+                log_posterior=self.log_weight + log_odds + case.log_evidence,
+                change=max(self.change, case.size),
+                last_change=case.size,
             )
-        ]
-        if evidence.with_compound and np.isfinite(evidence.with_compound.log_evidence):
-            bent = replace(
-                plain,
-                unnamed=plain.unnamed or COMPOUND,
-                log_posterior=log_prior + evidence.with_compound.log_evidence,
-                change=max(self.change, evidence.with_compound.size, self.linear.deviation[0]),
-                last_change=evidence.with_compound.size,
-                compound_deviates=True,
-            )
-            extended.append(bent)
+            if case is bent:
+                change = max(new.change, self.linear.deviation[0])
+                new = replace(new, unnamed=plain.unnamed or COMPOUND, change=change, compound_deviates=True)
+            extended.append(new)
         return extended
 
     @cached_property

@@ -142,14 +142,10 @@ class Search:
     def _with_outlier_cluster(self, hypothesis: Hypothesis, part: OutlierCluster) -> Hypothesis:
         """Extend a hypothesis by a disturbance at a frequency where several outliers were left out."""
         log_posterior = hypothesis.log_posterior + self._meeting_odds + part.log_odds
-        if hypothesis.change > self.request.tolerance:
-            change = max(hypothesis.change, part.size)
-            faulty_parts = (*hypothesis.faulty_parts, part)
-            return replace(hypothesis, faulty_parts=faulty_parts, log_posterior=log_posterior, change=change)
-        plain = self.root.hypotheses[0]  # what is smaller than the tolerance is no part of an explanation
-        return replace(
-            plain, faulty_parts=(part,), log_posterior=log_posterior, change=part.size, last_change=part.size
-        )
+        if hypothesis.change <= self.request.tolerance:  # what is that small is no part of an explanation
+            hypothesis = self.root.hypotheses[0]
+        change, faulty_parts = max(hypothesis.change, part.size), (*hypothesis.faulty_parts, part)
+        return replace(hypothesis, faulty_parts=faulty_parts, log_posterior=log_posterior, change=change)
 
     def _grow(self, state: SearchState, depth: int) -> Iterator[SearchState]:
         """Extend a state of the search by each of its most promising effects (refitted) and faulty parts of the tests.
