@@ -342,8 +342,7 @@ class SearchState:
         They are three: as the state is, with rig errors of amplitude levels beyond the stated accuracy, and with a
         smooth deviation of the rubber compound from the model's laws.
         """
-        linear, tests = self.linear, self.tests
-        log_prior = self.log_weight
+        linear, tests, log_prior = self.linear, self.tests, self.log_weight
         plain = Hypothesis(
             self.effects,
             tests.claim,

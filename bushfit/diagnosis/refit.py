@@ -77,10 +77,8 @@ def refitted(
     }
     if columns is None:
         return {name: Evidence(solution, evidence.data_sets) for name, solution in near.items()}
-    return {
-        name: Evidence(solution.reevaluate(solution.model, evidence.data_sets), evidence.data_sets, solution)
-        for name, solution in near.items()
-    }
+    plain = {name: solution.reevaluate(solution.model, evidence.data_sets) for name, solution in near.items()}
+    return {name: Evidence(plain[name], evidence.data_sets, solution) for name, solution in near.items()}
 
 
 def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:

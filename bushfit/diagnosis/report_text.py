@@ -138,12 +138,13 @@ class DiagnosisWriter:
         )
         absent = tuple(name for name in names if _may_be_absent(name, diagnosis.result))
         if holdout and (absent or (holdout.after or 0.0) > LARGEST_CLOSED_GAP):
-            return replace(self, finding=decide_verdict(self.hypotheses, request.tolerance, gap_stays=True)).diagnosis()
-        if absent:  # the model does without these effects
+            finding = decide_verdict(self.hypotheses, request.tolerance, gap_stays=True)
+        elif absent:  # the model does without these effects
             kept, leads = tuple(name for name in names if name not in absent), (*absent, *self.finding.leads)
             finding = replace(self.finding, verdict="partly" if kept else "described", names=kept, leads=leads)
-            return replace(self, finding=finding).diagnosis()
-        return diagnosis
+        else:
+            return diagnosis
+        return replace(self, finding=finding).diagnosis()
 
     def _described(self, evidence: Evidence) -> GapDescription | None:
         """Describe the gap of a fit by a smooth correction; None if effects are excluded or no correction is valid."""

@@ -176,9 +176,8 @@ class Search:
         gains = {
             e.name: base + prior[e.name] + evidence.total
             for e, evidence in state.explanation_evidence
-            if e.kind == "effect"
+            if e.kind == "effect" and e.name in scores
         }
-        gains = {name: gain for name, gain in gains.items() if name in scores}
         first = sorted(gains, key=lambda name: -gains[name])[:by_evidence]
         second = [name for name, score in scores.items() if 0.5 * score + prior[name] > -_SLIGHT][:by_score]
         return list(dict.fromkeys([*(name for name in first if gains[name] > -_SLIGHT), *second]))
@@ -201,8 +200,7 @@ class Search:
         start = request.start if not state.effects and state.evidence.reduced_chi_square > _BENT else {}
         grown: dict[str, SearchState] = {}
         for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
-            columns = state.free_columns(deviation)
-            fits = refitted(state.evidence, models, start, request.fixed, request.bounds, columns)
+            fits = refitted(state.evidence, models, start, request.fixed, request.bounds, state.free_columns(deviation))
             for name, evidence in fits.items():
                 candidate = self._register(self._with_effect(state, name, evidence, depth))
                 if name not in grown or candidate.log_posterior > grown[name].log_posterior:
@@ -257,9 +255,8 @@ class Search:
 
     def _without_earlier(self, state: SearchState) -> Iterator[SearchState]:
         """Yield the refitted state without each earlier effect, which the last effect may make unnecessary."""
-        if state.faulty_parts:
-            return
-        shorter = {name: state.evidence.model.without(name) for name in state.effects[:-1]}
+        earlier = () if state.faulty_parts else state.effects[:-1]
+        shorter = {name: state.evidence.model.without(name) for name in earlier}
         for name, model in shorter.items():
             if state.key - {name} in self._visited or not all(has_used_parameters(e, model) for e in model.records):
                 continue
@@ -280,7 +277,7 @@ class Search:
             fitted = self._with_effect(fitted, name, evidence, order)
         return fitted
 
-    def _with_common_start(self, states: Sequence[SearchState]) -> list[SearchState]:
+    def _with_common_start(self, states: list[SearchState]) -> list[SearchState]:
         """Refit the rivals of the most probable state from its values, so that all are compared at one minimum.
 
         A rubber that deviates from the model's laws has several fits of almost equal misfit. An effect is not to be
@@ -292,14 +289,13 @@ class Search:
         Returns:
             The states, the refitted where a refit is more probable.
         """
-        states = list(states)
         leader = max(states, key=lambda state: state.log_posterior)
         near = [n for n, state in enumerate(states) if state is not leader and not state.faulty_parts]
         near.sort(key=lambda n: -states[n].log_posterior)
         for n in near[:_RIVALS] if leader.likeliest_deviation and not leader.faulty_parts else ():
             state, start = states[n], leader.evidence.model.values
-            model, columns = state.evidence.model, state.free_columns(leader.likeliest_deviation)
-            fits = refitted(state.evidence, {"": model}, start, self.request.fixed, self.request.bounds, columns)
+            models, columns = {"": state.evidence.model}, state.free_columns(leader.likeliest_deviation)
+            fits = refitted(state.evidence, models, start, self.request.fixed, self.request.bounds, columns)
             for evidence in fits.values():
                 candidate = self._register(self._with_fit(state, state.effects, evidence))
                 states[n] = max(state, candidate, key=lambda rival: rival.log_posterior)
