@@ -453,6 +453,11 @@ EXPORTS: dict[str, Export] = {
     "a time without a name": Export("path,,Disp/Out1,Force/Out1\nunit,s,mm,N\n" + "\n".join(table([], [""] * 600, TIME, DISPLACEMENT, FORCE, mark=",")[1:]), "loop", ["column 2"]),
     "wf_increment": Export("wf_increment = 5.0E-2\n" + loop("Displacement|Force", DISPLACEMENT, FORCE).replace("\n", "\nmm\tN\n", 1), "loop", ["20 a second"]),
     "a channel in brackets": Export(loop("Total Time (s)|Position(8800MT (0,1):Position) (mm)|Load(8800MT (0,1):Load) (kN)", TIME, DISPLACEMENT, FORCE / 1e3), "loop"),
+    "a static curve": Export(
+        loop("time [s]|displacement [mm]|force [N]", TIME[:200], 1 - np.cos(np.pi * TIME[:200] / 5), 800 * (1 - np.cos(np.pi * TIME[:200] / 5 + 0.1))),
+        "loop", ["one loading and unloading"],
+        reference={"displacement": 1e-3 * (1 - np.cos(np.pi * TIME[:200] / 5))},
+    ),
     "rows that repeat": Export(
         loop("time [s]|displacement [mm]|force [N]", *np.repeat([TIME, DISPLACEMENT, FORCE], [1 + (n == 200) for n in range(600)], axis=1)), "loop",
         ["1 row that repeats"],

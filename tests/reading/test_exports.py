@@ -71,6 +71,19 @@ def test_an_export_is_read_right_or_raises_a_question(name, tmp_path):
         check(test, export.reference or usual, 0.06 if "spread" in notes else 2e-3)
 
 
+@pytest.mark.parametrize(
+    ("name", "is_odd"), [("axial_20Hz.csv", False), ("axial_0.1Hz.csv", False), ("axial_5Hz.csv", True)]
+)
+def test_a_name_may_state_the_sampling_rate(name, is_odd, tmp_path):
+    (tmp_path / name).write_text(
+        EXPORTS["a static curve"].content.partition("\n")[0]
+        + "\n"
+        + "\n".join(f"{t:.9g}\t{x:.9g}\t{f:.9g}" for t, x, f in zip(TIME, DISPLACEMENT, FORCE, strict=True))
+    )
+    document, _ = inspected(tmp_path, name)
+    assert any("the name states" in sentence for sentence in document["files"][0]["odd"]) == is_odd
+
+
 @pytest.mark.parametrize("channel", ["time", "force"])
 def test_complex_numbers_recorded_over_time_are_refused(channel, tmp_path):
     channels = {"time": TIME, "displacement": DISPLACEMENT, "force": FORCE}
