@@ -153,6 +153,18 @@ def test_repeats_and_levels(paper_model):
         reduce([first], levels=(2e-4,))
 
 
+def test_a_short_step_whose_motion_starts_and_stops_within_a_cycle_is_a_point():
+    """Of six cycles, the first and the last are 0.8 % larger."""
+    time = np.arange(0.0, 2.6, 1.0 / 1024.0)
+    turns = 5.0 * (time - 0.5)
+    envelope = np.clip(np.minimum(turns + 0.02, 8.02 - turns), 0.0, 1.0) * ((turns >= 0.0) & (turns <= 8.0))
+    motion = envelope * np.sin(2.0 * np.pi * turns)
+    noise = 2e-3 * np.random.default_rng(29).standard_normal(time.size)
+    reduction = reduce([Loop("x", Direction.AXIAL, time, 1e-4 * (motion + noise), 90.0 * motion)])
+    assert [step.nominal_frequency for step in reduction.steps] == [pytest.approx(5.0, rel=1e-3)]
+    assert abs(reduction.steps[0].stiffness) == pytest.approx(9e5, rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("motion", "said"),
     [
