@@ -85,13 +85,15 @@ class FaultyPart(Explanation):
         direction: direction or specimen of the first test.
         frequency: lowest and highest frequency of the faulty points [Hz].
         amplitude: their smallest and largest amplitude, zero-to-peak [m or rad].
-        extreme: True for the smallest or largest level of a direction, which an effect of amplitude would change alike.
+        may_be_physics: True if an effect that the model lacks could change the same points, and not a wrong test: the
+            smallest or largest level of a direction, a loop that no other test covers, or frequencies in all directions
+            at every amplitude.
     """
 
     direction: Place
     frequency: tuple[float, float]
     amplitude: tuple[float, float]
-    extreme: bool = field(default=False, kw_only=True)
+    may_be_physics: bool = field(default=False, kw_only=True)
 
     @property
     def columns(self) -> Array:
@@ -145,13 +147,15 @@ class OutlierCluster(FaultyPart):
 def is_pattern(faulty_parts: Sequence[FaultyPart]) -> bool:
     """True if suspected faults of the tests form a pattern, which may be physics that the model lacks.
 
-    Patterns are faults at several frequencies, as by a resonance; at the smallest or largest level, as by a contact; or
-    of two loops of one direction, rate and amplitude, which repeat each other.
+    Patterns are faults at several frequencies, as by a resonance, or at frequencies of all directions; at the smallest
+    or largest level, as by a contact; or of two loops of one direction, rate and amplitude, which repeat each other.
 
     Returns:
         True for a pattern.
     """
-    if sum(part.family == "frequency" for part in faulty_parts) > 1 or any(part.extreme for part in faulty_parts):
+    if sum(part.family == "frequency" for part in faulty_parts) > 1 or any(
+        part.may_be_physics for part in faulty_parts
+    ):
         return True
     loops = [(part.direction, *part.frequency, *part.amplitude) for part in faulty_parts if part.family == "loop"]
     return any(

@@ -55,7 +55,7 @@ def find_faulty_parts(evidence: Evidence) -> list[FaultyPart]:
             if test is not loop and test.direction == loop.direction
         )
         ends, name = ((frequency,) * 2, (amplitude,) * 2), f"the loop {loop.name}"
-        part = FaultyPart("part", "loop", name, group, loop.direction, *ends, extreme=not is_covered)
+        part = FaultyPart("part", "loop", name, group, loop.direction, *ends, may_be_physics=not is_covered)
         faulty_parts.append(part)
     return faulty_parts
 
@@ -79,7 +79,7 @@ def _levels(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterator[Fau
             label = _level_label(sweep, int(np.argmax(mask)))
             if levels.size > 1:  # in this file or in others
                 part = _common_fault(evidence, "level", label, [sweep], [mask])
-                yield replace(part, extreme=levels.size > 2 and level in (levels.min(), levels.max()))
+                yield replace(part, may_be_physics=levels.size > 2 and level in (levels.min(), levels.max()))
             numbers = np.unique(sweep.repeat[mask])
             for number in numbers if numbers.size > 2 else ():
                 repeat = mask & (sweep.repeat == number)
@@ -115,7 +115,10 @@ def _frequencies(evidence: Evidence, sweeps: Sequence[MeasuredSweep]) -> Iterato
                 name = f"{' to '.join(f'{end:.4g}' for end in ends)} Hz in {location}, at every amplitude"
                 chosen = [np.any(of_sweep, axis=0) for of_sweep in zip(*masks[window], strict=True)]
                 unit = np.kron(np.eye(width), np.array([[1.0], [1.0j]]))
-                yield _common_fault(evidence, "frequency", name, members, chosen, np.concatenate(columns[window]), unit)
+                part = _common_fault(
+                    evidence, "frequency", name, members, chosen, np.concatenate(columns[window]), unit
+                )
+                yield replace(part, may_be_physics=len({sweep.direction for sweep in members}) > 1)
 
 
 def _scopes(sweeps: Sequence[MeasuredSweep]) -> Iterator[tuple[str, str, Sequence[MeasuredSweep]]]:

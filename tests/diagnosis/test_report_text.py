@@ -165,7 +165,12 @@ def one(parts: str, odds: float, *, size: float = 0.05, last: float = 0.0, p_val
     spots = [name.split(":") for name in names if ":" in name]
     places: Any = tuple(
         SimpleNamespace(
-            family=family, name=name, extreme=False, direction="axial", frequency=(1.0,), amplitude=(name[0] == "1",)
+            family=family,
+            name=name,
+            may_be_physics=False,
+            direction="axial",
+            frequency=(1.0,),
+            amplitude=(name[0] == "1",),
         )
         for family, name in spots
     )
