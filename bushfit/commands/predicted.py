@@ -115,6 +115,9 @@ def prediction_files(
         drawn_sweeps: measured sweeps that the figures show.
         temperature: temperature of the prediction [K]; None for the reference temperature.
         wide: True to add tables with one column per amplitude.
+
+    Returns:
+        Files without folder and extension, each with the function that makes its table or figure.
     """
     result, by_place = output.result, by_direction(output.predictions)
     places = [predictions[0].direction for predictions in by_place]

@@ -187,10 +187,9 @@ class MeasuredLoop(MeasuredBase):
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
         """Change of the whitened residuals, (..., size), by a small change of the model's stiffness.
 
-        The force of a loop changes in its first harmonic only.
-
         Args:
-            change: change of the stiffness at each operating point (one in a loop), complex, (..., 1) [N/m or N m/rad].
+            change: change of the stiffness at each operating point (one in a loop, in the first harmonic of its force),
+                complex, (..., 1) [N/m or N m/rad].
             model: model whose stiffness changes.
             added: stiffness added to the model's at the same points, complex [N/m or N m/rad]; a loop does not use it.
         """
@@ -360,10 +359,7 @@ class MeasuredLoop(MeasuredBase):
         return CommonError(self._error_waves[2 * (self.first_error - 1) :])
 
     def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
-        """Inner products of the residuals and their derivatives by the named parameters, for the size of a model error.
-
-        They are computed at the values of the model; see `likeliest_model_error`.
-        """
+        """Inner products of residuals and their derivatives by the named parameters, for `likeliest_model_error`."""
         slopes = self._force_slopes(model, names)
         misfit = (self.force(model) - self.prepared.force)[None]
         white = self._whiten_rows(np.concatenate((misfit, slopes)) * self._per_noise)

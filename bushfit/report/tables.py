@@ -70,7 +70,13 @@ def response_columns(place: Place, stiffness: Array, before: str = "") -> dict[s
 
 
 def band_columns(header: str, band: Band, factor: float = 1.0) -> dict[str, Array]:
-    """Table columns of a predicted quantity and of the ends of its 95 % band ("..., low"), all times a factor."""
+    """Table columns of a predicted quantity and of the ends of its 95 % band, by their headers.
+
+    Args:
+        header: header of the quantity; ", low" and ", high" are added for the ends of the band.
+        band: quantity and band [SI].
+        factor: factor from SI to the unit in the header.
+    """
     ends = {"": band.value, ", low": band.low, ", high": band.high}
     return {f"{header}{end}": factor * values for end, values in ends.items()}
 
