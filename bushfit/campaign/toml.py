@@ -8,9 +8,12 @@ from typing import Any
 
 from bushfit.errors import CONTROL, CampaignError
 from bushfit.geometry import Bushing, Place, Specimen
-from bushfit.reading.files import read_utf8
+from bushfit.reading.files import line_of, read_utf8
 from bushfit.reading.preload import Preload
 from bushfit.units import CELSIUS
+
+#: A key of more than 16 parts, such as a.b.c; parsing one takes time in proportion to the square of their number.
+_DEEP_KEY = re.compile(rb"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){16}""")
 
 #: Hint for an error of the TOML parser, by the first words of its message.
 _WAYS = {
@@ -34,10 +37,12 @@ def parse_toml(path: Path, description: str = "a campaign file", largest: int = 
         CampaignError: the file is missing, too large or not TOML.
     """
     data = read_utf8(path, CampaignError, largest=largest, hint=f"give {description}, not a measurement")
+    chain = _DEEP_KEY.search(data)
     try:
-        tables = tomllib.loads(data.decode("utf-8-sig"))
-        repr(tables)  # an error may have to quote any part of it
-        return tables
+        if not chain:
+            tables = tomllib.loads(data.decode("utf-8-sig"))
+            repr(tables)  # an error may have to quote any part of it
+            return tables
     except ValueError as error:
         reason = re.fullmatch(r"(?P<problem>.*) \(at (?P<place>.*)\)", str(error), re.DOTALL)
         raise CampaignError(
@@ -52,9 +57,10 @@ def parse_toml(path: Path, description: str = "a campaign file", largest: int = 
         ) from error
     except RecursionError:
         pass
-    # outside of `except`: an error of a thousand frames cannot be pickled
     expected = "keys of a few parts, such as simulate.effects.inertia.mass"
-    raise CampaignError("the tables are nested too deeply", file=path, expected=expected)
+    place = line_of(data, chain.start()) if chain else None
+    # outside of `except`: an error of a thousand frames cannot be pickled
+    raise CampaignError("the tables are nested too deeply", file=path, place=place, expected=expected)
 
 
 def body_lines(bushing: Bushing | None, specimens: Collection[Specimen]) -> list[str]:

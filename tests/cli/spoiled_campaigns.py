@@ -80,6 +80,6 @@ WHOLE_CAMPAIGNS = [
     ("binary campaign", b"\x89PNG\r\n\x1a\n\0\0", "campaign.toml, line 3: the file is not UTF-8 text", "save it as UTF-8, or convert it: iconv -f LATIN1 -t UTF-8 old > new"),
     ("campaign in latin-1", BUSHING.replace('"x"', '"Gummi f\u00fcr T\u00fcr"').encode("latin-1"), "campaign.toml, line 2: the file is not UTF-8 text", "save it as UTF-8, or convert it: iconv -f LATIN1 -t UTF-8 old > new"),
     ("campaign of 1 MB", BUSHING + "#" * 1_000_001, "campaign.toml: the file is too large", "give a campaign file, not a measurement"),
-    ("a key of many parts", BUSHING + ".".join("a" * 1000) + " = 1\n", "campaign.toml: the tables are nested too deeply", "keys of a few parts, such as simulate.effects.inertia.mass"),
+    ("a key of many parts", BUSHING + ".".join("a" * 5000) + " = 1\n", "campaign.toml, line 6: the tables are nested too deeply", "keys of a few parts, such as simulate.effects.inertia.mass"),
     ("deep lists", "a = " + "[" * 5000, "campaign.toml: the tables are nested too deeply", "keys of a few parts, such as simulate.effects.inertia.mass"),
 ]
