@@ -106,7 +106,7 @@ def radial_stiffness(a: float, b: float, length: float) -> float:
         - inner * (3.0 * b**2 + a**2) * (i1a * k0b * twice + i0b * k1a)
     )
     denominator = inner * outer * (b**2 + a**2) * (i1b * k1a - i1a * k1b * twice)
-    return 10.0 * math.pi * length / (3.5 * _log_ratio(a, b) - 1.5 * q + float(numerator / denominator))
+    return float(10.0 * math.pi * length / (3.5 * _log_ratio(a, b) - 1.5 * q + numerator / denominator))
 
 
 def torsion_strain(a: float, b: float) -> float:
