@@ -55,7 +55,8 @@ class Point:
 def parse_point(text: str) -> Point:
     """Parse an operating point such as "axial 25 Hz 0.1 mm".
 
-    A direction of one of several bushings is "long axial"; a name that resembles no direction is that of a specimen.
+    With several bushings, the name of the bushing comes first: "long axial" is the axial direction of "long". A name
+    that resembles no direction is that of a specimen.
 
     Returns:
         The point in SI units.

@@ -82,8 +82,8 @@ def command(
     property of the model, the command states the error in stiffness. -v also lists properties without a stated error.
     Effects that belong to the test rig are left out. The axis of the bushing is z.
 
-    Writes bushing.bdf, .fem, .inp or .xlsx; bushing_car.bus and bushing_ride.bus (adams); one CSV file for each
-    table; prony.csv, a row per term; or an .fmu, with its Maxwell arms in arms.csv.
+    Depending on the format, writes bushing.bdf, .fem, .inp or .xlsx; bushing_car.bus and bushing_ride.bus (adams);
+    one CSV file for each table (csv); prony.csv, a row per term; or an .fmu, with its Maxwell arms in arms.csv.
     """
     from bushfit.campaign.campaign import load_campaign
     from bushfit.commands.export import export

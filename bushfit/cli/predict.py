@@ -136,7 +136,7 @@ def command(
 
 
 def _bushing_of(result: Result, text: str) -> Bushing | str:
-    """Find the bushing of --bushing: one of several fitted bushings by its name, or that of a TOML file."""
+    """Return the text of --bushing if it is the name of a fitted bushing, else the bushing in the named TOML file."""
     from bushfit.campaign.campaign import load_bushing
     from bushfit.errors import ModelError
 

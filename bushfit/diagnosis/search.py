@@ -228,7 +228,12 @@ class Search:
         )
 
     def _with_faulty_parts(self, state: SearchState, depth: int) -> Iterator[SearchState]:
-        """Extend a state by each of its likeliest faulty parts, with a common shift or an error of every point."""
+        """Extend a state by each of its likeliest faulty parts of the tests, with a common shift or an error per point.
+
+        Args:
+            state: state to extend.
+            depth: number of explanations that the state has.
+        """
         faulty_parts = [(e, evidence) for e, evidence in state.explanation_evidence if isinstance(e, FaultyPart)]
         faulty_parts.sort(key=lambda pair: -(self._log_prior(pair[0]) + pair[1].total))
         for part, shifted in faulty_parts[:_FAULTY_PARTS]:

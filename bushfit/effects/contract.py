@@ -367,10 +367,11 @@ def scaled_response(
 
 
 def linear_stress(modulus: Callable[[Values, Array, Array], Array], p: Values, history: History) -> Array:
-    """Steady stress [Pa] of a linear branch over one cycle: s_h = 2 mu^(h omega) e_h for every harmonic h.
+    """Steady stress [Pa] of a linear branch over one cycle: harmonic h of the stress is 2 mu(h omega) times that of e.
 
     Args:
-        modulus: complex modulus of the branch [Pa]; must be finite at omega = 0, where it multiplies the mean strain.
+        modulus: complex modulus mu of the branch [Pa] for parameter values, angular frequencies [rad/s] and strain
+            amplitude [1]; must be finite at omega = 0, where it multiplies the mean strain.
         p: parameter values by name.
         history: strain over a steady cycle, (..., n).
     """

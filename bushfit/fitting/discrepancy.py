@@ -90,11 +90,12 @@ class FittedTests:
 
     @cached_property
     def _blocks(self) -> list[tuple[MeasuredTest, slice, Array | None, Array]]:
-        """Tests, with the directions in the space of their residuals along which a change of the stiffness acts.
+        """Tests, with the combinations of their residuals that a change of the complex stiffness changes.
 
         Returns:
-            For each test: the test; the slice of its n residuals; orthonormal directions, (n, 2), or None for a sweep;
-            and components along them, (2, 2), of residual changes by stiffness changes of 1 and i [N/m or N m/rad].
+            For each test: the test; the slice of its n residuals; the two combinations as orthonormal columns, (n, 2),
+            or None for a sweep, of which all residuals change; and their changes, (2, 2), by stiffness changes of 1
+            and i [N/m or N m/rad].
         """
         units, blocks = np.array([[1.0], [1.0j]]), list[tuple[MeasuredTest, slice, Array | None, Array]]()
         for test, rows in zip(self.data_sets, residual_slices(self.data_sets), strict=True):

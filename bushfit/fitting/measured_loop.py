@@ -389,8 +389,8 @@ class MeasuredLoop(MeasuredBase):
     def extra_covariance(self, influence: Array) -> Array:
         """Covariance, (k, k), of k parameter estimates by errors that the weights of the residuals do not include.
 
-        For a loop with model error: the gain error, minus the model error of the first harmonic, which the Gaussian
-        process of the model error already includes.
+        For a loop with model error, the covariance by the gain error is added, and that by the model error of the first
+        harmonic is subtracted, because the Gaussian process of the model error includes it.
 
         Args:
             influence: change of each estimate by a unit of each whitened residual, (k, size).

@@ -202,7 +202,7 @@ def _scatter_growth(lines: Sequence[LineNoise]) -> tuple[float, float] | None:
 
 
 def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -> tuple[dict[LineKey, Array], int]:
-    """Variances of gain and phase [rad] from point to point of each line, pooled over lines that agree.
+    """Variances of gain [1] and phase [rad^2] from point to point of each line, pooled over lines that agree.
 
     With few degrees of freedom gain and phase share one variance, unless they differ significantly.
 
@@ -211,7 +211,7 @@ def _pooled(lines: Mapping[LineKey, LineNoise], measured: Sequence[LineNoise]) -
         measured: noise of the lines with repeats or enough points.
 
     Returns:
-        Variances of gain and phase by line, (2,) each, and their degrees of freedom.
+        Variances of gain and phase by line, (2,) each, and the degrees of freedom of the pooled variances.
     """
     if not measured:
         return {key: line.variance for key, line in lines.items()}, round(min(line.freedom for line in lines.values()))

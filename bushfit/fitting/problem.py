@@ -181,7 +181,7 @@ class FitResult:
 
     @property
     def minimised(self) -> Sequence[MeasuredTest]:
-        """Tests with the weights of the sum of squares that the fit minimises, to which `residual` belongs."""
+        """Tests with the weights of the minimised sum of squares; `residual` contains their residuals."""
         return self.problem.tests
 
     @property

@@ -72,7 +72,9 @@ def stack_stiffness(
 
 
 def rubber_stiffness(model: Model, setting: Setting, values: Values, omega: Array, amplitude: Array) -> Array:
-    """Complex stiffness of the rubber without layers, with modifiers [N/m or N m/rad], (..., n).
+    """Complex stiffness of the rubber alone [N/m or N m/rad], (..., n): without layers such as sleeve, rig and sensors.
+
+    The parameters have the values at the conditions of the test, such as its temperature.
 
     Args:
         model: the model.

@@ -104,9 +104,12 @@ class Knowledge:
 
     @property
     def precision(self) -> Array:
-        """Fisher information before the planned tests: inverse of `covariance` plus a weak prior, (k + b, k + b).
+        """Fisher information before the planned tests: inverse of `covariance`, plus that of a weak prior.
 
-        Notes: the weak prior allows a factor of 20 of each parameter. Parameters that the tests do not determine have
+        Returns:
+            Matrix for the k known parameters and the b parameters at a bound (`bounded`), (k + b, k + b).
+
+        Notes: one standard deviation of the prior is a factor of 20. Parameters that the tests do not determine have
         errors of a thousand times their value, and rounding errors would swamp all other parameters.
         """
         size = np.sqrt(np.diag(self.covariance))

@@ -265,13 +265,15 @@ def relative_slopes(knowledge: Knowledge, data_sets: Sequence[MeasuredTest]) -> 
 
 
 def rival_chi_squares(rivals: Sequence[Information]) -> Array:
-    """Compute the expected chi-square between any two rival models after the best refit of either.
+    """Compute the expected chi-square by which planned tests tell any two rival models apart.
+
+    It is the misfit of one rival, with its parameters refitted, to tests of the other: the smaller of both directions.
 
     Args:
-        rivals: information on each rival, whose departures are the other rivals in order.
+        rivals: information on each rival, with the other rivals in order as its departures from the model.
 
     Returns:
-        Expected chi-square for each choice of tests, (choices, rivals, rivals).
+        Symmetric matrix of expected chi-square for each choice of tests, (choices, rivals, rivals).
     """
     rows = [np.insert(rival.noncentralities(), index, 0.0, axis=1) for index, rival in enumerate(rivals)]
     one_way = np.stack(rows, axis=1)

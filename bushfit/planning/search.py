@@ -304,6 +304,6 @@ class PlanSearch:
 
 
 def freedom_per_repeat(test: Test) -> int:
-    """Degrees of freedom of the scatter of sweeps that one repeat of a test adds; 0 for loops and short sweeps."""
+    """Degrees of freedom that one more repeat of a test adds to the noise estimate; 0 for loops and short sweeps."""
     steps = len(test.steps) if isinstance(test, SimulatedSweep) else 0
     return steps - 1 if steps >= FEWEST_STEPS else 0

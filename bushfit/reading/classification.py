@@ -121,7 +121,7 @@ def classify(
 
 
 def _name(header: str) -> str:
-    """Name in a header without its unit and convention, in the spelling that `plain` returns."""
+    """Name in a column header, in plain letters (see `plain`): "force" of "Force p-p [N]"."""
     return plain(units.split_header(split_convention(header)[0])[0])
 
 
