@@ -131,7 +131,7 @@ class DiagnosisWriter:
             gap.after if gap else after,
             entries,
             " and ".join(rest),
-            places=first.best,
+            places=first.best if first.faulty_parts else None,
             gap=gap,
             holdout=holdout,
             known=known,

@@ -12,7 +12,7 @@ from rigged import LEVELS, SHARED, both, loop_too_strong, off
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import Explanation, compound_shapes
+from bushfit.diagnosis.explanations import Explanation, compound_shapes, is_pattern
 from bushfit.diagnosis.faulty_parts import find_faulty_parts
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.propose import proposals, scores
@@ -57,6 +57,7 @@ def test_the_place_that_went_wrong_is_the_likeliest(measured, fitted, tamper, ki
     found = best(evidence, find_faulty_parts(evidence))
     assert (found.kind, found.family) == ("part", kind)
     assert found.name == words
+    assert (kind == "frequency" and is_pattern([found])) == ("all directions" in words), "perhaps physics"
 
 
 def test_every_effect_is_proposed_but_twins_and_what_the_tests_do_not_state(bare):
