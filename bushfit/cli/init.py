@@ -241,13 +241,16 @@ def inspect_files(
 def inspect_source(
     source: TestSource, test_options: Mapping[str, Any], *, is_sized: bool, is_asking: bool
 ) -> Inspection:
-    """Read one test and its metadata.
+    """Read one test of the new campaign, with what its file and the user state on it.
 
     Args:
         source: file or sheet of the test.
-        test_options: metadata from the command line and from answers.
-        is_sized: True if sizes of a bushing are given.
+        test_options: campaign keys of the test, from the command line and from answers; "" for an empty answer.
+        is_sized: True if the diameters or the length of a bushing are given, so that a test is of a bushing.
         is_asking: True at a terminal: a missing optional entry, such as the preload, is also an error.
+
+    Returns:
+        The test in SI, with its direction, columns and entries for the campaign.
 
     Raises:
         BushfitError: an option is missing; the hint names it.

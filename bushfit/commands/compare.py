@@ -253,6 +253,9 @@ def _warnings(
         entries: compared results, the reference first.
         comparisons: comparison of each further result with the reference.
         are_families: True if the results are model families, which share their tests by design.
+
+    Returns:
+        Sentences; a warning that several results have is one sentence, which starts with their letters.
     """
     shared = "intervals of their {} assume independent tests and are usually too wide"
     if are_families:

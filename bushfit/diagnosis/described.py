@@ -79,10 +79,9 @@ def describe(evidence: Evidence, rig: RigSettings, start: Mapping[str, float], b
     if correction is None or correction.uncertainty >= 1.0:
         return None
     harmonic = tuple(test.fundamental() for test in evidence.data_sets)
-    fixed = [name for name in evidence.model.values if name not in evidence.solution.coordinates.names]
     try:
-        base = fit_from(evidence.model, harmonic, fixed, bounds).run(_EVALUATIONS).solution
-        base = fit_from(base.model, harmonic, (*fixed, *base.at_bound), bounds).run(_EVALUATIONS).solution
+        base = fit_from(evidence.model, harmonic, evidence.fixed, bounds).run(_EVALUATIONS).solution
+        base = fit_from(base.model, harmonic, (*evidence.fixed, *base.at_bound), bounds).run(_EVALUATIONS).solution
     except FitError:  # too few points are left for the parameters
         return None
     model = replace(fitted.model, effects=(*evidence.model.effects, NAME), unnamed=correction)

@@ -80,6 +80,11 @@ class Evidence:
         independent = sum(data_set.independent_count for data_set in self.data_sets)
         return self.chi_square + self.parameters * float(np.log(independent))
 
+    @property
+    def fixed(self) -> list[str]:
+        """Names of the parameters that the fit kept at their values."""
+        return [name for name in self.model.values if name not in self.solution.coordinates.names]
+
     def covariance_of(self, names: Collection[str]) -> Covariance:
         """Covariance of named parameters, from the fit with errors that tests share, if there is one."""
         fitted = self.joint or self.solution

@@ -297,8 +297,7 @@ class DiagnosisWriter:
             return evidence
         if evidence not in self._refitted:
             data_sets = with_gain_weighting(evidence.data_sets, weigh=False)
-            fixed = [name for name in evidence.model.values if name not in evidence.solution.coordinates.names]
-            self._refitted[evidence] = fit(evidence.model, data_sets, fixed, self.request.bounds)
+            self._refitted[evidence] = fit(evidence.model, data_sets, evidence.fixed, self.request.bounds)
         return self._refitted[evidence]
 
     def _notes(self) -> list[str]:

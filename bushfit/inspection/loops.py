@@ -77,7 +77,7 @@ def describe_sampling(history: Loop) -> str:
 
 
 class RecordedChannel(NamedTuple):
-    """A recorded channel: name, display unit, factor from SI to the display unit, and values [SI], (n,)."""
+    """Recorded displacement or force: name, display unit, factor from SI to that unit, and values [SI], (n,)."""
 
     name: str
     unit: str

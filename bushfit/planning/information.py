@@ -81,13 +81,13 @@ class ModelInformation:
     bounded: int = 0
 
     def of_runs(self, counts: Array) -> Information:
-        """Compute the Fisher information of each test separately, without that of the tests so far.
+        """Compute the Fisher information that each planned test adds by itself.
 
         Args:
             counts: number of runs of each test, (tests,).
 
         Returns:
-            Information with one choice for each test.
+            Information in which choice n is test n alone, without the tests so far.
 
         Notes:
             The gain and phase errors that all runs of a test share are eliminated: with their columns U and standard
