@@ -38,8 +38,8 @@ _AGREEMENT = 0.02
 _ALONG = 0.999
 #: Relative difference up to which force over displacement agrees with a stiffness; chosen: other channels differ more.
 _STIFFNESS_AGREEMENT = 0.1
-#: Number of a stated multiple of a unit, such as 200 N for the force of 1 V.
-_MULTIPLE = re.compile(r"^\d+\.?\d*(?=\s+[^\W\d_])")
+#: Number above zero of a stated multiple of a unit, such as 200 N for the force of 1 V.
+_MULTIPLE = re.compile(r"^(?=[\d.]*[1-9])\d+\.?\d*(?=\s+[^\W\d_])")
 #: Roles that are ignored, without an error, if two different columns have them: other columns can replace them.
 _REPLACEABLE = ("force_amplitude", "damping_coefficient", "damping_ratio", "relative_error", "temperature")
 #: Roles that state the loss of a sweep.

@@ -209,6 +209,10 @@ INSTRUMENT_EXPORTS: dict[str, Export] = {
         "1 V = 0.1 mm\n1 V = 200 N\n" + loop("t [s]|displacement [V]|force [V]", TIME, 10 * DISPLACEMENT, FORCE / 200), "loop", (),
         {"units": {"displacement": "0.1 mm", "force": "200 N"}},
     ),
+    "volts without any force": Export(
+        loop("t [s]|displacement [V]|force [V]", TIME, 10 * DISPLACEMENT, FORCE / 200), None, ["unknown unit", "0 N"],
+        {"units": {"displacement": "0.1 mm", "force": "0 N"}},
+    ),
     "digits": Export(
         "Kanal 2 Weg 1 digit = 0,0005 mm\n" + loop("t [s]|Kanal 1 [N]|Kanal 2", TIME, FORCE, 2000 * DISPLACEMENT), None, ['"displacement=0.0005 mm"'],
         {"columns": {"displacement": "Kanal 2"}},
