@@ -14,40 +14,40 @@ import click
 from bushfit.errors import BushfitError, OutputError, did_you_mean, printable
 from bushfit.version import __version__
 
-#: Commands by heading of `bushfit --help`: name of the command, module (with a function other than `command` after a
-#: point), and help line. The modules are imported when the command is called.
+#: Commands by heading of `bushfit --help`, with their help lines. The command "fit-static" is `static` in the module
+#: fit, any other is `command` in the module of its name, which is imported when the command is called.
 _GROUPS = {
     "From tests to a result": {
-        "run": ("run", "The main job: fits, diagnosis and prediction in one go."),
-        "diagnose": ("diagnose", "Where model and tests disagree, and which effect is missing."),
-        "predict": ("predict", "Stiffness and loss factor of a model, as tables and plots."),
-        "respond": ("respond", "Force over time for a displacement history, such as a road load."),
-        "compare": ("compare", "Differences between results that exceed chance."),
-        "report": ("report", "One page from a folder of results, to show, print and mail."),
-        "batch": ("batch", "Many campaigns at once: one table, limits, a report for CI."),
+        "run": "The main job: fits, diagnosis and prediction in one go.",
+        "diagnose": "Where model and tests disagree, and which effect is missing.",
+        "predict": "Stiffness and loss factor of a model, as tables and plots.",
+        "respond": "Force over time for a displacement history, such as a road load.",
+        "compare": "Differences between results that exceed chance.",
+        "report": "One page from a folder of results, to show, print and mail.",
+        "batch": "Many campaigns at once: one table, limits, a report for CI.",
     },
     "Test files": {
-        "inspect": ("inspect", "How bushfit reads test files, and anything unusual in them."),
-        "init": ("init", "A campaign from test files and the geometry."),
-        "reduce": ("reduce", "A sweep from raw stepped-sine histories or a resonance test."),
+        "inspect": "How bushfit reads test files, and anything unusual in them.",
+        "init": "A campaign from test files and the geometry.",
+        "reduce": "A sweep from raw stepped-sine histories or a resonance test.",
     },
     "Single fits": {
-        "fit": ("fit.fit", "All five parameters from loops and sweeps: the fit to use."),
-        "fit-static": ("fit.static", "mu, sigma_fmax and eps_half from the loops."),
-        "fit-dynamic": ("fit.dynamic", "m and alpha from the sweep of the smallest amplitude."),
+        "fit": "All five parameters from loops and sweeps: the fit to use.",
+        "fit-static": "mu, sigma_fmax and eps_half from the loops.",
+        "fit-dynamic": "m and alpha from the sweep of the smallest amplitude.",
     },
     "To learn bushfit": {
-        "example": ("example", "A simulated campaign to try bushfit on."),
-        "manual": ("manual", "The manual in the browser, without a network."),
+        "example": "A simulated campaign to try bushfit on.",
+        "manual": "The manual in the browser, without a network.",
     },
     "Before a test, and for other programs": {
-        "plan": ("plan", "The most informative next tests within your hours."),
-        "simulate": ("simulate", "A simulated campaign of tests from a model, with noise."),
-        "export": ("export", "Files for solvers, multibody codes and spreadsheets."),
-        "schema": ("schema", "JSON Schemas of all files, for programs and editors."),
+        "plan": "The most informative next tests within your hours.",
+        "simulate": "A simulated campaign of tests from a model, with noise.",
+        "export": "Files for solvers, multibody codes and spreadsheets.",
+        "schema": "JSON Schemas of all files, for programs and editors.",
     },
 }
-_COMMANDS = {name: entry for commands in _GROUPS.values() for name, entry in commands.items()}
+_COMMANDS = [name for commands in _GROUPS.values() for name in commands]
 
 #: Number of characters of the longest command name.
 _LONGEST = max(map(len, _COMMANDS))
@@ -68,21 +68,21 @@ class _Commands(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of all commands, in the order of the help."""
-        return list(_COMMANDS)
+        return _COMMANDS
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import the command with this name; raise a UsageError with a similar name for an unknown one."""
         if cmd_name not in _COMMANDS:
             words = (f"No such command '{cmd_name}'", did_you_mean(cmd_name, _COMMANDS))
             raise click.UsageError("; ".join(filter(None, words)), ctx)
-        module, _, name = _COMMANDS[cmd_name][0].partition(".")
-        return getattr(importlib.import_module(f"bushfit.cli.{module}"), name or "command")
+        module, _, step = cmd_name.partition("-")
+        return getattr(importlib.import_module(f"bushfit.cli.{module}"), step or "command")
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands with their help lines under the headings of the help."""
         for heading, commands in _GROUPS.items():
             with formatter.section(heading):
-                formatter.write_dl([(name.ljust(_LONGEST), line) for name, (_, line) in commands.items()])
+                formatter.write_dl([(name.ljust(_LONGEST), line) for name, line in commands.items()])
 
 
 @click.group(
@@ -116,18 +116,20 @@ def main(command: click.Command = cli) -> None:
         sys.stdout.reconfigure(encoding="utf-8", newline="\n")  # whatever the code page: programs read it
     heard, read = _Stream(sys.stderr, is_needed=False), _Stream(sys.stdout, is_needed=True)
     with contextlib.redirect_stderr(heard), contextlib.redirect_stdout(read):
-        sys.exit(_status(command))
+        try:
+            status = command.main(sys.argv[1:] or ["--help"], prog_name=command.name, standalone_mode=False)
+            sys.stdout.flush()
+        except (Exception, KeyboardInterrupt) as error:
+            sys.stderr.write(f"bushfit: {_message(error)}\n")
+            status = 2
+        sys.exit(status or 0)
 
 
-def _status(command: click.Command) -> int:
-    """Run a command from its command line, print its errors, and return its exit status."""
-    try:
-        status = command.main(sys.argv[1:] or ["--help"], prog_name=command.name, standalone_mode=False)
-        sys.stdout.flush()
-        return status or 0
-    except (click.exceptions.Abort, KeyboardInterrupt):
-        message = "aborted"
-    except click.ClickException as error:
+def _message(error: BaseException) -> str:
+    """Message for an error that ended a command, with the place, what was found and the next step."""
+    if isinstance(error, click.exceptions.Abort | KeyboardInterrupt):
+        return "aborted"
+    if isinstance(error, click.ClickException):
         context = error.ctx if isinstance(error, click.UsageError) else None
         text = " ".join(error.format_message().split())
         if isinstance(error, click.NoSuchOption) and context and not error.possibilities:
@@ -137,25 +139,20 @@ def _status(command: click.Command) -> int:
         if wrong := re.search(r"'([^']*)' is not one of (.*)\.$", text):
             near = did_you_mean(wrong[1], re.findall(r"'([^']*)'", wrong[2]))
             text = f"{text[:-1]}; {near}" if near else text
-        message = printable(f"error: {text}  (see {context.command_path if context else 'bushfit'} -h)")
-    except BushfitError as error:
-        message = f"error: {error}"
-    except MemoryError:
-        message = "error: out of memory"
-    except OSError as error:  # of a path that was typed or that a file names
-        path = printable(str(error.filename or ""))
-        message = (
-            f"error: {f'{path[:_LONGEST_PATH]}: ' if path else ''}this cannot be opened\n  found: {error.strerror}"
-        )
-    except Exception as error:  # a fault of bushfit, not of its user
-        if os.environ.get("BUSHFIT_TRACEBACK"):
-            raise
-        message = (
-            f"an internal error of bushfit: {type(error).__name__}: {printable(str(error))}\n"
-            "  try: set BUSHFIT_TRACEBACK=1, run again, and report what it prints"
-        )
-    sys.stderr.write(f"bushfit: {message}\n")
-    return 2
+        return printable(f"error: {text}  (see {context.command_path if context else 'bushfit'} -h)")
+    if isinstance(error, BushfitError):
+        return f"error: {error}"
+    if isinstance(error, MemoryError):
+        return "error: out of memory"
+    if isinstance(error, OSError):  # of a path that was typed or that a file names
+        path = printable(str(error.filename or ""))[:_LONGEST_PATH]
+        return f"error: {f'{path}: ' if path else ''}this cannot be opened\n  found: {error.strerror}"
+    if os.environ.get("BUSHFIT_TRACEBACK"):  # a fault of bushfit, not of its user
+        raise error
+    return (
+        f"an internal error of bushfit: {type(error).__name__}: {printable(str(error))}\n"
+        "  try: set BUSHFIT_TRACEBACK=1, run again, and report what it prints"
+    )
 
 
 class _Stream:

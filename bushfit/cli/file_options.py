@@ -3,13 +3,13 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import wraps
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 import click
 
-from bushfit.cli.options import DIRECTIONS, FILE, Function, Parameter, add_parameters, option, option_group, option_name
+from bushfit.cli.options import DIRECTIONS, FILE, Parameter, add_parameters, option, option_group, option_name
 from bushfit.errors import BushfitError, MeasurementError
 
 #: Options for metadata that a loop or sweep file may not contain: campaign key, metavar and help text.
@@ -73,60 +73,58 @@ _ENTRY = re.compile(r'(\w+) = "([^"]*)"')
 
 
 def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tests") -> Parameter:
-    """Decorator that adds the metadata options to a command, which receives them in one argument `test_options`.
+    """Create the metadata options of a command, whose function receives them in one argument `test_options`.
 
     Args:
         kind: "tests" for loops and sweeps, with the metadata of a campaign; "histories" for raw histories and resonance
             tests; both add the argument `files`. "displacements" for one displacement history.
     """
+    unit, header = ("axial=mm", "radial=Sy") if kind == "displacements" else ("force=kN", "force=Fz")
+    words = f'Header of a column, such as "{header}"; if ROLE does not exist, all roles are printed.'
+    columns = (
+        option("--unit units", "ROLE=UNIT", f'Unit of a column, such as "{unit}".', multiple=True),
+        option("--column columns", "ROLE=HEADER", words, multiple=True),
+    )
+    written = (_metadata_option(key, metavar) for key, metavar in _AS_WRITTEN.items())
+    record = "test_options", partial(_test_options, kind)
+    file_format = option_group("File format, if it is not detected", *written, record=record)
+    heading = "Information that is missing in the file"
     if kind == "displacements":
-        keys: tuple[str, ...] = ()
-        parameters = [
-            option_group(
-                "Information that is missing in the file",
-                option("--unit units", "ROLE=UNIT", 'Unit of a column: "axial=mm".', multiple=True),
-                option("--column columns", "ROLE=HEADER", 'Header of a column: "radial=Sy".', multiple=True),
-            )
-        ]
-    else:
-        words = 'Header of a column, such as "force=Fz"; if ROLE does not exist, all roles are printed.'
-        sign = "Reverse the sign of the force: use -1 if the force falls while the displacement rises."
-        further = _OF_TESTS if kind == "tests" else {}
-        keys = ("direction", "force_sign", *further)
-        parameters = [
-            click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_refuse_models),
-            option_group(
-                "Information that is missing in the files",
-                _metadata_option("direction", "DIRECTION", "Direction: axial, radial or torsion [from file names]."),
-                option("--unit units", "ROLE=UNIT", 'Unit of a column, such as "force=kN".', multiple=True),
-                option("--column columns", "ROLE=HEADER", words, multiple=True),
-                _metadata_option("force_sign", "-1", sign),
-                *(_metadata_option(key, *texts) for key, texts in further.items()),
-            ),
-        ]
-    written = [_metadata_option(key, metavar) for key, metavar in _AS_WRITTEN.items()]
+        return lambda function: add_parameters(function, option_group(heading, *columns, record=record), file_format)
+    sign = "Reverse the sign of the force: use -1 if the force falls while the displacement rises."
+    information = (
+        _metadata_option("direction", "DIRECTION", "Direction: axial, radial or torsion [from file names]."),
+        *columns,
+        _metadata_option("force_sign", "-1", sign),
+        *(_metadata_option(key, *texts) for key, texts in _OF_TESTS.items() if kind == "tests"),
+    )
+    return lambda function: add_parameters(
+        function,
+        click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_refuse_models),
+        option_group(f"{heading}s", *information, record=record),
+        file_format,
+    )
 
-    def decorate(function: Function) -> Function:
-        @wraps(function)
-        def wrapped(**arguments: Any) -> Any:
-            from bushfit.reading.displacements import DISPLACEMENT_COLUMNS
-            from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
-            from bushfit.reading.resonance import RESONANCE_COLUMNS
 
-            roles = {
-                "tests": (*LOOP_COLUMNS, *SWEEP_COLUMNS),
-                "histories": (*LOOP_COLUMNS, *RESONANCE_COLUMNS),
-                "displacements": tuple(DISPLACEMENT_COLUMNS),
-            }[kind]
-            test_options = {key: arguments.pop(key) for key in (*keys, *_AS_WRITTEN)}
-            test_options["columns"] = _pairs(arguments.pop("columns"), "--column", "force=Kraft", roles)
-            test_options["units"] = _pairs(arguments.pop("units"), "--unit", "force=kN", roles)
-            test_options = {key: value for key, value in test_options.items() if value not in (None, {})}
-            return function(test_options=test_options, **arguments)
+def _test_options(kind: str, _: click.Context, values: dict[str, Any]) -> dict[str, Any]:
+    """Campaign keys that the metadata options state, with columns and units by the role of a column.
 
-        return add_parameters(wrapped, *parameters, option_group("File format, if it is not detected", *written))
+    Args:
+        kind: kind of the files, as of `metadata_options`, which determines the roles.
+        values: values of the options by key.
+    """
+    from bushfit.reading.displacements import DISPLACEMENT_COLUMNS
+    from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
+    from bushfit.reading.resonance import RESONANCE_COLUMNS
 
-    return decorate
+    roles = {
+        "tests": (*LOOP_COLUMNS, *SWEEP_COLUMNS),
+        "histories": (*LOOP_COLUMNS, *RESONANCE_COLUMNS),
+        "displacements": tuple(DISPLACEMENT_COLUMNS),
+    }[kind]
+    values["columns"] = _pairs(values["columns"], "--column", "force=Kraft", roles)
+    values["units"] = _pairs(values["units"], "--unit", "force=kN", roles)
+    return {key: value for key, value in values.items() if value not in (None, {})}
 
 
 def _metadata_option(key: str, metavar: str, words: str | None = None) -> Parameter:

@@ -34,10 +34,14 @@ def static(
     """
     from bushfit.commands.fit import fit_static
     from bushfit.commands.loading import load_model
+    from bushfit.commands.provenance import input_files
 
     campaign, start = open_campaign(campaigns), load_model(dynamic) if dynamic else None
     folder = output.folder(campaign.name, "static.json")
-    _show_fit(output, folder, fit_static(campaign, dynamic=start, loss=loss), dynamic, max_nrmse)
+    fitted = fit_static(campaign, dynamic=start, loss=loss)
+    _print_fit(output, folder, fitted)
+    output.write(folder, fitted.files, fitted.document, [*input_files(campaign), *([dynamic] if dynamic else [])])
+    exit_above(max_nrmse, fitted.result)
 
 
 @command_called("fit-dynamic", "configs/cmp_15961.toml")
@@ -62,10 +66,14 @@ def dynamic(
     """
     from bushfit.commands.fit import fit_dynamic
     from bushfit.commands.loading import load_model
+    from bushfit.commands.provenance import input_files
 
     campaign, start = open_campaign(campaigns), load_model(static) if static else None
     folder = output.folder(campaign.name, "dynamic.json")
-    _show_fit(output, folder, fit_dynamic(campaign, static=start, loss=loss), static, max_nrmse)
+    fitted = fit_dynamic(campaign, static=start, loss=loss)
+    _print_fit(output, folder, fitted)
+    output.write(folder, fitted.files, fitted.document, [*input_files(campaign), *([static] if static else [])])
+    exit_above(max_nrmse, fitted.result)
 
 
 @command_called("fit", "configs/arm_bushing.toml --direction axial --direction radial --profile")
@@ -86,7 +94,7 @@ def dynamic(
 )
 @campaign_options()
 @with_output("results/<campaign name>/fit", "tables", "pictures")
-def fit(
+def command(
     campaigns: tuple[Path, ...],
     directions: tuple[str, ...],
     effects: tuple[str, ...],
@@ -105,26 +113,25 @@ def fit(
     Writes model.json, and a table and a plot of loops and sweeps; for several bushings also bushings.csv, which
     compares each bushing with a fit to the others.
     """
-    from bushfit.commands.fit import fit as fit_campaign
+    from bushfit.commands.fit import fit
+    from bushfit.commands.provenance import input_files
 
     campaign = open_campaign(campaigns)
     folder = output.folder(campaign.name, "model.json")
-    result = fit_campaign(campaign, directions=directions, effects=effects, profile=profile, loss=loss)
-    _show_fit(output, folder, result, None, max_nrmse)
+    fitted = fit(campaign, directions=directions, effects=effects, profile=profile, loss=loss)
+    _print_fit(output, folder, fitted)
+    output.write(folder, fitted.files, fitted.document, input_files(campaign))
+    exit_above(max_nrmse, fitted.result)
 
 
-def _show_fit(output: Output, folder: Path, fitted: FitOutput, model: Path | None, max_nrmse: float | None) -> None:
-    """Print and write the result of a fit, and exit with status 1 if its NRMSE exceeds the limit of --max-nrmse.
+def _print_fit(output: Output, folder: Path, fitted: FitOutput) -> None:
+    """Print the result of a fit: verdict, next step, parameters, and the prediction of each of several bushings.
 
     Args:
         output: output of the command.
-        folder: results folder.
+        folder: results folder, which the next step names.
         fitted: result of the fit.
-        model: model file that was read; None without one.
-        max_nrmse: largest allowed NRMSE; None without a limit.
     """
-    from bushfit.commands.provenance import input_files
-
     campaign, result, file = fitted.data.campaign, fitted.result, quote_path(fitted.data.campaign.path)
     written = quote_path(folder / f"{fitted.files[0].name}.json")
     verdict, action = "nothing was fitted: the tests are not compared", f"bushfit predict {written}"
@@ -150,5 +157,3 @@ def _show_fit(output: Output, folder: Path, fitted: FitOutput, model: Path | Non
         ]
         output.print_table("each bushing predicted by a fit to the others", list(table.columns), rows)
     output.warn(fitted.data.notes)
-    output.write(folder, fitted.files, fitted.document, [*input_files(campaign), *([model] if model else [])])
-    exit_above(max_nrmse, result)

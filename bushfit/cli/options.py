@@ -18,10 +18,16 @@ FILE = click.Path(path_type=Path)
 _NAMES = 26
 
 
+#: Argument of a command's function that collects the values of several options: its name, and the function that makes
+#: it from the context and these values by name.
+Record = tuple[str, Callable[[click.Context, dict[str, Any]], Any]]
+
+
 class Option(click.Option):
-    """Option with a heading in its command's help; click adds no defaults to its help text."""
+    """Option with a heading in its command's help, and the argument that collects its value, if it is not its own."""
 
     heading: str | None = None
+    record: Record | None = None
 
     def get_help_extra(self, ctx: click.Context) -> Any:
         """Texts that click appends to the help text of the option: none, since the text states the default."""
@@ -56,6 +62,16 @@ class Command(click.Command):
 
     Options without a help text share the line of the next option; at the end of a heading they form a paragraph.
     """
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the command line, and collect the values of options that have a record in one argument."""
+        rest, records = super().parse_args(ctx, args), dict[Record, dict[str, Any]]()
+        for parameter in self.params:
+            if (record := getattr(parameter, "record", None)) and parameter.expose_value:
+                records.setdefault(record, {})[str(parameter.name)] = ctx.params.pop(str(parameter.name), None)
+        for (name, make), values in () if ctx.resilient_parsing else records.items():  # none for the Tab key
+            ctx.params[name] = make(ctx, values)
+        return rest
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options with their help texts under headings."""
@@ -128,14 +144,14 @@ def add_parameters(function: Function, *parameters: Parameter) -> Function:
     return function
 
 
-def option_group(heading: str, *parameters: Parameter) -> Parameter:
-    """Group options under a heading of the help, in the given order."""
+def option_group(heading: str, *parameters: Parameter, record: Record | None = None) -> Parameter:
+    """Group options under a heading of the help, in the given order; a `record` collects their values."""
 
     def decorate(function: Function) -> Function:
         before = len(getattr(function, "__click_params__", ()))
         add_parameters(function, *parameters)
         for parameter in vars(function)["__click_params__"][before:]:
-            parameter.heading = heading
+            parameter.heading, parameter.record = heading, record
         return function
 
     return decorate

@@ -8,8 +8,7 @@ import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, fields
-from functools import wraps
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
 from typing import Any, Literal, get_args
@@ -22,7 +21,7 @@ from rich.markup import escape
 from rich.segment import Segment
 from rich.table import Table
 
-from bushfit.cli.options import Folder, Function, Parameter, add_parameters, flag, option, option_group
+from bushfit.cli.options import Folder, Parameter, flag, option, option_group
 from bushfit.errors import printable
 from bushfit.progress import report_progress_to
 from bushfit.reading.tablefile import Form, folder_name
@@ -225,42 +224,32 @@ class Output:
 
 
 def with_output(folder: str, *written: Written) -> Parameter:
-    """Decorator that adds the options shared by all commands, and passes them to the command as one `output`.
+    """Create the options shared by all commands, whose functions receive them as one argument `output`.
 
     Args:
         folder: default results folder, with a placeholder such as <campaign name> for the name of the result.
         written: kinds of result file whose formats can be chosen.
     """
 
-    def decorate(function: Function) -> Function:
-        @wraps(function)
-        def wrapped(**given: Any) -> Any:
-            names = [option.name for option in fields(Output) if option.name in given]
-            output = Output(folder, **{name: given.pop(name) for name in names})
-            with _progress(output.console):
-                try:
-                    return function(output=output, **given)
-                finally:
-                    output.print_warnings()
+    def start(context: click.Context, values: dict[str, Any]) -> Output:
+        """Make the output of a command, which shows its progress and, at its end, prints the collected warnings."""
+        output = Output(folder, **values)
+        context.with_resource(_progress(output.console))
+        context.call_on_close(output.print_warnings)
+        return output
 
-        return add_parameters(
-            wrapped,
-            option_group(
-                "Output",
-                option(
-                    "-o --output", "DIR", f"Write the results to this folder [{folder}].", type=Folder(path_type=Path)
-                ),
-                flag("--force", "Replace earlier results in this folder."),
-                *(_FORMAT_OPTIONS[kind] for kind in written),
-                flag("--no-plots", "Do not write plots.", hidden="pictures" not in written),
-                flag("--json as_json", "Print the result as JSON on standard output."),
-                flag("-v --verbose"),
-                flag("-q --quiet", "-v prints more details, -q only errors."),
-                flag("--trust", hidden=True, expose_value=False, callback=_trust),
-            ),
-        )
-
-    return decorate
+    return option_group(
+        "Output",
+        option("-o --output", "DIR", f"Write the results to this folder [{folder}].", type=Folder(path_type=Path)),
+        flag("--force", "Replace earlier results in this folder."),
+        *(_FORMAT_OPTIONS[kind] for kind in written),
+        flag("--no-plots", "Do not write plots.", hidden="pictures" not in written),
+        flag("--json as_json", "Print the result as JSON on standard output."),
+        flag("-v --verbose"),
+        flag("-q --quiet", "-v prints more details, -q only errors."),
+        flag("--trust", hidden=True, expose_value=False, callback=_trust),
+        record=("output", start),
+    )
 
 
 def _trust(_: click.Context, __: click.Parameter, is_given: bool) -> None:

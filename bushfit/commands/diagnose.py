@@ -23,7 +23,7 @@ from bushfit.planning.knowledge import undecided_effects
 from bushfit.prediction.validation import Validation, validate
 from bushfit.report import diagnosed, plots
 from bushfit.report.page.report import report_page
-from bushfit.report.results import ResultFile, table_with_figure
+from bushfit.report.results import ResultFile
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -141,12 +141,12 @@ def diagnosis_files(diagnosis: Diagnosis, document: DiagnosisFile, title: str) -
     Returns:
         Files gap.csv, gap.png and candidates.csv, not yet rendered.
     """
-    gap = table_with_figure(
-        "gap",
-        partial(diagnosed.gap_table, diagnosis),
-        lambda table: plots.gap.gap_figure(table, diagnosis.result, document, title),
-    )
-    return [*gap, ResultFile("candidates", "table", partial(diagnosed.candidates_table, diagnosis))]
+    gap = ResultFile("gap", "table", partial(diagnosed.gap_table, diagnosis))
+    return [
+        gap,
+        ResultFile("gap", "figure", lambda table: plots.gap.gap_figure(table, diagnosis.result, document, title), gap),
+        ResultFile("candidates", "table", partial(diagnosed.candidates_table, diagnosis)),
+    ]
 
 
 def _require_free_parameter(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> None:

@@ -17,7 +17,7 @@ from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.result import Result
 from bushfit.prediction.other_bushings import predict_each_bushing
 from bushfit.report import plots, tables
-from bushfit.report.results import ResultFile, table_with_figure
+from bushfit.report.results import ResultFile
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -165,11 +165,13 @@ def campaign_files(
     title = model.name if model.bushing else data.campaign.name
     files = list[ResultFile]()
     if "loop" in kinds and marked.loops:
-        make = partial(tables.loops_table, model, marked.loops)
-        files += table_with_figure("loops", make, lambda table: plots.fits.loops_figure(result, table, title))
+        loops = ResultFile("loops", "table", partial(tables.loops_table, model, marked.loops))
+        draw_loops = lambda table: plots.fits.loops_figure(result, table, title)  # noqa: E731  # imported late
+        files += [loops, ResultFile("loops", "figure", draw_loops, loops)]
     if "sweep" in kinds and marked.sweeps:
-        make = partial(tables.sweeps_table, model, marked.sweeps)
-        files += table_with_figure("sweeps", make, lambda table: plots.fits.sweeps_figure(result, table, title))
+        sweeps = ResultFile("sweeps", "table", partial(tables.sweeps_table, model, marked.sweeps))
+        draw_sweeps = lambda table: plots.fits.sweeps_figure(result, table, title)  # noqa: E731  # imported late
+        files += [sweeps, ResultFile("sweeps", "figure", draw_sweeps, sweeps)]
         if "temperature" in model.effects and any(map(can_shift, data.campaign.sweeps)):
             shifted = cache(partial(master_curve, result, marked.sweeps))
             files += [

@@ -25,7 +25,7 @@ from bushfit.reading.tablefile import folder_name
 from bushfit.reduction.displacement import prepare_displacements
 from bushfit.report import plots
 from bushfit.report.response import record_table, response_figures, response_table, validation_table
-from bushfit.report.results import ResultFile, table_with_figure
+from bushfit.report.results import ResultFile
 
 
 class ResponseDocument(TypedDict):
@@ -123,11 +123,9 @@ def respond(
     warnings = warnings_of(result, [response.warnings for response in responses], [*notes])
     figures = {str(response.direction): response_figures(response) for response in responses}
     title, time = f"{result.name}: force over time", prepared[0].time
-    files = table_with_figure(
-        "response",
-        partial(response_table, time, responses),
-        lambda table: plots.response.response_figure(title, table, plots.style.warnings_note(warnings)),
-    )
+    table = ResultFile("response", "table", partial(response_table, time, responses))
+    draw = lambda table: plots.response.response_figure(title, table, plots.style.warnings_note(warnings))  # noqa: E731
+    files = [table, ResultFile("response", "figure", draw, table)]
     return ResponseOutput(result, time, responses, warnings, {"directions": figures, "warnings": warnings}, files)
 
 
@@ -147,5 +145,6 @@ def validation_files(validations: Sequence[Validation], before: Sequence[Validat
     for validation in validations:
         name = f"validation_{folder_name(validation.record.name)}"
         record_title = f"{title}: {validation.record.name}"
-        files += table_with_figure(name, partial(record_table, validation), partial(draw, record_title))
+        record = ResultFile(name, "table", partial(record_table, validation))
+        files += [record, ResultFile(name, "figure", partial(draw, record_title), record)]
     return files

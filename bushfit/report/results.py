@@ -25,9 +25,6 @@ from bushfit.progress import track
 from bushfit.reading.tablefile import Form, ending, folder_name, to_bytes
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
     from bushfit.geometry import Place
 
 #: File formats of a figure.
@@ -49,30 +46,20 @@ class ResultFile:
         name: file name without its extension; a raw file has its extension.
         kind: "json", "table", "figure", "page" (HTML) or "raw".
         source: content, or function that makes it: a mapping, a pandas table, a chart, HTML text or bytes, by kind.
+        table: table that a figure shows, whose content `source` takes; None for other files.
     """
 
     name: str
     kind: Kind
     source: Any
+    table: ResultFile | None = None
 
     @cached_property
     def content(self) -> Any:
         """Content of the file before encoding; it is computed once."""
+        if self.table:
+            return self.source(self.table.content)
         return self.source() if callable(self.source) else self.source
-
-
-def table_with_figure(
-    name: str, make: Callable[[], pd.DataFrame], draw: Callable[[pd.DataFrame], Figure]
-) -> list[ResultFile]:
-    """Make the result files for a table and for its figure.
-
-    Args:
-        name: file name of both, without extension.
-        make: function that makes the table when it is first needed.
-        draw: function that makes the figure from the table.
-    """
-    table = ResultFile(name, "table", make)
-    return [table, ResultFile(name, "figure", lambda: draw(table.content))]
 
 
 def contents(files: Iterable[ResultFile], kind: Kind) -> dict[str, Any]:
@@ -137,8 +124,8 @@ class Formats:
         if file.kind == "figure" and names:
             from bushfit.report import plots
 
-            images = (plots.style.to_image(file.content, form) for form in self.picture_forms)
-            return dict(zip(names, images, strict=True))
+            figure = file.content
+            return dict(zip(names, [plots.style.to_image(figure, form) for form in self.picture_forms], strict=True))
         encoders: Mapping[Kind, Callable[[Any], bytes]] = {
             "json": to_json,
             "raw": bytes,
@@ -188,9 +175,8 @@ def write_results(
     ordered = sorted(files, key=lambda file: _KINDS.index(file.kind))
     names = [name for file in ordered for name in formats.names(file)]
     check_free(folder, names, overwrite=overwrite, inputs=inputs)
-    encoded = track("files made", (formats.encode(file) for file in ordered), len(ordered))
-    for contents in encoded:
-        write_files(folder, contents)
+    for file in track("files made", ordered):
+        write_files(folder, formats.encode(file))
     return names
 
 
