@@ -11,7 +11,7 @@ import pytest
 from commandline import typing
 from jsonschema import Draft202012Validator
 
-from bushfit.schemas import DESCRIBED, schema
+from bushfit.commands.schema import DESCRIBED, schema
 
 Documents = dict[str, list[Any]]
 INPUTS = ("campaign", "manifest", "limits")

@@ -87,7 +87,7 @@ def command(
     """
     from bushfit.campaign.campaign import load_campaign
     from bushfit.commands.export import export
-    from bushfit.commands.loading import load_model, model_file
+    from bushfit.commands.loading import load_model, model_file, model_source
     from bushfit.commands.provenance import input_files
     from bushfit.errors import error_location
     from bushfit.export.contract import UnitSystem
@@ -113,7 +113,8 @@ def command(
     names, file = tuple(dict.fromkeys(formats)), model_file(model)
     written = [_FILES[dialect or name if name == "nastran" else name] for name in names if name in _FILES]
     folder = output.folder((loaded or result).name, *written)
-    exported = export(file, names, loaded, dialect=dialect or "nastran", decimal_comma=comma, **settings)
+    source = model_source(file)
+    exported = export(result, source, names, loaded, dialect=dialect or "nastran", decimal_comma=comma, **settings)
     limits = dict[str, list[str]]()
     for name, of_format in exported.exported.items():
         for omission in of_format.omissions:

@@ -21,9 +21,9 @@ def command(name: str | None, output: Output) -> None:
 
     With -o, writes <name>.schema.json; without NAME, writes the schemas of all files.
     """
+    from bushfit.commands.schema import DESCRIBED, schema
     from bushfit.errors import error_location
     from bushfit.report.results import ResultFile
-    from bushfit.schemas import DESCRIBED, schema
 
     with error_location(place="NAME"):
         schemas = {key: schema(key) for key in ([name] if name else DESCRIBED if output.output else ())}

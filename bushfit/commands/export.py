@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -13,13 +12,13 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.commands.loading import model_source
 from bushfit.commands.predict import predict
 from bushfit.commands.predicted import PredictionOutput
 from bushfit.export.contract import Dialect, Exported, ExportRequest, UnitSystem
 from bushfit.model.arms import ACCURACY
-from bushfit.model.file import load_result
+from bushfit.model.result import Result
 from bushfit.progress import track
+from bushfit.reading.measurement import Source
 from bushfit.report.results import ResultFile
 from bushfit.report.tables import arms_table
 
@@ -72,7 +71,8 @@ class ExportOutput:
 
 
 def export(
-    model: Path,
+    result: Result,
+    source: Source,
     formats: Sequence[str],
     campaign: Campaign | None = None,
     *,
@@ -88,7 +88,8 @@ def export(
     """Convert a fitted model to files for other programs.
 
     Args:
-        model: model file.
+        result: fitted model.
+        source: name and SHA-256 of its model file, which the files quote.
         formats: names of formats: "fmu", "nastran", "abaqus", "adams", "prony", "csv", "xlsx".
         campaign: campaign whose grid is the default.
         accuracy: largest relative error of the modulus in an FMU, and the aim for a Prony series.
@@ -108,14 +109,13 @@ def export(
     Raises:
         ModelError: a model that a format cannot represent, or an invalid grid.
     """
-    result = load_result(model)
     predicted = predict(result, campaign, **grid)
     frequencies = [np.unique(prediction.frequency) for prediction in predicted.predictions]
     if not all(np.array_equal(axis, frequencies[0]) for axis in frequencies):
         predicted = predict(result, campaign, **{**grid, "frequencies": np.unique(np.concatenate(frequencies))})
     settings = (accuracy, units, dialect, decimal_comma, grid.get("temperature"), static_rates, time_domain, cardanic)
     today = datetime.now(UTC).date().isoformat()
-    request = ExportRequest(result, model_source(model), tuple(predicted.predictions), *settings, today)
+    request = ExportRequest(result, source, tuple(predicted.predictions), *settings, today)
     exported: dict[str, Exported] = {}
     for name in track("formats written", formats):
         module, _, function = FORMATS[name].partition(":")

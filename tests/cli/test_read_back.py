@@ -15,8 +15,8 @@ from jsonschema import Draft202012Validator
 from shell import document as read
 from virtual_rig import LOOP, MOUNT, SWEEP, SWEEPS, rig
 
+from bushfit.commands.schema import schema
 from bushfit.model.file import load_result, to_document
-from bushfit.schemas import schema
 
 SPECIMENS = """
 specimens = [

@@ -1,4 +1,4 @@
-"""JSON Schemas (draft 2020-12) of the JSON files that bushfit writes, and of the TOML files that it is given.
+"""schema: JSON Schemas (draft 2020-12) of the files that bushfit writes, and of the TOML files that it is given.
 
 Each schema is generated on demand from the type that reads or writes the file. The descriptions of keys come from the
 docstring of a dataclass, or from the annotation of each key of a TypedDict, so a schema cannot be out of date.
