@@ -87,8 +87,7 @@ class _Element(NamedTuple):
         element, model = np.concatenate(written), np.concatenate(exact)
         loss = number(float(np.max(np.abs(loss_factor(element) - loss_factor(model)))), 2)
         return (
-            f"{self.reference.direction}, {kind}: one static curve and one damping, "
-            f"that of {number(self.frequency, 4)} Hz: "
+            f"{self.reference.direction}, {kind}: one static curve, and the damping of {number(self.frequency, 4)} Hz: "
             f"the error of |K| is {format_deviation(np.abs(element / model))}, of the loss factor up to {loss}"
         )
 
@@ -119,7 +118,9 @@ def export(request: ExportRequest) -> Exported:
         common_omissions(request)
     )
     if request.units:
-        shared.append(f"the requested units, {request.units}: the file states its own units, which Adams converts")
+        shared.append(
+            f"the requested units ({request.units}) are not used: the file states its units, which Adams converts"
+        )
     omissions = {kind: [element.describe_error(kind) for element in elements] for kind in _KINDS}
     files = {
         f"bushing_{kind}.bus": encode_deck(_property_file(request, elements, kind, [*omissions[kind], *shared]))

@@ -235,8 +235,8 @@ def table_omissions(request: ExportRequest, form: StiffnessForm) -> Iterator[str
             unit, factor = place.display.displacement
             low, value, high = (number(table.amplitude * factor, 4) for table in (tables[0], reference, tables[-1]))
             yield (
-                f"{place}: one amplitude per property, {value} {unit}: the error of |K| is "
-                f"{format_deviation(ratios)} at {low} to {high} {unit}"
+                f"{place}: each property has one amplitude. That of {value} {unit} has errors of "
+                f"{format_deviation(ratios)} in |K| at {low} to {high} {unit}"
             )
         if tables[0].frequency.size > 1:
             worst = 0.0
@@ -245,7 +245,7 @@ def table_omissions(request: ExportRequest, form: StiffnessForm) -> Iterator[str
                 lines = (0.5 * (part[1:] + part[:-1]) for part in form.parts(table.frequency, table.stiffness))
                 exact = model.stiffness(place, halfway, table.amplitude, conditions=request.conditions)
                 worst = max(worst, float(np.max(np.abs(form.joined(halfway, *lines) / exact - 1.0))))
-            yield f"{place}: between the frequencies |K| has errors up to {number(100.0 * worst, 2)} %"
+            yield f"{place}: interpolated between the frequencies, |K| has errors of up to {number(100.0 * worst, 2)} %"
         else:
             yield f"{place}: one frequency, {number(tables[0].frequency[0], 4)} Hz: K and loss are constants"
         yield from band_omissions(prediction)
@@ -278,7 +278,7 @@ def band_omissions(prediction: Prediction) -> Iterator[str]:
     """Generate sentences on the omitted 95 % band, and on |K| if an unresolved effect belongs to the rig."""
     place, band = prediction.direction, prediction.stiffness
     if (width := float(np.max((band.high - band.low) / (2.0 * band.value)))) > 0.0:
-        yield f"{place}: no 95 % band, which is up to +/-{number(100.0 * width, 2)} % of |K|"
+        yield f"{place}: the 95 % band of up to +/-{number(100.0 * width, 2)} % of |K| is left out"
     if prediction.if_rigs:
         deviation = format_deviation(prediction.if_rigs.stiffness.value / band.value)
-        yield f"{place}: no values for the case that the unresolved effect belongs to the rig, where |K| is {deviation}"
+        yield f"{place}: if the unresolved effect belongs to the rig, |K| is {deviation}; these values are left out"

@@ -145,7 +145,7 @@ def model_header(model: TimeModel, guid: str) -> str:
         "VALUES": _OFFSET + len(model.values),
         "CONSTANTS": _OFFSET + sum(not value.settable for value in model.values),
         "DIRECTIONS": len(model.places),
-        "PARTS": max(1, len(model.parts)),
+        "PARTS": max(1, len(model.arms)),
         "ARMS": max(1, len(model.arm_rows)),
     }
     listed = ", ".join(f"{name} = {size}" for name, size in sizes.items())

@@ -59,20 +59,19 @@ class TimeModel:
         fields: name of the value for each field of the C structure `Direction`, for each place; missing fields have
             their neutral value.
         levers: lever arm of the slip force at each place: outer radius [m] for torsion, otherwise 1.
-        parts: name of the parameter to which the moduli of each group of arms are proportional.
-        arm_rows: for each arm, index of its group in `parts`, modulus over that parameter, and relaxation time [s].
-        omissions: sentences on effects that are omitted or constant, with the error that this causes.
         arms: groups of arms with the effects that they replace, and their error.
+        arm_rows: for each arm, index of its group in `arms`, its modulus over the model parameter that scales the
+            group (`Arms.size`), and its relaxation time [s].
+        omissions: sentences on effects that are omitted or constant, with the error that this causes.
     """
 
     places: tuple[Place, ...]
     values: tuple[FmuValue, ...]
     fields: tuple[Mapping[str, str], ...]
     levers: tuple[float, ...]
-    parts: tuple[str, ...]
+    arms: tuple[Arms, ...]
     arm_rows: tuple[tuple[int, float, float], ...]
     omissions: tuple[str, ...]
-    arms: tuple[Arms, ...]
 
 
 def time_model(request: ExportRequest) -> TimeModel:
@@ -115,14 +114,13 @@ def time_model(request: ExportRequest) -> TimeModel:
             _fields(model, place, place_names, arms) for place, place_names in zip(request.places, names, strict=True)
         ),
         tuple(tube.outer_radius if tube and place.is_rotation else 1.0 for tube, place in tubes),
-        tuple(part.size for part in arms),
+        arms,
         tuple(
             (index, float(modulus / sizes[part.size]), float(time))
             for index, part in enumerate(arms)
             for modulus, time in zip(part.modulus, part.time, strict=True)
         ),
         tuple(omissions),
-        arms,
     )
 
 
@@ -177,13 +175,12 @@ def _values(
                 place_names[key] = name
     for place, place_names in zip(places, names, strict=True):
         unit = f"1/{place.motion.displacement_unit}" if place.motion.displacement_unit != "1" else "1"
-        shape = {
-            "unit_strain": (unit, model.unit_strain(place), "equivalent strain per displacement, rotation or strain"),
-            "stiffness_per_modulus": ("", model.stiffness_per_modulus(place), "stiffness per equivalent shear modulus"),
-        }
-        for key, (unit, value, meaning) in shape.items():
+        for key, key_unit, value, meaning in (
+            ("unit_strain", unit, model.unit_strain(place), "equivalent strain per displacement, rotation or strain"),
+            ("stiffness_per_modulus", "", model.stiffness_per_modulus(place), "stiffness per equivalent shear modulus"),
+        ):
             place_names[key] = f"{key}.{place}"
-            values[FmuValue(place_names[key], unit, value, (1e-12, 1e12), meaning)] = None
+            values[FmuValue(place_names[key], key_unit, value, (1e-12, 1e12), meaning)] = None
     return tuple(sorted(values, key=lambda value: value.settable)), names
 
 

@@ -7,7 +7,7 @@ GE = tan(ANGLE), the angle in deg.
 Source: Autodesk Nastran 2025 reference, PBUSHT; Altair OptiStruct 2021 reference, PBUSH (example 3) and PBUSHT.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -74,34 +74,22 @@ def _property(
         pid: property number.
         level: stiffness of all directions at this amplitude.
     """
-    rows = [(dof, *form.in_units(table, units)) for dof, table in by_dof(level)]
-    several = level[0].frequency.size > 1
-    nominal, numbers = [dict[int, str](), dict[int, str]()], [dict[int, str](), dict[int, str]()]
-    for dof, _, *columns in rows:
-        for part, column in enumerate(columns):
-            nominal[part][dof] = format_real(column[0])
-            numbers[part][dof] = str(_TABLES * pid + 10 * part + dof)
-    yield from _card("PBUSH*", [str(pid), *_by_dof(names, nominal)])
-    if several:
-        yield from _card("PBUSHT", [str(pid), *_by_dof(names, numbers)])
-        for dof, frequency, *parts in rows:
-            for part, column in enumerate(parts):
-                points = zip(frequency, column, strict=True)
-                pairs = [text for f, value in points for text in (format_real(f, 10), format_real(value))]
-                yield from _card("TABLED1*", [numbers[part][dof], "LINEAR", "LINEAR", *5 * [""], *pairs, "ENDT"])
+    columns = {dof: form.in_units(table, units) for dof, table in by_dof(level)}
+    numbers = {(dof, part): str(_TABLES * pid + 10 * part + dof) for dof in columns for part in (0, 1)}
+    nominal = {(dof, part): format_real(columns[dof][1 + part][0]) for dof, part in numbers}
 
+    def fields(entries: Mapping[tuple[int, int], str]) -> list[str]:
+        """Number of the property; then the name of each table, with its entries by degree of freedom from 1 to 6."""
+        rows = [[name, *(entries.get((dof, part), "") for dof in range(1, 7))] for part, name in enumerate(names)]
+        return [str(pid), *rows[0], "", *rows[1]]
 
-def _by_dof(names: Sequence[str], rows: Sequence[dict[int, str]]) -> list[str]:
-    """List the fields of a property: the name of each table, then its entries for the six degrees of freedom.
-
-    Args:
-        names: names of the tables, such as K and GE.
-        rows: for each table, texts by degree of freedom, 1 to 6; missing ones stay empty.
-    """
-    fields: list[str] = []
-    for name, row in zip(names, rows, strict=True):
-        fields += [*([""] if fields else []), name, *(row.get(dof, "") for dof in range(1, 7))]
-    return fields
+    yield from _card("PBUSH*", fields(nominal))
+    if level[0].frequency.size > 1:
+        yield from _card("PBUSHT", fields(numbers))
+        for (dof, part), table_number in numbers.items():
+            points = zip(columns[dof][0], columns[dof][1 + part], strict=True)
+            pairs = [text for f, value in points for text in (format_real(f, 10), format_real(value))]
+            yield from _card("TABLED1*", [table_number, "LINEAR", "LINEAR", *5 * [""], *pairs, "ENDT"])
 
 
 def _card(name: str, fields: Sequence[str]) -> Iterator[str]:

@@ -113,8 +113,8 @@ def prony_omissions(series: Sequence[PronySeries]) -> list[str]:
         ratios = np.concatenate([np.abs(middle.exact / one.exact) for one in series])
         strain, *ends = (number(100.0 * one.strain, 3) for one in (middle, series[0], series[-1]))
         sentences.append(
-            f"compound: one strain amplitude per series, {strain} %: the error of |G| is "
-            f"{format_deviation(ratios)} at {' to '.join(ends)} %"
+            f"compound: each series has one strain amplitude. That of {strain} % has errors of "
+            f"{format_deviation(ratios)} in |G| at {' to '.join(ends)} %"
         )
     return [*sentences, "compound: friction is a viscous loss at that amplitude, without a force at rest"]
 

@@ -220,8 +220,8 @@ def test_every_format_at_once_and_what_it_leaves_out(bushfit, tmp_path):
         of_line = ", ".join(name for name, each in found["formats"].items() if line in each["left_out"])
         assert done.stderr.count(f"limit of {of_line}: {line}\n") == 1
     for words in (
-        "axial: one amplitude per property, 0.2 mm: the error of |K| is ",
-        "axial: no 95 % band, which is up to ",
+        "axial: each property has one amplitude. That of 0.2 mm has errors of ",
+        "axial: the 95 % band of up to ",
         "no law in time",
         "no stiffness in torsion, rotations about x and y",
     ):
