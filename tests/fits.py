@@ -1,13 +1,34 @@
-"""The joint fit of a campaign, as most tests need it."""
+"""Fits as most tests need them: of a campaign, and of a least-squares problem."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from bushfit.campaign.campaign import Campaign
+from bushfit.effects.contract import Array
+from bushfit.fitting.descent import EVALUATIONS, TOLERANCE, Descent
+from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.fitting.procedures import fit_joint
+from bushfit.model.model import Model
 from bushfit.model.result import Result
 
 
 def joint_fit(campaign: Campaign, **options: Any) -> Result:
     """The five parameters, or those of the campaign's effects, fitted to its tests at once."""
     return fit_joint(PreparedCampaign.from_campaign(campaign), **options)
+
+
+def solve(problem: FitProblem, *, evaluations: int = EVALUATIONS, tolerance: float = TOLERANCE) -> FitResult:
+    """A least-squares problem fitted to its end."""
+    return Descent.start(problem, tolerance).run(evaluations).solution
+
+
+def residual(model: Model, tests: Sequence[MeasuredTest]) -> Array:
+    """Whitened residuals of all tests in order, and of the priors of the model."""
+    return FitProblem(model, tests, ()).residual(model)
+
+
+def jacobian(model: Model, tests: Sequence[MeasuredTest], names: Sequence[str]) -> Array:
+    """Their derivatives by the coordinates of the named parameters."""
+    return FitProblem(model, tests, names).jacobian(model)

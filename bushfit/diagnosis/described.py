@@ -16,10 +16,10 @@ from bushfit.effects.unnamed import NAME, Unnamed
 from bushfit.errors import FitError
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.coordinates import Bounds
-from bushfit.fitting.design import fit_from
+from bushfit.fitting.descent import Descent
 from bushfit.fitting.model_error import with_model_error
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind
-from bushfit.fitting.problem import FitResult
+from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.model.covariance import Z95
 from bushfit.units import number
 
@@ -80,8 +80,10 @@ def describe(evidence: Evidence, rig: RigSettings, start: Mapping[str, float], b
         return None
     harmonic = tuple(test.fundamental() for test in evidence.data_sets)
     try:
-        base = fit_from(evidence.model, harmonic, evidence.fixed, bounds).run(_EVALUATIONS).solution
-        base = fit_from(base.model, harmonic, (*evidence.fixed, *base.at_bound), bounds).run(_EVALUATIONS).solution
+        problem = FitProblem.with_fixed(evidence.model, harmonic, evidence.fixed, bounds)
+        base = Descent.start(problem).run(_EVALUATIONS).solution
+        problem = FitProblem.with_fixed(base.model, harmonic, (*evidence.fixed, *base.at_bound), bounds)
+        base = Descent.start(problem).run(_EVALUATIONS).solution
     except FitError:  # too few points are left for the parameters
         return None
     model = replace(fitted.model, effects=(*evidence.model.effects, NAME), unnamed=correction)

@@ -11,10 +11,10 @@ from bushfit.effects.contract import Array
 from bushfit.fitting.agreement import expected_errors, misfits, prior_uses, prior_warnings
 from bushfit.fitting.assess import covariance, measured_range, quality, temperature_warning
 from bushfit.fitting.coordinates import Bounds
-from bushfit.fitting.design import fit_from
+from bushfit.fitting.descent import Descent
 from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.preparation import MeasuredTest, sources
-from bushfit.fitting.problem import FitResult
+from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.fitting.procedures import fit_warnings
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -56,7 +56,7 @@ class Evidence:
     @property
     def estimate(self) -> FitResult:
         """Result of the fit with each test weighted by its own noise, without errors that several tests share."""
-        return replace(self.solution, problem=replace(self.solution.problem, tests=self.data_sets))
+        return replace(self.solution, problem=replace(self.solution.problem, tests=self.data_sets, shared_error=None))
 
     @property
     def chi_square(self) -> float:
@@ -123,8 +123,8 @@ def fit(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], b
         FitError: fewer data than parameters, or no finite response.
         ModelError: no response.
     """
-    descent = fit_from(model, data_sets, fixed, bounds).run(EVALUATIONS)
-    return Evidence(descent.solution, tuple(data_sets))
+    problem = FitProblem.with_fixed(model, data_sets, fixed, bounds)
+    return Evidence(Descent.start(problem).run(EVALUATIONS).solution, tuple(data_sets))
 
 
 def result_of(

@@ -213,7 +213,7 @@ class Term:
         """
         residuals, added = self.evidence.solution.problem.residual(model), value * self.unit(model)
         for test, points in self.tests:
-            residuals[self.evidence.residual_rows[test]] = test.residual_with_added(added[points], model)
+            residuals[self.evidence.residual_rows[test]] = test.residual(model, added=added[points])
         return residuals
 
     def linearised(self, model: Model, value: Array, shapes: Array) -> tuple[Array, Array, Array]:
@@ -237,7 +237,7 @@ class Term:
             columns[:, place[test]] = test.residual_change(changes[:, points], model, added[points])
             residuals[place[test]] -= test.residual_change(added[points], model, added[points])
             as_share = self.measure == "gain"
-            rows[:, place[test]] = slopes * test.jacobian_with_added(added[points], model, names, as_share=as_share)
+            rows[:, place[test]] = slopes * test.jacobian(model, names, added[points], as_share=as_share)
         return residuals, rows, columns.reshape(2, len(shapes), -1).swapaxes(0, 1)
 
 

@@ -18,8 +18,10 @@ from bushfit.diagnosis.groups import Group
 from bushfit.effects import Branch, Effect, effects_for_places, qualified_name, twins_of
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.design import fit_from, shape_start_values
+from bushfit.fitting.descent import Descent
+from bushfit.fitting.design import shape_start_values
 from bushfit.fitting.preparation import MeasuredTest
+from bushfit.fitting.problem import FitProblem
 from bushfit.geometry import shared_labels
 from bushfit.model.model import Model
 
@@ -155,7 +157,8 @@ def _replacement(evidence: Evidence, effect: Effect, fixed: Sequence[str]) -> tu
     ends = list[tuple[float, Model]]()
     for start in evidence.model.start_values_for(effect):
         with suppress(FitError, ModelError):  # no response from there
-            fit = fit_from(evidence.model.with_effect(effect.name, start), evidence.data_sets, fixed, {})
+            with_effect = evidence.model.with_effect(effect.name, start)
+            fit = Descent.start(FitProblem.with_fixed(with_effect, evidence.data_sets, fixed, {}))
             ends.append((fit.chi_square - fit.expected_fall, fit.model))
     if not ends:
         return None

@@ -10,13 +10,12 @@ from bushfit.diagnosis.evidence import EVALUATIONS, Evidence
 from bushfit.effects import qualified_name
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
-from bushfit.fitting.common_error import CommonError, CorrelatedTests
+from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.coordinates import Bounds
-from bushfit.fitting.descent import Descent
-from bushfit.fitting.design import fit_from, shape_start_values
+from bushfit.fitting.descent import TOLERANCE, Descent
+from bushfit.fitting.design import shape_start_values
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.problem import FitProblem
-from bushfit.fitting.solve import solve
 from bushfit.model.model import Model
 from bushfit.progress import track
 
@@ -49,15 +48,14 @@ def refitted(
     Returns:
         Fits by the name of the effect; fits far behind the best, and effects without a response, are left out.
     """
-    fits: dict[str, Descent] = {}
-    tests: Sequence[MeasuredTest] = evidence.data_sets
-    if columns is not None:
-        tests = CorrelatedTests(evidence.data_sets, CommonError(columns))
+    fits, tests = dict[str, Descent](), evidence.data_sets
+    shared_error = None if columns is None else CommonError(columns)
     for name, model in models.items():
         limits = {**within_reach(model, evidence.data_sets), **bounds}
         start_values = {parameter: value for parameter, value in start.items() if parameter in model.values}
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
-            fits[name] = fit_from(model.with_values(start_values), tests, fixed, limits)
+            problem = FitProblem.with_fixed(model.with_values(start_values), tests, fixed, limits)
+            fits[name] = Descent.start(replace(problem, shared_error=shared_error))
     running, best = list(fits), 0.0
     for _ in track("evaluations of effects", range(1, EVALUATIONS)):
         for name in running:
@@ -119,9 +117,9 @@ def refit_with_free_columns(
         The better of the fits from the values of `evidence` and from `start`.
     """
     names = evidence.solution.coordinates.names
-    tests = CorrelatedTests(bare.data_sets, CommonError(columns))
     start_values = {name: value for name, value in start.items() if name in names}
     starts = [evidence.model, *([evidence.model.with_values(start_values)] if start_values else [])]
-    fits = [solve(FitProblem(model, tests, names, bounds), strict=False) for model in starts]
-    model = min(fits, key=lambda each: each.chi_square).model
+    problems = [FitProblem(model, bare.data_sets, names, bounds, CommonError(columns)) for model in starts]
+    fits = [Descent.start(problem, TOLERANCE).run() for problem in problems]
+    model = min(fits, key=lambda fit: fit.chi_square).model
     return replace(evidence, solution=evidence.solution.reevaluate(model, evidence.data_sets))

@@ -18,7 +18,7 @@ from bushfit.diagnosis.verdict import decide_verdict
 from bushfit.effects import get_effect, place_suffix, qualified_name
 from bushfit.effects.mistakes import get_candidate, get_mistake
 from bushfit.errors import FitError
-from bushfit.fitting.design import fit_from
+from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import split_by_kind, with_gain_weighting
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
@@ -141,5 +141,5 @@ def _initial_fit(
         robust = estimate(FitProblem.with_fixed(model, data_sets, fixed, data.bounds), robust=True)
         outliers, data_sets = robust.outliers, robust.data_sets
     data_sets = [data_set.with_weight() for data_set in with_gain_weighting(data_sets, weigh=True)]
-    descent = fit_from(model, data_sets, fixed, data.bounds).run(EVALUATIONS)
+    descent = Descent.start(FitProblem.with_fixed(model, data_sets, fixed, data.bounds)).run(EVALUATIONS)
     return Evidence(descent.solution, tuple(data_sets)), start, outliers

@@ -11,7 +11,7 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.coordinates import Coordinates, jacobian, residual
+from bushfit.fitting.coordinates import Coordinates
 from bushfit.fitting.preparation import (
     MeasuredLoop,
     MeasuredTest,
@@ -81,7 +81,7 @@ def covariance(
     bases = []
     for stage in stages:
         equations = slice(begin, begin + len(stage.names))
-        slope = jacobian(model, stage.tests, names, with_priors=True)
+        slope = FitProblem(model, stage.tests, names).jacobian(model)
         basis = np.linalg.qr(slope[equations].T)[0]
         system[equations] = basis.T @ slope.T
         excess = np.ones(len(basis))  # 1 in the rows of priors
@@ -173,7 +173,7 @@ def reduced_chi_square(model: Model, data_sets: Sequence[MeasuredTest], paramete
         data_sets: tests.
         parameters: number of fitted parameters.
     """
-    residuals = residual(model, data_sets)
+    residuals = np.concatenate([test.residual(model) for test in data_sets])
     freedom = max(sum(data_set.residual_count for data_set in data_sets) - parameters, 1)
     return float(residuals @ residuals) / freedom, freedom
 

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from bushfit.effects.contract import Array
-
-if TYPE_CHECKING:
-    from bushfit.fitting.preparation import MeasuredTest
 
 #: Variance along a direction, relative to the largest, below which it is rounding.
 _ROUNDING = 1e-14
@@ -69,16 +65,3 @@ class ErrorProducts(NamedTuple):
     products: Array
     components: Array
     variance: Array
-
-
-class CorrelatedTests(list["MeasuredTest"]):
-    """Tests that share an error in addition to the noise of each: their residuals are whitened together.
-
-    Args:
-        data_sets: tests.
-        error: shared error, over the residuals of all tests in order.
-    """
-
-    def __init__(self, data_sets: Iterable[MeasuredTest], error: CommonError) -> None:
-        super().__init__(data_sets)
-        self.error = error

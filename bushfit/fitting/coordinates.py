@@ -1,4 +1,4 @@
-"""Dimensionless coordinates of fitted parameters, and residuals of tests with their derivatives in these coordinates.
+"""Dimensionless coordinates of fitted parameters, and their bounds and priors in these coordinates.
 
 A fit moves the logarithm of strictly positive parameters and the others in units of their typical size, so that every
 coordinate is of order one.
@@ -11,8 +11,6 @@ import numpy as np
 
 from bushfit.effects import Parameter
 from bushfit.effects.contract import Array
-from bushfit.fitting.common_error import CorrelatedTests
-from bushfit.fitting.preparation import MeasuredTest
 from bushfit.model.constraints import Prior
 from bushfit.model.model import Model
 
@@ -69,45 +67,8 @@ def coordinate_bounds(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, 
     for name, parameter in zip(coordinates.names, coordinates.parameters, strict=True):
         limits = zip(bounds.get(name, (None, None)), parameter.bounds, strict=True)
         ends.append(sorted(coordinates.forward(name, end if limit is None else limit) for limit, end in limits))
-    low, high = np.array(ends).T
+    low, high = np.reshape(ends, (-1, 2)).T
     return low, high
-
-
-def residual(model: Model, data_sets: Sequence[MeasuredTest], *, with_priors: bool = False) -> Array:
-    """Whitened residuals of all tests in order, modelled minus measured in units of noise, (n,).
-
-    Args:
-        model: model to compare.
-        data_sets: tests.
-        with_priors: True to append the residuals of the model's priors, (n + p,).
-    """
-    of_priors = [prior_rows(model, ())[0]] if with_priors else []
-    return whiten_together(data_sets, np.concatenate([*(test.residual(model) for test in data_sets), *of_priors]))
-
-
-def jacobian(
-    model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str], *, with_priors: bool = False
-) -> Array:
-    """Derivatives of the whitened residuals of all tests by parameter coordinate.
-
-    Args:
-        model: model at whose values the derivatives are taken.
-        data_sets: tests.
-        names: names of the parameters.
-        with_priors: True to append the derivatives of the p residuals of the model's priors.
-
-    Returns:
-        Derivatives, (len(names), n) or (len(names), n + p).
-    """
-    slopes = Coordinates.of_parameters(model, names).slopes(model.values)
-    moving = (*names, *model.tied)
-    by_value = np.concatenate([test.jacobian(model, moving) for test in data_sets], axis=-1)
-    if model.tied:
-        by_value = by_value[: len(names)] + model.constraints.slopes(model.values, names) @ by_value[len(names) :]
-    by_value *= slopes[:, None]
-    if with_priors and model.constraints.priors:
-        by_value = np.concatenate([by_value, prior_rows(model, names)[1]], axis=-1)
-    return whiten_together(data_sets, by_value)
 
 
 def prior_rows(model: Model, names: Sequence[str]) -> tuple[Array, Array]:
@@ -164,8 +125,3 @@ def coordinate_changes(model: Model, names: Sequence[str], changed: Sequence[str
         elif name in names:
             changes[list(names).index(name), column] = 1.0
     return changes
-
-
-def whiten_together(data_sets: Sequence[MeasuredTest], rows: Array) -> Array:
-    """Whiten residuals or derivatives of all tests, (..., n), by an error that the tests share, if there is one."""
-    return data_sets.error.whiten(rows) if isinstance(data_sets, CorrelatedTests) else rows

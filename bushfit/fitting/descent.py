@@ -39,6 +39,9 @@ _SAME_WAY = 0.8
 #: Share of a step's length that its bend may have, both in units of noise; chosen: further on the way bends otherwise,
 #: and nearly all steps fail.
 _MOST_BENT = 0.2
+#: Largest number of model evaluations of a fit to its end (ten to forty are usual), and relative change of chi-square
+#: at which it ends: far below the effect of noise.
+EVALUATIONS, TOLERANCE = 400, 1e-9
 #: Expected fall of chi-square below which a step is the last, by default: a tenth of a standard error, however large
 #: the misfit, because models are compared in units of noise.
 _LEAST_FALL = 0.01
@@ -83,7 +86,7 @@ class Descent:
         """Start a fit at the start values of its problem, before the first step.
 
         Args:
-            problem: parameters to fit, tests and bounds.
+            problem: parameters to fit, tests and bounds; a fit without parameters is at its end.
             tolerance: expected relative fall of chi-square at which the fit ends; None for the absolute fall of 0.01.
 
         Returns:
@@ -103,7 +106,7 @@ class Descent:
                 found=", ".join(f"{name} = {value:.4g}" for name, value in model.values.items()),
                 hint="give start values or bounds in [fit] of the campaign",
             )
-        return cls(problem, model, point, misfit, slopes, tolerance)
+        return cls(problem, model, point, misfit, slopes, tolerance, converged=not problem.names)
 
     @property
     def chi_square(self) -> float:
@@ -122,7 +125,7 @@ class Descent:
         state = self.model, self.residual, self.jacobian, self.evaluations, at_bound, not self.converged
         return FitResult(self.problem, *state)
 
-    def run(self, evaluations: int) -> "Descent":
+    def run(self, evaluations: int = EVALUATIONS) -> "Descent":
         """Take steps until the fit has converged or has used up its evaluations of the model.
 
         A step that lowers chi-square is taken and reduces the damping; any other step is undone and increases it.

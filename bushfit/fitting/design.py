@@ -12,10 +12,9 @@ from bushfit.effects import Effect, Parameter, get_effect, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.coordinates import Bounds
-from bushfit.fitting.descent import Descent
+from bushfit.fitting.descent import TOLERANCE, Descent
 from bushfit.fitting.preparation import MeasuredTest, operating_conditions, split_by_kind
 from bushfit.fitting.problem import FitProblem, FitResult
-from bushfit.fitting.solve import solve
 from bushfit.model.model import Model
 
 #: Values tried of a shape parameter (a time, a gap, a frequency), spread evenly in its logarithm.
@@ -54,9 +53,9 @@ def start_with_effects(
     """
     added = [get_effect(name) for name in model.effects if name not in plain.effects]
     with suppress(FitError, ModelError):  # no response, or too few points; the fit then says what is wrong
-        direct = fit_from(model, data_sets, fixed, bounds).run(_MOST)
+        direct = Descent.start(FitProblem.with_fixed(model, data_sets, fixed, bounds)).run(_MOST)
         problem = FitProblem.with_fixed(plain, data_sets, fixed, bounds)
-        solution = solve(problem, evaluations=_MOST, strict=False)
+        solution = Descent.start(problem, TOLERANCE).run(_MOST).solution
         for effect in added:
             solution = with_effect(solution, data_sets, effect, fixed, bounds)
         if solution.chi_square <= direct.chi_square - _LOWER:  # alike: two of one law may change names
@@ -99,23 +98,11 @@ def with_effect(
     fits = []
     for start in starts:
         with suppress(FitError, ModelError):  # no response from this start
-            fits.append(fit_from(start, data_sets, fixed, bounds).run(_FIRST))
+            fits.append(Descent.start(FitProblem.with_fixed(start, data_sets, fixed, bounds)).run(_FIRST))
     if not fits:
         raise FitError("the model has no finite response to these tests", found=effect.name)
     best = sorted(fits, key=lambda descent: descent.chi_square)[:_BEST]
     return min((descent.run(_MOST) for descent in best), key=lambda descent: descent.chi_square).solution
-
-
-def fit_from(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], bounds: Bounds) -> Descent:
-    """Prepare a fit of all parameters of a model except the fixed ones; `Descent.run` then takes the steps.
-
-    Args:
-        model: model with the start values.
-        data_sets: tests.
-        fixed: names of parameters that stay fixed.
-        bounds: limits of parameters [SI], inside their default limits.
-    """
-    return Descent.start(FitProblem.with_fixed(model, data_sets, fixed, bounds))
 
 
 def shape_start_values(data_sets: Sequence[MeasuredTest], model: Model, parameter: Parameter) -> Array:

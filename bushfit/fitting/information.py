@@ -11,8 +11,8 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.fitting.assess import measured_range
-from bushfit.fitting.coordinates import jacobian
 from bushfit.fitting.preparation import MeasuredTest, planned_loop, planned_sweep, split_by_kind
+from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.rig_class import ASSUMED
 from bushfit.model.model import Model
 
@@ -58,7 +58,8 @@ class FisherInformation:
             data_sets: tests.
             names: names of the k parameters.
         """
-        slope = jacobian(model, data_sets, names) * relative_sizes(model, names)[:, None]
+        slope = FitProblem(model, data_sets, names).jacobian(model, with_priors=False)
+        slope *= relative_sizes(model, names)[:, None]
         return cls(tuple(names), slope @ slope.T)
 
     def directions(self) -> tuple[Array, Array]:

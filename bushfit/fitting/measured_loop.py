@@ -147,42 +147,27 @@ class MeasuredLoop(MeasuredBase):
         force = self.prepared.interpolate_at_rows(force) + (self.prepared.datum or 0.0)
         return force if values is not None else self._keep("force", model, (), force)
 
-    def residual_with_added(self, added: Array, model: Model) -> Array:
-        """Whitened residuals, (size,), model minus measured in units of noise, of a model with an additional stiffness.
+    def residual(self, model: Model, values: Values | None = None, added: Array | None = None) -> Array:
+        rows = self.whiten((self.force(model, values) - self.prepared.force) * self._per_noise)
+        return rows if added is None else rows + self.residual_change(added, model)
 
-        Args:
-            added: stiffness added to the model's at each operating point (one in a loop), complex [N/m or N m/rad].
-            model: model without the added stiffness.
-        """
-        return self.residual(model) + self.residual_change(added, model)
-
-    def slopes(self, model: Model, names: Sequence[str]) -> Array:
-        return self.whiten(self._force_slopes(model, names) * self._per_noise)
-
-    def _force_slopes(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the model's force at the n rows by parameter value [SI], (len(names), n)."""
-        history = self.prepared.history(model.is_transient)
-        if model.only_branches:
-            return self.prepared.interpolate_at_rows(force_slopes_of_branches(model, self.direction, history, names))
-        force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
-        self._keep("force", model, (), self.prepared.interpolate_at_rows(force) + (self.prepared.datum or 0.0))
-        return self.prepared.interpolate_at_rows(slopes)
-
-    def jacobian_with_added(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
-        """Derivatives by k parameters of the whitened residuals of a model with an additional stiffness, (k, size).
-
-        Args:
-            added: stiffness added to the model's at each operating point (one in a loop), complex [N/m or N m/rad].
-            model: model at whose values the derivatives are taken.
-            names: names of the k parameters.
-            as_share: True if the added stiffness remains proportional to the model's; False if it is constant.
-        """
-        slopes = self.jacobian(model, names)
-        if as_share:
-            test = self.direction, self.frequency, self.amplitude
-            stiffness, of_stiffness = stiffness_and_slopes(model, *test, names, "loop", self.test_conditions)
-            slopes = slopes + self.residual_change(added / stiffness * of_stiffness, model)
-        return slopes
+    def jacobian(
+        self, model: Model, names: Sequence[str], added: Array | None = None, *, as_share: bool = False
+    ) -> Array:
+        if (rows := self._recall("jacobian", model, tuple(names))) is None:
+            history = self.prepared.history(model.is_transient)
+            if model.only_branches:  # whose derivatives do not need the force
+                slopes = force_slopes_of_branches(model, self.direction, history, names)
+            else:
+                force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
+                self._keep("force", model, (), self.prepared.interpolate_at_rows(force) + (self.prepared.datum or 0.0))
+            rows = self.whiten(self.prepared.interpolate_at_rows(slopes) * self._per_noise)
+            self._keep("jacobian", model, tuple(names), rows)
+        if added is None or not as_share:
+            return rows
+        test = self.direction, self.frequency, self.amplitude
+        stiffness, slopes = stiffness_and_slopes(model, *test, names, "loop", self.test_conditions)
+        return rows + self.residual_change(added / stiffness * slopes, model)
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
         """Change of the whitened residuals, (..., size), by a small change of the model's stiffness.
@@ -203,11 +188,9 @@ class MeasuredLoop(MeasuredBase):
         difference = self.relative_difference(model)[0, self.weights > 0.0]
         return np.abs(difference - np.mean(difference))
 
-    def difference(self, model: Model, values: Values | None = None) -> Array:
-        return (self.force(model, values) - self.prepared.force) * self._per_noise
-
     def misfit(self, model: Model) -> Array:
-        return self.difference(model)
+        """Model minus measured force at each row, in units of the row's noise, (n,); 0 at rows without weight."""
+        return (self.force(model) - self.prepared.force) * self._per_noise
 
     def distance(self, model: Model) -> Array:
         """Absolute difference between model and measured force at each row, in units of noise, (n,)."""
@@ -360,9 +343,8 @@ class MeasuredLoop(MeasuredBase):
 
     def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
         """Inner products of residuals and their derivatives by the named parameters, for `likeliest_model_error`."""
-        slopes = self._force_slopes(model, names)
-        misfit = (self.force(model) - self.prepared.force)[None]
-        white = self._whiten_rows(np.concatenate((misfit, slopes)) * self._per_noise)
+        bare = replace(self, gain_error=0.0, model_error=0.0)
+        white = np.vstack((self._whiten_rows(self.misfit(model)), bare.jacobian(model, names)))
         directions, size = self._unit_error.principal_errors
         return ErrorProducts(white @ white.T, white @ directions * size, np.square(size))
 

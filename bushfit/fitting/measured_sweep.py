@@ -208,38 +208,25 @@ class MeasuredSweep(MeasuredBase):
         stiffness = distinct[..., distinct_index]
         return stiffness if values is not None else self._keep("stiffness", model, (), stiffness)
 
-    def difference(self, model: Model, values: Values | None = None) -> Array:
+    def residual(self, model: Model, values: Values | None = None, added: Array | None = None) -> Array:
+        stiffness = self.stiffness(model, values)
         with np.errstate(divide="ignore", invalid="ignore"):  # not finite where there is no stiffness: within free play
-            return self.deviation(self.stiffness(model, values))
+            return self.whiten(self.deviation(stiffness if added is None else stiffness + added))
 
-    def residual_with_added(self, added: Array, model: Model) -> Array:
-        return self.whiten(self.deviation(self.stiffness(model) + added))
-
-    def slopes(self, model: Model, names: Sequence[str]) -> Array:
-        return self.residual_change(self._stiffness_slopes(model, names), model)
-
-    def jacobian_with_added(self, added: Array, model: Model, names: Sequence[str], *, as_share: bool) -> Array:
-        """Derivatives by k parameters of the whitened residuals, gains then phases, of a model with an added stiffness.
-
-        Args:
-            added: stiffness added to the model's at the n points, complex (n,) [N/m or N m/rad].
-            model: model at whose values the derivatives are taken.
-            names: names of the k parameters.
-            as_share: True if the added stiffness remains proportional to the model's; False if it is constant.
-
-        Returns:
-            Derivatives per SI unit of each parameter, (k, 2 n).
-        """
-        grown = 1.0 + added / self.stiffness(model) if as_share else 1.0
-        return self.residual_change(grown * self._stiffness_slopes(model, names), model, added)
-
-    def _stiffness_slopes(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the model's complex stiffness at the n points by parameter value [SI], (len(names), n)."""
+    def jacobian(
+        self, model: Model, names: Sequence[str], added: Array | None = None, *, as_share: bool = False
+    ) -> Array:
+        if added is None and (rows := self._recall("jacobian", model, tuple(names))) is not None:
+            return rows
         frequency, amplitude, conditions, distinct_index = self._operating_points(model)
         points = self.direction, frequency, amplitude
         stiffness, slopes = stiffness_and_slopes(model, *points, names, conditions=conditions)
-        self._keep("stiffness", model, (), stiffness[distinct_index])
-        return slopes[:, distinct_index]
+        stiffness, slopes = stiffness[distinct_index], slopes[:, distinct_index]
+        self._keep("stiffness", model, (), stiffness)
+        if added is None:
+            return self._keep("jacobian", model, tuple(names), self.residual_change(slopes, model))
+        grown = 1.0 + added / stiffness if as_share else 1.0
+        return self.residual_change(grown * slopes, model, added)
 
     def residual_change(self, change: Array, model: Model, added: Array | float = 0.0) -> Array:
         """Change of the whitened residuals by a small change of the model's stiffness.
@@ -318,8 +305,9 @@ class MeasuredSweep(MeasuredBase):
         return self.covariance.log_det_covariance if self.model_error else 0.0
 
     def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
-        slopes = self._deviation_change(self._stiffness_slopes(model, names), self.stiffness(model))
-        return self.covariance.error_products(np.concatenate((self.deviation(self.stiffness(model))[None], slopes)))
+        bare = replace(self, noise=replace(self.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), model_error=0.0)
+        slopes = bare.jacobian(model, names)  # which keeps the response for the residuals
+        return self.covariance.error_products(np.vstack((bare.residual(model), slopes)))
 
     def relative_difference(self, model: Model) -> Array:
         difference = (self.stiffness(model) - self.measured) / np.abs(self.measured)

@@ -49,49 +49,34 @@ class MeasuredBase(ABC):
         """
 
     @abstractmethod
-    def difference(self, model: Model, values: Values | None = None) -> Array:
-        """Model minus measured at each row or point, before noise and shared errors are whitened.
-
-        Args:
-            model: model to evaluate.
-            values: parameter values in place of the model's own; leading axes are added to the result.
-
-        Returns:
-            Differences in force in units of noise, (..., n); of a sweep in gain + i phase [rad], complex (..., n).
-        """
-
-    @abstractmethod
-    def whiten(self, difference: Array) -> Array:
-        """Whiten a `difference`: remove the correlation of its noise, and the errors that rows or points share.
-
-        Returns:
-            Whitened residuals, (..., size), whose noise is independent with unit variance.
-        """
-
-    @abstractmethod
-    def slopes(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the whitened residuals by parameter value, (len(names), size), for `jacobian`."""
-
-    def residual(self, model: Model, values: Values | None = None) -> Array:
+    def residual(self, model: Model, values: Values | None = None, added: Array | None = None) -> Array:
         """Whitened residuals: model minus measured in units of noise; independent with variance 1 for a true model.
 
         Args:
             model: model to evaluate.
-            values: parameter values in place of the model's own; leading axes are added to the result.
+            values: parameter values in place of the model's; leading axes are added to the result.
+            added: stiffness added to the model's at each operating point (one in a loop), complex [N/m or N m/rad].
 
         Returns:
             Residuals in the force of each row, (..., size); of a sweep of n points, n gains, then n phases.
         """
-        return self.whiten(self.difference(model, values))
 
     def misfit(self, model: Model) -> Array:
         """Model minus measured in units of noise, (size,), for tables: whitened for a sweep, row by row for a loop."""
         return self.residual(model)
 
-    def jacobian(self, model: Model, names: Sequence[str]) -> Array:
-        """Derivatives of the whitened residuals by parameter value [SI], (len(names), size); the last are cached."""
-        rows = self._recall("jacobian", model, tuple(names))
-        return self._keep("jacobian", model, tuple(names), self.slopes(model, names)) if rows is None else rows
+    @abstractmethod
+    def jacobian(
+        self, model: Model, names: Sequence[str], added: Array | None = None, *, as_share: bool = False
+    ) -> Array:
+        """Derivatives of the whitened residuals by parameter value [SI], (len(names), size); the last are cached.
+
+        Args:
+            model: model at whose values the derivatives are taken.
+            names: names of the parameters.
+            added: stiffness added to the model's at each operating point (one in a loop), complex [N/m or N m/rad].
+            as_share: True if the added stiffness remains proportional to the model's; False if it is constant.
+        """
 
     def without(self, points: Array) -> Self:  # noqa: ARG002
         """Return a sweep with weight 0 at the points with the given indices; a loop is unchanged."""

@@ -31,6 +31,7 @@ from bushfit.errors import FitError, ModelError
 from bushfit.fitting.assess import excess_chi_square
 from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, prior_covariance, prior_rows
+from bushfit.fitting.descent import TOLERANCE, Descent
 from bushfit.fitting.discrepancy import (
     OVER_FREQUENCY,
     OVER_STRAIN,
@@ -44,7 +45,6 @@ from bushfit.fitting.levels import level_error_columns
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredTest, residual_slices
 from bushfit.fitting.problem import FitProblem, FitResult, SmoothError
 from bushfit.fitting.rig_class import class_errors
-from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
 from bushfit.gaussian_process import MAXIMUM_NODES, RestrictedLikelihood
 from bushfit.model.model import Model
@@ -129,7 +129,7 @@ def closest_fit(plain_fit: FitResult, bounds: Bounds) -> tuple[FitResult, float]
         weighted, ends = [test.with_model_error(size) for test in tests], list[FitResult]()
         for start in starts:
             with suppress(FitError, ModelError):  # no response from values that were read off the tests
-                ends.append(solve(FitProblem(start, weighted, names, bounds), strict=False))
+                ends.append(Descent.start(FitProblem(start, weighted, names, bounds), TOLERANCE).run().solution)
         solution = min(ends, key=lambda end: end.chi_square)
         starts, before = [solution.model], size
         size = likeliest_model_error(solution.model, tests, [names[i] for i in solution.moving])

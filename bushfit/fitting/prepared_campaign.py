@@ -14,7 +14,7 @@ from bushfit.campaign.session import measured_session
 from bushfit.effects import BASE, effect_name_of, get_effect, with_base
 from bushfit.errors import FitError, ModelError, error_location
 from bushfit.fitting.assess import check_strain, mixed_condition_warnings
-from bushfit.fitting.coordinates import Bounds, residual
+from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.design import start_with_effects
 from bushfit.fitting.preload import with_preload
 from bushfit.fitting.preparation import (
@@ -180,10 +180,16 @@ class PreparedCampaign:
         """
         bushing, given_values = self.campaign.bushing, self.given_values
         fixed = {name: value for name, value in given_values.items() if not self.free((name,))}
+        choices = [given_values] if fixed == given_values else [given_values, fixed]
         with error_location(self.campaign.path):
-            starts = [start_values(bushing, data_sets, {**values, **stage_fixed}) for values in (given_values, fixed)]
+            starts = [start_values(bushing, data_sets, {**values, **stage_fixed}) for values in choices]
         models = [Model.with_defaults(bushing, effects, values, constraints=self.constraints) for values in starts]
-        best = 0 if fixed == given_values else int(np.argmin([_chi_square(model, data_sets) for model in models]))
+        chi_squares = np.full(len(models), np.inf)
+        for i, model in enumerate(models if len(models) > 1 else ()):
+            with suppress(ModelError), np.errstate(all="ignore"):
+                rows = np.concatenate([test.residual(model) for test in data_sets])
+                chi_squares[i] = np.nan_to_num(rows @ rows, nan=np.inf)
+        best = int(np.argmin(chi_squares))
         named = {effect_name_of(name) for name in given_values}
         added = [name for name in effects if name not in BASE and name not in named]
         added = [name for name in added if get_effect(name).replaces not in effects]
@@ -293,14 +299,6 @@ class PreparedCampaign:
             found=", ".join(f"{x:.4g}" for x in wanted),
             expected="some of " + ", ".join(f"{x:.4g}" for x in levels),
         )
-
-
-def _chi_square(model: Model, data_sets: Sequence[MeasuredTest]) -> float:
-    """Chi-square of a model over tests; infinite if the model has no finite response."""
-    with suppress(ModelError), np.errstate(all="ignore"):
-        chi_square = float(np.sum(np.square(residual(model, data_sets))))
-        return chi_square if np.isfinite(chi_square) else np.inf
-    return np.inf
 
 
 def _preferred(data_sets: Sequence[_Kind]) -> list[_Kind]:

@@ -10,15 +10,8 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
-from bushfit.fitting.coordinates import (
-    ROUNDING,
-    Bounds,
-    Coordinates,
-    coordinate_bounds,
-    jacobian,
-    prior_rows,
-    residual,
-)
+from bushfit.fitting.common_error import CommonError
+from bushfit.fitting.coordinates import ROUNDING, Bounds, Coordinates, coordinate_bounds, prior_rows
 from bushfit.fitting.preparation import MeasuredTest, residual_slices
 from bushfit.model.covariance import Z95
 from bushfit.model.model import Model
@@ -40,12 +33,14 @@ class FitProblem:
         tests: tests with their noise.
         names: names of the k free parameters.
         bounds: limits of parameters [SI] by name, inside their default limits.
+        shared_error: error that the residuals of all tests share in addition to the noise of each test; None without.
     """
 
     model: Model
     tests: Sequence[MeasuredTest]
     names: Sequence[str]
     bounds: Bounds = field(default_factory=dict)
+    shared_error: CommonError | None = None
 
     @classmethod
     def with_fixed(
@@ -74,12 +69,34 @@ class FitProblem:
         return low + inside, high - inside
 
     def residual(self, model: Model) -> Array:
-        """Whitened residuals of the tests, then of the priors of the model, (n,)."""
-        return residual(model, self.tests, with_priors=True)
+        """Whitened residuals of the tests, then of the p priors of the model, (n + p,)."""
+        by_test = list[Array]()
+        for test in self.tests:
+            by_test.append(test.residual(model))
+        rows = np.concatenate((*by_test, prior_rows(model, ())[0]))
+        return self.shared_error.whiten(rows) if self.shared_error else rows
 
-    def jacobian(self, model: Model) -> Array:
-        """Derivatives of the whitened residuals of tests and priors by coordinate, (k, n)."""
-        return jacobian(model, self.tests, self.names, with_priors=True)
+    def jacobian(self, model: Model, *, with_priors: bool = True) -> Array:
+        """Derivatives of the whitened residuals by the coordinates of the k free parameters.
+
+        Args:
+            model: model at whose values the derivatives are taken.
+            with_priors: False to leave out the residuals of the p priors of the model.
+
+        Returns:
+            Derivatives, (k, n + p) or (k, n).
+        """
+        free, varied = len(self.names), (*self.names, *model.tied)
+        by_test = list[Array]()
+        for test in self.tests:
+            by_test.append(test.jacobian(model, varied))
+        slopes = np.concatenate(by_test, axis=-1)
+        if model.tied:
+            slopes = slopes[:free] + model.constraints.slopes(model.values, self.names) @ slopes[free:]
+        slopes *= self.coordinates.slopes(model.values)[:, None]
+        if with_priors and model.constraints.priors:
+            slopes = np.concatenate((slopes, prior_rows(model, self.names)[1]), axis=-1)
+        return self.shared_error.whiten(slopes) if self.shared_error else slopes
 
     @property
     def start(self) -> Array:
@@ -224,8 +241,9 @@ class FitResult:
             tests: tests.
 
         Returns:
-            Result with the new residuals and Jacobian; outliers and bounds are those of this result.
+            Result with the new residuals and Jacobian, without an error shared by the tests; outliers and bounds are
+            those of this result.
         """
-        problem = replace(self.problem, tests=tests)
+        problem = replace(self.problem, tests=tests, shared_error=None)
         slopes = problem.jacobian(model)
         return replace(self, problem=problem, model=model, residual=problem.residual(model), jacobian=slopes)

@@ -32,7 +32,6 @@ from bushfit.fitting.problem import FitResult
 from bushfit.fitting.profile import limit95, profile95
 from bushfit.fitting.rig_class import format_class_errors, largest_error
 from bushfit.fitting.robust import estimate, outlier_warnings
-from bushfit.fitting.solve import solve_with_lmfit
 from bushfit.geometry import get_places
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
@@ -245,7 +244,7 @@ def _fit_step(
         effects: names of the effects of the model.
         fixed: values of parameters that this step keeps fixed, by name [SI].
     """
-    return estimate(data.problem(effects, tests, fixed), robust=data.robust, solver=solve_with_lmfit)
+    return estimate(data.problem(effects, tests, fixed), robust=data.robust, lmfit=True)
 
 
 def _result(

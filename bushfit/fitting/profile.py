@@ -14,9 +14,9 @@ import numpy as np
 from bushfit.errors import FitError
 from bushfit.fitting.assess import linear_errors, reduced_chi_square
 from bushfit.fitting.coordinates import Coordinates
+from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import split_by_kind
 from bushfit.fitting.problem import FitResult
-from bushfit.fitting.solve import solve
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.progress import track
 
@@ -71,7 +71,7 @@ class _Profile:
             names = [name for name in self.best.names if name != self.name]
             problem = replace(self.best.problem, model=model, names=names)
             # five to ten evaluations are the rule, and the tolerance is far below what the rise is compared with
-            self.known[coordinate] = solve(problem, evaluations=100, tolerance=1e-7, strict=False)
+            self.known[coordinate] = Descent.start(problem, 1e-7).run(100).solution
         return self.known[coordinate]
 
     def root_rise(self, coordinate: float) -> float:

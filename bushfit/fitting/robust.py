@@ -7,7 +7,7 @@ Notes:
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -15,10 +15,11 @@ import numpy as np
 
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError
+from bushfit.fitting.descent import TOLERANCE, Descent
 from bushfit.fitting.outliers import misfit_scale
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.problem import FitProblem, FitResult
-from bushfit.fitting.solve import solve
+from bushfit.fitting.solve import solve_with_lmfit
 from bushfit.model.model import Model
 from bushfit.model.result import Outlier
 
@@ -47,10 +48,8 @@ def list_outliers(
     return tuple(entry for data_set, points in pairs for entry in data_set.outliers(points, model))
 
 
-def estimate(
-    problem: FitProblem, *, robust: bool = False, solver: Callable[[FitProblem], FitResult] = solve
-) -> FitResult:
-    """Fit by least squares, or robustly by the loss soft_l1 without the outliers of sweeps.
+def estimate(problem: FitProblem, *, robust: bool = False, lmfit: bool = False) -> FitResult:
+    """Fit to the end by least squares, or robustly by the loss soft_l1 without the outliers of sweeps.
 
     soft_l1 minimises the sum of 2 C^2 (sqrt(1 + (z/C)^2) - 1) over the distances z of the points in units of noise.
     The covariance is that of least squares with all weights equal to (E psi')^2/E psi^2 for normal noise, where psi is
@@ -59,30 +58,39 @@ def estimate(
     Args:
         problem: parameters to fit, tests and bounds.
         robust: True for soft_l1.
-        solver: function that minimises the sum of squares of a problem.
+        lmfit: True to minimise with lmfit, as the paper's procedure does.
 
     Returns:
         Result of the fit, with its outliers.
 
     Raises:
-        FitError: the robust fit does not converge, or the solver fails.
+        FitError: there are fewer data than parameters, the response is not finite, or the fit does not converge.
     """
-    if not robust:
-        found = solver(problem)
-        return replace(found, outliers=list_outliers(found.model, problem.tests))
-    model, tests = problem.model, problem.tests
+    current, tests = problem, problem.tests
     for _ in range(_MOST_ROUNDS):
-        outlying = [test.outlier_indices(model) for test in tests]
-        retained = [test.without(points) for test, points in zip(tests, outlying, strict=True)]
-        softened = []
-        for test in retained:
-            distance, parts = test.distance(model), test.residuals_per_point
-            scale = _SOFT * misfit_scale(distance[distance > 0.0] * np.sqrt(parts), parts)
-            softened.append(test.weighted(1.0 / np.sqrt(1.0 + (distance / scale) ** 2)))
-        found = solver(replace(problem, model=model, tests=softened))
+        model = current.model
+        if robust:
+            outlying = [test.outlier_indices(model) for test in tests]
+            retained = [test.without(points) for test, points in zip(tests, outlying, strict=True)]
+            softened = []
+            for test in retained:
+                distance, parts = test.distance(model), test.residuals_per_point
+                scale = _SOFT * misfit_scale(distance[distance > 0.0] * np.sqrt(parts), parts)
+                softened.append(test.weighted(1.0 / np.sqrt(1.0 + (distance / scale) ** 2)))
+            current = replace(problem, model=model, tests=softened)
+        found = solve_with_lmfit(current) if lmfit else Descent.start(current, TOLERANCE).run().solution
+        if found.stopped and not found.flat:
+            raise FitError(
+                "the fit did not converge",
+                found=f"no convergence after {found.evaluations} evaluations of the model",
+                hint="fix a parameter with vary = false, or give bounds, in [fit] of the campaign",
+            )
+        if not robust:
+            return replace(found, outliers=list_outliers(found.model, tests))
         before, after = (found.coordinates.point(fitted.values) for fitted in (model, found.model))
-        change, model = (after - before) @ found.jacobian, found.model
+        change, current = (after - before) @ found.jacobian, replace(problem, model=found.model)
         if float(change @ change) < _SETTLED**2:
+            model = found.model
             weighed = [test.weighted(np.array(_efficiency(test.residuals_per_point))) for test in retained]
             outliers = list_outliers(model, retained, outlying)
             return replace(found, covariance_tests=weighed, noise_weighted=retained, outliers=outliers)

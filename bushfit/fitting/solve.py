@@ -1,4 +1,4 @@
-"""Least-squares fits of a model's parameters to tests, within bounds, to the end."""
+"""Least-squares fits with lmfit, as the paper's procedure makes them."""
 
 from __future__ import annotations
 
@@ -8,47 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bushfit.errors import FitError, ModelError
-from bushfit.fitting.descent import Descent
+from bushfit.errors import ModelError
+from bushfit.fitting.descent import EVALUATIONS, TOLERANCE, Descent
 from bushfit.fitting.problem import FitProblem, FitResult
 from bushfit.model.model import Model
 
 if TYPE_CHECKING:
     import lmfit
-
-#: Largest number of model evaluations (ten to forty are usual), and relative change of chi-square, or of the point, at
-#: which a fit stops: far below the effect of noise.
-_EVALUATIONS, _TOLERANCE = 400, 1e-9
-
-
-def solve(
-    problem: FitProblem, *, evaluations: int = _EVALUATIONS, tolerance: float = _TOLERANCE, strict: bool = True
-) -> FitResult:
-    """Minimise the sum of squared residuals from the start values, within bounds.
-
-    Args:
-        problem: parameters to fit, tests and bounds; without parameters the residuals are only evaluated.
-        evaluations: largest number of model evaluations.
-        tolerance: expected relative fall of chi-square at which the fit stops.
-        strict: True to raise an error if the fit uses up its evaluations and chi-square is not yet flat.
-
-    Returns:
-        Result at the minimum, at which parameters may be at a bound.
-
-    Raises:
-        FitError: there are fewer data than parameters, the response is not finite, or the fit does not converge.
-    """
-    if not problem.names:
-        misfit = problem.residual(problem.model)
-        return FitResult(problem, problem.model, misfit, np.empty((0, misfit.size)))
-    found = Descent.start(problem, tolerance).run(evaluations).solution
-    if found.stopped and strict and not found.flat:
-        raise FitError(
-            "the fit did not converge",
-            found=f"no convergence after {found.evaluations} evaluations of the model",
-            hint="fix a parameter with vary = false, or give bounds, in [fit] of the campaign",
-        )
-    return found
 
 
 class _OutOfBoundsError(Exception):
@@ -65,14 +31,14 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
         Result at the minimum.
 
     Raises:
-        FitError: see `solve`, which replaces MINPACK if a step leaves the bounds or the fit does not converge.
+        FitError: see `Descent`, which replaces MINPACK if a step leaves the bounds or the fit does not converge.
 
     Notes:
         Both methods find the same minimum: on the campaigns in configs/ and data/practice parameters differ by 1e-8.
-        All other fits use `solve`, which needs 0.4 to 0.9 of the time and supports bounds.
+        All other fits use `Descent`, which needs 0.4 to 0.9 of the time and supports bounds.
     """
     if not problem.names:
-        return solve(problem)
+        return Descent.start(problem).solution
     import lmfit
 
     start, (low, high) = problem.start, problem.limits
@@ -98,16 +64,16 @@ def solve_with_lmfit(problem: FitProblem) -> FitResult:
             Dfun=lambda parameters: problem.jacobian(model_of(parameters)),
             col_deriv=True,
             gtol=0.0,
-            ftol=_TOLERANCE,
-            xtol=_TOLERANCE,
-            max_nfev=_EVALUATIONS,
+            ftol=TOLERANCE,
+            xtol=TOLERANCE,
+            max_nfev=EVALUATIONS,
             calc_covar=False,
         )
         if not fit.aborted:
             best = model_of(fit.params)
             at_bound = problem.at_bound(problem.coordinates.point(best.values))
             return FitResult(problem, best, problem.residual(best), problem.jacobian(best), int(fit.nfev), at_bound)
-    return solve(problem)
+    return Descent.start(problem, TOLERANCE).run().solution
 
 
 @cache

@@ -119,11 +119,10 @@ class Whitening:
             added += (sums * variance) @ sums.T
         return added
 
-    def error_products(self, deviation: Array) -> ErrorProducts:
-        """Inner products of m deviations, complex (m, n), in units of scatter, to estimate the model error's size."""
-        unit, (order, starts) = self._block.unit, self._by_point
-        rows = np.concatenate((deviation.real, deviation.imag), axis=-1) * unit
-        components = np.add.reduceat((rows * unit)[:, order], starts, axis=-1)
+    def error_products(self, rows: Array) -> ErrorProducts:
+        """Inner products of deviations in units of scatter, (m, 2 n), to estimate the size of the model error."""
+        order, starts = self._by_point
+        components = np.add.reduceat((rows * self._block.unit)[:, order], starts, axis=-1)
         return ErrorProducts(rows @ rows.T, components, self._point.weight)
 
     @property

@@ -19,9 +19,10 @@ from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.propose import missing_effects, sensitivity
 from bushfit.effects import Effect
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
-from bushfit.fitting.coordinates import Coordinates, jacobian
+from bushfit.fitting.coordinates import Coordinates
 from bushfit.fitting.information import relative_sizes
 from bushfit.fitting.preparation import MeasuredTest, planned_loop, planned_sweep, split_by_kind
+from bushfit.fitting.problem import FitProblem
 from bushfit.geometry import Place, shared_labels
 from bushfit.planning.contract import Knowledge, Test, operating_points
 
@@ -261,7 +262,8 @@ def relative_slopes(knowledge: Knowledge, data_sets: Sequence[MeasuredTest]) -> 
     model, bounded = knowledge.model, Coordinates.of_parameters(knowledge.model, knowledge.bounded)
     typical = np.array([parameter.typical for parameter in bounded.parameters]) / bounded.slopes(model.values)
     sizes = np.concatenate((relative_sizes(model, knowledge.names), typical))
-    return jacobian(model, data_sets, (*knowledge.names, *knowledge.bounded)) * sizes[:, None]
+    problem = FitProblem(model, data_sets, (*knowledge.names, *knowledge.bounded))
+    return problem.jacobian(model, with_priors=False) * sizes[:, None]
 
 
 def rival_chi_squares(rivals: Sequence[Information]) -> Array:

@@ -10,7 +10,6 @@ import numpy as np
 from bushfit.diagnosis.priors import DECISIVE_CHI_SQUARE
 from bushfit.effects import Effect
 from bushfit.effects.contract import Array
-from bushfit.fitting.coordinates import residual
 from bushfit.model.covariance import Z95
 from bushfit.planning.candidates import candidates, standard_tests
 from bushfit.planning.contract import Knowledge, PlanRequest, Test
@@ -73,7 +72,9 @@ class PlanningProblem:
         grid = CandidateGrid.from_tests(knowledge, tests)
         effects, columns = grid.effect_columns()
         models = [grid.information(knowledge, columns)]
-        residuals = np.array([residual(rival.model, grid.data_sets) for rival in knowledge.rivals])
+        residuals = np.array(
+            [np.concatenate([test.residual(rival.model) for test in grid.data_sets]) for rival in knowledge.rivals]
+        )
         for index, rival in enumerate(knowledge.rivals):
             models.append(grid.information(rival, np.delete(residuals, index, axis=0) - residuals[index]))
         wanted = {points.place: PointSensitivity.from_knowledge(knowledge, points) for points in request.points}

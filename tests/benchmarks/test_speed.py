@@ -24,12 +24,13 @@ from scipy.optimize import leastsq
 
 from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.workflow import diagnose
-from bushfit.fitting.coordinates import Coordinates, jacobian, residual
+from bushfit.fitting.coordinates import Coordinates
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.starts import start_values
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
+from tests.fits import jacobian, residual
 
 pytestmark = pytest.mark.slow
 

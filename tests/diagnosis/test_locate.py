@@ -10,7 +10,7 @@ from bushfit.diagnosis.evidence import fit
 from bushfit.diagnosis.holdout import hold_out, hold_out_parts
 from bushfit.diagnosis.locate import find_regions
 from bushfit.diagnosis.record import MisfitRegion
-from bushfit.fitting.coordinates import residual
+from tests.fits import residual
 
 DELAY = {"delay": {"tau": 1e-4}}
 #: A mass that bends a plain model far.

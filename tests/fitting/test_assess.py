@@ -13,16 +13,15 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.fitting.agreement import LeaveOut
 from bushfit.fitting.assess import covariance
-from bushfit.fitting.coordinates import jacobian
 from bushfit.fitting.preparation import MeasuredLoop, planned_loop
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import fit_joint
-from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Misfit, Result
 from bushfit.reading.measurement import Sweep
+from tests.fits import jacobian, solve
 
 BAND = (5.0, 15.0, 45.0, 100.0, 155.0)
 LEVELS = (1e-4, 2e-4, 5e-4)

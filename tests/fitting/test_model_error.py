@@ -17,7 +17,7 @@ from tries import SEEDS, some
 from bushfit.campaign.campaign import Campaign
 from bushfit.errors import FitError
 from bushfit.fitting.assess import covariance
-from bushfit.fitting.coordinates import Coordinates, jacobian
+from bushfit.fitting.coordinates import Coordinates
 from bushfit.fitting.discrepancy import SIZES, FittedTests, discrepancies
 from bushfit.fitting.model_error import log_likelihood, with_model_error
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -32,6 +32,7 @@ from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reduction.harmonics import basis
+from tests.fits import jacobian
 
 #: Relative error of the stiffness at frequencies [Hz] and amplitudes [m].
 Off = Callable[[np.ndarray, np.ndarray], np.ndarray]

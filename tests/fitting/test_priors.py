@@ -11,15 +11,15 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import ParameterSetting, RigSettings
 from bushfit.errors import BushfitError
 from bushfit.fitting.assess import covariance
-from bushfit.fitting.coordinates import jacobian, residual
 from bushfit.fitting.model_error import log_likelihood
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
-from bushfit.fitting.solve import solve, solve_with_lmfit
+from bushfit.fitting.solve import solve_with_lmfit
 from bushfit.model.constraints import Constraints, Prior
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE
 from bushfit.model.result import Result
+from tests.fits import jacobian, residual, solve
 
 
 @pytest.mark.parametrize("solver", [solve, solve_with_lmfit])

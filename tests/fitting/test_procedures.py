@@ -21,12 +21,12 @@ from bushfit.fitting.levels import level_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, fit_two_step
-from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
 from bushfit.prediction.bands import Band
 from bushfit.prediction.stiffness import predict
+from tests.fits import solve
 
 Rig = Callable[..., Campaign]
 NAMES = ("paper", "soft and long", "stiff and thin", "strongly filled")

@@ -15,12 +15,12 @@ from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
 from bushfit.fitting.procedures import fit_joint
 from bushfit.fitting.profile import limit95
-from bushfit.fitting.solve import solve
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE
 from bushfit.model.result import Result
 from bushfit.progress import report_progress_to
+from tests.fits import solve
 
 FREQUENCIES = (5.0, 15.0, 45.0, 100.0, 155.0)
 BAND = tuple(float(f) for f in range(5, 156, 10))

@@ -7,14 +7,14 @@ import pytest
 from bushfit.campaign.campaign import load_campaign
 from bushfit.effects import BASE, with_base
 from bushfit.errors import FitError
-from bushfit.fitting.coordinates import Coordinates, residual
+from bushfit.fitting.coordinates import Coordinates
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitProblem
-from bushfit.fitting.solve import solve
 from bushfit.fitting.starts import start_values
 from bushfit.model.model import FIVE, Model
+from tests.fits import residual, solve
 
 #: Campaigns, with the places of their tests.
 TESTS: dict[str, tuple[str, ...] | None] = {

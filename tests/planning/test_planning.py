@@ -13,10 +13,8 @@ from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSe
 from bushfit.commands.plan import plan as plan_tests
 from bushfit.effects import get_effect
 from bushfit.effects.contract import Array
-from bushfit.fitting.coordinates import residual
 from bushfit.fitting.preparation import MeasuredSweep, planned_loop, planned_sweep
 from bushfit.fitting.problem import FitProblem
-from bushfit.fitting.solve import solve
 from bushfit.geometry import Bushing, Direction, Place, Specimen
 from bushfit.model.covariance import Z95
 from bushfit.model.model import FIVE, Model
@@ -40,6 +38,7 @@ from bushfit.planning.plan import plan
 from bushfit.planning.problem import PlanningProblem
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import undisturbed
+from tests.fits import residual, solve
 
 AXIAL, RADIAL = Direction.AXIAL, Direction.RADIAL
 BAND = (5.0, 20.0, 60.0, 150.0)

@@ -10,7 +10,7 @@ from strd import Problem, problems
 
 from bushfit.fitting.assess import covariance
 from bushfit.fitting.problem import FitProblem, FitResult
-from bushfit.fitting.solve import solve
+from tests.fits import solve
 
 PROBLEMS = problems()
 STARTS = [(problem, start) for problem in PROBLEMS for start in (1, 2)]

@@ -14,11 +14,12 @@ from bushfit.diagnosis.propose import missing_effects, sensitivity
 from bushfit.effects import BASE, Effect
 from bushfit.effects.contract import Array
 from bushfit.errors import BushfitError
-from bushfit.fitting.coordinates import Coordinates, coordinate_bounds, residual
+from bushfit.fitting.coordinates import Coordinates, coordinate_bounds
 from bushfit.fitting.measured_sweep import MeasuredSweep
 from bushfit.fitting.preparation import with_gain_weighting
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.model import Model
+from tests.fits import residual
 
 #: Effects that forward selection adds at most.
 _MOST = 5
