@@ -17,7 +17,6 @@ from bushfit.geometry import Bushing, Direction, Place, bushing_at
 from bushfit.model.covariance import Z95
 from bushfit.model.result import Result
 from bushfit.reading.measurement import SAME_TEMPERATURE
-from bushfit.reading.preload import Preload
 from bushfit.units import CELSIUS, format_range, number
 
 #: Largest relative distance beyond the fitted range that is no extrapolation: rigs miss their set points by less.
@@ -27,8 +26,6 @@ BEYOND = "extrapolated outside this range"
 #: Relative decrease of the radial stiffness by a finite bulk modulus above which a warning is due: as large as the
 #: other errors.
 _NOTED_LOWERING = 0.01
-#: Relative difference up to which two stiffnesses are equal.
-_SAME = 1e-6
 
 
 #: Meaning of a warning for the use of the numbers, by a regular expression that the warning matches.
@@ -192,52 +189,6 @@ def _radial_error(bushing: Bushing) -> str:
     stiffness, strain = (number(100.0 / factor - 100.0, 2, "+") for factor in bushing.correction[:2])
     error = f"for this shape {stiffness} % in stiffness and {strain} % in strain compared with finite elements"
     return f'{error}; shape = "calibrated" in the campaign corrects it'
-
-
-def point_warnings(
-    result: Result,
-    place: Place,
-    points: Array,
-    rig_stiffness: Array | None,
-    measured: Array | None,
-    temperature: float | None,
-    preload: Preload | None,
-) -> Iterator[str]:
-    """Generate the warnings for predicted operating points.
-
-    Args:
-        result: fitted result.
-        place: direction or specimen.
-        points: frequency [Hz], zero-to-peak amplitude [m, rad or 1] and |K| [SI] of the points, (3, n).
-        rig_stiffness: |K| if the unresolved effects belong to the rig, (n,); None without such effects.
-        measured: measured complex stiffness, nan at points without a measurement, (n,); None without sweeps.
-        temperature: temperature of the prediction [K]; None for the reference temperature.
-        preload: requested preload; None if none is requested.
-
-    Yields:
-        Sentences.
-    """
-    frequency, amplitude, stiffness = points
-    yield from result.undecided
-    yield from unfitted_warnings(result, place)
-    confirmed = np.zeros(frequency.shape, dtype=bool)
-    if measured is not None and agrees_within_noise(result, place):
-        confirmed = np.isfinite(measured)
-    if not confirmed.all():
-        yield from extrapolations(result, place, frequency[~confirmed], amplitude[~confirmed], temperature)
-    requested = {"temperature": temperature, "preload": preload}
-    conditions = {name for name, value in requested.items() if value is not None}
-    effects = result.model.without(Level.INSTRUMENT).records
-    yield from (effect.assumption for effect in effects if effect.assumption and not conditions & {*effect.depends_on})
-    rig = rig_effects(result)
-    if rig and measured is not None and not np.isnan(measured).all():
-        percent = format_deviation(stiffness / np.abs(measured))
-        yield (
-            f"{place}: without {' and '.join(rig)} the predicted stiffness is {percent} compared with the measured one"
-        )
-    if rig_stiffness is not None and not np.allclose(rig_stiffness, stiffness, rtol=_SAME):
-        percent, names = format_deviation(rig_stiffness / stiffness), " and ".join(result.unresolved)
-        yield f"{place}: stiffness {percent} if {names} belongs to the rig; the band, low to high, includes both"
 
 
 def format_deviation(ratios: Array) -> str:

@@ -144,16 +144,15 @@ class Comparison:
         sentences = []
         for contrast in self.contrasts:
             stiffness, loss = self.widened(contrast.stiffness), self.widened(contrast.loss_factor)
-            percent = replace(stiffness, **{end: 100.0 * relative_difference(getattr(stiffness, end)) for end in _ENDS})
+            value, low, high = (
+                100.0 * relative_difference(x) for x in (stiffness.value, stiffness.low, stiffness.high)
+            )
+            percent = Band(value, low, high, stiffness.root)
             quantity, label = contrast.place.motion.words[2], contrast.reference.label
             differences = _describe_difference(percent, " %", contrast)
             losses = _describe_difference(loss, "", contrast)
             sentences.append(f"{label}: {quantity} {differences}; loss factor {losses}")
         return sentences
-
-
-#: Arrays of a band.
-_ENDS = ("value", "low", "high")
 
 
 def compare(

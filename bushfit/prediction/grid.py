@@ -95,18 +95,15 @@ def default_grid(result: Result, direction: Place, sweeps: Sequence[Sweep] = ())
         )
         if frequency.size and amplitude.size:
             return _distinct(frequency), _distinct(amplitude)
-    amplitudes = np.array(_AMPLITUDES_OF[direction.motion])
-    frequencies = np.array(PAPER_FREQUENCIES)
+    frequencies, amplitudes = np.array(PAPER_FREQUENCIES), np.array(_AMPLITUDES_OF[direction.motion])
     if result.measured is None:
         return frequencies, amplitudes
-    inside = _inside(frequencies, [result.measured.frequency])
-    if inside.size < 2:
-        inside = _distinct(np.geomspace(*result.measured.frequency, _FREQUENCIES))
+    frequencies = _limit(frequencies, [result.measured.frequency], _FREQUENCIES)
     if direction.is_rotation:
-        return inside, amplitudes
+        return frequencies, amplitudes
     tube = bushing_at(result.model.bushing, direction)
     per_displacement = tube.unit_strain(Direction.AXIAL) if tube else result.model.unit_strain(direction)
-    return inside, _limit(amplitudes, [np.array(result.measured.strain) / per_displacement], _AMPLITUDES)
+    return frequencies, _limit(amplitudes, [np.array(result.measured.strain) / per_displacement], _AMPLITUDES)
 
 
 def common_grid(
@@ -125,15 +122,16 @@ def common_grid(
     Returns:
         Frequencies [Hz] and zero-to-peak amplitudes [m, rad or 1], increasing.
     """
-    fitted = [
-        (result.measured, place, result) for result, place in zip(results, places, strict=True) if result.measured
+    ranges = [
+        (measured.frequency, np.array(measured.strain) / result.model.unit_strain(place))
+        for result, place in zip(results, places, strict=True)
+        if (measured := result.measured)
     ]
     frequency, amplitude = default_grid(results[0], places[0], sweeps)
-    if not fitted:
+    if not ranges:
         return frequency, amplitude
-    frequencies = [measured.frequency for measured, _, _ in fitted]
-    strains = [(np.array(measured.strain) / result.model.unit_strain(place)) for measured, place, result in fitted]
-    return _limit(frequency, frequencies, _FREQUENCIES), _limit(amplitude, strains, _AMPLITUDES)
+    frequencies, amplitudes = zip(*ranges, strict=True)
+    return _limit(frequency, frequencies, _FREQUENCIES), _limit(amplitude, amplitudes, _AMPLITUDES)
 
 
 def _limit(values: Array, ranges: Sequence[Any], count: int) -> Array:
@@ -148,15 +146,11 @@ def _limit(values: Array, ranges: Sequence[Any], count: int) -> Array:
         Values within all ranges; or `count` values in equal ratios over the common range; or, without a common range,
         all values.
     """
-    inside, low, high = _inside(values, ranges), max(low for low, _ in ranges), min(high for _, high in ranges)
+    low, high = max(low for low, _ in ranges), min(high for _, high in ranges)
     if low > high * (1 + MARGIN):
         return values
+    inside = values[(values >= low * (1 - MARGIN)) & (values <= high * (1 + MARGIN))]  # rigs miss their set points
     return inside if inside.size > 1 else _even(low, high, count)
-
-
-def _inside(values: Array, ranges: Sequence[Any]) -> Array:
-    """Select the values, (n,), within all ranges (low, high), with a margin for inaccurate set points of the rig."""
-    return values[np.all([(values >= a * (1 - MARGIN)) & (values <= b * (1 + MARGIN)) for a, b in ranges], axis=0)]
 
 
 def measured_levels(sweeps: Sequence[Sweep], axis: Literal["frequency", "amplitude"]) -> Array:

@@ -13,7 +13,7 @@ from bushfit.model.result import Result
 from bushfit.model.sensitivity import force_and_slopes
 from bushfit.prediction.bands import Band, envelope, uncertainty
 from bushfit.prediction.caveats import extrapolations
-from bushfit.prediction.stiffness import tested_preload
+from bushfit.prediction.stiffness import preload_label, tested_preload
 from bushfit.prediction.superposed import timed_candidates
 from bushfit.reading.preload import Preload
 from bushfit.units import number
@@ -55,11 +55,7 @@ class StaticCurve:
     @property
     def label(self) -> str:
         """Direction or specimen for users, with the preload: "axial at a preload of 500 N"."""
-        return (
-            f"{self.direction} at a preload of {self.preload.text(self.direction)}"
-            if self.preload
-            else str(self.direction)
-        )
+        return preload_label(self.direction, self.preload)
 
     @property
     def rate_text(self) -> str:

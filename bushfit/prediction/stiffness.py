@@ -7,7 +7,7 @@ without the effect; such effects are called unresolved.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -23,13 +23,22 @@ from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.model.sensitivity import stiffness_and_slopes
 from bushfit.prediction.bands import Band, candidates, envelope, uncertainty
-from bushfit.prediction.caveats import MARGIN, extrapolations, point_warnings
+from bushfit.prediction.caveats import (
+    MARGIN,
+    agrees_within_noise,
+    extrapolations,
+    format_deviation,
+    rig_effects,
+    unfitted_warnings,
+)
 from bushfit.prediction.superposed import LargeMotion, superposed_stiffness_and_slopes, timed_candidates
 from bushfit.reading.preload import SAME_PRELOAD, Preload
 from bushfit.reading.runs import nominal
 
 #: Predicted quantities.
 _BANDS = ("stiffness", "loss_factor", "storage_stiffness", "loss_stiffness")
+#: Relative difference up to which two stiffnesses are equal.
+_SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +78,13 @@ class Prediction:
     @property
     def label(self) -> str:
         """Direction or specimen for users, with preload and large motion: "axial at a preload of 500 N"."""
-        preload = f" at a preload of {self.preload.text(self.direction)}" if self.preload else ""
-        return f"{self.direction}{preload}" + (f" over {self.over.describe(self.direction)}" if self.over else "")
+        label = preload_label(self.direction, self.preload)
+        return f"{label} over {self.over.describe(self.direction)}" if self.over else label
+
+
+def preload_label(place: Place, preload: Preload | None) -> str:
+    """Direction or specimen for users, with the preload of a prediction: "axial at a preload of 500 N"."""
+    return f"{place} at a preload of {preload.text(place)}" if preload else str(place)
 
 
 def predict(
@@ -115,33 +129,69 @@ def predict(
         axis.ravel() for axis in np.meshgrid(np.unique(amplitudes), np.unique(frequencies), indexing="ij")
     )
     conditions = RubberConditions(temperature, preload=tested_preload(result, direction, preload))
-    points = direction, frequency, amplitude, conditions, over
-    models, untimed = candidates(result, rig=rig), list[str]()
     if over:
-        over.require(direction, frequency, result.model.without(Level.INSTRUMENT))
         models, untimed = timed_candidates(result, f"{direction}, with the large motion", rig=rig)
-    predictions = [predict_with_model(source, model, *points) for source, model in models]
-    bushings = predictions[0]
-    rigs = predictions[2 ** len(result.unresolved) - 1] if result.unresolved and not rig else None
-    measured = None if sweeps is None else measured_stiffness(direction, frequency, amplitude, sweeps)
+        over.require(direction, frequency)
+        point = np.array([over.frequency or frequency.min()]), np.array([abs(over.displacement) + amplitude.max()])
+        together = extrapolations(result, direction, *point, temperature, f"{direction}, with the large motion")
+    else:
+        models, untimed, together = candidates(result, rig=rig), [], iter(())
+    predictions = [
+        predict_with_model(source, model, direction, frequency, amplitude, conditions, over) for source, model in models
+    ]
     bands: dict[str, Any] = {
         name: envelope([getattr(prediction, name) for prediction in predictions]) for name in _BANDS
     }
-    warnings = point_warnings(
-        result,
-        direction,
-        np.array((frequency, amplitude, bushings.stiffness.value)),
-        rigs.stiffness.value if rigs else None,
-        None if rig else measured,
-        temperature,
-        preload,
+    prediction = replace(
+        predictions[0],
+        **bands,
+        if_rigs=predictions[2 ** len(result.unresolved) - 1] if result.unresolved and not rig else None,
+        measured=None if sweeps is None else measured_stiffness(direction, frequency, amplitude, sweeps),
+        preload=conditions.preload,
+        over=over,
     )
-    bands |= {"if_rigs": rigs, "measured": measured, "preload": conditions.preload, "over": over}
-    together: Iterable[str] = ()
-    if over:
-        point = np.array([over.frequency or frequency.min()]), np.array([abs(over.displacement) + amplitude.max()])
-        together = extrapolations(result, direction, *point, temperature, f"{direction}, with the large motion")
-    return replace(bushings, **bands, warnings=(*warnings, *together, *untimed))
+    compared = replace(prediction, measured=None) if rig else prediction
+    warnings = point_warnings(result, compared, temperature, preload)
+    return replace(prediction, warnings=(*warnings, *together, *untimed))
+
+
+def point_warnings(
+    result: Result, prediction: Prediction, temperature: float | None, preload: Preload | None
+) -> Iterator[str]:
+    """Generate the warnings on a prediction: unfitted directions and ranges, effects of the rig, unresolved effects.
+
+    Args:
+        result: fitted result.
+        prediction: prediction for the bushing without the rig, with the measured stiffness if sweeps are compared.
+        temperature: temperature of the prediction [K]; None for the reference temperature.
+        preload: requested preload; None if none is requested.
+
+    Yields:
+        Sentences.
+    """
+    place, measured, stiffness = prediction.direction, prediction.measured, prediction.stiffness.value
+    yield from result.undecided
+    yield from unfitted_warnings(result, place)
+    confirmed = np.zeros(stiffness.shape, dtype=bool)
+    if measured is not None and agrees_within_noise(result, place):
+        confirmed = np.isfinite(measured)
+    if not confirmed.all():
+        points = prediction.frequency[~confirmed], prediction.amplitude[~confirmed]
+        yield from extrapolations(result, place, *points, temperature)
+    requested = {"temperature": temperature, "preload": preload}
+    conditions = {name for name, value in requested.items() if value is not None}
+    effects = result.model.without(Level.INSTRUMENT).records
+    yield from (effect.assumption for effect in effects if effect.assumption and not conditions & {*effect.depends_on})
+    rig = rig_effects(result)
+    if rig and measured is not None and not np.isnan(measured).all():
+        percent = format_deviation(stiffness / np.abs(measured))
+        yield (
+            f"{place}: without {' and '.join(rig)} the predicted stiffness is {percent} compared with the measured one"
+        )
+    if prediction.if_rigs and not np.allclose(prediction.if_rigs.stiffness.value, stiffness, rtol=_SAME):
+        percent = format_deviation(prediction.if_rigs.stiffness.value / stiffness)
+        names = " and ".join(result.unresolved)
+        yield f"{place}: stiffness {percent} if {names} belongs to the rig; the band, low to high, includes both"
 
 
 def tested_preload(result: Result, place: Place, preload: Preload | None) -> Preload | None:

@@ -58,19 +58,17 @@ class LargeMotion:
         slow = np.sin(2.0 * phase / cycles) if self.frequency else 1.0
         return History.steady(self.displacement * slow + amplitude * np.sin(phase), frequency, cycles)
 
-    def require(self, place: Place, frequency: Array, model: Model) -> None:
+    def require(self, place: Place, frequency: Array) -> None:
         """Check that the small harmonic can be superposed on this motion.
 
         Args:
             place: direction or specimen of the small harmonic.
             frequency: frequencies of the small harmonic [Hz], (n,).
-            model: model, whose effects must have laws in time.
 
         Raises:
-            ModelError: an effect has no law in time, the motion is of another kind than the direction, or it is not
-                slow compared with the small harmonic.
+            ModelError: the motion is of another kind than the direction, or it is not slow compared with the small
+                harmonic.
         """
-        model.without(Level.INSTRUMENT, UNNAMED).require_time_law()
         if place.motion.displacement_unit != self.unit:
             expected = f"a motion in {place.display.displacement.name}"
             raise ModelError("not a motion of this direction", place=str(place), found=self.unit, expected=expected)
@@ -150,4 +148,4 @@ def timed_candidates(
     models = candidates(result, rig=rig)
     untimed = sorted({name for _, model in models for name in untimed_effects(model)})
     sentence = f"{subject}: the band excludes the alternative with {' or '.join(untimed)}, which has no law in time"
-    return [pair for pair in models if not untimed_effects(pair[1])], [sentence] if untimed else []
+    return [(source, model) for source, model in models if not untimed_effects(model)], [sentence] * bool(untimed)
