@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from bushfit.errors import CONTROL, OutputError
 from bushfit.progress import track
 from bushfit.reading.tablefile import Form, ending, folder_name, to_bytes
+from bushfit.report import plots
 
 if TYPE_CHECKING:
     from bushfit.geometry import Place
@@ -121,18 +122,17 @@ class Formats:
             OutputError: a table that is too large for its format.
         """
         names = self.names(file)
-        if file.kind == "figure" and names:
-            from bushfit.report import plots
-
-            figure = file.content
-            return dict(zip(names, [plots.style.to_image(figure, form) for form in self.picture_forms], strict=True))
-        encoders: Mapping[Kind, Callable[[Any], bytes]] = {
-            "json": to_json,
-            "raw": bytes,
-            "table": lambda table: to_bytes(file.name, table, self.table_form),
-            "page": str.encode,
-        }
-        return {name: encoders[file.kind](file.content) for name in names}
+        if not names:
+            return {}
+        content = file.content
+        if file.kind == "figure":
+            forms = zip(names, self.picture_forms, strict=True)
+            return {name: plots.style.to_image(content, form) for name, form in forms}
+        if file.kind == "table":
+            content = to_bytes(file.name, content, self.table_form)
+        elif file.kind != "raw":
+            content = to_json(content) if file.kind == "json" else content.encode()
+        return {names[0]: content}
 
 
 def encode_all(files: Iterable[ResultFile], formats: Formats) -> dict[str, bytes]:

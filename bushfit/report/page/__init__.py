@@ -95,5 +95,5 @@ def folder_pages(folder: Path, base: str = "", date: str | None = None) -> list[
         comparison = ComparisonDocument.from_document(read_document(file), file)
         pages.append(ResultFile("compare", "page", partial(comparison_page, comparison)))
     if not pages or any((folder / f"{name}.json").exists() for name in MODELS):
-        pages.append(ResultFile("report", "page", partial(report_page, read_results(folder), date)))
+        pages.append(ResultFile("report", "page", partial(report_page, read_results(folder), date, folder)))
     return pages

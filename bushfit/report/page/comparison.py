@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from bushfit.geometry import Bushing
-from bushfit.prediction.caveats import by_importance, consequence_of
 from bushfit.report import plots
 from bushfit.report.compared import (
     FAMILY_HEADS,
@@ -18,7 +17,7 @@ from bushfit.report.compared import (
     parameter_cells,
 )
 from bushfit.report.page import render_page
-from bushfit.report.page.report import MOST, summarize_conditions, tube_description
+from bushfit.report.page.report import MOST, group_warnings, summarize_conditions, tube_description
 from bushfit.report.page.svg import picture
 from bushfit.report.page.values import spread_points
 from bushfit.report.results import ResultFile
@@ -90,7 +89,7 @@ def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = N
         "chance": format_p_value,
         "pictures": pictures,
         "tabled": [*value_rows(comparison)][: 2 * _ROWS],
-        "warnings": [(line, consequence_of(line)) for line in by_importance(document["warnings"])],
+        "warnings": group_warnings(document["warnings"]),
         "files": [(f"{', '.join(letters)}: {file}", sha256) for (file, sha256), letters in labels.items()],
     }
     return render_page("compare.html", context)

@@ -69,8 +69,9 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
         part = parts[index]
         mean = 100.0 * float(np.expm1(np.log1p(relative[index]).mean())) if has_curves else np.nan
         numbers = ", ".join(str(warnings.index(line) + 1) for line in part.warnings)
+        remark = numbers and f"see warning{'s' * (len(part.warnings) > 1)} {numbers}"
         remarks = [part.error, part.poor_fit and "poor fit", part.differs and f"differs: {part.differs}"]
-        remarks += [*([] if part.poor_fit else part.doubtful.values()), numbers and f"see warning {numbers}"]
+        remarks += [*([] if part.poor_fit else part.doubtful.values()), remark]
         color = _DIFFERENT if part.deviations else _USUAL
         tones = ["bad" if name in part.misses else "fair" * (name in part.deviations) for name, _ in units.values()]
         values = ["" if value is None else number(value, 4) for value in part.values]
@@ -94,6 +95,7 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
     context: dict[str, Any] = {
         "batch": batch,
         "bad": bool(batch.missed or batch.failed),
+        "results": [(result, batch.limits[result]) for result in reversed(_TONES) if result in batch.limits],
         "fails": [*listed.get("fail", []), *listed.get("conditional fail", [])][:_MOST_NAMED],
         "unjudged": listed.get("not judged", [])[:_MOST_NAMED],
         "errors": listed.get("error", [])[:_MOST_NAMED],

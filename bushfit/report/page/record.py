@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -179,12 +178,13 @@ def read_results(folder: Path) -> list[ResultFile]:
             hint=f"bushfit run CAMPAIGN -o {folder} writes one",
         )
     paths = {name: folder / f"{name}.json" for name in (*MODELS, JOINT, "diagnosis")}
-    documents = [ResultFile(name, "json", read_document(path)) for name, path in paths.items() if path.exists()]
-    specimens = report_record(documents, folder).result.specimens
+    documents = {name: read_document(path) for name, path in paths.items() if path.exists()}
+    model = next(name for name in MODELS if name in documents)
     records = sorted({path.stem for path in folder.glob("validation_*") if path.suffix in (".csv", ".xlsx")})
-    names = ("loops", "sweeps", "gap", *records, *place_names([*Direction, *specimens]))
-    tables = {name: table for name in names if (table := read_table(folder, name)) is not None}
-    return [*documents, *(ResultFile(name, "table", partial(pd.DataFrame, table)) for name, table in tables.items())]
+    places = [*Direction, *from_document(documents[model], paths[model]).specimens]
+    tables = {name: read_table(folder, name) for name in ("loops", "sweeps", "gap", *records, *place_names(places))}
+    files = [ResultFile(name, "json", document) for name, document in documents.items()]
+    return files + [ResultFile(name, "table", table) for name, table in tables.items() if table is not None]
 
 
 def read_table(folder: Path, name: str) -> pd.DataFrame | None:
@@ -200,30 +200,26 @@ def read_table(folder: Path, name: str) -> pd.DataFrame | None:
     Raises:
         ModelError: a table that is not as bushfit writes it.
     """
-    file, workbook = folder / f"{name}.csv", folder / f"{name}.xlsx"
+    file = folder / f"{name}.csv"
+    options: dict[str, Any] = {"keep_default_na": False, "na_values": [""]}
     try:
         if file.exists():
             data = read_utf8(file, ModelError, largest=_LARGEST)
-            separator = ";" if b";" in data.partition(b"\n")[0] else ","
-            form: dict[str, Any] = {
-                "sep": separator,
-                "decimal": "," if separator == ";" else ".",
-                "encoding": "utf-8-sig",
-            }
-            types = dict.fromkeys(_TEXTS, str)
-            table = pd.read_csv(io.BytesIO(data), dtype=types, keep_default_na=False, na_values=[""], **form)
-        elif (file := workbook).exists():
-            table = pd.read_excel(file, engine="openpyxl", keep_default_na=False, na_values=[""])
+            separator, decimal = (";", ",") if b";" in data.partition(b"\n")[0] else (",", ".")
+            options |= {"sep": separator, "decimal": decimal, "encoding": "utf-8-sig"}
+            table = pd.read_csv(io.BytesIO(data), dtype=dict.fromkeys(_TEXTS, str), **options)
+        elif (file := folder / f"{name}.xlsx").exists():
+            table = pd.read_excel(file, engine="openpyxl", **options)
         else:
             return None
-        texts = [header for header in table if header in _TEXTS]
-        numbers = table.columns.difference(texts)
-        table = table.astype(dict.fromkeys(numbers, float))
-        if np.isinf(table[numbers].to_numpy()).any():
-            raise ValueError("inf")
-        return table.assign(
-            **{header: [unescape_formula(str(cell)) for cell in table[header].fillna("")] for header in texts}
-        )
+        for header in table:
+            if header in _TEXTS:
+                table[header] = [unescape_formula(str(cell)) for cell in table[header].fillna("")]
+            elif np.isinf(values := table[header].to_numpy(dtype=float)).any():
+                raise ValueError("inf")
+            else:
+                table[header] = values
+        return table
     except (ValueError, KeyError, BadZipFile) as error:
         raise ModelError(
             "this table is not as bushfit writes it",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -64,13 +65,14 @@ MOST, _MOST_PLACES = 12, 6
 _LARGEST_FIGURES = 440_000
 
 
-def report_page(files: Sequence[ResultFile], date: str | None = None) -> str:
+def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Path | None = None) -> str:
     """Make the report of a result as an HTML page.
 
     Args:
         files: documents (model, fit without the effects of a diagnosis, diagnosis), tables (sweeps, loops, gap, and
             predictions of directions and specimens) and figures.
         date: date of the report; None for the date that the campaign states.
+        folder: folder that the files were read from, for error messages; None for the files of a run.
 
     Returns:
         The page as HTML.
@@ -78,7 +80,7 @@ def report_page(files: Sequence[ResultFile], date: str | None = None) -> str:
     Raises:
         ModelError: no model among the documents, or a document or table that is not as bushfit writes it.
     """
-    record = report_record(files)
+    record = report_record(files, folder)
     result, diagnosis, campaign = record.result, record.diagnosis, record.campaign
     head = {**(campaign.report if campaign else {}), **({"date": date} if date else {})}
     tests = campaign.tests if campaign else ()
@@ -113,7 +115,10 @@ def report_page(files: Sequence[ResultFile], date: str | None = None) -> str:
         "diagnosis": diagnosis,
         "tone": _TONES.get(diagnosis["verdict"], "fair") if diagnosis else "fair",
         "consequence": _CONSEQUENCES[diagnosis["verdict"]] if diagnosis else "",
-        "effects": [(effect, effect_sizes(effect)) for effect in diagnosis["effects"]] if diagnosis else [],
+        "effects": [
+            (effect, [size for size in effect_sizes(effect) if size[0] not in result.model.parameters])
+            for effect in (diagnosis["effects"] if diagnosis else ())
+        ],
         "odds": format_odds(diagnosis) if diagnosis else [],
         "pictures": pictures,
         "left_out": left_out,
@@ -129,7 +134,7 @@ def report_page(files: Sequence[ResultFile], date: str | None = None) -> str:
         "more_tests": max(0, len(tests) - MOST),
         "tabled": [*value_rows(predictions)],
         "gaps": gaps,
-        "warnings": [(line, consequence_of(line)) for line in by_importance(warnings)],
+        "warnings": group_warnings(warnings),
         "campaign": campaign,
         "files": list(dict.fromkeys((file, sha256) for file, sha256 in (*named, *inputs) if file and sha256)),
         "versions": record.versions,
@@ -199,6 +204,14 @@ def comparable_sweeps(sweeps: pd.DataFrame | None, result: Result) -> pd.DataFra
         return sweeps
     degrees = sweeps.groupby("sweep" if "sweep" in sweeps else "test")["temperature [degC]"].transform("mean")
     return sweeps[~((degrees - (REFERENCE - CELSIUS)).abs() > SAME_TEMPERATURE)]
+
+
+def group_warnings(warnings: Iterable[str]) -> dict[str, list[str]]:
+    """Group warnings by their meaning for the use of the numbers, the most important first."""
+    groups = dict[str, list[str]]()
+    for warning in by_importance(warnings):
+        groups.setdefault(consequence_of(warning), []).append(warning)
+    return groups
 
 
 def tube_description(bushing: Bushing) -> str:

@@ -105,7 +105,11 @@ def describe_basis(record: ReportRecord, place: str) -> str:
     """
     fitted = record.result.measured.directions if record.result.measured else ()
     if place in fitted:
-        return "fitted to tests in this direction"
+        return (
+            "fitted to tests in this direction"
+            if record.result.place(place).axis
+            else "fitted to tests of this specimen"
+        )
     tests = [test for test in record.result.tests if test.place == place and test.held is None and not test.fitted]
     source = f"predicted from {' and '.join(fitted)} tests" if fitted else "calculated from given parameters"
     if not tests:

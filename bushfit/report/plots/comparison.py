@@ -76,6 +76,5 @@ def comparison_figure(comparison: ComparisonDocument) -> style.Chart:
         names = [f"{label}: {style.file_name(name)}" for label, name in comparison.names.items()]
         style.legend(grid[2 * row, 1], lines, names, "", dict(zip(level_names, dashed, strict=True)))
     return figure.explain(
-        "Shaded: 95 % band of each single point. compare.json and the terminal state the differences that are valid "
-        "for all points together."
+        "Shaded: 95 % band of each single point. Stated differences hold for all points together, with wider bands."
     )

@@ -29,7 +29,7 @@ from bushfit.model.covariance import Z95
 from bushfit.report.tables import shorten, spread_indices
 
 #: Width of a figure [cm]: the text of a page of A4.
-_WIDTH = 16.0
+WIDTH = 16.0
 #: Height of a panel with its labels [cm]: two in a row are a little wider than high.
 ROW = 5.4
 #: Heights [cm]: margin above a title and below an explanation, with the gap to the panels, and a line of each.
@@ -121,13 +121,14 @@ class Chart(Figure):
         height: height of the panels with their labels [cm].
 
     Attributes:
+        panel_height, above: height of the panels and of the space above them [cm].
         heading, footer: matplotlib texts above and below the panels.
         caption: explanation without the note, in one line, for use in a page.
     """
 
     def __init__(self, title: str, height: float) -> None:
-        self._title, self._panel_height = printable(title, lines=True), height
-        super().__init__(figsize=(_WIDTH / 2.54, height / 2.54), dpi=_DPI, facecolor="white")
+        self._title, self.panel_height = printable(title, lines=True), height
+        super().__init__(figsize=(WIDTH / 2.54, height / 2.54), dpi=_DPI, facecolor="white")
 
     def explain(self, *sentences: str, note: str = "") -> Self:
         """Compute the layout of the panels, and add title and explanation above and below them.
@@ -140,41 +141,20 @@ class Chart(Figure):
             The figure itself, ready to be written in any format.
         """
         self.tight_layout(pad=0.5, h_pad=0.9, w_pad=1.2)
-        self._panel_ends = self.subplotpars.bottom, self.subplotpars.top
         self.caption = printable(" ".join(filter(None, sentences)), lines=True)
         title = textwrap.wrap(self._title, _TITLE_LETTERS)
         lines = textwrap.wrap(f"{self.caption} {printable(note, lines=True)}", _NOTE_LETTERS)
-        self._margins = _MARGIN + _TITLE_LINE * len(title), _MARGIN + _NOTE_LINE * len(lines)
-        height = self._panel_height + sum(self._margins)
+        self.above, below = _MARGIN + _TITLE_LINE * len(title), _MARGIN + _NOTE_LINE * len(lines)
+        height = self.above + self.panel_height + below
         bold: dict[str, Any] = {"fontsize": TEXT + 1.5, "weight": "bold", "family": fonts(), "parse_math": False}
         self.heading = self.suptitle("\n".join(title), y=1.0 - 0.25 / height, **bold)
         small: dict[str, Any] = {"fontsize": SMALL, "color": GREY, "parse_math": False}
         self.footer = self.supxlabel("\n".join(lines), x=0.01, y=0.2 / height, ha="left", **small)
-        self._place_panels(*self._margins)
-        return self
-
-    def _place_panels(self, above: float, below: float) -> None:
-        """Set the space above and below the panels [cm]; the panels keep their size and their distances."""
-        height = above + self._panel_height + below
-        ends = ((below + end * self._panel_height) / height for end in self._panel_ends)
+        bottom, top = self.subplotpars.bottom, self.subplotpars.top  # the panels keep their size and distances
         self.set_figheight(height / 2.54)
+        ends = ((below + end * self.panel_height) / height for end in (bottom, top))
         self.subplots_adjust(**dict(zip(("bottom", "top"), ends, strict=True)))
-
-    @contextmanager
-    def panels_alone(self) -> Iterator[None]:
-        """Context in which title and explanation are hidden and the figure has the size of its panels.
-
-        Returns:
-            Iterator for `contextlib.contextmanager`.
-        """
-        texts = self.heading, self.footer
-        for text in texts:
-            text.set_visible(False)
-        self._place_panels(0.0, 0.0)
-        yield
-        self._place_panels(*self._margins)
-        for text in texts:
-            text.set_visible(True)
+        return self
 
 
 class Style(NamedTuple):
