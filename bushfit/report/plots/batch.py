@@ -95,8 +95,7 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> s
         axes.tick_params(labelbottom=lowest)
         axes.xaxis.set_in_layout(index // _COLUMNS == rows - 1)  # its labels may extend into the empty cell below
         if tick_names:
-            look = {"rotation": 90, "fontsize": style.SMALL - 1, "family": style.fonts(), "parse_math": False}
-            axes.set_xticks(range(1, len(tick_names) + 1), tick_names, **look)
+            axes.set_xticks(range(1, len(tick_names) + 1), tick_names, rotation=90, fontsize=style.SMALL - 1)
         elif lowest:
             axes.set_xlabel("bushing, in the manifest's order", **style.WORDS)
         axes.set_xlim(0.5, len(names) + 0.5)
@@ -139,8 +138,7 @@ def _draw_panel(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
         more = f" and {len(missed) - _MOST_NAMED} more" if len(missed) > _MOST_NAMED else ""
         named = shorten(", ".join(missed[:_MOST_NAMED]), _MOST_LETTERS)
         title, color = f"{title}: {len(missed)} out\n{named}{more}", _OUT
-    look = {"fontsize": style.SMALL, "color": color, "family": style.fonts(), "parse_math": False}
-    axes.set_title(title, loc="left", pad=3, **look)
+    axes.set_title(title, loc="left", pad=3, fontsize=style.SMALL, color=color)
 
 
 @style.fixed_settings()
@@ -167,9 +165,7 @@ def curves_figure(headers: Sequence[str], usual: Array, singles: Mapping[str, Ar
     axes.plot(x, np.median(usual, axis=0), color=style.INK, lw=_STROKE, label="median")
     named = dict([*singles.items()][:_MOST_CURVES])
     for look, (name, values) in zip(style.styles(len(named), "loop"), named.items(), strict=True):
-        axes.plot(
-            x, values, color=look.color, marker=look.marker, lw=_STROKE, **style.POINT, label=style.file_name(name, 24)
-        )
+        axes.plot(x, values, color=look.color, marker=look.marker, lw=_STROKE, **style.POINT, label=shorten(name, 24))
     style.label_axes(axes, x_label, f"|K| [{unit}]", x)
     axes.legend()
     names = f" Single curves: {', '.join(named)}." if named else ""

@@ -5,7 +5,7 @@ from matplotlib.lines import Line2D
 
 from bushfit.report.compared import ComparisonDocument, ContrastHeaders
 from bushfit.report.plots import style
-from bushfit.report.tables import numeric_columns
+from bushfit.report.tables import numeric_columns, shorten
 from bushfit.units import display_unit, format_range, split_header
 
 #: Width of a line [point].
@@ -73,7 +73,7 @@ def comparison_figure(comparison: ComparisonDocument) -> style.Chart:
         lines = [style.Style(look.color, "-", look.marker).handle(True) for look in looks.values()]
         level_names = [format_range(split_header(fixed_header)[1] or "", float(level)) for level in levels]
         dashed = [Line2D([], [], color=style.INK, lw=_STROKE, ls=dashes) for dashes in style.DASHES[: len(levels)]]
-        names = [f"{label}: {style.file_name(name)}" for label, name in comparison.names.items()]
+        names = [f"{label}: {shorten(name, 20)}" for label, name in comparison.names.items()]
         style.legend(grid[2 * row, 1], lines, names, "", dict(zip(level_names, dashed, strict=True)))
     return figure.explain(
         "Shaded: 95 % band of each single point. Stated differences hold for all points together, with wider bands."

@@ -23,7 +23,7 @@ from bushfit.report.plots.measured import (
     sector_means,
     sweep_groups,
 )
-from bushfit.report.tables import displacement_header, response_headers
+from bushfit.report.tables import displacement_header, response_headers, shorten
 from bushfit.units import display_unit, format_range
 
 #: Height of a panel of residuals [cm].
@@ -83,15 +83,19 @@ def draw_curves(pair: Sequence[Axes], group: SweepGroup, result: Result) -> None
         result: fitted model, with the effects of the rig.
     """
     stiffness, x_header = response_headers(group.place)[1], group.x_header
-    factor, labels = stiffness_scale(group.place, max(curve.rows[stiffness].max() for curve in group.curves))
+    to_table = group.place.display.stiffness.factor
+    largest = max(float(curve.rows[stiffness].max()) for curve in group.curves)
+    factor, labels = stiffness_scale(group.place, largest / to_table)
     looks = style.styles(len(group.curves), group.palette)
-    for axes, label, header, scale in zip(pair, labels, (stiffness, "loss factor [-]"), (factor, 1.0), strict=True):
+    for axes, label, header, scale in zip(
+        pair, labels, (stiffness, "loss factor [-]"), (factor / to_table, 1.0), strict=True
+    ):
         for curve, look in zip(group.curves, looks, strict=True):
             draw_points(axes, points_to_draw(curve.rows), x_header, header, scale, look, len(group.curves))
             x, values = _model_line(group, curve, header, result)
             axes.plot(x, scale * values, color=look.color, ls=look.dashes, lw=1.3)
         style.label_axes(axes, x_header, label, np.concatenate([curve.rows[x_header] for curve in group.curves]))
-    names = [style.file_name(curve.name, 30) for curve in group.curves]
+    names = [shorten(curve.name, 30) for curve in group.curves]
     if group.shares_levels:
         style.name_levels(pair[-1], names, group.palette)
     else:
@@ -103,16 +107,15 @@ def stiffness_scale(place: Place, largest: float) -> tuple[float, tuple[str, str
 
     Args:
         place: direction or specimen of the tests.
-        largest: largest stiffness or modulus to draw, in the unit of the tables.
+        largest: largest stiffness or modulus to draw [SI].
 
     Returns:
-        Factor from the unit of the tables to that of the figure, and the two labels with units.
+        Factor from SI to the unit of the figure, and the two labels with units.
     """
-    name, factor = place.display.stiffness
-    unit, to_figure = display_unit(name, factor, largest / factor)
+    unit, factor = display_unit(*place.display.stiffness, largest)
     quantity = response_headers(place)[1].partition(" [")[0]
     symbol = " |K|" if quantity == "stiffness" else ""
-    return to_figure / factor, (f"{place} {quantity}{symbol} [{unit}]", f"{place} loss factor [-]")
+    return factor, (f"{place} {quantity}{symbol} [{unit}]", f"{place} loss factor [-]")
 
 
 def points_to_draw(rows: pd.DataFrame) -> pd.DataFrame:
@@ -291,7 +294,7 @@ def loop_labels(place: Place, loops: dict[str, pd.DataFrame]) -> list[str]:
         labels.append(f"{amplitude}, {format_range('Hz', float(loop['frequency [Hz]'].iloc[0]))}")
     if len(set(labels)) == len(labels):
         return labels
-    return [f"{label}\n{style.file_name(name)}" for label, name in zip(labels, loops, strict=True)]
+    return [f"{label}\n{shorten(name, 20)}" for label, name in zip(labels, loops, strict=True)]
 
 
 def _drawn_rows(loop: pd.DataFrame) -> Array:

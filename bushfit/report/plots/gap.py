@@ -27,6 +27,7 @@ from bushfit.report.plots.measured import (
     sector_means,
     sweep_groups,
 )
+from bushfit.report.tables import shorten
 
 #: Heights [cm]: row of a map; smallest and largest map; colour bar; panel of loops; labels of a row of panels.
 _LEVEL, _LEAST_MAP, _LARGEST_MAP, _SCALE, _LOOPS, _LABELS = 0.6, 1.9, 4.2, 0.5, 4.4, 0.85
@@ -86,7 +87,7 @@ def gap_figure(table: pd.DataFrame, result: Result, diagnosis: Mapping[str, Any]
         first = first or list(panels)
     for axes, name in zip(first, sides.values(), strict=True):
         lines = [line for part in name.splitlines() for line in textwrap.wrap(part, 80 // len(sides))]
-        axes.set_title("\n".join(lines), weight="bold", pad=7.0, parse_math=False, **style.NAMES)
+        axes.set_title("\n".join(lines), weight="bold", pad=7.0, **style.NAMES)
     held_out, note = diagnosis["gap"]["heldout"], ""
     if held_out and None not in held_out.values():
         note = f"Held-out data: {held_out['before']:.2f} × noise before, {held_out['after']:.2f} × noise after."
@@ -217,7 +218,7 @@ def _label_maps(panels: Sequence[Axes], group: SweepGroup, rows: Sequence[Curve]
         rows: rows of each map, the smallest amplitude or frequency first.
         part: "storage" or "loss".
     """
-    names = [style.file_name(row.name, 24) for row in rows]
+    names = [shorten(row.name, 24) for row in rows]
     ticks = np.arange(0, len(names), math.ceil(len(names) / 10))
     for axes in panels:
         axes.set_yticks(ticks, [names[tick] for tick in ticks])

@@ -18,6 +18,7 @@ from bushfit.report.plots import style
 from bushfit.report.plots.fits import stiffness_scale
 from bushfit.report.plots.measured import header_of
 from bushfit.report.plots.response import extreme_rows
+from bushfit.report.tables import shorten
 from bushfit.units import display_unit, format_range
 
 #: Colour of a history.
@@ -50,7 +51,7 @@ def inspection_figure(files: Sequence[Inspection], first: int = 0, count: int = 
     grid = figure.add_gridspec(len(drawn_files), 2)
     for row, file in enumerate(drawn_files):
         name = f"{file.file.parent.name}/{file.label}" if names[file.label] > 1 else file.label
-        title = f"{style.file_name(name, letters=48)}: {file.kind}, {file.direction or 'direction unknown'}"
+        title = f"{shorten(name, 48)}: {file.kind}, {file.direction or 'direction unknown'}"
         title += ", sign of the force reversed" * (file.entry.get("force_sign") == -1)
         title += f", {len(file.odd)} remarks" if file.odd else ""
         if isinstance(file.measured, Sweep):
@@ -95,7 +96,7 @@ def _draw_history(figure: Figure, cell: SubplotSpec, history: Loop, loop: Axes |
 def _draw_sweep(pair: Sequence[Axes], sweep: Sweep) -> Axes:
     """Draw stiffness and loss factor over the stepped quantity of a sweep; return the left panel."""
     place, length = sweep.direction, sweep.direction.display.displacement
-    magnitude = place.display.stiffness.factor * np.abs(sweep.stiffness)
+    magnitude = np.abs(sweep.stiffness)
     factor, labels = stiffness_scale(place, float(magnitude.max()))
     by_amplitude = sweep.stepped == "amplitude"
     fixed_quantity, unit, scale = ("frequency", "Hz", 1.0) if by_amplitude else ("amplitude", *length)
@@ -138,7 +139,7 @@ def reduction_figure(reduction: Reduction, histories: Sequence[Loop], title: str
         strip = figure.add_subplot(grid[row, :])
         _draw_strip(strip, history, reduction, looks)
         if len(histories) > 1:  # the title of the figure names a single history
-            name = style.file_name(history.name, letters=100)  # one line
+            name = shorten(history.name, 100)  # one line
             strip.set_title(name, fontsize=style.SMALL, loc="left", color=style.GREY, pad=2)
     points = [figure.add_subplot(grid[-2, column]) for column in range(2)]
     quality = [figure.add_subplot(grid[-1, column], sharex=points[0]) for column in range(2)]
@@ -190,11 +191,10 @@ def _draw_points(
         looks: colour and marker by nominal amplitude [m, rad or 1].
     """
     unit, length = reduction.direction.display.displacement
-    to_table = reduction.direction.display.stiffness.factor
-    factor, labels = stiffness_scale(reduction.direction, to_table * float(steps["stiffness"].abs().max()))
+    factor, labels = stiffness_scale(reduction.direction, float(steps["stiffness"].abs().max()))
     for level, look in looks.items():
         rows = steps[steps["level"] == level]
-        frequency, magnitude = rows["frequency"], (factor * to_table * rows["stiffness"].abs()).to_numpy()
+        frequency, magnitude = rows["frequency"], (factor * rows["stiffness"].abs()).to_numpy()
         factors = loss_factor(rows["stiffness"].to_numpy())
         errors = magnitude * rows["gain_error"], (1.0 + factors**2) * rows["phase_error"]
         for axes, value, error in zip(pair, (magnitude, factors), errors, strict=True):

@@ -179,11 +179,10 @@ def draw_prediction(
     measured = np.array([len(rows) > 0 for rows in points])
     chosen = np.flatnonzero(measured) if measured.sum() > 1 else np.arange(levels.size)
     chosen = chosen[spread_indices(chosen.size, _MOST_LEVELS[axis])]
-    to_table = place.display.stiffness.factor
-    factor, labels = stiffness_scale(place, to_table * float(prediction.stiffness.value.max()))
+    factor, labels = stiffness_scale(place, float(prediction.stiffness.value.max()))
     x, looks = scales[axis] * getattr(prediction, axis), style.styles(chosen.size, fixed)
     kinds = (
-        ("stiffness", response_headers(place)[1], factor, factor * to_table),
+        ("stiffness", response_headers(place)[1], factor / place.display.stiffness.factor, factor),
         ("loss_factor", "loss factor [-]", 1.0, 1.0),
     )
     for axes, label, (name, header, from_table, from_si) in zip(pair, labels, kinds, strict=True):

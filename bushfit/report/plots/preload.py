@@ -40,11 +40,10 @@ def preload_figure(
     ends = min(preloads).value, max(preloads).value
     loads = [Preload(value, preloads[0].unit) for value in np.linspace(*ends, _FINE).tolist()]
     fine = [predict(result, place, [frequency], amplitudes, temperature=temperature, preload=load) for load in loads]
-    to_table = place.display.stiffness.factor
-    factor, labels = stiffness_scale(place, to_table * max(float(one.stiffness.value.max()) for one in fine))
+    factor, labels = stiffness_scale(place, max(float(one.stiffness.value.max()) for one in fine))
     figure = style.Chart(title, style.ROW)
     pair = figure.subplots(1, 2)
-    quantities = (("stiffness", factor * to_table), ("loss_factor", 1.0))
+    quantities = (("stiffness", factor), ("loss_factor", 1.0))
     for axes, label, (name, scale) in zip(pair, labels, quantities, strict=True):
         for index, look in enumerate(style.styles(amplitudes.size, "amplitude")):
             bands = [getattr(prediction, name) for prediction in fine]

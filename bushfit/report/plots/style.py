@@ -26,7 +26,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from bushfit.effects.contract import Array
 from bushfit.errors import printable
 from bushfit.model.covariance import Z95
-from bushfit.report.tables import shorten, spread_indices
+from bushfit.report.tables import spread_indices
 
 #: Width of a figure [cm]: the text of a page of A4.
 WIDTH = 16.0
@@ -78,7 +78,9 @@ _WIDER_FONTS = {"Noto Sans CJK SC", "Noto Sans CJK JP", "WenQuanYi Zen Hei", "Mi
 _SETTINGS: dict[Any, Any] = {
     key: value for key, value in rcParamsDefault.items() if key.partition(".")[0] not in ("backend", "interactive")
 } | {
-    "font.family": ["DejaVu Sans"],  # one font to search for, not the fourteen of "sans-serif"
+    # one font to search for, not the fourteen of "sans-serif", and installed ones for names in further scripts
+    "font.family": ["DejaVu Sans", *sorted({font.name for font in fontManager.ttflist} & _WIDER_FONTS)],
+    "text.parse_math": False,
     "axes.grid": True,
     "axes.axisbelow": True,
     "axes.labelsize": TEXT,
@@ -146,10 +148,9 @@ class Chart(Figure):
         lines = textwrap.wrap(f"{self.caption} {printable(note, lines=True)}", _NOTE_LETTERS)
         self.above, below = _MARGIN + _TITLE_LINE * len(title), _MARGIN + _NOTE_LINE * len(lines)
         height = self.above + self.panel_height + below
-        bold: dict[str, Any] = {"fontsize": TEXT + 1.5, "weight": "bold", "family": fonts(), "parse_math": False}
-        self.heading = self.suptitle("\n".join(title), y=1.0 - 0.25 / height, **bold)
-        small: dict[str, Any] = {"fontsize": SMALL, "color": GREY, "parse_math": False}
-        self.footer = self.supxlabel("\n".join(lines), x=0.01, y=0.2 / height, ha="left", **small)
+        self.heading = self.suptitle("\n".join(title), y=1.0 - 0.25 / height, fontsize=TEXT + 1.5, weight="bold")
+        below_panels: dict[str, Any] = {"x": 0.01, "y": 0.2 / height, "ha": "left", "fontsize": SMALL, "color": GREY}
+        self.footer = self.supxlabel("\n".join(lines), **below_panels)
         bottom, top = self.subplotpars.bottom, self.subplotpars.top  # the panels keep their size and distances
         self.set_figheight(height / 2.54)
         ends = ((below + end * self.panel_height) / height for end in (bottom, top))
@@ -184,11 +185,6 @@ def styles(count: int, palette: str) -> list[Style]:
     return [Style(c, DASHES[i % len(DASHES)], _MARKERS[i % len(_MARKERS)]) for i, c in enumerate(colors)]
 
 
-def fonts() -> list[str]:
-    """Font families for user text in any script: the default font, then installed fonts for further scripts."""
-    return ["DejaVu Sans", *sorted({font.name for font in fontManager.ttflist} & _WIDER_FONTS)]
-
-
 def label_axes(axes: Axes, x_label: str, y_label: str, x: Array | None = None) -> None:
     """Give a panel its labels, few ticks, and a logarithmic x axis if it spans decades.
 
@@ -218,7 +214,7 @@ def label_left(axes: Axes, label: str, **options: Any) -> None:
     """
     whole = re.sub(r"\[.*?\]", lambda unit: unit[0].replace(" ", "\u00a0"), printable(label, lines=True))
     lines = [part for line in whole.splitlines() for part in textwrap.wrap(line, _LABEL_LETTERS)]
-    axes.set_ylabel("\n".join(lines), family=fonts(), parse_math=False, **options)
+    axes.set_ylabel("\n".join(lines), **options)
 
 
 def logarithmic(axes: Axes, values: Array, axis_name: Literal["x", "y"] = "x") -> None:
@@ -317,11 +313,6 @@ def name_levels(
     bar.minorticks_off()
     bar.ax.set_title(quantity, **WORDS)
     bar.outline.set(edgecolor=GREY, linewidth=0.6)
-
-
-def file_name(name: str, letters: int = 20) -> str:
-    """Shorten a file name to `letters` characters for use in a figure, with dollar signs escaped for matplotlib."""
-    return shorten(name, letters).replace("$", r"\$")
 
 
 def warnings_note(sentences: Sequence[str]) -> str:
