@@ -20,6 +20,8 @@ Bounds = Mapping[str, tuple[float | None, float | None]]
 #: Smallest significant singular value of a Jacobian, or eigenvalue of a scaled information matrix, relative to the
 #: largest: smaller ones are rounding errors.
 ROUNDING = 1e-10
+#: Least size of a parameter, relative to its typical value, that a relative change is counted from.
+_LEAST_SIZE = 0.05
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,14 @@ class Coordinates:
         """Derivatives of the k parameter values [SI] by their coordinates, (k,), at values by name."""
         pairs = zip(self.names, self.parameters, strict=True)
         return np.array([values[name] if parameter.log else parameter.typical for name, parameter in pairs])
+
+
+def relative_sizes(model: Model, names: Sequence[str]) -> Array:
+    """Derivative of each parameter's fit coordinate by its relative change dp/p, (k,): 1 if the coordinate is ln p."""
+    pairs = [(model.parameters[name], abs(model.values[name])) for name in names]
+    return np.array(
+        [1.0 if parameter.log else max(value / parameter.typical, _LEAST_SIZE) for parameter, value in pairs]
+    )
 
 
 def coordinate_bounds(coordinates: Coordinates, bounds: Bounds) -> tuple[Array, Array]:

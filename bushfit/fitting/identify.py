@@ -1,4 +1,4 @@
-"""Sentences on parameters that the tests do not determine: the reason, known combinations, and the best further test.
+"""Sentences on parameters that the tests do not determine: the reason, and combinations that they determine.
 
 A direction is an eigenvector of the Fisher information, with parameters scaled by their size: a combination of relative
 changes. Its standard error is one over the root of the eigenvalue. A direction is open, and so are the parameters that
@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bushfit.effects import effect_name_of
+from bushfit.effects.contract import Array
 from bushfit.fitting.assess import measured_range
-from bushfit.fitting.coordinates import Coordinates
-from bushfit.fitting.information import FisherInformation, further_test, percent, relative_sizes
+from bushfit.fitting.coordinates import Coordinates, relative_sizes
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind
+from bushfit.fitting.problem import FitProblem
 from bushfit.model.covariance import Z95, Covariance
 from bushfit.model.model import Model
 from bushfit.units import format_range
@@ -33,6 +34,8 @@ _NARROW_STRAIN = 2.0
 _KNOWN = 0.1
 #: Error of a combination over the smallest error of its parts, up to which the combination is reported.
 _BETTER = 0.34
+#: Relative standard error beyond which only "beyond 1000 %" is printed.
+_BEYOND = 10.0
 #: Relative step of a parameter into the complex plane: a derivative so taken is exact to rounding.
 _COMPLEX_STEP = 1e-30
 _FRICTION = ("sigma_fmax", "eps_half")
@@ -98,66 +101,89 @@ def undetermined_parameters(
     """
     if not names:
         return []
-    information = FisherInformation.from_tests(model, data_sets, names)
-    groups, lines = _groups(information), list[str]()
+    directions = _error_directions(model, data_sets, names)
+    groups, lines = _groups(names, directions), list[str]()
     changes = np.abs(Coordinates.of_parameters(model, names).slopes(model.values) * relative_sizes(model, names))
-    errors = {name: (covariance.stderr(name) or 0.0) / float(c) for name, c in zip(names, changes, strict=True)}
-
-    def is_zero(name: str) -> bool:
-        """True if an amount of an added effect, given by name, is within noise of its neutral value."""
-        neutral, noise = model.parameters[name].neutral, Z95 * (covariance.stderr(name) or 0.0)
-        return "." in name and neutral is not None and abs(model.values[name] - neutral) < noise
-
-    if zero := [name for group in groups for name in group if is_zero(name)]:
-        amounts = [name for name in names if model.parameters[name].neutral is not None]
-        idle = {effect_name_of(name) for name in zero}
-        idle -= {effect_name_of(name) for name in amounts if not is_zero(name)}
+    stderr = {name: covariance.stderr(name) or 0.0 for name in names}
+    errors = {name: stderr[name] / float(change) for name, change in zip(names, changes, strict=True)}
+    # amounts of added effects, and those within noise of their neutral value
+    neutral = {name: value for name in names if (value := model.parameters[name].neutral) is not None}
+    idle = {name for name in neutral if "." in name and abs(model.values[name] - neutral[name]) < Z95 * stderr[name]}
+    if zero := [name for group in groups for name in group if name in idle]:
+        unseen = {effect_name_of(name) for name in zero} - {
+            effect_name_of(name) for name in neutral if name not in idle
+        }
         for name in zero:
-            effect, neutral = effect_name_of(name), model.parameters[name].neutral
-            unseen = f": these tests do not show {effect}" * (effect in idle)
-            lines.append(f"{name} does not differ from {neutral:g}{unseen}")
-        rest = [name for name in names if name not in zero and effect_name_of(name) not in idle]
-        if not rest:
+            effect = effect_name_of(name)
+            remark = f": these tests do not show {effect}" * (effect in unseen)
+            lines.append(f"{name} does not differ from {neutral[name]:g}{remark}")
+        names = [name for name in names if name not in zero and effect_name_of(name) not in unseen]
+        if not names:
             return lines
-        information = FisherInformation.from_tests(model, data_sets, rest)
-        groups = _groups(information)
+        directions = _error_directions(model, data_sets, names)
+        groups = _groups(names, directions)
     if not groups:
         return []
-    combinations: dict[str, None] = {}
+    combinations, rows = dict[str, None](), dict(zip(names, directions, strict=True))
     for group in groups:
-        listed = ", ".join(f"{name} {percent(errors[name])}" for name in group)
+        listed = ", ".join(f"{name} {_percent(errors[name])}" for name in group)
         reasons = "; ".join(_reasons(model, data_sets, group)) or "these tests do not determine"
         meaning = f"{', '.join(group[:-1])} and {group[-1]} cannot be determined separately"
-        if set(group) == set(_FRICTION) and information.error({"sigma_fmax": 1.0, "eps_half": -1.0}) < _KNOWN:
+        if set(group) == set(_FRICTION) and np.linalg.norm(rows["sigma_fmax"] - rows["eps_half"]) < _KNOWN:
             meaning = "sigma_fmax and eps_half are determined only as a ratio"
         elif len(group) == 1:
             meaning = f"{group[0]} is not determined"
         lines.append(f"{reasons}: {meaning} (standard errors: {listed})")
-        combinations |= dict.fromkeys(_known_combinations(model, data_sets, information, group))
+        combinations |= dict.fromkeys(_known_combinations(model, data_sets, rows, group))
     if combinations:
         lines.append("combinations that the tests determine: " + "; ".join(combinations))
     # what another test would tell beside an error of the model depends on what that error is
     missed = any(data_set.model_error for data_set in data_sets)
-    return lines if missed else [*lines, *further_test(model, data_sets, information)]
+    return lines if missed else [*lines, "bushfit plan chooses further tests that determine these parameters"]
 
 
-def _groups(information: FisherInformation) -> list[list[str]]:
+def _percent(error: float) -> str:
+    """Format a relative standard error as text, such as "2.5 %" for 0.025."""
+    return f"{float(f'{100.0 * error:.2g}'):g} %" if error < _BEYOND else "beyond 1000 %"
+
+
+def _error_directions(model: Model, data_sets: Sequence[MeasuredTest], names: Sequence[str]) -> Array:
+    """Independent errors of relative parameter changes: eigenvectors of their covariance times their standard errors.
+
+    Args:
+        model: fitted model.
+        data_sets: tests.
+        names: names of the k parameters.
+
+    Returns:
+        Relative change of each parameter by each of the k independent errors, (k, k), one column per error. The sum of
+        squares along a row is the variance of a parameter; their outer products are the covariance.
+    """
+    slopes = FitProblem(model, data_sets, names).jacobian(model, with_priors=False)
+    slopes *= relative_sizes(model, names)[:, None]
+    values, vectors = np.linalg.eigh(slopes @ slopes.T)
+    return np.asarray(vectors / np.sqrt(np.maximum(values, np.finfo(float).eps * values.max())))
+
+
+def _groups(names: Sequence[str], directions: Array) -> list[list[str]]:
     """Group the names of the parameters that the tests do not determine.
 
     An open direction is a combination of parameters with a large standard error. The parameters of one open direction,
     and of all open directions that have a parameter in common with it, form a group.
+
+    Args:
+        names: names of the k parameters.
+        directions: result of `_error_directions`, (k, k).
     """
-    errors, vectors = information.directions()
     groups: list[set[str]] = []
-    for j in np.flatnonzero(errors > _OPEN):
-        parts = np.abs(vectors[:, j]) * errors[j]
+    for parts in np.abs(directions.T[np.linalg.norm(directions, axis=0) > _OPEN]):
         threshold = min(_OPEN, _PARTNER * float(parts.max()))
-        group = {name for name, part in zip(information.names, parts, strict=True) if part > threshold}
+        group = {name for name, part in zip(names, parts, strict=True) if part > threshold}
         for overlapping in [overlapping for overlapping in groups if overlapping & group]:
             groups.remove(overlapping)
             group |= overlapping
         groups.append(group)
-    return [[name for name in information.names if name in group] for group in groups]
+    return [[name for name in names if name in group] for group in groups]
 
 
 def _reasons(model: Model, data_sets: Sequence[MeasuredTest], involved: Sequence[str]) -> Iterator[str]:
@@ -191,26 +217,27 @@ def _reasons(model: Model, data_sets: Sequence[MeasuredTest], involved: Sequence
 
 
 def _known_combinations(
-    model: Model, data_sets: Sequence[MeasuredTest], information: FisherInformation, involved: Sequence[str]
+    model: Model, data_sets: Sequence[MeasuredTest], rows: Mapping[str, Array], involved: Sequence[str]
 ) -> Iterator[str]:
     """Yield texts (formula, value, relative standard error) on moduli that are known better than their parameters.
 
     Args:
         model: fitted model.
         data_sets: tests of the campaign.
-        information: Fisher information of the tests on relative changes of the parameters.
+        rows: relative change of each parameter by each of the k independent errors, by name, (k,) each.
         involved: names of the parameters in these moduli that the tests do not determine.
     """
-    errors = dict(zip(information.names, information.errors(), strict=True))
-    enough = min(_KNOWN, _BETTER * min(float(errors[name]) for name in involved))
+    enough = min(_KNOWN, _BETTER * min(float(np.linalg.norm(rows[name])) for name in involved))
     slow = measured_range(model, data_sets).frequency[0]
     values = {**model.values, "omega": 2.0 * np.pi * slow}
     for formula, function, names, open_with, remark in _COMBINATIONS:
-        if not (set(names) <= set(information.names) and set(open_with or names) & set(involved)):
+        if not (set(names) <= rows.keys() and set(open_with or names) & set(involved)):
             continue
         modulus = function(values)
-        stepped = {name: function({**values, name: values[name] * (1.0 + 1j * _COMPLEX_STEP)}) for name in names}
-        error = information.error({name: float(x.imag / _COMPLEX_STEP / modulus) for name, x in stepped.items()})
-        if error < enough:
+        change = np.zeros(len(rows))
+        for name in names:
+            stepped = function({**values, name: values[name] * (1.0 + 1j * _COMPLEX_STEP)})
+            change += stepped.imag / _COMPLEX_STEP / modulus * rows[name]
+        if (error := float(np.linalg.norm(change))) < enough:
             condition = f" at {slow:.3g} Hz" if "omega" in formula else ""
-            yield f"{formula}{condition} = {format_range('Pa', modulus, digits=4)} to {percent(error)}{remark}"
+            yield f"{formula}{condition} = {format_range('Pa', modulus, digits=4)} to {_percent(error)}{remark}"

@@ -200,7 +200,6 @@ def planned_loop(
     *,
     cycles: float = 1.0,
     rows: int,
-    from_rest: bool = False,
 ) -> MeasuredLoop:
     """Build a sinusoidal loop of a planned test, with the force of a model.
 
@@ -212,10 +211,9 @@ def planned_loop(
         noise: standard deviation of one row, relative to half the force range.
         cycles: number of cycles.
         rows: number of rows.
-        from_rest: True if the loop begins at rest, False if it is settled.
 
     Returns:
-        Loop whose force has no noise, but whose residuals are in units of `noise`.
+        Settled loop whose force has no noise, but whose residuals are in units of `noise`.
     """
     phase, nil = cycles * np.arange(rows) / rows, np.zeros(rows)
     motion = amplitude * np.sin(2.0 * np.pi * phase)
@@ -223,7 +221,7 @@ def planned_loop(
         loop=Loop("new", place, phase / frequency, motion, nil),
         frequency=frequency,
         cycles=cycles,
-        from_rest=from_rest,
+        from_rest=False,
         phase=phase,
         force=nil,
         weight=np.ones(rows),

@@ -19,8 +19,7 @@ from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.diagnosis.propose import missing_effects, sensitivity
 from bushfit.effects import Effect
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
-from bushfit.fitting.coordinates import Coordinates
-from bushfit.fitting.information import relative_sizes
+from bushfit.fitting.coordinates import Coordinates, relative_sizes
 from bushfit.fitting.preparation import MeasuredTest, planned_loop, planned_sweep, split_by_kind
 from bushfit.fitting.problem import FitProblem
 from bushfit.geometry import Place, shared_labels

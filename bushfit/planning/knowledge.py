@@ -16,8 +16,7 @@ from bushfit.diagnosis.refit import refitted
 from bushfit.diagnosis.workflow import diagnose
 from bushfit.effects import LIBRARY, twins_of
 from bushfit.errors import ModelError, did_you_mean
-from bushfit.fitting.coordinates import Bounds, Coordinates
-from bushfit.fitting.information import relative_sizes
+from bushfit.fitting.coordinates import Bounds, Coordinates, relative_sizes
 from bushfit.fitting.preparation import MeasuredTest, split_by_kind
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.rig_class import class_errors

@@ -225,7 +225,7 @@ def test_one_loop_alone_is_fitted_and_what_it_leaves_open_is_said_first(own, tmp
     assert "no sweeps: the two-step procedure is skipped" in ran.stderr
     warnings = document(tmp_path / "run/model.json")["warnings"]
     assert any("one loop rate, 0.1 Hz: mu, m and alpha cannot be determined separately" in line for line in warnings)
-    assert any("the most helpful further test: a loop at" in line for line in warnings)
+    assert "bushfit plan chooses further tests that determine these parameters" in warnings
     assert warnings[0] == UNKNOWN
     fitted = typing(own)("fit", CAMPAIGN, "-o", tmp_path / "fit", "--no-plots", "--json")
     assert fitted.stderr.startswith(f"CMP 15 961: {UNKNOWN}\n")
