@@ -28,6 +28,8 @@ _MOST_SHORT = 0.2
 _JUMP = 2.0
 #: Smallest number of samples per mean cycle without a warning: with 20 the springpot errs by 0.7 % of its force.
 _FEWEST_PER_CYCLE = 20.0
+#: Number of frequencies, evenly spaced in their logarithm, at which a smooth correction is evaluated.
+_CORRECTED = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,23 +107,17 @@ def time_response(
         rig: True to include the effects of the rig, as in the tests; False for the bushing as the car will have it.
 
     Returns:
-        Force with a band that spans all models that agree with the tests. Effects of the rig (unless `rig`), a
-        correction without a name and, in a steady state, effects of the first cycles are left out; the band includes
-        the correction, and excludes alternatives without a law in time.
+        Force with a band that spans all models that agree with the tests. Effects of the rig (unless `rig`) and, in a
+        steady state, effects of the first cycles are left out; the band excludes alternatives without a law in time.
 
     Raises:
         ModelError: an effect of the model has no law in time.
     """
     conditions = RubberConditions(temperature)
-    left_out = {
-        effect.name
-        for effect in result.model.records
-        if effect.name == UNNAMED or (history.periodic and effect.is_transient)
-    }
+    left_out = {effect.name for effect in result.model.records if history.periodic and effect.is_transient}
     timed = replace(
         result,
         model=result.model.without(*left_out),
-        model_error=result.model_error or result.model.unnamed,
         alternatives=tuple(
             replace(alternative, model=alternative.model.without(*left_out)) for alternative in result.alternatives
         ),
@@ -143,22 +139,55 @@ def _force(result: Result, model: Model, place: Place, history: History, conditi
         conditions: temperature of the rubber.
 
     Notes: the model's relative errors of real and imaginary part multiply the force and its Hilbert transform. They are
-    the larger of those at the peak amplitude and at that of a sine of equal rms, at the mean frequency.
+    the larger of those at the peak amplitude and at that of a sine of equal rms, at the mean frequency, and of those
+    far from the tested points, because the tests are sines and this motion is none.
     """
     amplitude = np.array([np.abs(history.value).max(), np.sqrt(2.0) * np.std(history.value)])
     amplitude = np.maximum(amplitude, np.finfo(float).eps)
     errors = uncertainty(result, model, place, np.full(2, history.frequency), amplitude, conditions)
-    if not model.only_branches:  # one model's solution of implicit equations is the start for its derivatives
-        model.force(place, history, kind="loop", conditions=conditions)
-    force, slopes = force_and_slopes(model, place, history, errors.covariance.names, conditions)
+    named = model.without(UNNAMED)
+    if not named.only_branches:  # one model's solution of implicit equations is the start for its derivatives
+        named.force(place, history, kind="loop", conditions=conditions)
+    force, slopes = force_and_slopes(named, place, history, errors.covariance.names, conditions)
+    if model.unnamed:
+        force = _corrected(force, model, place, history, conditions)
     half = errors.scale.max() * errors.covariance.half_width(slopes)
     if errors.relative.size:
         from scipy.signal import hilbert  # slow to import
 
-        real, imaginary = np.abs(errors.relative).max(axis=-1)
+        measured_in_sines = model.unnamed or result.model_error
+        far = measured_in_sines.far_deviation if measured_in_sines else 0.0
+        real, imaginary = np.maximum(np.abs(errors.relative).max(axis=-1), far)
         quadrature = hilbert(force, next_fast_len(force.size)).imag[: force.size]
         half = np.sqrt(half**2 + Z95**2 * ((real * force) ** 2 + (imaginary * quadrature) ** 2))
     return Band(force, force - half, force + half)
+
+
+def _corrected(force: Array, model: Model, place: Place, history: History, conditions: RubberConditions) -> Array:
+    """Apply the unnamed correction of a model to a force without it.
+
+    Args:
+        force: force of the other effects [N, N m or Pa], (n,).
+        model: model with the correction.
+        place: direction or specimen.
+        history: displacement [m, rad or 1], (n,).
+        conditions: temperature of the rubber.
+
+    Returns:
+        Corrected force [N, N m or Pa], (n,). Each frequency is multiplied by the ratio of the stiffness with and
+        without the correction in a sine of equal rms displacement, which is exact for a sine (statistical
+        linearisation, T. K. Caughey, J. Acoust. Soc. Am. 35 (1963) 1706); the mean force is not corrected.
+    """
+    samples = force.size if history.periodic else next_fast_len(2 * force.size)
+    frequency = np.fft.rfftfreq(samples, history.step)[1:]
+    grid = np.geomspace(frequency[0], frequency[-1], _CORRECTED)
+    amplitude = np.maximum(np.sqrt(2.0) * np.std(history.value), np.finfo(float).eps)
+    with_it, without = (
+        source.stiffness(place, grid, amplitude, conditions=conditions) for source in (model, model.without(UNNAMED))
+    )
+    spectrum = np.fft.rfft(force, samples)
+    spectrum[1:] *= np.interp(np.log(frequency), np.log(grid), with_it / without)
+    return np.fft.irfft(spectrum, samples)[: force.size]
 
 
 def _tested(result: Result) -> tuple[float, float] | None:
@@ -196,6 +225,11 @@ def _warnings(result: Result, response: TimeResponse, left_out: list[str], tempe
         )
         warnings.append(
             f"{place}: strain rates of up to {rate} 1/s only, in {number(100.0 * share, 2)} % of the time: {BEYOND}"
+        )
+    if (result.model.unnamed or result.model_error) and "friction" in result.model.effects:
+        warnings.append(
+            f"{place}: friction laws that agree in sines can differ in a mixed motion by more than the band: compare "
+            "with a fit that has --effect distributed_sliders, or with a [[validation]] record"
         )
     if left_out:
         warnings.append(f"{place}: {' and '.join(left_out)} left out, because no law describes this motion")

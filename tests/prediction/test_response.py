@@ -12,6 +12,7 @@ from bushfit.commands.respond import respond
 from bushfit.effects.contract import Array
 from bushfit.effects.history import History
 from bushfit.effects.rig_compliance import force as sleeve_force
+from bushfit.effects.unnamed import Patch, Unnamed
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Direction
 from bushfit.model import rig
@@ -80,8 +81,14 @@ def test_the_force_is_that_of_the_rig_at_a_tenth_of_the_step(paper_model, law, m
     assert np.sqrt(np.mean((force - expected) ** 2)) < 0.003 * np.sqrt(np.mean(expected**2))
 
 
-def test_a_steady_state_is_that_of_the_closed_form(paper_model):
+@pytest.mark.parametrize("corrected", [False, True])
+def test_a_steady_state_is_that_of_the_closed_form(paper_model, corrected):
     amplitude, cycles = 2e-4, 4
+    if corrected:
+        patch = Patch(("radial",), (5.0, 20.0), (0.01, 0.02), (0.04, 0.05), (0.02, 0.01), (0.001,) * 2, (0.001,) * 2)
+        effects = [*paper_model.effects, "unnamed"]
+        unnamed = Unnamed(0.05, (1.0, 1.0), (patch,))
+        paper_model = paper_model.with_defaults(paper_model.bushing, effects, paper_model.values, unnamed)
     motion = amplitude * np.sin(2.0 * np.pi * 10.0 * np.arange(400 * cycles) / 4000.0)
     response = time_response(Result(paper_model), Direction.RADIAL, History.sampled(motion, 1 / 4000, periodic=True))
     ratio = np.fft.rfft(response.force.value)[cycles] / np.fft.rfft(motion)[cycles]
