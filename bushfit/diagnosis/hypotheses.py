@@ -14,13 +14,14 @@ from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart, OutlierCluster, compound, unnamed_curves
 from bushfit.diagnosis.faulty_parts import find_faulty_parts
 from bushfit.diagnosis.groups import Group, GroupEvidence
+from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.linear_model import LinearModel
 from bushfit.diagnosis.priors import LEVELS
 from bushfit.diagnosis.propose import Proposal, proposals
+from bushfit.diagnosis.record import DiagnosisSettings
 from bushfit.diagnosis.rig_errors import RigErrors, in_scatter_units, rig_errors
 from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.contract import Array
-from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.rig_class import ASSUMED, class_errors
 
@@ -37,25 +38,17 @@ class DiagnosisRequest:
         data: campaign with the prepared tests.
         base: starting model, fitted to the tests.
         fit_corrected: function that fits the starting model to a campaign with a corrected record.
-        without: names of effects and mistakes not to consider.
-        max_effects: maximum number of added effects.
-        tolerance: relative change of |K| up to which an explanation is neglected.
+        settings: limits of the diagnosis, and effects and mistakes not to consider.
         start: starting values read from the data, by parameter, for a fit that the gap has distorted.
         outlier_clusters: frequencies at which several outliers were left out.
-        fixed: names of parameters that are not fitted.
-        bounds: limits of the fitted parameters inside their general limits.
     """
 
     data: PreparedCampaign
     base: Evidence
     fit_corrected: Callable[[PreparedCampaign], Evidence]
-    without: Sequence[str]
-    max_effects: int
-    tolerance: float
+    settings: DiagnosisSettings
     start: Mapping[str, float]
     outlier_clusters: Sequence[OutlierCluster]
-    fixed: Sequence[str]
-    bounds: Bounds
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,31 +56,48 @@ class Hypothesis:
     """One set of explanations of the gap between model and tests, with its posterior probability.
 
     Args:
-        effects: names of the effects, in the order in which they were added.
-        claim: mistake in the record; None without a mistake.
-        faulty_parts: faulty parts of the tests: frequencies, levels, repeats or loops.
-        unnamed: name of the smooth curve or compound deviation that stands for an unknown effect; "" without one.
-        levels: True if errors of amplitude levels are larger than the accuracy class of the rig allows.
+        state: step of the search (fitted model) that has exactly these explanations, or all but the last.
         log_posterior: natural log of prior times evidence, not normalised.
         change: largest relative change of |K| by any of the explanations.
-        last_change: relative change of |K| by the last explanation if its evidence is that of the linear model; 0 if it
-            was refitted.
-        state: step of the search (fitted model) that has exactly these explanations, or all but the last.
+        last: last explanation, if its evidence is that of the linear model; None without one.
+        last_change: relative change of |K| by the last explanation, or by the compound's deviation; 0 without either.
         compound_deviates: True if the compound deviates from the model's laws in addition.
+        levels: True if errors of amplitude levels are larger than the accuracy class of the rig allows.
+        clusters: disturbances at frequencies with several outliers that were left out.
     """
 
-    effects: tuple[str, ...]
-    claim: Claim | None
-    faulty_parts: tuple[FaultyPart, ...]
-    unnamed: str
-    levels: bool
+    state: SearchState
     log_posterior: float
     change: float
-    last_change: float
-    state: SearchState
+    last: Explanation | None = None
+    last_change: float = 0.0
     compound_deviates: bool = False
+    levels: bool = False
+    clusters: tuple[OutlierCluster, ...] = ()
 
     @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects, in the order in which they were added."""
+        return (*self.state.effects, *([] if self.refitted or not self.last else [self.last.name]))
+
+    @property
+    def faulty_parts(self) -> tuple[FaultyPart, ...]:
+        """Faulty parts of the tests: frequencies, levels, repeats or loops."""
+        last = [self.last] if isinstance(self.last, FaultyPart) else []
+        return (*self.state.faulty_parts, *last, *self.clusters)
+
+    @property
+    def claim(self) -> Claim | None:
+        """Mistake in the record; None without a mistake."""
+        return self.state.tests.claim
+
+    @property
+    def unnamed(self) -> str:
+        """Name of the smooth curve or compound deviation that stands for an unknown effect; "" without one."""
+        is_curve = self.last is not None and self.last.kind == "unnamed"
+        return self.last.name if is_curve and self.last else COMPOUND * self.compound_deviates
+
+    @cached_property
     def key(self) -> frozenset[Hashable]:
         """Names that identify this set of explanations; empty for the hypothesis that nothing is missing."""
         marks = [self.unnamed, "levels" if self.levels else "", self.claim and self.claim.key]
@@ -96,7 +106,7 @@ class Hypothesis:
     @property
     def refitted(self) -> bool:
         """True if all effects were refitted, so that no evidence rests on a linear model alone."""
-        return self.effects == self.state.effects
+        return self.last is None or self.last.kind != "effect"
 
     @property
     def p_value(self) -> float:
@@ -111,6 +121,7 @@ class Tests:
     Args:
         base: fit of the starting model; its residuals are whitened by scatter and by errors that points share.
         rig: stated accuracy class of the rig (gain and phase errors).
+        without: names of effects not to consider.
         log_prior: natural log of the prior probability that these are the right records and nothing is missing.
         claim: mistake that is corrected; None for the tests as recorded.
         change: relative change of the recorded quantities by the correction; 0 for the tests as recorded.
@@ -118,6 +129,7 @@ class Tests:
 
     base: Evidence
     rig: RigSettings
+    without: Sequence[str]
     log_prior: float
     claim: Claim | None = None
     change: float = 0.0
@@ -170,8 +182,8 @@ class SearchState:
 
     Args:
         tests: tests with their record, as read or corrected.
-        request: input of the search.
         evidence: fit of the model with the added effects.
+        bare: the same fit with residuals in units of the scatter from point to point, without shared errors.
         log_prior: natural log of the prior probability of the set of explanations.
         effects: names of the effects that were added.
         faulty_parts: faulty parts of the tests, whose points may deviate together.
@@ -183,8 +195,8 @@ class SearchState:
     """
 
     tests: Tests
-    request: DiagnosisRequest
     evidence: Evidence
+    bare: Evidence
     log_prior: float
     effects: tuple[str, ...] = ()
     faulty_parts: tuple[FaultyPart, ...] = ()
@@ -194,20 +206,34 @@ class SearchState:
     change: float = 0.0
 
     @classmethod
-    def of_tests(cls, tests: Tests, request: DiagnosisRequest) -> SearchState:
+    def of_tests(cls, tests: Tests) -> SearchState:
         """Create the initial state of a search: the starting model with nothing added."""
-        return cls(tests, request, tests.base, tests.log_prior, change=tests.change)
+        return cls(tests, tests.base, tests.bare, tests.log_prior, change=tests.change)
 
-    @property
-    def key(self) -> frozenset[Hashable]:
-        """Names that identify this step of the search: effects, faulty parts of the tests, and corrected mistake."""
-        claim = self.tests.claim
-        return frozenset((*self.effects, *(part.name for part in self.faulty_parts), *([claim.key] if claim else [])))
+    def with_effect(self, name: str, evidence: Evidence, log_odds: float) -> SearchState:
+        """Add an effect to this step of the search.
+
+        Args:
+            name: name of the effect.
+            evidence: fit with the effect.
+            log_odds: natural log of the prior odds of the effect.
+        """
+        log_density, precision, change = laplace(name, evidence, self.evidence)
+        return replace(
+            self,
+            effects=(*self.effects, name),
+            evidence=evidence,
+            bare=self.bare if evidence is self.evidence else in_scatter_units(evidence),
+            log_prior=self.log_prior + log_odds,
+            precision={**self.precision, **precision},
+            log_density=self.log_density + log_density,
+            change=max(self.change, change),
+        )
 
     @cached_property
-    def bare(self) -> Evidence:
-        """Fit of this step with residuals in units of the scatter from point to point, without shared errors."""
-        return self.tests.bare if self.evidence is self.tests.base else in_scatter_units(self.evidence)
+    def key(self) -> frozenset[Hashable]:
+        """Names that identify this step of the search: effects, faulty parts of the tests, and corrected mistake."""
+        return self.hypotheses[0].key
 
     @cached_property
     def linear(self) -> LinearModel:
@@ -220,14 +246,10 @@ class SearchState:
         precision = np.concatenate([precision[moves], *of_faulty_parts])
         return LinearModel(self.bare.residual, rows, precision, tests.errors, compound=tests.compound)
 
-    @cached_property
+    @property
     def log_posterior(self) -> float:
-        """Natural log of prior times evidence of these explanations, with or without a deviation of the compound.
-
-        The probabilities of both cases are added.
-        """
-        total = float(np.logaddexp(self.linear.log_evidence, self.linear.log_evidence_with_compound))
-        return self.log_weight + total
+        """Natural log of prior times evidence of these explanations, whether or not the compound deviates."""
+        return self.log_weight + self.linear.evidence.total
 
     @cached_property
     def log_weight(self) -> float:
@@ -249,8 +271,8 @@ class SearchState:
     @property
     def likeliest_deviation(self) -> float:
         """Likeliest standard deviation of the compound's deviation, relative to |K|; 0 if none is more probable."""
-        linear = self.linear
-        return linear.deviation[1] if linear.log_evidence_with_compound > linear.log_evidence else 0.0
+        plain, bent = self.linear.evidence, self.linear.evidence.with_compound
+        return bent.likeliest if bent and bent.log_evidence > plain.log_evidence else 0.0
 
     def free_columns(self, deviation: float) -> Array | None:
         """Changes of the residuals by faulty parts of the tests and the compound, left free in refits of effects.
@@ -275,7 +297,7 @@ class SearchState:
     @cached_property
     def proposals(self) -> list[Proposal]:
         """Effects of the library that the model lacks, ranked by expected decrease of chi-square."""
-        return proposals(self.bare, (*self.request.without, *self.effects), self.request.fixed)
+        return proposals(self.bare, (*self.tests.without, *self.effects), self.tests.base.fixed)
 
     @cached_property
     def explanation_evidence(self) -> list[tuple[Explanation, GroupEvidence]]:
@@ -302,73 +324,36 @@ class SearchState:
         curves = replace(self.linear, groups=smooth, compound=None)
         return np.union1d(self.linear.likely_cases(_NEAR), curves.likely_cases(_NEAR))
 
-    def extended(self, explanation: Explanation, evidence: GroupEvidence, log_odds: float) -> list[Hypothesis]:
-        """Extend this state by one explanation, whose evidence comes from the linear model.
+    def extended(
+        self, evidence: GroupEvidence, last: Explanation | None = None, log_odds: float = 0.0
+    ) -> list[Hypothesis]:
+        """List the hypotheses with the explanations of this state and at most one more.
 
         Args:
-            explanation: the added explanation.
-            evidence: evidence of the tests for the explanation.
-            log_odds: natural log of the explanation's prior odds.
+            evidence: evidence of the linear model for the added explanation, or without one.
+            last: added explanation; None without one.
+            log_odds: natural log of its prior odds.
 
         Returns:
-            The extended hypothesis and, if the search considers a smooth deviation of the compound from the model, a
-            second one with this deviation.
+            The hypothesis and, if a deviation of the compound from the model's laws is considered, a second one with
+            this deviation.
         """
-        plain = self.hypotheses[0]
-        if explanation.kind == "effect":
-            plain = replace(plain, effects=(*plain.effects, explanation.name))
-        elif isinstance(explanation, FaultyPart):
-            plain = replace(plain, faulty_parts=(*plain.faulty_parts, explanation))
-        else:
-            plain = replace(plain, unnamed=explanation.name)
-        bent, extended = evidence.with_compound, list[Hypothesis]()
-        for case in (evidence, bent) if bent and np.isfinite(bent.log_evidence) else (evidence,):
-            new = replace(
-                plain,
-                log_posterior=self.log_weight + log_odds + case.log_evidence,
-                change=max(self.change, case.size),
-                last_change=case.size,
-            )
-            if case is bent:
-                change = max(new.change, self.linear.deviation[0])
-                new = replace(new, unnamed=plain.unnamed or COMPOUND, change=change, compound_deviates=True)
-            extended.append(new)
+        log_prior, bent = self.log_weight + log_odds, evidence.with_compound
+        change, log_posterior = max(self.change, evidence.size), log_prior + evidence.log_evidence
+        extended = [Hypothesis(self, log_posterior, change, last, evidence.size)]
+        alone = self.linear.evidence.with_compound
+        if bent and alone and np.isfinite(bent.log_evidence):
+            change, log_posterior = max(self.change, bent.size, alone.size), log_prior + bent.log_evidence
+            extended.append(Hypothesis(self, log_posterior, change, last, bent.size, compound_deviates=True))
         return extended
 
     @cached_property
     def hypotheses(self) -> list[Hypothesis]:
         """Hypotheses about the gap that have the explanations of this state and no further effect or fault.
 
-        They are three: as the state is, with rig errors of amplitude levels beyond the stated accuracy, and with a
-        smooth deviation of the rubber compound from the model's laws.
+        They are three: as the state is, with a smooth deviation of the rubber compound from the model's laws, and with
+        rig errors of amplitude levels beyond the stated accuracy.
         """
-        linear, tests, log_prior = self.linear, self.tests, self.log_weight
-        plain = Hypothesis(
-            self.effects,
-            tests.claim,
-            self.faulty_parts,
-            unnamed="",
-            levels=False,
-            log_posterior=log_prior + linear.log_evidence,
-            change=self.change,
-            last_change=0.0,
-            state=self,
-        )
-        wide = replace(
-            plain,
-            levels=True,
-            log_posterior=log_prior + linear.log_evidence_with_level_errors,
-            change=max(self.change, LEVELS[-1][0] * max(class_errors(tests.rig, ASSUMED))),
-        )
-        if not np.isfinite(linear.log_evidence_with_compound):
-            return [plain, wide]
-        deviation = linear.deviation[0]
-        bent = replace(
-            plain,
-            unnamed=COMPOUND,
-            log_posterior=log_prior + linear.log_evidence_with_compound,
-            change=max(self.change, deviation),
-            last_change=deviation,
-            compound_deviates=True,
-        )
-        return [plain, wide, bent]
+        log_posterior = self.log_weight + self.linear.log_evidence_with_level_errors
+        change = max(self.change, LEVELS[-1][0] * max(class_errors(self.tests.rig, ASSUMED)))
+        return [*self.extended(self.linear.evidence), Hypothesis(self, log_posterior, change, levels=True)]

@@ -98,19 +98,20 @@ class LinearModel(ProjectedColumns):
             for evidence in replace(self, groups=groups[start:stop]).group_evidence
         ]
 
-    def _log_evidence_over(self, chosen: Array) -> float:
-        """Natural log of the evidence without a further explanation, over the noise cases in a mask, (cases,)."""
-        return _log_sum(self.products.base[chosen]) if chosen.any() else -np.inf
+    @cached_property
+    def evidence(self) -> GroupEvidence:
+        """Evidence of the tests if nothing further is missing, with rig errors within the stated accuracy.
 
-    @property
-    def log_evidence(self) -> float:
-        """Natural log of the tests' marginal likelihood if nothing is missing and rig errors are as stated."""
-        return self._log_evidence_over(self._is_plain)
-
-    @property
-    def log_evidence_with_compound(self) -> float:
-        """Natural log of the tests' marginal likelihood if only the compound deviates from the model's laws."""
-        return self._log_evidence_over(self.deviations > 0.0)
+        With a deviation of the compound, `size` and `likeliest` are those of the deviation, relative to |K|.
+        """
+        base, deviates, with_compound = self.products.base, self.deviations > 0.0, None
+        if deviates.any():
+            log_evidence, sizes = _log_sum(base[deviates]), self.deviations[deviates]
+            share = np.exp(base[deviates] - log_evidence)
+            likeliest = max(np.unique(sizes), key=lambda size: share[sizes == size].sum())
+            size = float(np.sqrt(share @ self.products.changes[deviates]))
+            with_compound = GroupEvidence(log_evidence, size, float(likeliest))
+        return GroupEvidence(_log_sum(base[self._is_plain]), 0.0, 0.0, with_compound)
 
     @property
     def log_evidence_with_level_errors(self) -> float:
@@ -118,20 +119,7 @@ class LinearModel(ProjectedColumns):
 
         A level is the set of all points at one constant amplitude, or frequency, of a sweep.
         """
-        return self._log_evidence_over(~self._is_plain & (self.deviations == 0.0))
-
-    @property
-    def deviation(self) -> tuple[float, float]:
-        """Size of the compound's deviation from the model's laws, relative to |K|.
-
-        Returns:
-            Root mean square over the posterior, and the likeliest size.
-        """
-        deviates = self.deviations > 0.0
-        share = np.exp(self.products.base[deviates] - self.log_evidence_with_compound)
-        sizes = self.deviations[deviates]
-        likeliest = max(np.unique(sizes), key=lambda size: share[sizes == size].sum())
-        return float(np.sqrt(share @ self.products.changes[deviates])), float(likeliest)
+        return _log_sum(self.products.base[~self._is_plain & (self.deviations == 0.0)])
 
     def likely_cases(self, far: float) -> Array:
         """Select the noise cases that matter to the evidence for further explanations.

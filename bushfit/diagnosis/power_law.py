@@ -264,7 +264,7 @@ def nearest_power_law(
     settled = (_settled_grid(fitted, term, plain, begun, bounds) for term in terms)
     grids = [grid for grid in settled if grid]
     grids.sort(key=lambda grid: -grid.log_evidence)
-    if not grids or grids[0].log_evidence < grids[0].linear.log_evidence:
+    if not grids or grids[0].log_evidence < grids[0].linear.evidence.log_evidence:
         return None
     log_ratios = np.array([grid.log_evidence - grids[0].log_evidence for grid in grids])
     alternatives = tuple(

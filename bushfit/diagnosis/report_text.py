@@ -49,13 +49,11 @@ class DiagnosisWriter:
         search: completed search, with the tests.
         finding: verdict on the hypotheses, with the explanations to report.
         hypotheses: all hypotheses that were compared, the most probable first.
-        unresolved: effects of the starting model that earlier tests could not distinguish from a twin of the rig.
     """
 
     search: Search
     finding: Finding
     hypotheses: Sequence[Hypothesis]
-    unresolved: Sequence[str]
     _refitted: dict[Evidence, Evidence] = field(default_factory=dict)
 
     @property
@@ -87,7 +85,7 @@ class DiagnosisWriter:
         """Diagnosis in which named effects explain the gap, or part of it with a description of the rest."""
         request, names = self.request, self.finding.names
         states = [h.state for h in self.hypotheses if h.refitted and set(h.effects) >= set(names)]
-        known, fixed = None, request.fixed
+        known, fixed = None, request.base.fixed
         if self.finding.verdict == "partly" and first.unnamed:  # without the compound's deviation amounts are distorted
             state, model = states[0], request.base.model
             for name in names:
@@ -101,7 +99,7 @@ class DiagnosisWriter:
             model = state.evidence.model
             for name in state.effects:
                 model = model if name in names else model.without(name)
-        after = fit(model, state.evidence.data_sets, fixed, request.bounds)
+        after = fit(model, state.evidence.data_sets, fixed, request.data.bounds)
         base, plain = self._with_free_gains(request.base), self._with_free_gains(after)
         company = " with the other named effects" if len(names) > 1 else ""
         why = f"lowers chi-square by {base.chi_square - plain.chi_square:.0f}{company}; "
@@ -109,7 +107,7 @@ class DiagnosisWriter:
         entries = [NamedCause(name, why) for name in names]
         gap, rest, holdout = None, list[str](), None
         if self.finding.verdict == "named":
-            holdout = hold_out(base, plain, request.bounds)
+            holdout = hold_out(base, plain, request.data.bounds)
             summary = f"{' and '.join(names)} {'closes' if len(names) == 1 else 'close'} the gap"
         else:
             excess = [
@@ -138,7 +136,7 @@ class DiagnosisWriter:
         )
         absent = tuple(name for name in names if _may_be_absent(name, diagnosis.result))
         if holdout and (absent or (holdout.after or 0.0) > LARGEST_CLOSED_GAP):
-            finding = decide_verdict(self.hypotheses, request.tolerance, gap_stays=True)
+            finding = decide_verdict(self.hypotheses, request.settings.tolerance, gap_stays=True)
         elif absent:  # the model does without these effects
             kept, leads = tuple(name for name in names if name not in absent), (*absent, *self.finding.leads)
             finding = replace(self.finding, verdict="partly" if kept else "described", names=kept, leads=leads)
@@ -148,10 +146,10 @@ class DiagnosisWriter:
 
     def _described(self, evidence: Evidence) -> GapDescription | None:
         """Describe the gap of a fit by a smooth correction; None if effects are excluded or no correction is valid."""
-        request, fitted = self.request, self._with_free_gains(evidence)
-        return (
-            describe(fitted, request.data.campaign.rig, request.start, request.bounds) if request.max_effects else None
-        )
+        data, fitted = self.request.data, self._with_free_gains(evidence)
+        if not self.request.settings.max_effects:
+            return None
+        return describe(fitted, data.campaign.rig, self.request.start, data.bounds)
 
     def _mistaken_record(self, first: Composition) -> Diagnosis:
         """Diagnosis in which a mistake in the record explains the gap; the model to use is unchanged."""
@@ -171,7 +169,7 @@ class DiagnosisWriter:
             diagnosis,
             after=after,
             remainder=find_regions(after),
-            holdout=hold_out(diagnosis.before, after, self.request.bounds),
+            holdout=hold_out(diagnosis.before, after, self.request.data.bounds),
             result=replace(diagnosis.result, warnings=(*diagnosis.result.warnings, warning)),
         )
 
@@ -252,7 +250,7 @@ class DiagnosisWriter:
         base, after, bounds = (
             self._with_free_gains(self.request.base),
             self._with_free_gains(after),
-            self.request.bounds,
+            self.request.data.bounds,
         )
         if not next_test and entries:
             next_test = get_effect(entries[0].name).confirmed_by
@@ -267,7 +265,7 @@ class DiagnosisWriter:
         if places and places.faulty_parts:
             next_test = f"measure again: {places.faulty_parts[0].name}"
         lacking = verdict in ("partly", "ambiguous", "unexplained") and not (self.first and self.first.best.claim)
-        resolved, corrected = {*base.model.effects} - {*self.unresolved}, gap.fitted if gap else None
+        resolved, corrected = {*base.model.effects} - {*self.request.settings.unresolved}, gap.fitted if gap else None
         regions = tuple(sorted((*at_fault, *find_regions(base)), key=lambda region: -region.excess))
         odds = explanation_odds(self.finding, self.request.data)
         result = odds.averaged(result_of(after, bounds, resolved, lacking=lacking, corrected=corrected, fixed=known))
@@ -297,7 +295,7 @@ class DiagnosisWriter:
             return evidence
         if evidence not in self._refitted:
             data_sets = with_gain_weighting(evidence.data_sets, weigh=False)
-            self._refitted[evidence] = fit(evidence.model, data_sets, evidence.fixed, self.request.bounds)
+            self._refitted[evidence] = fit(evidence.model, data_sets, evidence.fixed, self.request.data.bounds)
         return self._refitted[evidence]
 
     def _notes(self) -> list[str]:

@@ -7,23 +7,26 @@ without a name comes from a linear model.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import product
 from math import log
 
 import numpy as np
 
 from bushfit.diagnosis.claims import ClaimScreening, claims
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart, OutlierCluster
+from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart
 from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, SearchState, Tests
-from bushfit.diagnosis.laplace import laplace
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.propose import has_used_parameters
 from bushfit.diagnosis.refit import refit_with_free_columns, refitted
+from bushfit.diagnosis.rig_errors import in_scatter_units
 from bushfit.diagnosis.verdict import decide_verdict
+from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
+from bushfit.model.model import Model
 from bushfit.progress import track
 
 #: Maximum number of refits of hypotheses that are probable by the linear model alone; for time.
@@ -50,8 +53,9 @@ class Search:
         self.request = request
         self._known: dict[frozenset[Hashable], Hypothesis] = {}
         self._visited: set[frozenset[Hashable]] = set()
-        tests = Tests(request.base, request.data.campaign.rig, log(1.0 - sum(ODDS.values())))
-        self.root = SearchState.of_tests(tests, request)
+        rig, without = request.data.campaign.rig, request.settings.without
+        tests = Tests(request.base, rig, without, log(1.0 - sum(ODDS.values())))
+        self.root = SearchState.of_tests(tests)
         self._log_priors = prior_odds([*self.root.proposals, *tests.explanations])
         families = {e.family for e in (*request.outlier_clusters, *tests.explanations) if e.kind == "part"}
         self._meeting_odds = log(ODDS["part"] / max(len(families), 1)) - tests.log_prior
@@ -62,19 +66,21 @@ class Search:
         Returns:
             All hypotheses that were compared, the most probable first.
         """
-        beam = [self._register(self.root)]
+        beam = [self._visit(self.root)]
         for depth in range(ROUNDS + 1):
             for state in track(f"round {depth + 1} of at most {ROUNDS + 1}", beam):
                 for explanation, evidence in state.explanation_evidence:
-                    if len(state.effects) < self.request.max_effects or explanation.kind != "effect":
-                        log_odds = self._log_prior(explanation) - log(depth + 1)
-                        for hypothesis in state.extended(explanation, evidence, log_odds):
-                            self._note(hypothesis)
+                    if explanation.kind != "effect" or self._may_grow(state):
+                        log_odds = self._log_odds(explanation.kind, explanation.name, depth)
+                        self._note(state.extended(evidence, explanation, log_odds))
             if depth == ROUNDS or self._is_sure():
                 break
             fresh = list[SearchState]()
             for state in track("with one more", beam):
-                fresh += self._grow(state, depth)
+                by_evidence, by_score = REFITS[1 if depth else 2 if state.evidence.reduced_chi_square > _BENT else 0]
+                for grown in self._with_effects(state, self._promising(state, by_evidence, by_score), depth):
+                    fresh += [grown, *self._without_earlier(grown)]
+                fresh += self._with_faulty_parts(state, depth)
             fresh = self._with_common_start([*beam, *fresh])[len(beam) :]
             if depth == 0:
                 fresh += self._corrected_records()
@@ -84,8 +90,12 @@ class Search:
             beam = [state for state in nearest if state.log_posterior > limit]
             if not beam:
                 break
-        self._settle()
+        self._refit_linear()
         return self._ordered()
+
+    def _may_grow(self, state: SearchState) -> bool:
+        """True if a further effect may be added to a state."""
+        return len(state.effects) < self.request.settings.max_effects
 
     def _ordered(self) -> list[Hypothesis]:
         """Hypotheses about the gap that the search has recorded so far, the most probable first."""
@@ -93,12 +103,12 @@ class Search:
 
     def _is_sure(self) -> bool:
         """True if the search can stop: one explanation, or none missing, is nearly certain and fits the tests."""
-        finding = decide_verdict(self._ordered(), self.request.tolerance)
+        finding = decide_verdict(self._ordered(), self.request.settings.tolerance)
         if finding.verdict == "consistent":
             return finding.nothing >= NAMED and self.root.linear.p_value() >= DOES_NOT_FIT
         return finding.verdict == "named" and finding.reported[0].best.refitted
 
-    def _settle(self) -> None:
+    def _refit_linear(self) -> None:
         """Refit the most probable hypotheses whose evidence still comes from the linear model alone."""
         for _ in range(_SETTLED):
             ordered = self._ordered()
@@ -111,56 +121,41 @@ class Search:
             if not self._with_effects(linear.state, [linear.effects[-1]], len(linear.state.key)):
                 del self._known[linear.key]  # no response with it, or far behind
 
-    def _log_prior(self, explanation: Explanation) -> float:
-        """Natural log of the prior odds of an explanation; if it is not listed, the lowest odds of its kind."""
-        key = explanation.kind, explanation.name
-        if key not in self._log_priors:
-            self._log_priors[key] = min(odds for (kind, _), odds in self._log_priors.items() if kind == key[0])
-        return self._log_priors[key]
+    def _log_odds(self, kind: str, name: str, depth: int) -> float:
+        """Natural log of the prior odds of one more explanation; if it is not listed, the lowest odds of its kind.
 
-    def _register(self, state: SearchState) -> SearchState:
+        Args:
+            kind: kind of the explanation.
+            name: name of the explanation.
+            depth: number of explanations that it is added to; the order of explanations does not count.
+        """
+        if (kind, name) not in self._log_priors:
+            self._log_priors[kind, name] = min(odds for (other, _), odds in self._log_priors.items() if other == kind)
+        return self._log_priors[kind, name] - log(depth + 1)
+
+    def _visit(self, state: SearchState) -> SearchState:
         """Record a state of the search (a fitted model) and its hypotheses, to visit it only once; return the state."""
         self._visited.add(state.key)
-        for hypothesis in state.hypotheses:
-            self._note(hypothesis)
+        self._note(state.hypotheses)
         return state
 
-    def _note(self, hypothesis: Hypothesis) -> None:
-        """Record a hypothesis, alone and with a disturbance at each frequency with several outliers.
+    def _note(self, hypotheses: Sequence[Hypothesis]) -> None:
+        """Record hypotheses, alone and with a disturbance at each frequency where several outliers were left out.
 
         Of two fits of the same set of explanations, a refitted one replaces a linear one; else the more probable stays.
         """
-        for candidate in (
-            hypothesis,
-            *(self._with_outlier_cluster(hypothesis, part) for part in self.request.outlier_clusters),
-        ):
+        candidates = list(hypotheses)
+        for hypothesis, part in product(hypotheses, self.request.outlier_clusters):
+            log_posterior = hypothesis.log_posterior + self._meeting_odds + part.log_odds
+            if hypothesis.change <= self.request.settings.tolerance:  # what is that small is no part of an explanation
+                hypothesis = self.root.hypotheses[0]
+            change, clusters = max(hypothesis.change, part.size), (*hypothesis.clusters, part)
+            candidates.append(replace(hypothesis, clusters=clusters, log_posterior=log_posterior, change=change))
+        for candidate in candidates:
             before = self._known.get(candidate.key)
             rank = candidate.refitted, candidate.log_posterior
             if before is None or rank > (before.refitted, before.log_posterior):
                 self._known[candidate.key] = candidate
-
-    def _with_outlier_cluster(self, hypothesis: Hypothesis, part: OutlierCluster) -> Hypothesis:
-        """Extend a hypothesis by a disturbance at a frequency where several outliers were left out."""
-        log_posterior = hypothesis.log_posterior + self._meeting_odds + part.log_odds
-        if hypothesis.change <= self.request.tolerance:  # what is that small is no part of an explanation
-            hypothesis = self.root.hypotheses[0]
-        change, faulty_parts = max(hypothesis.change, part.size), (*hypothesis.faulty_parts, part)
-        return replace(hypothesis, faulty_parts=faulty_parts, log_posterior=log_posterior, change=change)
-
-    def _grow(self, state: SearchState, depth: int) -> Iterator[SearchState]:
-        """Extend a state of the search by each of its most promising effects (refitted) and faulty parts of the tests.
-
-        States without one of the earlier effects follow each extension: the last effect may make that one unnecessary.
-
-        Args:
-            state: fitted model with some explanations.
-            depth: number of explanations in the state.
-        """
-        by_evidence, by_score = REFITS[1 if depth else 2 if state.evidence.reduced_chi_square > _BENT else 0]
-        for grown in self._with_effects(state, self._promising(state, by_evidence, by_score), depth):
-            yield grown
-            yield from self._without_earlier(grown)
-        yield from self._with_faulty_parts(state, depth)
 
     def _promising(self, state: SearchState, by_evidence: int, by_score: int) -> list[str]:
         """Select the effects to refit as additions to a state of the search.
@@ -171,7 +166,7 @@ class Search:
             by_score: number of effects with the largest expected decrease of chi-square, better for large gaps.
         """
         scores = {p.name: p.score for p in state.proposals if state.key | {p.name} not in self._visited}
-        prior = {p.name: self._log_prior(p) for p in state.proposals}
+        prior = {name: self._log_odds("effect", name, 0) for name in scores}
         base = state.log_weight - state.log_posterior
         gains = {
             e.name: base + prior[e.name] + evidence.total
@@ -193,39 +188,24 @@ class Search:
             names: names of the effects to add, one at a time.
             depth: number of explanations in the state.
         """
-        request = self.request
-        if not names or len(state.effects) >= request.max_effects:
+        if not names or not self._may_grow(state):
             return []
         models = {proposal.name: proposal.model for proposal in state.proposals if proposal.name in names}
-        start = request.start if not state.effects and state.evidence.reduced_chi_square > _BENT else {}
+        start = self.request.start if not state.effects and state.evidence.reduced_chi_square > _BENT else {}
         grown: dict[str, SearchState] = {}
         for deviation in dict.fromkeys((state.likeliest_deviation, 0.0)):
-            fits = refitted(state.evidence, models, start, request.fixed, request.bounds, state.free_columns(deviation))
-            for name, evidence in fits.items():
-                candidate = self._register(self._with_effect(state, name, evidence, depth))
+            for name, evidence in self._refitted(state, models, start, state.free_columns(deviation)):
+                candidate = self._visit(state.with_effect(name, evidence, self._log_odds("effect", name, depth)))
                 if name not in grown or candidate.log_posterior > grown[name].log_posterior:
                     grown[name] = candidate
         return list(grown.values())
 
-    def _with_effect(self, state: SearchState, name: str, evidence: Evidence, depth: int) -> SearchState:
-        """Add an effect to a state of the search, a fitted model with some explanations.
-
-        Args:
-            state: state without the effect.
-            name: name of the effect.
-            evidence: fit with the effect.
-            depth: number of explanations in the state, which the prior depends on.
-        """
-        log_density, precision, change = laplace(name, evidence, state.evidence)
-        return replace(
-            state,
-            effects=(*state.effects, name),
-            evidence=evidence,
-            log_prior=state.log_prior + self._log_priors["effect", name] - log(depth + 1),
-            precision={**state.precision, **precision},
-            log_density=state.log_density + log_density,
-            change=max(state.change, change),
-        )
+    def _refitted(
+        self, state: SearchState, models: Mapping[str, Model], start: Mapping[str, float], columns: Array | None = None
+    ) -> Iterable[tuple[str, Evidence]]:
+        """Fit models to the tests of a state; see `refit.refitted`."""
+        base, bounds = self.request.base, self.request.data.bounds
+        return refitted(state.evidence, models, start, base.fixed, bounds, columns).items()
 
     def _with_faulty_parts(self, state: SearchState, depth: int) -> Iterator[SearchState]:
         """Extend a state by each of its likeliest faulty parts of the tests, with a common shift or an error per point.
@@ -235,28 +215,30 @@ class Search:
             depth: number of explanations that the state has.
         """
         faulty_parts = [(e, evidence) for e, evidence in state.explanation_evidence if isinstance(e, FaultyPart)]
-        faulty_parts.sort(key=lambda pair: -(self._log_prior(pair[0]) + pair[1].total))
+        faulty_parts.sort(key=lambda pair: -(self._log_odds("part", pair[0].name, depth) + pair[1].total))
         for part, shifted in faulty_parts[:_FAULTY_PARTS]:
             scattered_part = part.point_by_point()
             (scattered,) = state.weigh([scattered_part])
             better, worth = (scattered_part, scattered) if scattered.total > shifted.total else (part, shifted)
-            log_odds = self._log_prior(part) - log(depth + 1)
+            log_odds = self._log_odds("part", part.name, depth)
             improves = state.log_weight + log_odds + worth.total > state.log_posterior
             if not improves or state.key | {part.name} in self._visited:
                 continue
-            evidence = state.evidence
+            evidence, bare = state.evidence, state.bare
             if evidence.reduced_chi_square > _BENT:  # perhaps by the part
                 start = {} if state.effects else self.request.start
-                evidence = refit_with_free_columns(evidence, state.bare, better.columns, start, self.request.bounds)
+                evidence = refit_with_free_columns(evidence, bare, better.columns, start, self.request.data.bounds)
+                bare = in_scatter_units(evidence)
             grown = replace(
                 state,
                 evidence=evidence,
+                bare=bare,
                 faulty_parts=(*state.faulty_parts, better),
                 log_prior=state.log_prior + log_odds,
                 amounts=(*state.amounts, worth.likeliest),
                 change=max(state.change, worth.size),
             )
-            yield self._register(grown)
+            yield self._visit(grown)
 
     def _without_earlier(self, state: SearchState) -> Iterator[SearchState]:
         """Yield the refitted state without each earlier effect, which the last effect may make unnecessary."""
@@ -265,21 +247,20 @@ class Search:
         for name, model in shorter.items():
             if state.key - {name} in self._visited or not all(has_used_parameters(e, model) for e in model.records):
                 continue
-            fits = refitted(state.evidence, {name: model}, {}, self.request.fixed, self.request.bounds)
-            for evidence in fits.values():
-                yield self._register(self._with_fit(state, [e for e in state.effects if e != name], evidence))
+            for _, evidence in self._refitted(state, {name: model}, {}):
+                yield self._visit(self._with_fit(state, [e for e in state.effects if e != name], evidence))
 
     def _with_fit(self, state: SearchState, effects: Sequence[str], evidence: Evidence) -> SearchState:
-        """Fit the model with these effects to the tests of `state`, and return the fit as a state of the search.
+        """Build the state of the search with these effects from a fit of all of them.
 
         Args:
             state: state with the tests.
             effects: names of the effects, added one after the other.
-            evidence: linear estimates of the evidence of all candidates, from which the fits start.
+            evidence: fit with all effects.
         """
-        fitted = replace(SearchState.of_tests(state.tests, self.request), evidence=evidence)
+        fitted = replace(SearchState.of_tests(state.tests), evidence=evidence, bare=in_scatter_units(evidence))
         for order, name in enumerate(effects):
-            fitted = self._with_effect(fitted, name, evidence, order)
+            fitted = fitted.with_effect(name, evidence, self._log_odds("effect", name, order))
         return fitted
 
     def _with_common_start(self, states: list[SearchState]) -> list[SearchState]:
@@ -299,24 +280,23 @@ class Search:
         near.sort(key=lambda n: -states[n].log_posterior)
         for n in near[:_RIVALS] if leader.likeliest_deviation and not leader.faulty_parts else ():
             state, start = states[n], leader.evidence.model.values
-            models, columns = {"": state.evidence.model}, state.free_columns(leader.likeliest_deviation)
-            fits = refitted(state.evidence, models, start, self.request.fixed, self.request.bounds, columns)
-            for evidence in fits.values():
-                candidate = self._register(self._with_fit(state, state.effects, evidence))
+            columns = state.free_columns(leader.likeliest_deviation)
+            for _, evidence in self._refitted(state, {"": state.evidence.model}, start, columns):
+                candidate = self._visit(self._with_fit(state, state.effects, evidence))
                 states[n] = max(state, candidate, key=lambda rival: rival.log_posterior)
         return states
 
     def _corrected_records(self) -> Iterator[SearchState]:
         """Generate the states with one mistake in the record corrected, the most promising mistake first."""
-        data, base = self.request.data, self.request.base
-        possible = claims(data, self.request.without)
+        data, base, without = self.request.data, self.request.base, self.request.settings.without
+        possible = claims(data, without)
         for claim in track("mistakes put right", list(ClaimScreening(data).best(possible, _CLAIMS))):
             with suppress(FitError, ModelError):  # corrected tests that nothing can be fitted to
                 evidence = self.request.fit_corrected(claim.corrected(data))
                 if [test.size for test in evidence.data_sets] == [test.size for test in base.data_sets]:
-                    log_prior = log(ODDS["record"]) - log(len(possible))
-                    tests = Tests(evidence, data.campaign.rig, log_prior, claim, _record_change(base, evidence))
-                    yield self._register(SearchState.of_tests(tests, self.request))
+                    odds, change = log(ODDS["record"]) - log(len(possible)), _record_change(base, evidence)
+                    tests = Tests(evidence, data.campaign.rig, without, odds, claim, change)
+                    yield self._visit(SearchState.of_tests(tests))
 
 
 def _record_change(base: Evidence, corrected: Evidence) -> float:

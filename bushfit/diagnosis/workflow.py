@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 from bushfit.diagnosis.claims import ClaimScreening, claims, correct_adopted
 from bushfit.diagnosis.condense import shorten_tests
@@ -57,9 +58,10 @@ def diagnose(
     data, messages = correct_adopted(data, [name for name in settings.adopt if get_mistake(name)])
     excluded: tuple[Outlier, ...] = ()
     fixed = [name for name, setting in data.campaign.fit.parameters.items() if not setting.vary]
+    refit = partial(_initial_fit, model=model, settings=settings, fixed=fixed)
     for _ in range(_MAXIMUM_ROUNDS):  # single outliers of sweeps, which repeats and neighbours contradict
         try:
-            base, start, outliers = _initial_fit(data, model, settings, fixed)
+            base, start, outliers = refit(data)
         except FitError as error:
             thousands = [claim for claim in claims(data, settings.without) if claim.mistake.scales]
             for claim in ClaimScreening(data).best(thousands, 1):
@@ -74,24 +76,12 @@ def diagnose(
         data, excluded = data.without(wild), (*excluded, *wild)
     whole, (data, reductions) = data, shorten_tests(data)
     if reductions:
-        base, start, outliers = _initial_fit(data, model, settings, fixed)
-    search = Search(
-        DiagnosisRequest(
-            data,
-            base,
-            lambda mended: _initial_fit(mended, model, settings, fixed)[0],
-            settings.without,
-            settings.max_effects,
-            settings.tolerance,
-            start,
-            outlier_clusters(excluded, whole.sweeps, base.model),
-            fixed,
-            data.bounds,
-        )
-    )
+        base, start, outliers = refit(data)
+    clusters = outlier_clusters(excluded, whole.sweeps, base.model)
+    search = Search(DiagnosisRequest(data, base, lambda mended: refit(mended)[0], settings, start, clusters))
     hypotheses = search.run()
     finding = decide_verdict(hypotheses, settings.tolerance)
-    diagnosis = DiagnosisWriter(search, finding, hypotheses, settings.unresolved).diagnosis()
+    diagnosis = DiagnosisWriter(search, finding, hypotheses).diagnosis()
     pairs = zip(whole.sweeps, data.sweeps, strict=True)
     reduced = {after.name for before, after in pairs if after.size < before.size}
     counts = Counter(outlier.test for outlier in outliers if outlier.test in reduced)

@@ -78,7 +78,7 @@ def test_worth_is_that_of_the_covariance_in_full(seed):
     chosen, over all sizes and nodes."""
     of = ledger(seed)
     plain = [restricted(of, covariance(of, node)) for node in of.rig.cases]
-    assert of.log_evidence == pytest.approx(over_nodes(of, plain), abs=1e-6)
+    assert of.evidence.log_evidence == pytest.approx(over_nodes(of, plain), abs=1e-6)
     assert of.log_evidence_with_level_errors == pytest.approx(over_nodes(of, plain, wide=True), abs=1e-6)
     for group, worth in zip(of.groups, of.group_evidence, strict=True):
         if group.sign:
@@ -132,8 +132,8 @@ def test_a_deviation_of_the_compound_is_part_of_the_covariance(seed):
         return float(logsumexp([restricted(of, each) + node.log_weight for node, each in zip(own, whole, strict=True)]))
 
     nothing = np.zeros((of.residual.size, of.residual.size))
-    assert of.log_evidence == pytest.approx(evidence(False, nothing), abs=1e-6)
-    assert of.log_evidence_with_compound == pytest.approx(evidence(True, nothing), abs=1e-6)
+    assert of.evidence.log_evidence == pytest.approx(evidence(False, nothing), abs=1e-6)
+    assert of.evidence.with_compound.log_evidence == pytest.approx(evidence(True, nothing), abs=1e-6)
     added = size**2 * (group.T @ group)
     worth = of.group_evidence[0]
     for bent, found in (

@@ -13,6 +13,7 @@ import pytest
 from rigged import SHARED, SMALLER, asked, said
 
 from bushfit.campaign.schema import RigSettings
+from bushfit.diagnosis.explanations import Explanation
 from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.next_test import BUSHING_TESTS, FIXTURE_TESTS, deciding_test, remaining_entropy
 from bushfit.diagnosis.report_text import _may_be_absent
@@ -177,11 +178,12 @@ def one(parts: str, odds: float, *, size: float = 0.05, last: float = 0.0, p_val
     claims: list[Any] = [SimpleNamespace(mistake=MISTAKES[name], key=name) for name in names if name in MISTAKES]
     others = {"unnamed", "compound", "levels", *MISTAKES}
     effects = tuple(name for name in names if ":" not in name and name not in others)
-    state: Any = SimpleNamespace(effects=effects, linear=SimpleNamespace(p_value=lambda **_: p_value))
-    claim, curve = claims[0] if claims else None, "smooth all" if "unnamed" in names else ""
-    size, bent = size if names else 0.0, "compound" in names
-    curve = "compound" if bent else curve
-    return Hypothesis(effects, claim, places, curve, "levels" in names, log(odds), size, last, state, bent)
+    tests = SimpleNamespace(claim=claims[0] if claims else None)
+    linear = SimpleNamespace(p_value=lambda **_: p_value)
+    state: Any = SimpleNamespace(effects=effects, faulty_parts=places, tests=tests, linear=linear)
+    curve = Explanation("unnamed", "unnamed", "smooth all", None) if "unnamed" in names else None
+    size = size if names else 0.0
+    return Hypothesis(state, log(odds), size, curve, last, "compound" in names, "levels" in names)
 
 
 def of(**odds: float) -> Finding:

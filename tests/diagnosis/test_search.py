@@ -78,11 +78,10 @@ def test_what_one_place_alone_shows_is_to_be_measured_again(measured, tamper, pl
 def test_a_parameter_without_influence_is_no_gain(measured, fitted):
     """The rubber's parameters have the same posterior in any unit, and a fit in which one hardly acts wins nothing."""
     evidence = fitted(measured(INERTIA, SHARED))
-    state = hypotheses.SearchState.of_tests(hypotheses.Tests(evidence, RigSettings(), log(0.5)), request=None)  # type: ignore[arg-type]
+    state = hypotheses.SearchState.of_tests(hypotheses.Tests(evidence, RigSettings(), (), log(0.5)))
     expected, bare = state.log_posterior, state.bare
-    slack = replace(state)
     scaled = bare.solution.jacobian * np.array([[1e-2], [1.0], [30.0], [1.0], [1.0]])
-    vars(slack)["bare"] = replace(bare, solution=replace(bare.solution, jacobian=scaled))
+    slack = replace(state, bare=replace(bare, solution=replace(bare.solution, jacobian=scaled)))
     assert slack.log_posterior == pytest.approx(expected, abs=1e-3)
 
 
