@@ -22,13 +22,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from functools import cache
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
 from bushfit.effects.history import Array as Array
 from bushfit.effects.history import History as History
-from bushfit.geometry import Bushing, Direction, Place
+from bushfit.geometry import STRAINING, Bushing, Direction, Place
 from bushfit.reading.preload import Preload
 
 if TYPE_CHECKING:
@@ -46,21 +46,20 @@ Values = Mapping[str, Value]
 ForceBelow = Callable[[History], Array]
 
 
-@dataclass(frozen=True)
-class StiffnessBelow:
-    """Steady response without a layer and those around it: an argument of `Layer.stiffness`.
+class StiffnessBelow(Protocol):
+    """Steady response without a layer and those around it: an argument of `Layer.stiffness`."""
 
-    Args:
-        stiffness: (omega [rad/s], amplitude [m or rad]) -> complex dynamic stiffness.
-        cycle: (omega, displacement over one steady cycle per operating point, (..., n, samples), index of these
-            operating points in the test) -> force of the same shape; for layers that distort the waveform.
-    """
+    def __call__(self, omega: Array, amplitude: Array, /) -> Array:
+        """Complex dynamic stiffness at omega [rad/s] and amplitude [m or rad]."""
 
-    stiffness: Callable[[Array, Array], Array]
-    cycle: Callable[[Array, Array, Any], Array]
+    def cycle(self, omega: Array, motion: Array, points: Any) -> Array:
+        """Force over one steady cycle of any waveform, for layers that distort the waveform.
 
-    def __call__(self, omega: Array, amplitude: Array) -> Array:
-        return self.stiffness(omega, amplitude)
+        Args:
+            omega: angular frequencies [rad/s], (..., k).
+            motion: displacement over the cycle [m or rad], (..., k, samples).
+            points: numpy index of these k operating points in the test.
+        """
 
 
 class Level(IntEnum):
@@ -306,6 +305,11 @@ class Layer(Effect):
     adds: str | None = None
     stiffness: Callable[[Values, StiffnessBelow, Array, Array, Setting], Array]
     force: Callable[[Values, ForceBelow, History, Setting], Array]
+
+    def acts_at(self, place: Place) -> bool:
+        """Return True if the layer acts in this direction or specimen; a modulus test has only formula corrections."""
+        acts = self.corrects is not None if place.motion is STRAINING else self.turns or not place.is_rotation
+        return acts and super().acts_at(place)
 
 
 @dataclass(frozen=True, eq=False)

@@ -193,12 +193,11 @@ def _fields(model: Model, place: Place, names: Mapping[str, str], arms: tuple[Ar
         names: name of the FMU value of each parameter.
         arms: Maxwell arms that replace viscoelastic effects.
     """
-    layers = model.layers(model.setting(place))
     fields = {key: names[key] for key in ("unit_strain", "stiffness_per_modulus")}
     fields |= {f"size[{index}]": names[part.size] for index, part in enumerate(arms)}
     for effect in model.records:
-        acts = (isinstance(effect, Branch) or effect in layers) and place_suffix(effect.name) in (None, str(place))
-        if acts and fields_of(effect):
+        acts = effect.acts_at(place) and place_suffix(effect.name) in (None, str(place))
+        if acts and not isinstance(effect, Modifier) and fields_of(effect):
             parameters = (names[qualified_name(effect, parameter)] for parameter in effect.parameters)
             fields |= dict(zip(fields_of(effect), parameters, strict=True))
     return fields

@@ -10,15 +10,15 @@ from typing import Any, Literal
 import numpy as np
 
 from bushfit import geometry
-from bushfit.effects import BASE, Branch, Effect, Layer, Level, Parameter, Setting, get_effect, qualified_name, twins_of
+from bushfit.effects import BASE, Branch, Effect, Level, Parameter, Setting, get_effect, qualified_name, twins_of
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Value, Values
 from bushfit.effects.history import History
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.effects.unnamed import Unnamed
 from bushfit.errors import ModelError
-from bushfit.geometry import STRAINING, Bushing, Direction, Place
+from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.constraints import UNCONSTRAINED, Constraints
-from bushfit.model.stack import adjusted_values, stack_force, stack_stiffness
+from bushfit.model.stack import Stack, acting_layers
 from bushfit.model.structure import Structure, values_for_effect
 from bushfit.units import display_unit
 
@@ -311,9 +311,8 @@ class Model:
         amplitude = np.asarray(amplitude, dtype=float)
         if omega.shape != amplitude.shape:
             omega, amplitude = np.broadcast_arrays(omega, amplitude)
-        points, setting = np.atleast_1d(omega), self.setting(direction, kind, conditions)
-        values = self.values if values is None else values
-        stiffness = stack_stiffness(self, setting, values, self.layers(setting), points, np.atleast_1d(amplitude))
+        points = np.atleast_1d(omega)
+        stiffness = self.stack(self.setting(direction, kind, conditions), values)(points, np.atleast_1d(amplitude))
         if stiffness.shape[-points.ndim :] != points.shape:
             stiffness = stiffness + np.zeros(points.shape)
         return stiffness if omega.ndim else stiffness[..., 0]
@@ -343,9 +342,7 @@ class Model:
         >>> round(float(paper.force("axial", motion).max()), 1)
         458.1
         """
-        setting = self.setting(direction, kind, conditions)
-        respond = stack_force(self, setting, self.values if values is None else values, self.layers(setting))
-        return respond(displacement)
+        return self.stack(self.setting(direction, kind, conditions), values).force(displacement)
 
     def setting(self, place: Place | str, kind: Kind = "sweep", conditions: RubberConditions = UNKNOWN) -> Setting:
         """Collect the properties of a test that its response depends on.
@@ -361,12 +358,15 @@ class Model:
         direction = Direction(place) if isinstance(place, str) else place
         return Setting(self.bushing, direction, kind, conditions, self.unnamed)
 
-    def layers(self, setting: Setting) -> tuple[Layer, ...]:
-        """List the layers (effects around the rubber, such as the rig's) that act in a test, innermost first."""
-        place, layers = setting.direction, self.structure.layers
-        if place.motion is STRAINING:
-            layers = tuple(layer for layer in layers if layer.corrects)
-        return tuple(layer for layer in layers if layer.acts_at(place) and (layer.turns or not place.is_rotation))
+    def stack(self, setting: Setting, values: Values | None = None) -> Stack:
+        """Rubber and layers (effects around it, such as the rig's) that act in a test, to evaluate stiffness and force.
+
+        Args:
+            setting: direction, kind and conditions of the test.
+            values: parameter values [SI] in place of those of the model.
+        """
+        values = self.values if values is None else values
+        return Stack(self, setting, values, acting_layers(self, setting, values))
 
     def values_at(
         self, place: Place, frequency: float, amplitude: float, conditions: RubberConditions = UNKNOWN
@@ -389,8 +389,8 @@ class Model:
         omega, reached = 2.0 * np.pi * np.atleast_1d(frequency), np.atleast_1d(amplitude)
         setting = self.setting(place, conditions=conditions)
         strain = reached * self.unit_strain(setting.direction)
-        found = adjusted_values(self, setting, self.values, omega, reached, strain)
-        return {name: float(np.asarray(value).item()) for name, value in found.items()}
+        adjusted = Stack(self, setting, self.values).adjusted_values(omega, reached, strain)
+        return {name: float(np.asarray(value).item()) for name, value in adjusted.items()}
 
     def shift_factor(self, conditions: RubberConditions, values: Values | None = None) -> Value:
         """Time-temperature shift factor a_T at the temperature of a test: ratio of reduced to actual frequency."""

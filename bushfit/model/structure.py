@@ -1,9 +1,8 @@
 """Structure of a model: its effects by kind, their parameters, and the values that each effect reads."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import groupby
 from types import MappingProxyType
 
 from bushfit.effects import BASE, LIBRARY, Branch, Effect, Layer, Modifier, Parameter, get_effect, qualified_name
@@ -71,34 +70,6 @@ class Structure:
                 if parameter.unit.startswith("Pa")
             ),
         )
-
-
-def in_groups(layers: Sequence[Layer]) -> list[list[Layer]]:
-    """Group adjacent layers that act as one layer with the sum of their amounts, such as two compliances in series.
-
-    Args:
-        layers: layers from the rubber outward.
-
-    Returns:
-        Groups from the rubber outward; most consist of one layer.
-    """
-    return [list(group) for _, group in groupby(layers, key=lambda layer: layer.force if layer.adds else layer.name)]
-
-
-def as_one_layer(group: Sequence[Layer], values: Values) -> tuple[Layer, Values]:
-    """Combine adjacent layers with the same equation into the first of them, whose amount is the sum of all amounts.
-
-    Args:
-        group: layers with the same equation, such as two compliances in series.
-        values: parameter values [SI] by qualified name.
-
-    Returns:
-        The layer, and the values with the summed amount.
-    """
-    first, layer_values = group[0], [values_for_effect(layer, values) for layer in group]
-    if not first.adds:
-        return first, layer_values[0]
-    return first, {**layer_values[0], first.adds: sum(values_of_one[first.adds] for values_of_one in layer_values)}
 
 
 def values_for_effect(effect: Effect, values: Values) -> Values:
