@@ -29,13 +29,12 @@ _UNITS: Mapping[str, str | None] = {
 }
 
 
-def simulation_settings(tests: Sequence[Test], noise: Noise, seed: int = 0) -> SimulateSettings:
+def simulation_settings(tests: Sequence[Test], noise: Noise) -> SimulateSettings:
     """Convert planned tests to the settings of `bushfit simulate`.
 
     Args:
         tests: runs of the plan; equal sweeps become one sweep with repeats.
         noise: measurement errors of the rig.
-        seed: seed of the random numbers.
 
     Returns:
         Settings of the table [simulate].
@@ -46,7 +45,6 @@ def simulation_settings(tests: Sequence[Test], noise: Noise, seed: int = 0) -> S
     """
     counts = Counter(tests)
     return SimulateSettings(
-        seed=seed,
         noise=float(np.sqrt(np.mean(np.square(noise.scatter)))),
         force_noise=noise.force,
         force_correlation=(noise.rows_as_one - 1.0) / (noise.rows_as_one + 1.0),
@@ -59,17 +57,9 @@ def simulation_settings(tests: Sequence[Test], noise: Noise, seed: int = 0) -> S
     )
 
 
-def campaign_toml(plan: Plan, seed: int = 0) -> str:
-    """Format the planned tests as a campaign file for `bushfit simulate`.
-
-    Args:
-        plan: planned tests, and the model that the simulation uses.
-        seed: seed of the random numbers.
-
-    Returns:
-        Text of the TOML file.
-    """
-    knowledge, settings = plan.knowledge, simulation_settings(plan.planned.tests, plan.knowledge.noise, seed)
+def campaign_toml(plan: Plan) -> str:
+    """Format the planned tests as a campaign file in TOML for `bushfit simulate`, with the model of the plan."""
+    knowledge, settings = plan.knowledge, simulation_settings(plan.planned.tests, plan.knowledge.noise)
     tested = [test.direction for test in plan.planned.tests]
     lines = [
         "# Planned by bushfit plan; bushfit simulate computes these tests from the model below. No rubber was tested.",

@@ -95,11 +95,11 @@ class Budget:
 
     @classmethod
     def from_tests(cls, tests: Sequence[Test], request: PlanRequest) -> Budget:
-        """Compute the durations of tests, without a limit of hours.
+        """Compute the durations of tests.
 
         Args:
             tests: candidate tests; tests in directions that the request excludes get no runs.
-            request: directions that the rig can test, and its durations.
+            request: directions that the rig can test, its durations, and the available hours.
 
         Returns:
             Durations and limits of the tests.
@@ -121,7 +121,7 @@ class Budget:
             np.array([distinct.index(alternative) for alternative in alternatives]),
             np.array([1000 * (test.direction in request.places) for test in tests]),
             _SETUP_MINUTES if setup is None else setup / 60.0,
-            np.inf,
+            60.0 * request.hours,
         )
 
     def spent(self, counts: Array) -> float:

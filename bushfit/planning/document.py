@@ -10,7 +10,7 @@ from typing_extensions import TypedDict
 from bushfit.campaign.simulated import SimulatedLoop
 from bushfit.effects import get_effect, qualified_name
 from bushfit.planning.contract import Aim, Plan, amplitudes_and_frequencies
-from bushfit.planning.problem import RIVALS_APART
+from bushfit.planning.search import RIVALS_APART
 
 
 class PlannedRun(TypedDict):

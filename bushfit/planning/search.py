@@ -1,23 +1,37 @@
-"""Search for the tests of a plan within given hours, with repeats that show the scatter of the rig."""
+"""Search for the tests of a plan: data of all candidate tests, and the best choice of tests within the hours."""
 
-from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from bushfit.campaign.simulated import SimulatedSweep
+from bushfit.diagnosis.priors import DECISIVE_CHI_SQUARE
+from bushfit.effects import Effect
 from bushfit.effects.contract import Array
 from bushfit.fitting.repeats import FEWEST_STEPS
 from bushfit.geometry import Place
+from bushfit.model.covariance import Z95
 from bushfit.model.result import Range, Result
-from bushfit.planning.candidates import standard_tests
-from bushfit.planning.contract import Programme, Test
+from bushfit.planning.candidates import candidates, standard_tests
+from bushfit.planning.contract import Knowledge, PlanRequest, Test
 from bushfit.planning.criterion import Budget, Criterion, best_runs
-from bushfit.planning.problem import DETECTABLE, RIVALS_APART, PlanningProblem
-from bushfit.planning.targets import TargetSensitivity
+from bushfit.planning.information import CandidateGrid, ModelInformation, rival_chi_squares
+from bushfit.planning.targets import UNLIMITED_RUNS, PointSensitivity, TargetSensitivity
 from bushfit.prediction.caveats import unfitted_warnings
+
+#: The 90 % quantile of the normal distribution.
+_NINE_OF_TEN = 1.2815515655446004
+#: Amount of an effect over its standard error that a test at the 5 % level detects in 90 % of the cases: the sum of the
+#: 97.5 % and the 90 % quantiles of the normal distribution.
+DETECTABLE = Z95 + _NINE_OF_TEN
+#: Expected chi-square between rivals above which `diagnose` separates them in 90 % of the cases: the observed value of
+#: an expected d scatters by 2 sqrt(d), and `diagnose` does not separate rivals within DECISIVE_CHI_SQUARE.
+RIVALS_APART = (_NINE_OF_TEN + float(np.sqrt(_NINE_OF_TEN**2 + DECISIVE_CHI_SQUARE))) ** 2
 
 #: Penalty weight of the criterion for effects that are detected less well than with the standard programme, and the
 #: weight that is used if the first leaves such effects; chosen.
@@ -28,22 +42,67 @@ _SCATTER_FREEDOM = 10
 
 @dataclass(frozen=True, eq=False)
 class PlanSearch:
-    """Search for the best number of runs of each candidate test within given hours.
+    """Candidate tests of a plan with their durations and their information on the aim, and the search among them.
 
-    In all methods, `counts` is the number of runs of each candidate test, (tests,).
+    In all methods, `counts` is the number of runs of each candidate test, (tests,). The k parameters include those at a
+    bound.
 
     Args:
-        problem: candidate tests with their durations and information.
-        hours: available time on the rig [h].
+        knowledge: model, covariance and noise before the planned tests.
+        request: aim of the plan and limits of the rig.
+        tests: candidate tests, then tests that only the standard programme has.
+        effects: the e missing effects, each repeated for its shapes (such as frequencies of a resonance).
+        models: Fisher information of each test on the likeliest model and the missing effects, then on each rival model
+            and its differences from the other rivals.
+        wanted: derivatives, by parameter, of the stiffness at the operating points of each direction of the request.
+        goals: for each target of the request, its derivatives by parameter, and the variance that no test reduces.
+        budget: durations of the tests, and available hours.
     """
 
-    problem: PlanningProblem
-    hours: float
+    knowledge: Knowledge
+    request: PlanRequest
+    tests: tuple[Test, ...]
+    effects: list[Effect]
+    models: list[ModelInformation]
+    wanted: list[PointSensitivity]
+    goals: list[TargetSensitivity]
+    budget: Budget
 
-    @cached_property
-    def budget(self) -> Budget:
-        """Durations and limits of the candidate tests, with the available hours."""
-        return replace(self.problem.budget, maximum_minutes=60.0 * self.hours)
+    @classmethod
+    def from_request(cls, knowledge: Knowledge, request: PlanRequest) -> PlanSearch:
+        """Compute the durations and the information of all candidate tests.
+
+        Args:
+            knowledge: model, covariance and noise before the planned tests.
+            request: aim of the plan and limits of the rig.
+
+        Returns:
+            Search within the hours of the request, not yet started.
+
+        Raises:
+            ModelError: no test is within the limits of the rig.
+        """
+        tests = tuple(dict.fromkeys([*candidates(knowledge, request), *standard_tests(knowledge, request)]))
+        grid = CandidateGrid.from_tests(knowledge, tests)
+        effects, columns = grid.effect_columns()
+        models = [grid.information(knowledge, columns)]
+        residuals = np.array(
+            [np.concatenate([test.residual(rival.model) for test in grid.data_sets]) for rival in knowledge.rivals]
+        )
+        for index, rival in enumerate(knowledge.rivals):
+            models.append(grid.information(rival, np.delete(residuals, index, axis=0) - residuals[index]))
+        wanted = {points.place: PointSensitivity.from_knowledge(knowledge, points) for points in request.points}
+        names = (*knowledge.names, *knowledge.bounded)
+        goals = [
+            TargetSensitivity.from_target(target, names, wanted[target.place] if target.place else None)
+            for target in request.targets
+        ]
+        budget = Budget.from_tests(tests, request)
+        return cls(knowledge, request, tests, effects, models, list(wanted.values()), goals, budget)
+
+    def within(self, hours: float) -> PlanSearch:
+        """Copy of the search for another available time on the rig [h]."""
+        return replace(self, budget=replace(self.budget, maximum_minutes=60.0 * hours))
 
     @cached_property
     def counts(self) -> Array:
@@ -63,15 +122,13 @@ class PlanSearch:
     @cached_property
     def strict_criterion(self) -> Criterion:
         """Criterion with a large penalty for effects that the tests detect less well than the standard programme."""
-        problem = self.problem
-        probabilities = np.array([rival.probability for rival in problem.knowledge.rivals])
-        return Criterion(problem.models, problem.weight, probabilities, self.minimum_noncentrality, _STRICT_PENALTY)
+        probabilities = np.array([rival.probability for rival in self.knowledge.rivals])
+        return Criterion(self.models, self.weight, probabilities, self.minimum_noncentrality, _STRICT_PENALTY)
 
     @cached_property
     def standard_runs(self) -> list[int]:
         """Test indices of the standard programme, repeated to fill the hours and ordered by direction."""
-        problem = self.problem
-        tests = [problem.tests.index(test) for test in standard_tests(problem.knowledge, problem.request)]
+        tests = [self.tests.index(test) for test in standard_tests(self.knowledge, self.request)]
         runs = list[int]()
         while tests:
             runs.append(tests[len(runs) % len(tests)])
@@ -86,8 +143,8 @@ class PlanSearch:
 
         It is that of a typical amount, and 0 if the programme cannot detect even the largest possible amount.
         """
-        reached = self.problem.models[0].total(self.count_runs(self.standard_runs)).noncentralities()[0]
-        amounts = [effect.amount for effect in self.problem.effects]
+        reached = self.models[0].total(self.count_runs(self.standard_runs)).noncentralities()[0]
+        amounts = [effect.amount for effect in self.effects]
         # the largest amount that a bushing or a rig can have, in typical amounts
         largest = [max(abs(end - (x.neutral or 0.0)) for end in x.bounds) / x.typical for x in amounts]
         return np.where(np.array(largest) * np.sqrt(reached) >= DETECTABLE, reached, 0.0)
@@ -99,21 +156,20 @@ class PlanSearch:
         Only a test in a direction determines the error of its stiffness formula. All zero if the runs do not fit into
         the hours.
         """
-        problem = self.problem
-        required = np.zeros(len(problem.tests), dtype=int)
-        if problem.goals:
+        required = np.zeros(len(self.tests), dtype=int)
+        if self.goals:
             values = self.strict_criterion.values_with_one_more(required)
-            for goal in problem.goals:
-                chosen = np.array([test.direction == goal.target.place for test in problem.tests])
+            for goal in self.goals:
+                chosen = np.array([test.direction == goal.target.place for test in self.tests])
                 chosen &= self.budget.maximum_runs > 0
-                tested = problem.knowledge.tests or required.any()
+                tested = self.knowledge.tests or required.any()
                 if chosen.any() and (not tested or self.untested_warning(goal, required)):
                     required[int(np.argmin(np.where(chosen, values, np.inf)))] = 1
         return required if self.budget.spent(required) <= self.budget.maximum_minutes else 0 * required
 
     def count_runs(self, runs: Sequence[int]) -> Array:
         """Number of runs of each test, (tests,), in a sequence of test indices."""
-        return np.bincount(np.array(runs, dtype=int), minlength=len(self.problem.tests))
+        return np.bincount(np.array(runs, dtype=int), minlength=len(self.tests))
 
     def reaches_aim(self, *, with_checks: bool = False) -> bool:
         """Check that the chosen tests separate the rival models with a margin of two, or meet the reachable targets.
@@ -125,13 +181,13 @@ class PlanSearch:
         Returns:
             True if the tests reach the aim.
         """
-        problem, counts = self.problem, self.counts
-        if problem.request.aim == "rivals":
-            return problem.nearest_rivals(counts) >= 2.0 * RIVALS_APART
-        covariance = problem.error_covariance(counts)
-        reached = all(goal.reached(covariance, problem.limit_covariance) for goal in problem.goals)
-        testable = [goal for goal in problem.goals if goal.target.place in problem.request.places]
-        if not problem.goals or not reached or any(self.untested_warning(goal, counts) for goal in testable):
+        counts = self.counts
+        if self.request.aim == "rivals":
+            return self.nearest_rivals(counts) >= 2.0 * RIVALS_APART
+        covariance = self.error_covariance(counts)
+        reached = all(goal.reached(covariance, self.limit_covariance) for goal in self.goals)
+        testable = [goal for goal in self.goals if goal.target.place in self.request.places]
+        if not self.goals or not reached or any(self.untested_warning(goal, counts) for goal in testable):
             return False
         return not with_checks or (not self.less_visible_effects(counts) and self.determines_scatter(counts))
 
@@ -145,9 +201,9 @@ class PlanSearch:
         Returns:
             Sentence; None if the direction is tested or the target is a parameter.
         """
-        place, knowledge = goal.target.place, self.problem.knowledge
+        place, knowledge = goal.target.place, self.knowledge
         measured = knowledge.result.measured if knowledge.result else None
-        planned = (self.problem.tests[test] for test in np.flatnonzero(counts))
+        planned = (self.tests[test] for test in np.flatnonzero(counts))
         tested = [*(measured.directions if measured else ())]
         tested += [str(test.direction) for test in (*knowledge.tests, *planned)]
         if place is None or str(place) in tested:
@@ -157,9 +213,9 @@ class PlanSearch:
 
     def less_visible_effects(self, counts: Array) -> list[str]:
         """Names of the effects that `counts` runs, (tests,), detect less well than the standard programme."""
-        reached = self.problem.models[0].total(counts).noncentralities()[0]
+        reached = self.models[0].total(counts).noncentralities()[0]
         short = np.sqrt(reached) < 0.995 * np.sqrt(self.minimum_noncentrality)  # numerical accuracy
-        return list(dict.fromkeys(self.problem.effects[index].name for index in np.flatnonzero(short)))
+        return list(dict.fromkeys(self.effects[index].name for index in np.flatnonzero(short)))
 
     def with_repeats(self, counts: Array) -> Array:
         """Repeat one test in each direction with more than two tests, so that repeats show drift and noise.
@@ -186,12 +242,11 @@ class PlanSearch:
         Returns:
             Number of runs of each test, (tests,). Unless there are targets, the errors grow by at most a twentieth.
         """
-        largest = (
-            np.inf if self.problem.goals else self.strict_criterion.value(counts) + 0.1
-        )  # a twentieth of the error
+        # 0.1 in the logarithm of the variance is a twentieth of the error
+        largest = np.inf if self.goals else self.strict_criterion.value(counts) + 0.1
         while not self.determines_scatter(counts):
             freedom = self.scatter_freedom(counts)
-            sweeps = [test for test in np.flatnonzero(counts).tolist() if freedom_per_repeat(self.problem.tests[test])]
+            sweeps = [test for test in np.flatnonzero(counts).tolist() if freedom_per_repeat(self.tests[test])]
             choices = [
                 runs
                 for runs in self.with_one_repeat(counts, sweeps)
@@ -214,7 +269,7 @@ class PlanSearch:
         Returns:
             Iterator over the numbers of runs of each test, (tests,), one for each repeat that fits.
         """
-        one = np.eye(len(self.problem.tests), dtype=int)
+        one = np.eye(len(self.tests), dtype=int)
         for test in tests:
             runs = counts + one[test]
             while (
@@ -234,8 +289,8 @@ class PlanSearch:
         Returns:
             Degrees of freedom for the bushing and for each specimen, in ascending order, capped at the wanted number.
         """
-        runs = Counter(self.problem.knowledge.tests)
-        runs.update({test: int(n) for test, n in zip(self.problem.tests, counts, strict=True) if n})
+        runs = Counter(self.knowledge.tests)
+        runs.update({test: int(n) for test, n in zip(self.tests, counts, strict=True) if n})
         freedom = Counter[Place | None]()
         for test, count in runs.items():
             if isinstance(test, SimulatedSweep):
@@ -247,60 +302,48 @@ class PlanSearch:
         """True if the repeats among `counts` runs, (tests,), determine the scatter of sweeps well enough."""
         return self.scatter_freedom(counts) >= [_SCATTER_FREEDOM]
 
-    def programme(self, runs: Sequence[int]) -> Programme:
-        """Compute the durations and expected results of a sequence of runs.
+    def error_covariance(self, counts: Array) -> Array:
+        """Covariance of the parameters' relative errors, (k, k), after `counts` runs of each test, (tests,)."""
+        return np.asarray(self.models[0].error_covariance(self.models[0].total(counts))[0])
 
-        Args:
-            runs: test indices in the order of the runs.
+    @cached_property
+    def limit_covariance(self) -> Array:
+        """Covariance of the parameters' relative errors after unlimited repeats of all candidates, (k, k)."""
+        return self.error_covariance(UNLIMITED_RUNS * (self.budget.maximum_runs > 0))
 
-        Returns:
-            The tests with their durations, standard errors and detectable amounts.
+    @cached_property
+    def weight(self) -> Array | None:
+        """Matrix W, (k, k), of the search criterion trace(W C) with the parameters' covariance C; None for rivals."""
+        if self.request.aim == "rivals":
+            return None
+        if self.request.aim == "targets":
+            return np.sum([goal.weight(self.limit_covariance) for goal in self.goals], axis=0)
+        if self.request.aim == "predictions":
+            slopes = np.concatenate([points.slopes for points in self.wanted], axis=1)
+            return np.asarray(np.einsum("cnk,cnl->kl", slopes, slopes) / slopes.shape[1])
+        names = (*self.knowledge.names, *self.knowledge.bounded)
+        return np.diag(np.isin(names, self.request.parameters).astype(float))
+
+    def rival_distances(self, counts: Array) -> Array:
+        """Expected chi-square between any two rival models, (rivals, rivals), for runs `counts`, (tests,)."""
+        return np.asarray(rival_chi_squares([model.total(counts) for model in self.models[1:]])[0])
+
+    @cached_property
+    def separable_rivals(self) -> Array:
+        """Mask of the pairs of rival models that all candidate tests together can distinguish, (rivals, rivals).
+
+        If no pair is separable, the mask contains all pairs. Only the upper triangle is used.
         """
-        problem, counts, places = self.problem, self.count_runs(runs), self.budget.place[list(runs)]
-        model, k = problem.models[0], len(problem.knowledge.names)
-        information = model.total(counts)
-        covariance = model.error_covariance(information)[0]
-        errors = []
-        for points in problem.wanted:
-            gain, phase = np.sqrt(np.einsum("cnk,kl,cnl->cn", points.slopes, covariance, points.slopes))
-            errors.append(np.hypot([gain, phase * (1.0 + np.square(points.loss_factor))], points.model_error))
-        stiffness, loss = np.concatenate(errors, axis=1)
-        return Programme(
-            tests=tuple(problem.tests[run] for run in runs),
-            minutes=self.budget.minutes[list(runs)] + self.budget.setup_minutes * (np.diff(places, prepend=-1) != 0),
-            errors=np.sqrt(np.diag(covariance))[:k],
-            stiffness=stiffness,
-            loss=loss,
-            rival_chi_square=problem.nearest_rivals(counts) if problem.knowledge.rivals else None,
-            half_widths=tuple(goal.half_width(covariance) for goal in problem.goals),
-            detectable=self.detectable_amounts(counts),
-        )
+        rivals = len(self.knowledge.rivals)
+        pairs = np.triu(np.ones((rivals, rivals), dtype=bool), 1)
+        if not rivals:
+            return pairs
+        separable = pairs & (self.rival_distances(np.ones(len(self.tests), dtype=int)) >= RIVALS_APART)
+        return separable if separable.any() else pairs
 
-    def detectable_amounts(self, counts: Array) -> Mapping[str, float]:
-        """Compute the smallest amount of each effect that runs detect in 90 % of the cases by a test at the 5 % level.
-
-        Args:
-            counts: number of runs of each test, (tests,).
-
-        Returns:
-            Amount [SI] by name, for effects that the standard programme can detect; infinite if the runs detect none.
-
-        Notes:
-            Noise alone would permit amounts that many repeats average out, such as 0.1 g of moving mass. The accuracy
-            class of a rig limits its errors at each frequency and amplitude, not only their average: an amount is
-            detected only if it changes the response somewhere by more than the class. Of the shapes of an effect, such
-            as the frequencies of a resonance, the median is reported: the most visible one, a resonance at a tested
-            frequency, is a rare case.
-        """
-        model = self.problem.models[0]
-        ratios = model.class_ratios[counts > 0].max(axis=0, initial=0.0)
-        with np.errstate(divide="ignore"):
-            smallest = np.maximum(DETECTABLE / np.sqrt(model.total(counts).noncentralities()[0]), 1.0 / ratios)
-        amounts = defaultdict[str, list[float]](list)
-        for index in np.flatnonzero(self.minimum_noncentrality).tolist():
-            effect = self.problem.effects[index]
-            amounts[effect.name].append(effect.amount.typical * float(smallest[index]))
-        return {name: float(np.median(sizes)) for name, sizes in amounts.items()}
+    def nearest_rivals(self, counts: Array) -> float:
+        """Smallest expected chi-square between separable rival models, for runs `counts`, (tests,)."""
+        return float(self.rival_distances(counts)[self.separable_rivals].min())
 
 
 def freedom_per_repeat(test: Test) -> int:

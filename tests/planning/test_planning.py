@@ -35,7 +35,7 @@ from bushfit.planning.contract import (
 )
 from bushfit.planning.information import CandidateGrid, ModelInformation, relative_slopes, rival_chi_squares
 from bushfit.planning.plan import plan
-from bushfit.planning.problem import PlanningProblem
+from bushfit.planning.search import PlanSearch
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import undisturbed
 from tests.fits import residual, solve
@@ -195,7 +195,7 @@ def test_a_plan_is_better_than_the_standard_programme_and_errors_before_are_thos
     expected = np.sqrt(np.einsum("kcn,kl,lcn->cn", slopes, np.linalg.inv(known.precision), slopes))
     np.testing.assert_allclose([planned.before.stiffness, planned.before.loss], expected, rtol=1e-3)
     request = replace(planned.request, targets=(Target("loss_factor", 0.05, RADIAL),))
-    (goal,) = PlanningProblem.from_request(known, request).goals
+    (goal,) = PlanSearch.from_request(known, request).goals
     relative = 1.96 * expected[1] / wanted_of("mu", 1.0)[1]
     radial = slice(POINTS[0].frequency.size, None)
     assert goal.half_width(np.linalg.inv(known.precision)) == pytest.approx(relative[radial].max(), rel=2e-3)
@@ -281,10 +281,10 @@ def test_the_campaign_of_a_plan_is_what_simulate_reads(small, tmp_path):
     known = replace(small.knowledge, model=model, noise=Noise(rows_as_one=9.0, level=(0.003, 0.002)))
     file = tmp_path / "planned.toml"
     file.write_text(
-        campaign_toml(replace(small, knowledge=known, planned=replace(small.planned, tests=tests)), 3), encoding="utf-8"
+        campaign_toml(replace(small, knowledge=known, planned=replace(small.planned, tests=tests))), encoding="utf-8"
     )
     campaign = load_campaign(file)
-    asked, read = simulation_settings(tests, known.noise, 3), campaign.simulate
+    asked, read = simulation_settings(tests, known.noise), campaign.simulate
     assert [test.repeats for test in read.sweeps] == [2, 1, 1]
     for each in fields(SimulateSettings):
         if each.name not in ("parameters", "effects", "loops", "sweeps"):

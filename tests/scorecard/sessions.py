@@ -20,7 +20,7 @@ from bushfit.errors import ModelError
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.planning.campaign import simulation_settings
 from bushfit.planning.contract import Noise, Test
-from bushfit.planning.problem import RIVALS_APART
+from bushfit.planning.search import RIVALS_APART
 from bushfit.simulation.measured import Simulated, simulate
 
 #: Effects that are hidden.
