@@ -5,10 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from pydantic import Field
 from typing_extensions import TypedDict
 
 from bushfit.campaign.campaign import Campaign
@@ -35,22 +34,27 @@ FORMATS = {
 
 
 class FormatEntry(TypedDict):
-    """Entry of an export format in `export --json`: its files, and properties of the model that it cannot represent."""
+    """Entry of an export format in `export --json`: its files, and properties of the model that it cannot represent.
 
-    files: Annotated[list[str], Field(description="Names of the files of the format.")]
-    left_out: Annotated[
-        list[str],
-        Field(description="Properties of the model that the format cannot represent, with the error that this causes."),
-    ]
+    Args:
+        files: names of the files of the format.
+        left_out: properties of the model that the format cannot represent, with the error that this causes.
+    """
+
+    files: list[str]
+    left_out: list[str]
 
 
 class ExportDocument(TypedDict):
-    """Content of `export --json`."""
+    """Content of `export --json`.
 
-    formats: Annotated[
-        dict[str, FormatEntry], Field(description="Files and limitations of each exported format, by name.")
-    ]
-    warnings: Annotated[list[str], Field(description="Warnings on the use of the numbers.")]
+    Args:
+        formats: files and limitations of each exported format, by name.
+        warnings: warnings on the use of the numbers.
+    """
+
+    formats: dict[str, FormatEntry]
+    warnings: list[str]
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,10 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from pydantic import Field
 from typing_extensions import TypedDict
 
 from bushfit.commands.loading import HasResult, as_result
@@ -29,13 +28,15 @@ from bushfit.report.results import ResultFile
 
 
 class ResponseDocument(TypedDict):
-    """Peak force, energy and other values of the force over time, by direction, printed by `bushfit respond --json`."""
+    """Peak force, energy and other values of the force over time, by direction, printed by `bushfit respond --json`.
 
-    directions: Annotated[
-        dict[str, dict[str, float | None]],
-        Field(description="Figures of each direction in SI units; null without fitted tests."),
-    ]
-    warnings: Annotated[list[str], Field(description="Limits of the response, and corrections of the history.")]
+    Args:
+        directions: figures of each direction in SI units; null without fitted tests.
+        warnings: limits of the response, and corrections of the history.
+    """
+
+    directions: dict[str, dict[str, float | None]]
+    warnings: list[str]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -29,16 +29,24 @@ from bushfit.report.results import ResultFile
 
 
 class RunDocument(TypedDict, total=False):
-    """JSON documents of all steps (fits, diagnosis), as `bushfit run --json` prints them."""
+    """JSON documents of all steps (fits, diagnosis), as `bushfit run --json` prints them.
 
-    static: Annotated[ModelFile, Field(description="Fit of the loops, if there are loops.")]
-    dynamic: Annotated[ModelFile, Field(description="Two-step procedure, if there are loops and sweeps.")]
-    joint: Annotated[ModelFile, Field(description="Joint fit, if the model to use is another one.")]
+    Args:
+        static: fit of the loops, if there are loops.
+        dynamic: two-step procedure, if there are loops and sweeps.
+        joint: joint fit, if the model to use is another one.
+        diagnosis: diagnosis, if a parameter is free.
+        warnings: limits of the model to use and of its prediction.
+    """
+
+    static: ModelFile
+    dynamic: ModelFile
+    joint: ModelFile
     model: Required[
         Annotated[ModelFile, Field(description="Model to use: the joint fit, or the model with the effects added.")]
     ]
-    diagnosis: Annotated[DiagnosisFile, Field(description="Diagnosis, if a parameter is free.")]
-    warnings: Annotated[list[str], Field(description="Limits of the model to use and of its prediction.")]
+    diagnosis: DiagnosisFile
+    warnings: list[str]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,7 +1,7 @@
 """schema: JSON Schemas (draft 2020-12) of the files that bushfit writes, and of the TOML files that it is given.
 
 Each schema is generated on demand from the type that reads or writes the file. The descriptions of keys come from the
-docstring of a dataclass, or from the annotation of each key of a TypedDict, so a schema cannot be out of date.
+docstring of this type, so a schema cannot be out of date.
 """
 
 import importlib
@@ -11,9 +11,9 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, is_dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
-from typing_extensions import Doc, get_type_hints, is_typeddict
+from typing_extensions import get_original_bases
 
 from bushfit.errors import BushfitError, did_you_mean
 
@@ -117,8 +117,8 @@ def _explained(table_schema: dict[str, Any], kind: type) -> dict[str, Any]:
     from bushfit.validation import inline_fields
 
     properties: dict[str, Any] = table_schema["properties"]
-    descriptions = _beside_keys(kind) if is_typeddict(kind) else {}
-    for base in reversed(kind.__mro__):
+    descriptions: dict[str, str] = {}
+    for base in (*get_original_bases(kind), *reversed(kind.__mro__)):  # a TypedDict has no other bases in its order
         found = _ARGS.search(re.sub(r"\bNone\b", "null", inspect.cleandoc(base.__doc__ or "")))
         for names, words in _ARG.findall(found[1]) if found else ():
             descriptions |= dict.fromkeys(names.split(", "), " ".join(words.split()))
@@ -134,14 +134,6 @@ def _explained(table_schema: dict[str, Any], kind: type) -> dict[str, Any]:
             table_schema["additionalProperties"] = inner
     words = inspect.cleandoc(kind.__doc__ or "").partition("\n\nArgs:")[0]
     return {**table_schema, "description": " ".join(words.split())}
-
-
-def _beside_keys(kind: type) -> dict[str, str]:
-    """Description of each key of a TypedDict, from the annotations of its fields."""
-    hints = get_type_hints(kind, include_extras=True)
-    parts = ((key, part) for key, hint in hints.items() for part in (hint, *get_args(hint)))  # as in NotRequired[...]
-    metadata = ((key, item) for key, part in parts for item in getattr(part, "__metadata__", ()))
-    return {key: item.documentation for key, item in metadata if isinstance(item, Doc)}
 
 
 def _tidied(node: Any) -> Any:

@@ -6,9 +6,9 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import chain, count
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from typing_extensions import Doc, TypedDict
+from typing_extensions import TypedDict
 
 from bushfit.campaign.toml import specimen_lines, toml_value
 from bushfit.effects.contract import Array
@@ -52,29 +52,43 @@ class ColumnDescription:
 
 
 class InspectedFile(TypedDict):
-    """Result of the inspection of a file or a sheet of a workbook, as JSON."""
+    """Result of the inspection of a file or a sheet of a workbook, as JSON.
 
-    file: Annotated[str, Doc("test file, as the user names it.")]
-    sheet: Annotated[str | int | None, Doc("sheet of the workbook; null if the file has only one.")]
-    kind: Annotated[Kind, Doc("hysteresis loop, sweep, or raw history of a stepped sine.")]
-    direction: Annotated[str | None, Doc("tested direction or specimen; null if neither file nor options state it.")]
-    written: Annotated[dict[str, str], Doc("format of the file by label: encoding, delimiter, decimal mark and so on.")]
-    columns: Annotated[tuple[ColumnDescription, ...], Doc("all columns of the file, in order.")]
-    facts: Annotated[
-        dict[str, str], Doc("properties of the test as texts, by label, such as frequencies, amplitudes and noise.")
-    ]
-    assumed: Annotated[
-        str | None, Doc("assumptions, each with the option or key that changes it; null if there are none.")
-    ]
-    odd: Annotated[list[str], Doc("one sentence for each oddity, such as an outlier or a gap.")]
+    Args:
+        file: test file, as the user names it.
+        sheet: sheet of the workbook; null if the file has only one.
+        kind: hysteresis loop, sweep, or raw history of a stepped sine.
+        direction: tested direction or specimen; null if neither file nor options state it.
+        written: format of the file by label: encoding, delimiter, decimal mark and so on.
+        columns: all columns of the file, in order.
+        facts: properties of the test as texts, by label, such as frequencies, amplitudes and noise.
+        assumed: assumptions, each with the option or key that changes it; null if there are none.
+        odd: one sentence for each oddity, such as an outlier or a gap.
+    """
+
+    file: str
+    sheet: str | int | None
+    kind: Kind
+    direction: str | None
+    written: dict[str, str]
+    columns: tuple[ColumnDescription, ...]
+    facts: dict[str, str]
+    assumed: str | None
+    odd: list[str]
 
 
 class InspectionDocument(TypedDict):
-    """Result of the inspection of several test files, as JSON."""
+    """Result of the inspection of several test files, as JSON.
 
-    files: Annotated[list[InspectedFile], Doc("inspected files that contain a test.")]
-    left_out: Annotated[list[str], Doc("one sentence for each file or sheet without a test.")]
-    campaign: Annotated[str, Doc("text for a campaign file, or a whole campaign file.")]
+    Args:
+        files: inspected files that contain a test.
+        left_out: one sentence for each file or sheet without a test.
+        campaign: text for a campaign file, or a whole campaign file.
+    """
+
+    files: list[InspectedFile]
+    left_out: list[str]
+    campaign: str
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,59 +32,84 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class BushingTable:
-    """Entry of a model file for the bushing: name, radii, length and shape formulas."""
+    """Entry of a model file for the bushing: name, radii, length and shape formulas.
 
-    name: Annotated[Name, Field(description="Name of the bushing.")]
-    inner_radius_m: Annotated[Number, Field(description="Inner radius of the rubber [m].")]
-    outer_radius_m: Annotated[Number, Field(description="Outer radius of the rubber [m].")]
-    length_m: Annotated[Number, Field(description="Mean length of the rubber [m].")]
-    shape: Annotated[
-        Shape, Field(description='"paper" for the radial formulas of the paper, "calibrated" for finite elements.')
-    ] = "paper"
+    Args:
+        name: name of the bushing.
+        inner_radius_m: inner radius of the rubber [m].
+        outer_radius_m: outer radius of the rubber [m].
+        length_m: mean length of the rubber [m].
+        shape: "paper" for the radial formulas of the paper, "calibrated" for finite elements.
+    """
+
+    name: Name
+    inner_radius_m: Number
+    outer_radius_m: Number
+    length_m: Number
+    shape: Shape = "paper"
 
 
 @dataclass(frozen=True)
 class SpecimenTable:
-    """Entry of a model file for a specimen of the compound (coupon or blocks in shear): kind and dimensions."""
+    """Entry of a model file for a specimen of the compound (coupon or blocks in shear): kind and dimensions.
 
-    name: Annotated[Name, Field(description="Name of the specimen.")]
-    kind: Annotated[CouponKind, Field(description='"modulus" for tests of the modulus, "shear" for blocks in shear.')]
-    strain: Annotated[StatedStrain, Field(description="Kind of strain in the test files; for the kind modulus.")] = (
-        "engineering"
-    )
-    area_m2: Annotated[Number | None, Field(description="Sheared area of a block [m^2]; for the kind shear.")] = None
-    thickness_m: Annotated[Number | None, Field(description="Thickness of a block [m]; for the kind shear.")] = None
-    elements: Annotated[WholeNumber, Field(description="Number of blocks in parallel.")] = 1
+    Args:
+        name: name of the specimen.
+        kind: "modulus" for tests of the modulus, "shear" for blocks in shear.
+        strain: kind of strain in the test files; for the kind modulus.
+        area_m2: sheared area of a block [m^2]; for the kind shear.
+        thickness_m: thickness of a block [m]; for the kind shear.
+        elements: number of blocks in parallel.
+    """
+
+    name: Name
+    kind: CouponKind
+    strain: StatedStrain = "engineering"
+    area_m2: Number | None = None
+    thickness_m: Number | None = None
+    elements: WholeNumber = 1
 
 
 @dataclass(frozen=True)
 class ParameterTable:
-    """Entry of a model file for one parameter: value, unit, standard error, 95 % interval and bound."""
+    """Entry of a model file for one parameter: value, unit, standard error, 95 % interval and bound.
 
-    value: Annotated[Number, Field(description="Value of the parameter, in `unit`.")]
-    unit: Annotated[str | None, Field(description='SI unit; "1" for a ratio.')] = None
-    stderr: Annotated[Number | None, Field(description="Standard error; null for an exact value.")] = None
-    ci95: Annotated[Interval | None, Field(description="Ends of the 95 % interval; null for an exact value.")] = None
-    vary: Annotated[Flag, Field(description="True if the parameter was fitted.")] = False
-    profile95: Annotated[
-        tuple[Number | None, Number | None] | None,
-        Field(description="95 % interval by profile likelihood, if requested; null for an open end."),
-    ] = None
-    at_bound: Annotated[End | None, Field(description="Bound that the value reached: min or max.")] = None
-    tied: Annotated[str | None, Field(description="Expression of other parameters that gives the value.")] = None
-    prior: Annotated[PriorUse | None, Field(description="Prior of the parameter; null without one.")] = None
+    Args:
+        value: value of the parameter, in `unit`.
+        unit: SI unit; "1" for a ratio.
+        stderr: standard error; null for an exact value.
+        ci95: ends of the 95 % interval; null for an exact value.
+        vary: True if the parameter was fitted.
+        profile95: 95 % interval by profile likelihood, if requested; null for an open end.
+        at_bound: bound that the value reached: min or max.
+        tied: expression of other parameters that gives the value.
+        prior: prior of the parameter; null without one.
+    """
+
+    value: Number
+    unit: str | None = None
+    stderr: Number | None = None
+    ci95: Interval | None = None
+    vary: Flag = False
+    profile95: tuple[Number | None, Number | None] | None = None
+    at_bound: End | None = None
+    tied: str | None = None
+    prior: PriorUse | None = None
 
 
 @dataclass(frozen=True)
 class CovarianceTable:
-    """Covariance matrix of the parameters [SI] in a model file, with the names of its rows and columns."""
+    """Covariance matrix of the parameters [SI] in a model file, with the names of its rows and columns.
 
-    names: Annotated[tuple[str, ...], Field(description="Names of the parameters that have errors.")]
-    matrix: Annotated[Matrix, Field(description="Covariance matrix, in the order of the names.")]
-    spread: Annotated[
-        tuple[Matrix, ...],
-        Field(description="Change of the matrix when one estimated figure of the noise rises by its standard error."),
-    ] = ()
+    Args:
+        names: names of the parameters that have errors.
+        matrix: covariance matrix, in the order of the names.
+        spread: change of the matrix when one estimated figure of the noise rises by its standard error.
+    """
+
+    names: tuple[str, ...]
+    matrix: Matrix
+    spread: tuple[Matrix, ...] = ()
 
 
 def _check_covariance(table: CovarianceTable) -> CovarianceTable:
@@ -116,21 +141,25 @@ def _check_covariance(table: CovarianceTable) -> CovarianceTable:
 
 @dataclass(frozen=True)
 class FitTable(Quality):
-    """Entry of a model file on its fit: quality, ranges of the fitted tests, misfit by test, and expected error."""
+    """Entry of a model file on its fit: quality, ranges of the fitted tests, misfit by test, and expected error.
 
-    frequency_Hz: Annotated[Interval | None, Field(description="Lowest and highest frequency [Hz].")] = None  # noqa: N815
-    strain: Annotated[Interval | None, Field(description="Smallest and largest equivalent strain amplitude.")] = None
-    directions: Annotated[tuple[Name, ...], Field(description="Names of the fitted directions and specimens.")] = ()
-    temperature_K: Annotated[  # noqa: N815
-        Interval | None, Field(description="Lowest and highest temperature [K]; null if no test states one.")
-    ] = None
-    preloads: Annotated[
-        tuple[PreloadRange, ...], Field(description="Preloads by direction or specimen, if there are two or more.")
-    ] = ()
-    tests: Annotated[
-        tuple[Misfit, ...], Field(description="Misfit of every test, fitted or not, and of its runs.")
-    ] = ()
-    usable: Annotated[tuple[ExpectedError, ...], Field(description="Expected error by direction or specimen.")] = ()
+    Args:
+        frequency_Hz: lowest and highest frequency [Hz].
+        strain: smallest and largest equivalent strain amplitude.
+        directions: names of the fitted directions and specimens.
+        temperature_K: lowest and highest temperature [K]; null if no test states one.
+        preloads: preloads by direction or specimen, if there are two or more.
+        tests: misfit of every test, fitted or not, and of its runs.
+        usable: expected error by direction or specimen.
+    """
+
+    frequency_Hz: Interval | None = None  # noqa: N815
+    strain: Interval | None = None
+    directions: tuple[Name, ...] = ()
+    temperature_K: Interval | None = None  # noqa: N815  # a key of the file
+    preloads: tuple[PreloadRange, ...] = ()
+    tests: tuple[Misfit, ...] = ()
+    usable: tuple[ExpectedError, ...] = ()
 
     def __post_init__(self) -> None:
         """Raise a ValueError for a range that is incomplete or not ascending, or a measure of quality below zero."""
@@ -161,76 +190,91 @@ class FitTable(Quality):
 
 @dataclass(frozen=True)
 class InputTable:
-    """Name, checksum and conditions of a test's data file, in the provenance of a model file."""
+    """Name, checksum and conditions of a test's data file, in the provenance of a model file.
 
-    file: Annotated[str, Field(description="Name of the file as in the campaign.")]
-    sha256: Annotated[str, Field(description="SHA-256 of the content of the file.")]
-    conditions: Annotated[
-        Mapping[str, str | Number], Field(description="Conditions in the campaign, such as preload and date.")
-    ] = field(default_factory=dict)
+    Args:
+        file: name of the file as in the campaign.
+        sha256: SHA-256 of the content of the file.
+        conditions: conditions in the campaign, such as preload and date.
+    """
+
+    file: str
+    sha256: str
+    conditions: Mapping[str, str | Number] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class ProvenanceTable:
-    """Entry of a model file on its origin: version of bushfit, versions of numerical packages, and test files."""
+    """Entry of a model file on its origin: version of bushfit, versions of numerical packages, and test files.
 
-    bushfit: Annotated[str | None, Field(description="Version of bushfit that wrote the file.")] = None
-    inputs: Annotated[tuple[InputTable, ...], Field(description="Files of the tests.")] = ()
-    packages: Annotated[Mapping[str, str], Field(description="Versions of numerical packages.")] = field(
-        default_factory=dict
-    )
+    Args:
+        bushfit: version of bushfit that wrote the file.
+        inputs: files of the tests.
+        packages: versions of numerical packages.
+    """
+
+    bushfit: str | None = None
+    inputs: tuple[InputTable, ...] = ()
+    packages: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class AlternativeTable:
-    """Entry of a model file for another model that the tests do not rule out: effects, values and probability."""
+    """Entry of a model file for another model that the tests do not rule out: effects, values and probability.
 
-    effects: Annotated[tuple[str, ...], Field(description="Names of the effects of the other model.")]
-    values: Annotated[Mapping[str, Number], Field(description="Parameter values of the other model by name [SI].")]
-    probability: Annotated[
-        Number, Field(ge=0.0, le=1.0, description="Probability of the other model by the diagnosis.")
-    ]
+    Args:
+        effects: names of the effects of the other model.
+        values: parameter values of the other model by name [SI].
+        probability: probability of the other model by the diagnosis.
+    """
+
+    effects: tuple[str, ...]
+    values: Mapping[str, Number]
+    probability: Annotated[Number, Field(ge=0.0, le=1.0)]
 
 
 @dataclass(frozen=True)
 class ModelFile:
-    """Content of a model file such as model.json: model, parameters with uncertainty, fit and provenance."""
+    """Content of a model file such as model.json: model, parameters with uncertainty, fit and provenance.
+
+    Args:
+        schema: schema of the file.
+        bushing: geometry of the bushing; null if several bushings, or only specimens, were tested.
+        effects: names of the effects of the model.
+        laws: package or file of each effect from outside bushfit, by its name.
+        parameters: parameters by name.
+        bushings: bushings, if several were tested.
+        specimens: other bodies of the compound.
+        covariance: covariance of the parameters.
+        fit: quality and range of the fit; null without a fit.
+        unresolved: effects that may belong to the rig instead of the bushing.
+        unnamed: data of the effect unnamed, a smooth correction.
+        model_error: error of the model in the fit, relative to the stiffness.
+        alternatives: other models that the tests do not rule out.
+        warnings: warnings on the use of the numbers.
+        outliers: points far outside their noise.
+        provenance: origin of the file.
+        campaign: campaign that the model was fitted to.
+    """
 
     __pydantic_config__ = ConfigDict(str_max_length=10_000)  # for texts that pages show
 
-    schema: Annotated[Literal["bushfit/model/1"], Field(description="Schema of the file.")]
-    bushing: Annotated[
-        BushingTable | None,
-        Field(description="Geometry of the bushing; null if several bushings, or only specimens, were tested."),
-    ]
-    effects: Annotated[tuple[str, ...], Field(description="Names of the effects of the model.")]
-    laws: Annotated[
-        Mapping[str, Origin], Field(description="Package or file of each effect from outside bushfit, by its name.")
-    ] = field(default_factory=dict, kw_only=True)
-    parameters: Annotated[Mapping[str, ParameterTable], Field(description="Parameters by name.")]
-    bushings: Annotated[tuple[BushingTable, ...], Field(description="Bushings, if several were tested.")] = ()
-    specimens: Annotated[tuple[SpecimenTable, ...], Field(description="Other bodies of the compound.")] = ()
-    covariance: Annotated[
-        CovarianceTable | None,
-        AfterValidator(lambda table: table and _check_covariance(table)),
-        Field(description="Covariance of the parameters."),
-    ] = None
-    fit: Annotated[FitTable | None, Field(description="Quality and range of the fit; null without a fit.")] = None
-    unresolved: Annotated[
-        tuple[str, ...], Field(description="Effects that may belong to the rig instead of the bushing.")
-    ] = ()
-    unnamed: Annotated[Unnamed | None, Field(description="Data of the effect unnamed, a smooth correction.")] = None
-    model_error: Annotated[
-        Unnamed | None, Field(description="Error of the model in the fit, relative to the stiffness.")
-    ] = None
-    alternatives: Annotated[
-        tuple[AlternativeTable, ...], Field(description="Other models that the tests do not rule out.")
-    ] = ()
-    warnings: Annotated[
-        tuple[str, ...], Field(max_length=10_000, description="Warnings on the use of the numbers.")
-    ] = ()
-    outliers: Annotated[tuple[Outlier, ...], Field(description="Points far outside their noise.")] = ()
-    provenance: Annotated[ProvenanceTable, Field(description="Origin of the file.")] = field(
-        default_factory=ProvenanceTable
+    schema: Literal["bushfit/model/1"]
+    bushing: BushingTable | None
+    effects: tuple[str, ...]
+    laws: Mapping[str, Origin] = field(default_factory=dict, kw_only=True)
+    parameters: Mapping[str, ParameterTable]
+    bushings: tuple[BushingTable, ...] = ()
+    specimens: tuple[SpecimenTable, ...] = ()
+    covariance: Annotated[CovarianceTable | None, AfterValidator(lambda table: table and _check_covariance(table))] = (
+        None
     )
-    campaign: Annotated[CampaignTable | None, Field(description="Campaign that the model was fitted to.")] = None
+    fit: FitTable | None = None
+    unresolved: tuple[str, ...] = ()
+    unnamed: Unnamed | None = None
+    model_error: Unnamed | None = None
+    alternatives: tuple[AlternativeTable, ...] = ()
+    warnings: Annotated[tuple[str, ...], Field(max_length=10000)] = ()
+    outliers: tuple[Outlier, ...] = ()
+    provenance: ProvenanceTable = field(default_factory=ProvenanceTable)
+    campaign: CampaignTable | None = None

@@ -1,10 +1,9 @@
 """plan.json: the tests of a plan and their expected results."""
 
 from collections.abc import Iterable
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
-from pydantic import Field
 from typing_extensions import TypedDict
 
 from bushfit.campaign.simulated import SimulatedLoop
@@ -14,99 +13,128 @@ from bushfit.planning.search import RIVALS_APART
 
 
 class PlannedRun(TypedDict):
-    """Entry of plan.json for one run of the rig."""
+    """Entry of plan.json for one run of the rig.
 
-    place: Annotated[str, Field(description="Direction, or name of the specimen.")]
-    kind: Annotated[Literal["loop", "sweep"], Field(description="Kind of test.")]
-    stepped: Annotated[
-        Literal["frequency", "amplitude"] | None,
-        Field(description="Quantity that a sweep steps through while the other is constant; null for a loop."),
-    ]
-    amplitudes: Annotated[list[float], Field(description="Zero-to-peak amplitudes in the unit.")]
-    unit: Annotated[str, Field(description='SI unit of the amplitudes: "m", "rad" or "1".')]
-    frequencies_Hz: Annotated[list[float], Field(description="Frequencies of the points, or of the loop [Hz].")]
-    cycles: Annotated[int | None, Field(description="Cycles of a loop; null for a sweep.")]
-    minutes: Annotated[float, Field(description="Duration with the change of direction before it [min].")]
+    Args:
+        place: direction, or name of the specimen.
+        kind: kind of test.
+        stepped: quantity that a sweep steps through while the other is constant; null for a loop.
+        amplitudes: zero-to-peak amplitudes in the unit.
+        unit: SI unit of the amplitudes: "m", "rad" or "1".
+        frequencies_Hz: frequencies of the points, or of the loop [Hz].
+        cycles: cycles of a loop; null for a sweep.
+        minutes: duration with the change of direction before it [min].
+    """
+
+    place: str
+    kind: Literal["loop", "sweep"]
+    stepped: Literal["frequency", "amplitude"] | None
+    amplitudes: list[float]
+    unit: str
+    frequencies_Hz: list[float]
+    cycles: int | None
+    minutes: float
 
 
 class ErrorComparison(TypedDict):
-    """Relative standard error or half width: before further tests, with the plan, and with the standard programme."""
+    """Relative standard error or half width: before further tests, with the plan, and with the standard programme.
 
-    before: Annotated[float, Field(description="Standard error without further tests.")]
-    planned: Annotated[float, Field(description="Standard error with the tests of the plan.")]
-    standard: Annotated[
-        float, Field(description="Standard error with the standard programme of as many hours instead.")
-    ]
+    Args:
+        before: standard error without further tests.
+        planned: standard error with the tests of the plan.
+        standard: standard error with the standard programme of as many hours instead.
+    """
+
+    before: float
+    planned: float
+    standard: float
 
 
 class TargetEntry(ErrorComparison):
-    """Half width of the 95 % interval of a target, relative to its value, at the worst operating point."""
+    """Half width of the 95 % interval of a target, relative to its value, at the worst operating point.
 
-    asked: Annotated[float, Field(description="Largest half width of the interval that the target allows.")]
-    met: Annotated[bool, Field(description="True if the planned tests reach the target.")]
-    why: Annotated[str | None, Field(description="Reason why the target is not reached; null if it is.")]
+    Args:
+        asked: largest half width of the interval that the target allows.
+        met: True if the planned tests reach the target.
+        why: reason why the target is not reached; null if it is.
+    """
+
+    asked: float
+    met: bool
+    why: str | None
 
 
 class DetectableEntry(TypedDict):
-    """Smallest amount of an effect that tests detect in 90 % of the cases, and that the rig's errors do not hide."""
+    """Smallest amount of an effect that tests detect in 90 % of the cases, and that the rig's errors do not hide.
 
-    parameter: Annotated[str, Field(description="Parameter of the effect that measures the amount.")]
-    unit: Annotated[str, Field(description='SI unit of the amount; "1" for a ratio.')]
-    planned: Annotated[
-        float | None, Field(description="Smallest amount that the tests of the plan detect; null if none.")
-    ]
-    standard: Annotated[
-        float | None, Field(description="Smallest amount that the standard programme detects; null if none.")
-    ]
+    Args:
+        parameter: parameter of the effect that measures the amount.
+        unit: SI unit of the amount; "1" for a ratio.
+        planned: smallest amount that the tests of the plan detect; null if none.
+        standard: smallest amount that the standard programme detects; null if none.
+    """
+
+    parameter: str
+    unit: str
+    planned: float | None
+    standard: float | None
 
 
 class Rivalry(TypedDict):
-    """Expected separation of the models that explain the tests so far equally well."""
+    """Expected separation of the models that explain the tests so far equally well.
 
-    effects: Annotated[list[str], Field(description="Effect that each of the models adds.")]
-    planned: Annotated[
-        float,
-        Field(
-            description="Expected chi-square between the two nearest models, after the best refit of either, with the "
-            "tests of the plan."
-        ),
-    ]
-    standard: Annotated[
-        float, Field(description="Expected chi-square between the two nearest models with the standard programme.")
-    ]
-    enough: Annotated[float, Field(description="Chi-square above which nine of ten campaigns separate the models.")]
+    Args:
+        effects: effect that each of the models adds.
+        planned: expected chi-square between the two nearest models, after the best refit of either, with the tests of
+            the plan.
+        standard: expected chi-square between the two nearest models with the standard programme.
+        enough: chi-square above which nine of ten campaigns separate the models.
+    """
+
+    effects: list[str]
+    planned: float
+    standard: float
+    enough: float
 
 
 class PlanFile(TypedDict):
-    """plan.json: the tests of a plan and their expected results."""
+    """plan.json: the tests of a plan and their expected results.
 
-    schema: Annotated[str, Field(description="Name and version of this schema.")]
-    source: Annotated[str, Field(description="Starting point of the plan.")]
-    aim: Annotated[Aim, Field(description="Quantity that the plan makes more accurate, or the separation of rivals.")]
-    hours: Annotated[float, Field(description="Available time on the rig [h].")]
-    tests: Annotated[list[PlannedRun], Field(description="Runs of the rig in their order.")]
-    hours_planned: Annotated[float, Field(description="Duration of the planned tests [h].")]
-    hours_standard: Annotated[
-        float,
-        Field(description="Duration of the standard programme, repeated as often as fits into that of the plan [h]."),
-    ]
-    hours_left: Annotated[float, Field(description="Available time that the plan does not use [h].")]
-    enough: Annotated[str | None, Field(description="Reason why hours are left; null if they are used.")]
-    targets: Annotated[dict[str, TargetEntry], Field(description="Targets by name; empty if none was given.")]
-    parameters: Annotated[
-        dict[str, ErrorComparison],
-        Field(description="Relative standard error of each parameter if the model is right."),
-    ]
-    stiffness: Annotated[
-        dict[str, ErrorComparison],
-        Field(description="Root mean square relative standard error of the stiffness, by direction or specimen."),
-    ]
-    loss_factor: Annotated[
-        dict[str, ErrorComparison], Field(description="Root mean square standard error of the loss factor, likewise.")
-    ]
-    visible: Annotated[dict[str, DetectableEntry], Field(description="Smallest detectable amount of each effect.")]
-    rivals: Annotated[Rivalry | None, Field(description="Models to separate; null if there are none.")]
-    warnings: Annotated[list[str], Field(description="Warnings on the plan.")]
+    Args:
+        schema: name and version of this schema.
+        source: starting point of the plan.
+        aim: quantity that the plan makes more accurate, or the separation of rivals.
+        hours: available time on the rig [h].
+        tests: runs of the rig in their order.
+        hours_planned: duration of the planned tests [h].
+        hours_standard: duration of the standard programme, repeated as often as fits into that of the plan [h].
+        hours_left: available time that the plan does not use [h].
+        enough: reason why hours are left; null if they are used.
+        targets: targets by name; empty if none was given.
+        parameters: relative standard error of each parameter if the model is right.
+        stiffness: root mean square relative standard error of the stiffness, by direction or specimen.
+        loss_factor: root mean square standard error of the loss factor, likewise.
+        visible: smallest detectable amount of each effect.
+        rivals: models to separate; null if there are none.
+        warnings: warnings on the plan.
+    """
+
+    schema: str
+    source: str
+    aim: Aim
+    hours: float
+    tests: list[PlannedRun]
+    hours_planned: float
+    hours_standard: float
+    hours_left: float
+    enough: str | None
+    targets: dict[str, TargetEntry]
+    parameters: dict[str, ErrorComparison]
+    stiffness: dict[str, ErrorComparison]
+    loss_factor: dict[str, ErrorComparison]
+    visible: dict[str, DetectableEntry]
+    rivals: Rivalry | None
+    warnings: list[str]
 
 
 def plan_document(plan: Plan) -> PlanFile:

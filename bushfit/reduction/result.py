@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Required
+from typing import Required
 
 import numpy as np
-from typing_extensions import Doc, TypedDict
+from typing_extensions import TypedDict
 
 from bushfit.geometry import Place
 from bushfit.units import display_unit, number
@@ -20,21 +20,27 @@ _MOST_LISTED = 5
 
 
 class ReductionDocument(TypedDict, total=False):
-    """JSON document of a sweep obtained by reduction of raw histories or of a resonance test."""
+    """JSON document of a sweep obtained by reduction of raw histories or of a resonance test.
 
-    direction: Annotated[str, Doc("tested direction of the bushing; missing for a specimen.")]
-    specimen: Annotated[str, Doc("tested specimen; missing for a bushing.")]
-    points: Required[
-        Annotated[
-            dict[str, list[float | str | None]],
-            Doc("columns of sweep.csv by header, one entry for each operating point."),
-        ]
-    ]
-    warnings: Required[Annotated[list[str], Doc("warnings on the use of the numbers.")]]
-    campaign: Required[Annotated[str, Doc("text of the [[sweeps]] table for a campaign.")]]
-    mass_kg: Annotated[float, Doc("mass on the mount [kg]; only for a resonance test, like the next two keys.")]
-    resonance_Hz: Annotated[float, Doc("frequency of the largest transmissibility [Hz].")]
-    transmissibility_at_resonance: Annotated[float, Doc("largest magnitude of the transmissibility [1].")]
+    Args:
+        direction: tested direction of the bushing; missing for a specimen.
+        specimen: tested specimen; missing for a bushing.
+        points: columns of sweep.csv by header, one entry for each operating point.
+        warnings: warnings on the use of the numbers.
+        campaign: text of the [[sweeps]] table for a campaign.
+        mass_kg: mass on the mount [kg]; only for a resonance test, like the next two keys.
+        resonance_Hz: frequency of the largest transmissibility [Hz].
+        transmissibility_at_resonance: largest magnitude of the transmissibility [1].
+    """
+
+    direction: str
+    specimen: str
+    points: Required[dict[str, list[float | str | None]]]
+    warnings: Required[list[str]]
+    campaign: Required[str]
+    mass_kg: float
+    resonance_Hz: float
+    transmissibility_at_resonance: float
 
 
 @dataclass(frozen=True, eq=False)

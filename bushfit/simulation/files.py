@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
 import pandas as pd
-from pydantic import Field
 from typing_extensions import TypedDict
 
 from bushfit.campaign.toml import body_lines, table_lines, toml_value
@@ -24,10 +22,15 @@ from bushfit.simulation.measured import Simulated
 
 
 class SimulationDocument(TypedDict):
-    """JSON document on a simulated campaign: the true model and the names of the files."""
+    """JSON document on a simulated campaign: the true model and the names of the files.
 
-    truth: Annotated[ModelFile, Field(description="True model, as in truth.json.")]
-    files: Annotated[list[str], Field(description="Names of the written files.")]
+    Args:
+        truth: True model, as in truth.json.
+        files: names of the written files.
+    """
+
+    truth: ModelFile
+    files: list[str]
 
 
 def to_files(simulated: Simulated, form: Form = "csv") -> dict[str, bytes]:
