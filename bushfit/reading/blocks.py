@@ -1,15 +1,16 @@
-"""Blocks of one table, one below the other or side by side, as one table with columns that identify the blocks."""
+"""Blocks of a table: one below the other, side by side, or with rows and columns exchanged, as one long table."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby, islice, pairwise, zip_longest
+from typing import NamedTuple
 
 from bushfit import units
 from bushfit.errors import UnitError
 from bushfit.reading.cells import Cells, FaultyRow
 from bushfit.reading.headers import COUNTED, Column, Vocabulary, parse_unit, plain, split_unit
-from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row, is_units_row, split
+from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row, is_units_row
 from bushfit.reading.names import NO_LABELS, Labels, labels_above, labels_in_names, named_direction
 from bushfit.reading.numerals import is_like_number
 from bushfit.reading.source import Channels, RowSource, Sheet, Text, cells_of
@@ -27,8 +28,39 @@ _COMPLEX = re.compile(
 #: First rows that are searched for complex numbers; chosen: room for remarks.
 _FIRST = 8
 
-#: Row of a block: line number, cells, and index of the block from 0.
-_BlockRow = tuple[int, Sequence[str | float], int]
+
+class Segment(NamedTuple):
+    """Rows of numbers of a file, and the lines between them and the rows of the segment before.
+
+    Args:
+        above: lines above the rows, such as titles, a header and units.
+        rows: the rows; empty for the lines below the last row.
+    """
+
+    above: list[Line]
+    rows: list[Line]
+
+
+def find_segments(
+    lines: Iterable[Line], kind: Callable[[Line], Hashable | None], fewest_rows: int = 1
+) -> Iterator[Segment]:
+    """Divide the lines of a file into runs of rows, each with the lines above it.
+
+    Args:
+        lines: lines or rows of the file.
+        kind: function that returns None for a line that is no row, and equal values for the rows of one run.
+        fewest_rows: smallest number of rows of a run; the rows of a shorter one belong to the lines above the next.
+    """
+    above = list[Line]()
+    for value, run in groupby(lines, key=kind):
+        rows = list(run)
+        if value is None or len(rows) < fewest_rows:
+            above += rows
+        else:
+            yield Segment(above, rows)
+            above = []
+    if above:
+        yield Segment(above, [])
 
 
 def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple[RowSource, Layout]:
@@ -49,28 +81,25 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     starts = [index for index, header in enumerate(layout.headers) if header == first]
     columns = list(zip(layout.headers, layout.units, strict=True))
     sides = [[one for one in columns[start:end] if one[0]] for start, end in pairwise([*starts, len(columns)])]
-    width, are_sides = len(sides[0]), len(sides) > 1 and all(side == sides[0] for side in sides)
-    are_sides = are_sides and 1 < width == len(dict(sides[0]))
+    are_sides = 1 < len(sides[0]) == len(dict(sides[0])) and len(sides) > 1 and all(side == sides[0] for side in sides)
     if are_sides:
-        groups, rows = _side_by_side(source, layout, [slice(start, start + width) for start in starts])
+        blocks = _side_by_side(source, layout, [slice(start, start + len(sides[0])) for start in starts])
         headers, in_row = zip(*sides[0], strict=True)
         layout = replace(layout, headers=headers, units=in_row)
     elif isinstance(source, Text) and _is_one_block(source, layout):
         return source, layout
     else:
-        groups, rows = _stacked(source, layout, vocabulary)
-    if len(groups) < 2:
+        blocks = _stacked(source, layout, vocabulary)
+    if len(blocks) < 2:
         return _with_complex_parts(source, layout)
-    titles = [lines[-1].text if lines else "" for lines in groups]
-    labels = [labels_above(lines) | labels_in_names(title) for lines, title in zip(groups, titles, strict=True)]
+    titles = [block.above[-1].text if block.above else "" for block in blocks]
+    labels = [labels_above(block.above) | labels_in_names(title) for block, title in zip(blocks, titles, strict=True)]
     added = _label_columns(labels, titles, titles if are_sides else [], vocabulary.roles(layout.headers))
-    width, numbers = len(layout.headers), [number for number, *_ in rows]
-    content = [
-        [*cells, *[""] * (width - len(cells)), *(texts[block] for texts in added.values())]
-        if len(cells) <= width
-        else cells
-        for _, cells, block in rows
-    ]
+    numbers, content, width = list[int](), list[Sequence[str | float]](), len(layout.headers)
+    for index, row in ((index, row) for index, block in enumerate(blocks) for row in block.rows):
+        cells, texts = cells_of(row, layout.delimiter), [column[index] for column in added.values()]
+        content.append([*cells, *[""] * (width - len(cells)), *texts] if len(cells) <= width else cells)
+        numbers.append(row.number)
     layout = replace(layout, headers=(*layout.headers, *added), units=(*layout.units, *[""] * len(added)))
     return _with_complex_parts(Sheet(source.sheet or "", content, numbers=numbers), layout)
 
@@ -88,15 +117,20 @@ def exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> 
     """
     if not any(map(is_like_number, layout.headers)):
         return None
-    rows = [list(map(str, cells_of(line, layout.delimiter))) for line in source.head()]
-    content, is_exchanged = list[Sequence[str]](), False
-    for is_table, run in groupby(rows, key=lambda cells: len(cells) > 3 and all(map(is_like_number, cells[1:]))):
-        lines = list(run)
-        roles = vocabulary.roles([cells[0] for cells in lines]) if is_table else set()
-        if "frequency" in roles and len(roles) > 2:
-            is_exchanged = True
-            lines = [list(cells) for cells in zip_longest(*lines, fillvalue="")]
-        content += lines
+    lines = [Line(line.number, list(map(str, cells_of(line, layout.delimiter)))) for line in source.head()]
+
+    def has_name(line: Line) -> bool | None:
+        """True for a row with numbers behind its first cell."""
+        return (len(line.content) > 3 and all(map(is_like_number, map(str, line.content[1:])))) or None
+
+    content, is_exchanged = list[Sequence[str | float]](), False
+    for above, rows in find_segments(lines, has_name):
+        table = [line.content for line in rows]
+        roles = vocabulary.roles([str(cells[0]) for cells in table])
+        is_table = "frequency" in roles and len(roles) > 2
+        is_exchanged |= is_table
+        content += [line.content for line in above]
+        content += [list(cells) for cells in zip_longest(*table, fillvalue="")] if is_table else table
     return Sheet(source.sheet or "", content) if is_exchanged else None
 
 
@@ -109,67 +143,64 @@ def _is_one_block(source: Text, layout: Layout) -> bool:
     return not source.data[end:].translate(None, _NUMERIC + layout.delimiter.encode())
 
 
-def _side_by_side(
-    source: RowSource, layout: Layout, sides: Sequence[slice]
-) -> tuple[list[list[Line]], list[_BlockRow]]:
-    """Separate blocks of columns side by side, each with the same headers and maybe a title above.
-
-    Returns:
-        Title of each block, and rows of the blocks.
-    """
-    head = [line for line in source.head() if line.number < layout.header_line]
-    above = [(line.number, split(line.content, layout.delimiter)) for line in reversed(head)]
-    groups = [[Line(number, cell) for number, cells in above for cell in cells[side] if cell][:1] for side in sides]
-    lines = [
-        (line.number, cells_of(line, layout.delimiter))
-        for line in source.lines(layout.lines_before_data)
-        if not is_comment(line.content, layout.delimiter)
+def _side_by_side(source: RowSource, layout: Layout, sides: Sequence[slice]) -> list[Segment]:
+    """Separate blocks of columns side by side, each with the same headers and maybe a title above."""
+    head = [line for line in reversed(source.head()) if line.number < layout.header_line]
+    rows = [line for line in source.lines(layout.lines_before_data) if not is_comment(line.content, layout.delimiter)]
+    above, below = ([(line.number, cells_of(line, layout.delimiter)) for line in lines] for lines in (head, rows))
+    return [
+        Segment(
+            [Line(number, str(cell)) for number, cells in above for cell in cells[side] if cell != ""][:1],
+            [Line(number, cells[side]) for number, cells in below if any(cell != "" for cell in cells[side])],
+        )
+        for side in sides
     ]
-    rows = ((number, cells[side], block) for block, side in enumerate(sides) for number, cells in lines)
-    return groups, [row for row in rows if any(cell != "" for cell in row[1])]
 
 
-def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple[list[list[Line]], list[_BlockRow]]:
+def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> list[Segment]:
     """Separate blocks one below the other, each with its header or lines that state a quantity.
 
-    The header of a later block may have other names, such as German ones, for the same quantities and units.
-
-    Args:
-        source: lines or rows of the file.
-        layout: location and headers of the first block.
-        vocabulary: known column names.
-
-    Returns:
-        Lines above each block, and rows of the blocks.
+    The header of a later block may have other names, such as German ones, for the same quantities and units. Rows that
+    are not data, such as means, remain among the rows of a block; they are left out later.
     """
     has_meaning = len(vocabulary.roles(layout.headers)) > 1
     meanings = [vocabulary.heading(header) or header for header in layout.headers]
-    above = [line for line in source.head() if line.number < layout.header_line]
-    groups, rows, between, is_new = [above], list[_BlockRow](), list[Line](), False
-    for line in source.lines(layout.lines_before_data):
-        texts = [line.content] if isinstance(line.content, str) else [c for c in line.content if isinstance(c, str)]
-        is_note = not layout.numbered and is_comment(line.content, layout.delimiter)
-        if is_note or any(map(_LETTER.search, texts)):
-            cells = [str(cell) for cell in cells_of(line, layout.delimiter)]
-            is_same = has_meaning and [vocabulary.heading(cell) or cell for cell in cells] == meanings
-            if is_same or layout.is_repeated(cells):
-                is_new = True
-                continue
-            if rows and (is_summary_row(cells) or is_units_row(cells) or layout.is_header(cells, vocabulary)):
-                rows.append((line.number, cells, len(groups) - 1))  # left out later, or refused
-                continue
-            if is_note or not is_row(cells):
-                between.append(line)
-                continue
-        is_new = is_new or (bool(between) and labels_above(between) != NO_LABELS)
-        if is_new:
-            groups = [*groups, between] if rows else [[*above, *between]]
-        else:  # rows that are left out later, with a note
-            notes = (part for part in between if not is_comment(part.content, layout.delimiter))
-            rows += [(part.number, cells_of(part, layout.delimiter), len(groups) - 1) for part in notes]
-        rows.append((line.number, cells_of(line, layout.delimiter), len(groups) - 1))
-        between, is_new = [], False
-    return groups, [*rows, *((line.number, cells_of(line, layout.delimiter), len(groups) - 1) for line in between)]
+
+    def texts(line: Line) -> list[str]:
+        return [str(cell) for cell in cells_of(line, layout.delimiter)]
+
+    def is_note(line: Line) -> bool:
+        return not layout.numbered and is_comment(line.content, layout.delimiter)
+
+    def is_data(line: Line) -> bool | None:
+        """True for a row of numbers, None for any other line."""
+        cells = [line.content] if isinstance(line.content, str) else [c for c in line.content if isinstance(c, str)]
+        has_letters = is_note(line) or any(map(_LETTER.search, cells))
+        return not has_letters or (not is_note(line) and is_row(texts(line))) or None
+
+    def is_left_out(cells: Sequence[str]) -> bool:
+        return is_summary_row(cells) or is_units_row(cells) or layout.is_header(cells, vocabulary)
+
+    def is_header(line: Line) -> bool:
+        cells = texts(line)
+        is_same = has_meaning and [vocabulary.heading(cell) or cell for cell in cells] == meanings
+        return is_same or layout.is_repeated(cells)
+
+    blocks = [Segment([line for line in source.head() if line.number < layout.header_line], [])]
+    for above, rows in find_segments(source.lines(layout.lines_before_data), is_data):
+        between = [line for line in above if not is_header(line)]
+        labels = between
+        if blocks[-1].rows:  # below rows, a mean or a header with other names is no label, but a row to be left out
+            labels = [line for line in between if not is_left_out(texts(line))]
+        begins = bool(rows) and (len(between) < len(above) or labels_above(labels) != NO_LABELS)
+        left_out = [line for line in between if not (is_note(line) or (begins and line in labels))]
+        blocks[-1].rows.extend(left_out)
+        if begins and blocks[-1].rows:
+            blocks.append(Segment(labels, rows))
+        else:
+            blocks[-1].above.extend(labels if begins else ())
+            blocks[-1].rows.extend(rows)
+    return blocks
 
 
 def _label_columns(
@@ -187,17 +218,15 @@ def _label_columns(
         One text or number per block, by header: quantities that all blocks state, direction, part, and block number.
     """
     columns: dict[str, list[str | float]] = {}
-    for role, expected in (("amplitude", "m"), ("amplitude", "rad"), ("amplitude", "1"), ("frequency", "Hz")):
-        quantities = [label.of_dimension(expected) for label in labels]
-        if role not in roles and all(len(matches) == 1 for matches in quantities):
-            kinds = {(matches[0].unit, matches[0].convention) for matches in quantities}
-            if len(kinds) == 1:
-                unit, convention = kinds.pop()
-                columns[f"{role}{COUNTED[convention]} [{unit}]"] = [float(q[0].text.split()[0]) for q in quantities]
-    if "temperature" not in roles and all(label.temperature for label in labels):
-        degrees = [str(label.temperature).partition(" ") for label in labels]
-        if len({unit for *_, unit in degrees}) == 1:
-            columns[f"temperature [{degrees[0][2]}]"] = [float(number) for number, *_ in degrees]
+    quantities = [("amplitude", [label.of_dimension(si) for label in labels]) for si in ("m", "rad", "1")]
+    for role, stated in [*quantities, ("frequency", [label.of_dimension("Hz") for label in labels])]:
+        kinds = {(one.unit, one.convention) for matches in stated for one in matches}
+        if role not in roles and len(kinds) == 1 and all(len(matches) == 1 for matches in stated):
+            unit, convention = kinds.pop()
+            columns[f"{role}{COUNTED[convention]} [{unit}]"] = [float(one.text.split()[0]) for (one,) in stated]
+    degrees = [(label.temperature or "").partition(" ") for label in labels]
+    if "temperature" not in roles and all(map(any, degrees)) and len({unit for *_, unit in degrees}) == 1:
+        columns[f"temperature [{degrees[0][2]}]"] = [float(number) for number, *_ in degrees]
     directions = [named_direction([title], short=True) for title in titles]
     if all(directions):
         columns["direction"] = [str(direction) for direction in directions]
