@@ -10,15 +10,17 @@ cell ("K* 0.1 mm [N/mm]") or in several. Of merged header cells only the leftmos
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate, groupby
+from itertools import accumulate
 from pathlib import Path
+from typing import NamedTuple
 
 from bushfit import units
 from bushfit.errors import MeasurementError
+from bushfit.reading.blocks import find_segments
 from bushfit.reading.headers import COUNTED, AmplitudeConvention, Vocabulary, split_convention
-from bushfit.reading.layout import Layout, is_comment, is_row, is_summary_row
+from bushfit.reading.layout import Layout, Line, is_comment, is_row, is_summary_row
 from bushfit.reading.numerals import is_like_number, plainest_value
 from bushfit.reading.source import RowSource, Sheet, cells_of
 
@@ -44,9 +46,6 @@ _LONGEST_HEADER = 200
 _GROUPED = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
 #: Separator of the two roles in the top left cell of a block: "f [Hz] \ A [mm]".
 _CORNER = re.compile(r"\s*[\\|]\s*|\s+/\s+")
-
-#: Line number and cells of a row.
-_Row = tuple[int, list[str | float]]
 
 
 @dataclass(frozen=True)
@@ -74,9 +73,18 @@ class _Meaning:
         return replace(second, **{name: value for name, value in vars(self).items() if value is not None})
 
 
-#: Column of a wide table: meaning of its headers, meaning of the first column of its block, and for each row the line
-#: number, the cell of the first column, and the cell of this column.
-_WideColumn = tuple[_Meaning, _Meaning, list[tuple[int, str | float, str | float]]]
+class _WideColumn(NamedTuple):
+    """Column of a wide table.
+
+    Args:
+        meaning: meaning of its headers.
+        down: meaning of the first column of its block.
+        points: for each row, its line number, the cell of the first column, and the cell of this column.
+    """
+
+    meaning: _Meaning
+    down: _Meaning
+    points: list[tuple[int, str | float, str | float]]
 
 
 def unpivot(source: RowSource, file: Path, vocabulary: Vocabulary, layout: Layout) -> tuple[RowSource, Layout] | None:
@@ -99,74 +107,64 @@ def unpivot(source: RowSource, file: Path, vocabulary: Vocabulary, layout: Layou
     has_merged_titles = "" in layout.headers and not set(roles).issuperset(_STEPPED)
     if (is_long and not has_merged_titles) or len(layout.headers) > _MOST_COLUMNS:
         return None
-    lines = [(line.number, cells_of(line, mark)) for line in source.head() if not is_comment(line.content, mark)]
-    rows = [(n, [c[:_LONGEST_HEADER] if isinstance(c, str) else c for c in cells]) for n, cells in lines]
-    blocks = list(_find_blocks(rows, vocabulary))
-    series = [column for headers, data in blocks for column in _read_block(headers, data, vocabulary)]
-    if not series:
-        return None
-    texts = [text for headers, _ in blocks for row in headers for text in row]
-    summaries = dict.fromkeys(text for text in texts if is_summary_row([text]))
-    written = tuple(text for text in texts if any(m.role or m.stepped for m in _read_corner(text, vocabulary)))
-    sheet, long_layout = _long_table(series, source, file, vocabulary)
-    notes = tuple(f'the column "{text}" is left out, as a summary of others' for text in summaries)
-    return sheet, replace(long_layout, delimiter=mark, written=written, notes=notes)
 
-
-def _find_blocks(rows: Sequence[_Row], vocabulary: Vocabulary) -> Iterator[tuple[list[list[str]], list[_Row]]]:
-    """Yield header rows and rows of numbers of each possible block of a wide table, without columns beside it."""
-
-    def first_number(index: int) -> int | None:
-        """Index of the first filled column if the row with this index has only numbers; else None."""
-        texts = [str(cell) for cell in rows[index][1]]
+    def first_number(line: Line) -> int | None:
+        """Index of the first filled cell if a row has only numbers; None for any other line."""
+        texts = list(map(str, line.content))
         first = next((column for column, text in enumerate(texts) if text), 0)
         return first if is_row(texts) and is_like_number(texts[first]) else None
 
-    end = 0
-    for start, run in groupby(range(len(rows)), key=first_number):
-        numbers = list(run)
-        if start is None or len(numbers) < 2:
+    cells = [(line.number, cells_of(line, mark)) for line in source.head() if not is_comment(line.content, mark)]
+    width = max(len(row) for _, row in cells)
+    lines = [Line(number, [*row, *[""] * (width - len(row))]) for number, row in cells]
+    columns, texts = list[_WideColumn](), list[str]()
+    for above, rows in find_segments(lines, first_number, fewest_rows=2):
+        headers = [list(map(str, line.content)) for line in above[-_MOST_HEADER_ROWS:]]
+        if not (rows and headers):
             continue
-        part = rows[max(end, numbers[0] - _MOST_HEADER_ROWS) : numbers[-1] + 1]
-        end = numbers[-1] + 1
-        width = max(len(cells) for _, cells in part)
-        padded = [(line, cells + [""] * (width - len(cells))) for line, cells in part]
-        headers = [[str(cell) for cell in cells] for _, cells in padded[: -len(numbers)]]
-        corners = [[m.stepped for m in _read_corner(cell, vocabulary) if not m.level] for cell in (headers or [[]])[-1]]
-        repeated = [n for n in range(start + 1, len(corners)) if any(corners[n]) and corners[n] == corners[start]]
+        corners = [[m.stepped for m in _read_corner(cell, vocabulary) if not m.level] for cell in headers[-1]]
+        start = first_number(rows[0]) or 0
+        repeated = [n for n in range(start + 1, width) if any(corners[n]) and corners[n] == corners[start]]
         for side in map(slice, [start, *repeated], [*repeated, width]):
-            data = [(line, cells[side]) for line, cells in padded[-len(numbers) :]]
-            yield [cells[side] for cells in headers], data
+            data = [Line(row.number, row.content[side]) for row in rows]
+            columns += _read_block([row[side] for row in headers], data, vocabulary)
+        texts += [text for row in headers for text in row]
+    if not columns:
+        return None
+    sheet, long_layout = _long_table(columns, source, file, vocabulary)
+    summaries = dict.fromkeys(text for text in texts if is_summary_row([text]))
+    notes = tuple(f'the column "{text}" is left out, as a summary of others' for text in summaries)
+    written = tuple(text for text in texts if any(m.role or m.stepped for m in _read_corner(text, vocabulary)))
+    return sheet, replace(long_layout, delimiter=mark, written=written, notes=notes)
 
 
-def _read_block(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: Vocabulary) -> list[_WideColumn]:
+def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: Vocabulary) -> list[_WideColumn]:
     """Read the columns of a block with their meanings; an empty list if it is not a block of a wide table.
 
     Args:
         headers: cells of the header rows.
-        data: rows of numbers.
+        rows: rows of numbers.
         vocabulary: known column names.
     """
-    columns = [index for index in range(1, len(data[0][1])) if any(cells[index] != "" for _, cells in data)]
+    columns = [n for n in range(1, len(headers[0])) if any(row.content[n] != "" for row in rows)]
     meanings = dict.fromkeys(columns, _Meaning())
     down, across = _Meaning(), _Meaning()
     for distance, cells in enumerate(reversed(headers)):
-        merged: Iterator[str] = accumulate(cells, lambda before, cell: cell or before)
-        texts = list(merged) if distance else cells
+        texts = [*accumulate(cells, _merged)] if distance else cells
         row = {column: _read_header(texts[column], vocabulary) for column in columns}
         levels = {meaning.stepped for meaning in row.values() if meaning.level}
         unclear = [column for column in columns if texts[column] and row[column] == _Meaning()]
         if unclear and not (levels and all(is_summary_row([texts[column]]) for column in unclear)):
             break
-        columns = [column for column in columns if column not in unclear]
         for corner in _read_corner(cells[0], vocabulary):
+            axis = replace(corner, level_unit=corner.level_unit or corner.unit, unit=None)
             if corner.role is not None or corner.level:
                 continue
-            axis = replace(corner, level_unit=corner.level_unit or corner.unit, unit=None)
             if corner.stepped in levels - {None} or (levels and down.stepped not in (None, corner.stepped)):
                 across |= axis
             else:
                 down |= axis
+        columns = [column for column in columns if column not in unclear]
         meanings = {column: meanings[column] | row[column] for column in columns}
     stepped = next((meaning.stepped for meaning in (*meanings.values(), across) if meaning.stepped), None)
     stepped = stepped or next((role for role in _STEPPED if down.stepped and role != down.stepped), None)
@@ -174,7 +172,15 @@ def _read_block(headers: Sequence[list[str]], data: Sequence[_Row], vocabulary: 
     if stepped is None or len(columns) < 2 or not all(meaning.level for meaning in meanings.values()):
         return []
     down = replace(down, stepped=_STEPPED[stepped == _STEPPED[0]])
-    return [(meaning, down, [(line, cells[0], cells[n]) for line, cells in data]) for n, meaning in meanings.items()]
+    return [
+        _WideColumn(meaning, down, [(row.number, row.content[0], row.content[n]) for row in rows])
+        for n, meaning in meanings.items()
+    ]
+
+
+def _merged(left: str, cell: str) -> str:
+    """Text of a header cell, or of the cell to its left with which it is merged."""
+    return cell or left
 
 
 def _read_corner(text: str, vocabulary: Vocabulary) -> list[_Meaning]:
@@ -231,12 +237,12 @@ def _role_of_unit(unit: str | None) -> str | None:
 
 
 def _long_table(
-    series: Sequence[_WideColumn], source: RowSource, file: Path, vocabulary: Vocabulary
+    columns: Sequence[_WideColumn], source: RowSource, file: Path, vocabulary: Vocabulary
 ) -> tuple[RowSource, Layout]:
     """Build a long table (a row per frequency and amplitude) from all blocks of a wide table, with its layout.
 
     Args:
-        series: columns of all blocks, with their meanings.
+        columns: columns of all blocks.
         source: lines or rows of the file.
         file: path, for errors.
         vocabulary: known column names.
@@ -245,19 +251,16 @@ def _long_table(
         MeasurementError: a block does not state its quantity, blocks differ in their frequencies or amplitudes, or a
             quantity has two units.
     """
-    by_role: dict[str | None, list[_WideColumn]] = {meaning.role: [] for meaning, *_ in series}
-    for column in sorted(series, key=lambda column: plainest_value(column[0].level or "")):
-        by_role[column[0].role].append(column)
-    down = {(first.stepped, first.level_unit, first.convention) for _, first, _ in series}
-    across = {(meaning.stepped, meaning.level_unit, meaning.convention) for meaning, *_ in series}
-    quantities = dict.fromkeys((meaning.role, meaning.unit, None) for meaning, *_ in series)
+    by_role: dict[str | None, list[_WideColumn]] = {column.meaning.role: [] for column in columns}
+    for column in sorted(columns, key=lambda column: plainest_value(column.meaning.level or "")):
+        by_role[column.meaning.role].append(column)
     steps = [
-        [
-            (plainest_value(m.level or ""), *(plainest_value(str(text)) for _, text, _ in points))
-            for m, _, points in columns
-        ]
-        for columns in by_role.values()
+        [[plainest_value(str(cell)) for cell in (m.level, *(row[1] for row in points))] for m, _, points in block]
+        for block in by_role.values()
     ]
+    down = dict.fromkeys((meaning.stepped, meaning.level_unit, meaning.convention) for _, meaning, _ in columns)
+    across = dict.fromkeys((meaning.stepped, meaning.level_unit, meaning.convention) for meaning, *_ in columns)
+    quantities = dict.fromkeys((meaning.role, meaning.unit, None) for meaning, *_ in columns)
     problem = None
     if None in by_role:
         problem = "the quantity of a block of this wide table is not stated"
@@ -268,11 +271,11 @@ def _long_table(
         problem = "this wide table states one quantity in two ways"
         expected = "one unit for each quantity, and levels of one kind"
     if problem:
-        kinds = Counter((m.role, m.unit, m.stepped, len(points)) for m, _, points in series)
+        kinds = Counter((m.role, m.unit, m.stepped, len(points)) for m, _, points in columns)
         raise MeasurementError(
             problem,
             file=file,
-            place=f'sheet "{source.sheet}"' if source.sheet else f"line {series[0][2][0][0] - 1}",
+            place=f'sheet "{source.sheet}"' if source.sheet else f"line {columns[0].points[0][0] - 1}",
             found="; ".join(
                 f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of {count} "
                 f"{'frequencies' if stepped == 'frequency' else 'amplitudes'}, {rows} rows"
@@ -281,16 +284,16 @@ def _long_table(
             expected=expected,
             hint="correct the wide table, or write it as a long one: a row for each frequency and amplitude",
         )
-    headers = [
+    headers = tuple(
         f"{vocabulary.name_of(role or '')}{COUNTED[convention]}{f' [{unit}]' if unit else ''}"
         for role, unit, convention in (*down, *across, *quantities)
-    ]
-    rows: list[_Row] = []
-    for columns in zip(*by_role.values(), strict=True):
-        text = columns[0][0].level or ""
+    )
+    numbers, content = list[int](), list[list[str | float]]()
+    for block in zip(*by_role.values(), strict=True):
+        text = block[0].meaning.level or ""
         level = text if _GROUPED.fullmatch(text) else plainest_value(text)
-        points = zip(*(points for *_, points in columns), strict=True)
-        rows += [(row[0][0], [row[0][1], level, *(cell for _, _, cell in row)]) for row in points]
-    numbers, content = zip(*rows, strict=True)
-    sheet = Sheet(source.sheet or "", content, numbers=numbers)
-    return sheet, Layout("", tuple(headers), min(numbers) - 1, ("",) * len(headers), None)
+        for points in zip(*(column.points for column in block), strict=True):
+            numbers.append(points[0][0])
+            content.append([points[0][1], level, *(cell for *_, cell in points)])
+    layout = Layout("", headers, min(numbers) - 1, ("",) * len(headers), None)
+    return Sheet(source.sheet or "", content, numbers=numbers), layout
