@@ -50,6 +50,9 @@ def find_segments(
         lines: lines or rows of the file.
         kind: function that returns None for a line that is no row, and equal values for the rows of one run.
         fewest_rows: smallest number of rows of a run; the rows of a shorter one belong to the lines above the next.
+
+    Yields:
+        Each run with the lines above it, and at last the lines below the last run, if there are any.
     """
     above = list[Line]()
     for value, run in groupby(lines, key=kind):
@@ -219,11 +222,11 @@ def _label_columns(
     """
     columns: dict[str, list[str | float]] = {}
     quantities = [("amplitude", [label.of_dimension(si) for label in labels]) for si in ("m", "rad", "1")]
-    for role, stated in [*quantities, ("frequency", [label.of_dimension("Hz") for label in labels])]:
-        kinds = {(one.unit, one.convention) for matches in stated for one in matches}
-        if role not in roles and len(kinds) == 1 and all(len(matches) == 1 for matches in stated):
+    for role, by_block in [*quantities, ("frequency", [label.of_dimension("Hz") for label in labels])]:
+        kinds = {(one.unit, one.convention) for matches in by_block for one in matches}
+        if role not in roles and len(kinds) == 1 and all(len(matches) == 1 for matches in by_block):
             unit, convention = kinds.pop()
-            columns[f"{role}{COUNTED[convention]} [{unit}]"] = [float(one.text.split()[0]) for (one,) in stated]
+            columns[f"{role}{COUNTED[convention]} [{unit}]"] = [float(one.text.split()[0]) for (one,) in by_block]
     degrees = [(label.temperature or "").partition(" ") for label in labels]
     if "temperature" not in roles and all(map(any, degrees)) and len({unit for *_, unit in degrees}) == 1:
         columns[f"temperature [{degrees[0][2]}]"] = [float(number) for number, *_ in degrees]

@@ -8,6 +8,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from bushfit.errors import MeasurementError
 from bushfit.reading.headers import WORDS, Column
 from bushfit.reading.instruments import word_for_part
@@ -153,13 +156,6 @@ class Cells:
                 return "doubtful" if not is_word else "missing" if word in _MISSING else "word"
         return None
 
-    @cached_property
-    def first_decimal(self) -> str | None:
-        """Decimal mark of the first thousand rows; None if they leave it open, or the first row is not complete."""
-        ways = consistent_notations(islice(self.number_texts(), _FIRST), self.possible_numerals()).ways
-        is_settled = len({way.decimal for way in ways}) == 1 and len(self.first_row) == len(self.headers)
-        return ways[0].decimal if is_settled else None
-
     def parse(self, block: RowSource, indices: frozenset[int]) -> Mapping[int, Floats] | None:
         """Read columns of a block at once, in units of the file.
 
@@ -179,37 +175,26 @@ class Cells:
             return None
         if isinstance(block, Channels) and block.numeric >= indices:
             return {index: block.arrays[index] for index in indices}
-        if not isinstance(block, Text) or not indices or self.first_decimal is None:
+        first = list(map(str, self.first_row))
+        if not isinstance(block, Text) or not indices or len(first) != len(self.headers) or self.numerals.thousands:
             return None
-        notation, first = Numerals(self.first_decimal), [str(cell) for cell in self.first_row]
-        numeric = [index for index, cell in enumerate(first) if notation.allows(cell)]
+        numeric = [index for index, cell in enumerate(first) if self.numerals.allows(cell)]
         if not indices <= {*numeric}:
             return None  # pandas takes TRUE for 1
-        frame = block.frame(self.layout, dict.fromkeys(numeric, float), len(first), notation.decimal)
+        frame = block.frame(self.layout, dict.fromkeys(numeric, float), len(first), self.numerals.decimal)
         words = block.first_words(self.layout.delimiter) if numeric[0] else ()
         if frame is None or any(is_summary_row([word]) for word in words):
             return None
-        block.clean.add((block.before, indices))
         return {index: frame[index].to_numpy() for index in indices}
 
-    def distinct_texts(self, block: RowSource, indices: Sequence[int]) -> Iterator[tuple[Sequence[str | float], Any]]:
-        """Find the distinct texts of columns in a block of rows.
-
-        Returns:
-            For each column its texts or numbers, and the index among them of each of the n rows of data, (n,).
-        """
+    def texts(self, block: RowSource, index: int) -> NDArray[np.object_]:
+        """Return the cells of a column, texts or numbers, in the rows of data of a block, (n,)."""
         if isinstance(block, Text) and self.layout.delimiter != " " and not self.marks and b'"' not in block.data:
-            is_clean = (block.before, self.needed) in block.clean or self.parse(block, self.needed) is not None
-            types = dict.fromkeys(indices, "category")
-            frame = block.frame(self.layout, types, len(self.headers), ".") if is_clean else None
+            is_clean = self.parse(block, self.needed) is not None
+            frame = block.frame(self.layout, {index: "category"}, len(self.headers), ".") if is_clean else None
             if frame is not None:
-                for index in indices:
-                    codes, texts = frame[index].factorize()
-                    yield list(texts), codes
-                return
-        rows = [row for _, row in self.rows(block)]
-        for index in indices:
-            yield [row[index] for row in rows], slice(None)
+                return np.asarray(frame[index], dtype=object)
+        return np.array([row[index] for _, row in self.rows(block)], dtype=object)
 
     def note_left_out(self, rows: Sequence[FaultyRow], count: int) -> Iterator[str]:
         """Describe rows that are left out because they are not data, except headers and units that are repeated.

@@ -1,4 +1,4 @@
-"""Recordings of instruments and programs, as groups of channels.
+"""Recordings of instruments and programs, as groups of channels; and workbooks.
 
 The first bytes of a file determine its format.
 """
@@ -22,15 +22,14 @@ from bushfit.errors import MeasurementError
 from bushfit.reading.formats import arrow, labview, matlab, mdf, tdms
 from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
 from bushfit.reading.layout import Layout, Line
-from bushfit.reading.source import Channel, Channels, Group
+from bushfit.reading.source import Channel, Channels, Group, Sheet
 from bushfit.reading.uff import uff
+from bushfit.reading.workbook import workbook
 
 #: Names of channels whose values cannot be complex.
 _REAL = Vocabulary(
     {"time": LOOP_COLUMNS["time"], **{role: SWEEP_COLUMNS[role] for role in ("frequency", "amplitude")}}, {}
 )
-#: Next step to suggest for files without channels.
-_HINT = "export it again, with its channels"
 _MATLAB_HINT = 'save vectors, or structs of them, with -v7; a table by way of table2struct(T, "ToScalar", true)'
 _UFF_HINT = "export records or frequency responses as dataset 58; of data at nodes (55) only the latter are read"
 
@@ -39,28 +38,33 @@ class Format(NamedTuple):
     """File format of recordings.
 
     Args:
-        name: name of the format, such as "TDMS".
+        name: name of the format, such as "TDMS"; "" for a workbook.
         endings: file name endings, such as ".tdms".
         sign: regular expression that matches the first bytes of a file.
-        read: function that takes bytes and path of a file and yields its groups of channels.
+        read: function that takes bytes and path of a file and yields its groups of channels, or its sheets.
         hint: next step to suggest for a file without channels.
+        again: next step to suggest for a broken file.
     """
 
     name: str
     endings: tuple[str, ...]
     sign: bytes
-    read: Callable[[bytes, Path], Iterator[Group]]
-    hint: str
+    read: Callable[[bytes, Path], Iterator[Group | Sheet]]
+    hint: str = "export it again, with its channels"
+    again: str = "it may be cut short: copy or export it again"
 
 
 #: Supported formats of recordings.
 _FORMATS = (
     Format("MATLAB", (".mat",), rb"MATLAB (?:5\.0|7\.3) MAT-file", matlab, _MATLAB_HINT),
-    Format("TDMS", (".tdms",), rb"TDSm", tdms, _HINT),
+    Format("TDMS", (".tdms",), rb"TDSm", tdms),
     Format("UFF", (".uff", ".unv"), rb" {4}-1 *\r?\n +\d+", uff, _UFF_HINT),
-    Format("MDF", (".mf4", ".mdf"), rb"MDF     |UnFinMF ", mdf, _HINT),
-    Format("LabVIEW", (".lvm",), rb"LabVIEW Measurement", labview, _HINT),
-    Format("Parquet or Arrow", (".parquet", ".feather", ".arrow"), rb"PAR1|ARROW1", arrow, _HINT),
+    Format("MDF", (".mf4", ".mdf"), rb"MDF     |UnFinMF ", mdf),
+    Format("LabVIEW", (".lvm",), rb"LabVIEW Measurement", labview),
+    Format("Parquet or Arrow", (".parquet", ".feather", ".arrow"), rb"PAR1|ARROW1", arrow),
+    Format(
+        "workbook", (), rb"PK\x03\x04|\xd0\xcf\x11\xe0", workbook, again="copy it, or save it again as xlsx, or as CSV"
+    ),
 )
 #: File name endings of recordings.
 RECORDINGS = tuple(ending for one in _FORMATS for ending in one.endings)
@@ -72,7 +76,7 @@ def word_for_part(file: Path) -> str:
 
 
 def format_of(data: bytes, file: Path) -> Format | None:
-    """Return the format of a recording, identified by its first bytes; None for a text or a workbook.
+    """Return the format of a recording or workbook, identified by its first bytes; None for a text.
 
     Raises:
         MeasurementError: the file has the ending of a recording, but not its content.
@@ -93,8 +97,10 @@ def format_of(data: bytes, file: Path) -> Format | None:
 
 
 @lru_cache(maxsize=1)
-def read_groups(data: bytes, file: Path, recording: Format) -> tuple[Channels, ...]:
-    """Read the groups of channels in a recording; the last result is cached, because an inspection reads several times.
+def read_parts(data: bytes, file: Path, recording: Format) -> tuple[Sheet, ...]:
+    """Read the groups of channels in a recording, or the sheets of a workbook.
+
+    The last result is cached, because an inspection reads a file several times.
 
     Args:
         data: bytes of the file.
@@ -102,15 +108,17 @@ def read_groups(data: bytes, file: Path, recording: Format) -> tuple[Channels, .
         recording: format of the file.
 
     Returns:
-        Groups of channels of equal length, with unique titles if there are several.
+        Groups of channels of equal length, with unique titles if there are several; or sheets.
 
     Raises:
         MeasurementError: the file cannot be read, or has no channels of numbers.
     """
-    groups, details = list[Channels](), dict[str, str]()
+    parts, details = list[Sheet](), dict[str, str]()
+    kind = f"{recording.name} file" if recording.name else "workbook"
     with _silenced():
         try:
-            groups = [part for group in recording.read(data, file) for part in _split_by_length(*group, recording)]
+            for part in recording.read(data, file):
+                parts += [part] if isinstance(part, Sheet) else _split_by_length(*part, recording)
             problem, details = "holds no channels", {"expected": "numbers", "hint": recording.hint}
         except MeasurementError as error:
             error.file = file
@@ -120,14 +128,15 @@ def read_groups(data: bytes, file: Path, recording: Format) -> tuple[Channels, .
             details["hint"] = 'pip install "bushfit[instruments]"'
         except Exception as error:  # libraries raise any kind for broken files, struct.error and KeyError among them
             problem, details = "cannot be read", {"found": str(error) or type(error).__name__}
-            details["hint"] = "it may be cut short: copy or export it again"
-        if not groups:
+            details["hint"] = recording.again
+            parts = []
+        if not parts:
             gc.collect()  # finalizers of unfinished readers run here, where they print nothing
-            raise MeasurementError(f"the {recording.name} file {problem}", file=file, **details)
-    titles = [part.sheet or ("top level" if len(groups) > 1 else "") for part in groups]
+            raise MeasurementError(f"the {kind} {problem}", file=file, **details)
+    titles = [part.sheet or ("top level" if len(parts) > 1 else "") for part in parts]
     counts = [titles[: index + 1].count(title) for index, title in enumerate(titles)]
     titles = [f"{title} ({count})" if count > 1 else title for title, count in zip(titles, counts, strict=True)]
-    return tuple(replace(part, sheet=title) for part, title in zip(groups, titles, strict=True))
+    return tuple(replace(part, sheet=title) for part, title in zip(parts, titles, strict=True))
 
 
 @contextmanager

@@ -37,12 +37,12 @@ class Rows(NamedTuple):
 class ColumnTexts(NamedTuple):
     """Texts of a column, compressed: its distinct texts, and the index among them of the text of each row, (n,)."""
 
-    values: Sequence[str]
+    distinct: Sequence[str]
     codes: NDArray[np.intp]
 
     def per_row(self) -> list[str]:
         """Return the text of the column in each row, (n,)."""
-        return [self.values[code] for code in self.codes.tolist()]
+        return [self.distinct[code] for code in self.codes.tolist()]
 
 
 def same_text(text: str, reference: str) -> bool:
@@ -50,24 +50,16 @@ def same_text(text: str, reference: str) -> bool:
     return text.strip(" #").casefold() == reference.strip(" #").casefold()
 
 
-def column_texts(cells: Cells, *indices: int) -> list[ColumnTexts]:
-    """Texts of columns; an empty or merged cell has the text of the cell above.
+def column_texts(cells: Cells, index: int) -> ColumnTexts:
+    """Return the texts of the column with this index; an empty or merged cell has the text of the cell above."""
+    import pandas as pd
 
-    Returns:
-        One entry for each index.
-    """
-    code_by_text: list[dict[str, int]] = [{} for _ in indices]
-    parts = [[np.empty(0, dtype=np.intp)] for _ in indices]
-    for block in cells.blocks() if indices else ():
-        for codes, part, (texts, rows) in zip(code_by_text, parts, cells.distinct_texts(block, indices), strict=True):
-            numbers = [codes.setdefault(_text(cell).strip(" #"), len(codes)) for cell in texts]
-            part.append(np.array(numbers, dtype=np.intp)[rows])
-    columns = []
-    for codes, column in zip(code_by_text, map(np.concatenate, parts), strict=True):
-        if "" in codes:
-            column = column[np.maximum.accumulate(np.where(column == codes[""], 0, np.arange(column.size)))]
-        columns.append(ColumnTexts(list(codes), column))
-    return columns
+    codes, distinct = pd.factorize(np.concatenate([cells.texts(block, index) for block in cells.blocks()]))
+    numbers, texts = pd.factorize(np.array([_text(cell).strip(" #") for cell in distinct], dtype=object))
+    codes = numbers[codes]
+    is_empty = codes == next((number for number, text in enumerate(texts) if text == ""), -1)
+    codes = codes[np.maximum.accumulate(np.where(is_empty, 0, np.arange(codes.size)))]
+    return ColumnTexts(list(texts), codes)
 
 
 def _text(cell: str | float) -> str:
@@ -96,12 +88,12 @@ def find_labels(cells: Cells) -> Mapping[str, tuple[int, Sequence[str]]]:
         if heading is None or heading.role in labels or (header == "block" and "displacement" not in cells.roles):
             continue
         if _may_distinguish_tests(cells, index):
-            (texts,) = column_texts(cells, index)
+            texts = column_texts(cells, index)
             if heading.role == "direction":
-                directions = [named_direction([text], short=True) for text in texts.values]
+                directions = [named_direction([text], short=True) for text in texts.distinct]
                 if not any(directions):
                     continue
-                named = [str(direction or text) for direction, text in zip(directions, texts.values, strict=True)]
+                named = [str(direction or text) for direction, text in zip(directions, texts.distinct, strict=True)]
                 texts = ColumnTexts(named, texts.codes)
             labels[heading.role] = (index, texts.per_row())
     return labels
@@ -128,7 +120,7 @@ def select_rows(cells: Cells, labels: Mapping[str, tuple[int, Sequence[str]]], w
         if header not in cells.headers:
             raise cells.header_error(f'there is no column "{header}"', expected="headers, as keys of rows")
         index = cells.headers.index(header)
-        chosen.append((index, column_texts(cells, index)[0].per_row(), text))
+        chosen.append((index, column_texts(cells, index).per_row(), text))
     if wanted.shared and not chosen:
         expected = "each file once, or a column that selects the rows of each test"
         raise cells.header_error("a file is listed twice", expected=expected)
@@ -176,14 +168,14 @@ def note_not_understood(
         and (settled or not cells.holds_numbers(index))
         and _may_distinguish_tests(cells, index)
     ]
-    for index, texts in zip(unclear, column_texts(cells, *unclear), strict=True):
-        header, is_number = cells.headers[index], cells.holds_numbers(index)
+    for index in unclear:
+        header, is_number, texts = cells.headers[index], cells.holds_numbers(index), column_texts(cells, index)
         codes = texts.codes if rows is None else texts.codes[rows]
-        distinct, number, counts = np.unique(codes, return_inverse=True, return_counts=True)
+        present, number, counts = np.unique(codes, return_inverse=True, return_counts=True)
         depends_on = [settled] if is_number else [(quantity,) for quantity in settled]
         explained = any(all(np.ptp(number[group]) == 0 for group in group_rows(*keys)) for keys in depends_on)
         if counts.size > 1 and not explained and not (is_number and counts.min() < _FEWEST_ROWS):
-            values = sorted(texts.values[code] for code in distinct)
+            values = sorted(texts.distinct[code] for code in present)
             listed = ", ".join(values[:4]) + ", ..." * (len(values) > 4)
             yield (
                 f'"{header}" (column {index + 1}) varies from row to row ({listed}) and is not understood: all '

@@ -7,7 +7,7 @@ import io
 import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import islice
 from typing import Any, NamedTuple
 
@@ -35,13 +35,11 @@ class Text:
         data: bytes of the text.
         encoding: original encoding of its file.
         before: number of lines of the file before the text.
-        clean: blocks found to have no faulty rows: number of the line before the block, and columns read.
     """
 
     data: bytes
     encoding: str | None
     before: int = 0
-    clean: set[tuple[int, frozenset[int]]] = field(default_factory=set, repr=False)
     sheet: None = None
     layout: None = None
     numeric: frozenset[int] = frozenset()
@@ -67,7 +65,7 @@ class Text:
         start = self.offset(after)
         while start < len(self.data):
             end = self.data.find(b"\n", start + CHUNK_BYTES) + 1 or len(self.data)
-            block = Text(self.data[start:end], self.encoding, after, self.clean)
+            block = Text(self.data[start:end], self.encoding, after)
             yield block
             start, after = end, after + block.data.count(b"\n")
 
@@ -153,6 +151,7 @@ class Sheet:
         above: lines above the table, such as those above the first block, or properties of a recording.
         numbers: line number in the file of each row, if the rows were rearranged below the header; None for a sheet.
         hidden: numbers of the rows that the workbook hides.
+        is_visible: False for a hidden sheet of a workbook.
     """
 
     sheet: str
@@ -164,6 +163,7 @@ class Sheet:
     above: Sequence[Line] = ()
     numbers: Sequence[int] | None = None
     hidden: Sequence[int] = ()
+    is_visible: bool = True
 
     def head(self) -> list[Line]:
         """Return the lines above the table, and the first non-empty rows, which can contain the header."""

@@ -10,7 +10,7 @@ cell ("K* 0.1 mm [N/mm]") or in several. Of merged header cells only the leftmos
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
 from pathlib import Path
@@ -150,7 +150,8 @@ def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: 
     meanings = dict.fromkeys(columns, _Meaning())
     down, across = _Meaning(), _Meaning()
     for distance, cells in enumerate(reversed(headers)):
-        texts = [*accumulate(cells, _merged)] if distance else cells
+        merged: Iterator[str] = accumulate(cells, lambda before, cell: cell or before)
+        texts = list(merged) if distance else cells
         row = {column: _read_header(texts[column], vocabulary) for column in columns}
         levels = {meaning.stepped for meaning in row.values() if meaning.level}
         unclear = [column for column in columns if texts[column] and row[column] == _Meaning()]
@@ -176,11 +177,6 @@ def _read_block(headers: Sequence[list[str]], rows: Sequence[Line], vocabulary: 
         _WideColumn(meaning, down, [(row.number, row.content[0], row.content[n]) for row in rows])
         for n, meaning in meanings.items()
     ]
-
-
-def _merged(left: str, cell: str) -> str:
-    """Text of a header cell, or of the cell to its left with which it is merged."""
-    return cell or left
 
 
 def _read_corner(text: str, vocabulary: Vocabulary) -> list[_Meaning]:

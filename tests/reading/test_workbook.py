@@ -188,7 +188,7 @@ def test_what_a_sheet_does_not_hold_is_refused_and_cells_of_all_sheets_count(tmp
         to_bytes("t", wide, "xlsx")
     assert to_bytes("t", wide, "csv")
     file = workbook({"A": table("loop"), "B": table("loop")}, tmp_path)
-    monkeypatch.setattr("bushfit.reading.parts._MOST_CELLS", 300)
+    monkeypatch.setattr("bushfit.reading.workbook._MOST_CELLS", 300)
     with pytest.raises(MeasurementError, match='more, with sheet "B"'):
         forces(file)
     # a forgotten cell at the end of a sheet, as Excel writes it
