@@ -8,14 +8,14 @@ import numpy as np
 
 from bushfit.campaign.schema import UNSTATED, RigSettings
 from bushfit.effects.contract import Array
-from bushfit.fitting.agreement import expected_errors, misfits, prior_uses, prior_warnings
-from bushfit.fitting.assess import covariance, measured_range, quality, temperature_warning
+from bushfit.fitting.agreement import expected_errors
+from bushfit.fitting.assess import temperature_warning
 from bushfit.fitting.coordinates import Bounds
 from bushfit.fitting.descent import Descent
 from bushfit.fitting.model_error import model_error_warning, with_model_error
-from bushfit.fitting.preparation import MeasuredTest, sources
+from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.problem import FitProblem, FitResult
-from bushfit.fitting.procedures import fit_warnings
+from bushfit.fitting.procedures import build_result
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
@@ -152,34 +152,21 @@ def result_of(
     Returns:
         The model with covariance, quality, range, warnings and expected error.
     """
-    tests, model, error = evidence.data_sets, evidence.model, None
-    solution = corrected or evidence.estimate
-    if lacking and not corrected:
+    model, solution, error = evidence.model, evidence.estimate, None
+    if corrected:
+        solution = replace(corrected, noise_weighted=evidence.data_sets)
+    elif lacking:
         solution, error = with_model_error(solution, bounds, rig)
         model = solution.model
-    stage = solution.stage(solution.at_bound)
-    cov = covariance(solution.model, [stage], fixed, smooth_error=solution.smooth_error)
-    priors = prior_uses(solution, cov)
-    return Result(
-        model,
-        tuple(stage.names),
-        cov,
-        quality(model, tests, len(solution.coordinates.names)),
-        measured_range(model, tests),
-        (
-            *([_CORRECTED] if corrected else []),
-            *([model_error_warning(error)] if error else []),
-            *temperature_warning(model, tests),
-            *prior_warnings(priors),
-            *fit_warnings(solution.model, solution, bounds, cov),
-        ),
-        sources(tests),
-        at_bound=solution.at_bound,
-        tests=misfits(model, tests),
+    notes = (
+        *([_CORRECTED] if corrected else []),
+        *([model_error_warning(error)] if error else []),
+        *temperature_warning(model, evidence.data_sets),
+    )
+    return replace(
+        build_result([solution], bounds, model=model, fixed=fixed, notes=notes, bounded_is_fixed=True),
         # a correction has seen every run
-        usable=expected_errors(model, tests, fit=None if corrected else solution),
+        usable=expected_errors(model, evidence.data_sets, fit=None if corrected else solution),
         model_error=error,
-        ties={tie.name: tie.expression for tie in model.constraints.active_ties(model.values)},
-        priors=priors,
         unresolved=tuple(effect.name for effect in model.records if effect.twins and effect.name not in resolved),
     )

@@ -254,7 +254,7 @@ def _result(
     notes: Sequence[str] = (),
     unused: Sequence[MeasuredTest] = (),
 ) -> Result:
-    """Assemble the result of a procedure: the model of the last step, with uncertainty and warnings of all steps.
+    """Build the result of a procedure, with the warnings on its campaign.
 
     Args:
         data: prepared campaign.
@@ -264,18 +264,12 @@ def _result(
         unused: tests that no step fitted, which the model is compared with.
     """
     model, tests = steps[-1].model, [test for step in steps for test in step.data_sets]
-    error = steps[-1].smooth_error
-    stages = [step.stage(step.at_bound if error else ()) for step in steps]  # beside an error, one at a bound is fixed
-    cov = covariance(model, stages, fixed, error)
-    priors = {name: use for step in steps for name, use in prior_uses(step, cov).items()}
-    fitted = tuple(name for step in steps for name in step.names)
     outliers = tuple(outlier for step in steps for outlier in step.outliers)
     warnings = (
         *notes,
         *implausible_modulus(data.campaign.bushing, tests),
         *temperature_warning(model, tests),
         *data.assumptions,
-        *prior_warnings(priors),
         *(
             f"the tie {tie.name} = {tie.expression} is not used: the model lacks {', '.join(lacking)}"
             for tie in data.constraints.ties
@@ -287,19 +281,55 @@ def _result(
             if model.values.keys().isdisjoint(prior.names)
         ),
         *outlier_warnings(outliers, robust=data.robust),
-        *(sentence for step in steps for sentence in fit_warnings(model, step, data.bounds, cov, NEXT)),
     )
+    result = build_result(steps, data.bounds, fixed=fixed, notes=warnings, unused=unused, advice=NEXT)
+    return replace(result, outliers=outliers, specimens=data.campaign.specimens)
+
+
+def build_result(
+    steps: Sequence[FitResult],
+    bounds: Bounds,
+    *,
+    model: Model | None = None,
+    fixed: Covariance | None = None,
+    notes: Sequence[str] = (),
+    unused: Sequence[MeasuredTest] = (),
+    bounded_is_fixed: bool = False,
+    advice: str = "",
+) -> Result:
+    """Build a result: the model of the last fit, with the uncertainty and the warnings of all fits.
+
+    Args:
+        steps: fits of a procedure, in order.
+        bounds: limits of parameters that the campaign gives, by name [SI].
+        model: model to report, such as that of the last fit with a smooth correction; None for that of the last fit.
+        fixed: covariance of parameters that all fits kept fixed; None if these are exact.
+        notes: warnings to report before those of the fits.
+        unused: tests that no fit used, which the model is compared with.
+        bounded_is_fixed: True to treat a parameter at a bound as fixed even if the model meets the tests.
+        advice: text to append to the sentence on a misfit.
+    """
+    last = steps[-1]
+    model, tests = model or last.model, [test for step in steps for test in step.data_sets]
+    names = tuple(name for step in steps for name in step.names)
+    at_bound = {name: end for step in steps for name, end in step.at_bound.items()}
+    without_bounded = bounded_is_fixed or last.smooth_error  # beside an error, a parameter at a bound is fixed
+    stages = [step.stage(step.at_bound if without_bounded else ()) for step in steps]
+    cov = covariance(last.model, stages, fixed, last.smooth_error)
+    priors = {name: use for step in steps for name, use in prior_uses(step, cov).items()}
     return Result(
         model,
-        fitted,
+        tuple(name for name in names if not (bounded_is_fixed and name in at_bound)),
         cov,
-        quality(model, tests, len(fitted)),
+        quality(model, tests, len(names)),
         measured_range(model, tests),
-        warnings,
+        (
+            *notes,
+            *prior_warnings(priors),
+            *(sentence for step in steps for sentence in fit_warnings(last.model, step, bounds, cov, advice)),
+        ),
         sources(tests),
-        outliers,
-        at_bound={name: end for step in steps for name, end in step.at_bound.items()},
-        specimens=data.campaign.specimens,
+        at_bound=at_bound,
         tests=misfits(model, tests, unused),
         ties={tie.name: tie.expression for tie in model.constraints.active_ties(model.values)},
         priors=priors,
