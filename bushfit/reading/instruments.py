@@ -62,9 +62,7 @@ _FORMATS = (
     Format("MDF", (".mf4", ".mdf"), rb"MDF     |UnFinMF ", mdf),
     Format("LabVIEW", (".lvm",), rb"LabVIEW Measurement", labview),
     Format("Parquet or Arrow", (".parquet", ".feather", ".arrow"), rb"PAR1|ARROW1", arrow),
-    Format(
-        "workbook", (), rb"PK\x03\x04|\xd0\xcf\x11\xe0", workbook, again="copy it, or save it again as xlsx, or as CSV"
-    ),
+    Format("", (), rb"PK\x03\x04|\xd0\xcf\x11\xe0", workbook, again="save it again as xlsx, or as CSV"),
 )
 #: File name endings of recordings.
 RECORDINGS = tuple(ending for one in _FORMATS for ending in one.endings)
