@@ -9,7 +9,7 @@ import click
 
 from bushfit.cli.options import FILE, command_called, direction_option, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.shared_options import grid_options, grid_values
+from bushfit.cli.shared_options import Grid, grid_options
 from bushfit.errors import error_location, quote_path
 from bushfit.progress import track
 
@@ -48,7 +48,7 @@ def command(
     directions: tuple[str, ...],
     preload: str | None,
     output: Output,
-    **grids: str | None,
+    **grids: Grid | None,
 ) -> None:
     """Compare results with A, the reference: differences in parameters, stiffness and loss factor.
 
@@ -68,8 +68,9 @@ def command(
         raise click.UsageError(f"2 to {MOST} results are needed, or one campaign with '--families' after it.")
     if families is not None and len(sources) > 1:
         raise click.UsageError("'--families' takes one campaign.")
-    words = option_words(families=families, direction=directions, preload=preload, **grids)
-    settings: dict[str, Any] = {**grid_values(directions, grids), "preload": preload}
+    texts = {key: grid.text if grid else None for key, grid in grids.items()}
+    words = option_words(families=families, direction=directions, preload=preload, **texts)
+    settings: dict[str, Any] = {**grids, "directions": directions, "preload": preload}
     settings["command"] = command_line("compare", *map(str, sources), *words)
     if families is not None:
         names = () if families == _ALL else tuple(name.replace(" ", "") for name in families.split(","))

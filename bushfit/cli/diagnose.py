@@ -12,9 +12,8 @@ from rich.markup import escape
 from bushfit.cli.options import command_called, file_option, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.printing import print_parameters, print_validations
-from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign
-from bushfit.errors import BushfitError, error_location
-from bushfit.units import number, parse_quantity
+from bushfit.cli.shared_options import campaign_options, exit_above, open_campaign, quantity
+from bushfit.units import number
 
 if TYPE_CHECKING:
     from bushfit.campaign.schema import Loss
@@ -43,6 +42,7 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
         "--tolerance",
         "SHARE",
         "Ignore differences between tests and model below this share of the stiffness [1 %].",
+        type=quantity("1", "0 % to 100 %", lambda share: 0.0 <= share <= 1.0),
         default="1 %",
     ),
     file_option("--model", "Start from the model in this model.json [the paper's model]."),
@@ -52,7 +52,6 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 def command(
     campaigns: tuple[Path, ...],
     model: Path | None,
-    tolerance: str,
     loss: Loss | None,
     max_nrmse: float | None,
     output: Output,
@@ -74,17 +73,13 @@ def command(
     from bushfit.effects.mistakes import get_candidate
 
     start = load_model(model) if model else None
-    with error_location(place="--tolerance"):
-        share = parse_quantity(tolerance, "1")
-        if not 0.0 <= share <= 1.0:
-            raise BushfitError("this is not a share of |K|", found=f'"{tolerance}"', expected="0 % to 100 %")
     campaign = open_campaign(campaigns)
     for name in (*settings["adopt"], *settings["without"]):
         get_candidate(name)
     folder = output.folder(campaign.name, "diagnosis.json", "model.json")
     data = prepare_tests(campaign, loss)
     output.warn(data.notes)
-    diagnosed = diagnose(data, model=start, tolerance=share, **settings)
+    diagnosed = diagnose(data, model=start, **settings)
     print_diagnosis(output, diagnosed)
     inputs = [*input_files(campaign), *([model] if model else [])]
     output.write(folder, diagnosed.files, diagnosed.document, inputs)

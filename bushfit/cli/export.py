@@ -1,26 +1,38 @@
 """`bushfit export`: model -> files of solvers, multibody codes and spreadsheets."""
 
+from __future__ import annotations
+
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
 from bushfit.cli.options import FILE, command_called, flag, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.shared_options import (
-    displacement_rates,
-    grid_values,
-    parse_positive,
-    parse_temperature,
-    prediction_options,
-    static_rate_option,
-)
+from bushfit.cli.shared_options import prediction_options, quantity, static_rate_option
+
+if TYPE_CHECKING:
+    from bushfit.export.contract import UnitSystem
 
 #: File of each format, or dialect, that must not exist yet; an FMU is named after the bushing.
 _FILES = {
     **{"nastran": "bushing.bdf", "optistruct": "bushing.fem", "abaqus": "bushing.inp", "adams": "bushing_car.bus"},
     **{"prony": "prony.csv", "csv": "parameters.csv", "xlsx": "bushing.xlsx"},
 }
+
+
+def parse_units(text: str) -> UnitSystem:
+    """Parse --units, such as "mm t s N"."""
+    from bushfit.export.contract import UnitSystem
+
+    return UnitSystem.parse(text)
+
+
+def parse_cardanic(text: str) -> complex:
+    """Parse --cardanic, such as "60 N m/rad, 0.1" (stiffness, loss factor), to a complex stiffness [N m/rad]."""
+    stiffness, separator, loss = text.partition(",")
+    real = quantity("N*m/rad")(stiffness)
+    return complex(real, real * quantity("1")(f"{loss} -") if separator else 0.0)
 
 
 @command_called(
@@ -43,6 +55,7 @@ _FILES = {
         "--units",
         "UNITS",
         'Units of length, mass, time and force in the files, such as "m kg s N" [solver files: "mm t s N"].',
+        type=parse_units,
     ),
     option(
         "--dialect",
@@ -55,9 +68,16 @@ _FILES = {
         "--cardanic",
         "CONSTANTS",
         'Stiffness and loss factor for rotation about x and y in solver files, such as "60 N m/rad, 0.1" [0].',
+        type=parse_cardanic,
     ),
     static_rate_option("Rate of the static curves for Adams"),
-    option("--accuracy", "ERROR", "Largest permitted error of the modulus in an FMU or prony [1 %].", default="1 %"),
+    option(
+        "--accuracy",
+        "ERROR",
+        "Largest permitted error of the modulus in an FMU or prony [1 %].",
+        type=quantity("1"),
+        default="1 %",
+    ),
 )
 @prediction_options("Use the frequencies and amplitudes of this campaign.")
 @with_output("results/<name>/export", "tables")
@@ -65,16 +85,9 @@ def command(
     model: Path,
     formats: tuple[str, ...],
     campaign: Path | None,
-    directions: tuple[str, ...],
-    temperature: str | None,
-    units: str | None,
     dialect: Literal["optistruct"] | None,
-    time_domain: bool,
-    cardanic: str | None,
-    static_rate: str | None,
-    accuracy: str,
     output: Output,
-    **grids: str | None,
+    **settings: Any,
 ) -> None:
     """Write a fitted model for other programs: a solver, a multibody code, a spreadsheet.
 
@@ -89,26 +102,12 @@ def command(
     from bushfit.commands.export import export
     from bushfit.commands.loading import load_model, model_file, model_source
     from bushfit.commands.provenance import input_files
-    from bushfit.errors import error_location
-    from bushfit.export.contract import UnitSystem
 
     result, loaded = load_model(model), load_campaign(campaign) if campaign else None
-    settings: dict[str, Any] = grid_values(directions, grids)
     if dialect and "nastran" not in formats:
         raise click.UsageError("'--dialect' requires '--format nastran'.")
-    with error_location(place="--units"):
-        settings["units"] = UnitSystem.parse(units) if units is not None else None
-    settings["temperature"] = parse_temperature(temperature)
-    if time_domain and "abaqus" not in formats:
+    if settings["time_domain"] and "abaqus" not in formats:
         raise click.UsageError("'--time-domain' requires '--format abaqus'.")
-    settings["time_domain"] = time_domain
-    if cardanic is not None:
-        stiffness, separator, loss = cardanic.partition(",")
-        real = parse_positive(stiffness, "--cardanic", "N*m/rad") or 0.0
-        loss_factor = parse_positive(f"{loss} -", "--cardanic", "1") or 0.0 if separator else 0.0
-        settings["cardanic"] = complex(real, real * loss_factor)
-    settings["static_rates"] = displacement_rates(static_rate)
-    settings["accuracy"] = parse_positive(accuracy, "--accuracy", "1")
     comma = output.formats.table_form == "decimal-comma"
     names, file = tuple(dict.fromkeys(formats)), model_file(model)
     written = [_FILES[dialect or name if name == "nastran" else name] for name in names if name in _FILES]

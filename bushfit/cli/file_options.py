@@ -1,5 +1,6 @@
 """Options of the commands on test files for metadata that the files do not contain, and errors that name them."""
 
+import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -100,7 +101,7 @@ def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tes
     )
     return lambda function: add_parameters(
         function,
-        click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=_refuse_models),
+        click.argument("files", metavar="FILE...", nargs=-1, required=True, type=FILE, callback=require_tests),
         option_group(f"{heading}s", *information, record=record),
         file_format,
     )
@@ -132,13 +133,18 @@ def _metadata_option(key: str, metavar: str, words: str | None = None) -> Parame
     return option(option_name(key), metavar, words, type=TYPES.get(key))
 
 
-def _refuse_models(context: click.Context, _: click.Parameter, files: tuple[Path, ...]) -> tuple[Path, ...]:
-    """Callback of the argument `files`: raise a MeasurementError if a file is a campaign or a model."""
+def require_tests(context: click.Context, _: click.Parameter, value: Any) -> Any:
+    """Callback of an argument of one or more test files: raise a MeasurementError if one is missing or no test file."""
+    from bushfit.reading.files import view_bytes
+
+    files: Sequence[Path] = value if isinstance(value, tuple) else [value]
     for file in () if context.resilient_parsing else files:  # no error during shell completion
+        if not os.path.exists(file):  # noqa: PTH110  # Path.exists raises an error for a name that is too long
+            view_bytes(file, MeasurementError)
         if (found := _NO_TESTS.get(file.suffix.lower())) and file.is_file():
             hint = "bushfit diagnose looks at all tests of a campaign together; name its files, or their folder, here"
             raise MeasurementError("a test file is needed", file=file, found=found, expected="a table", hint=hint)
-    return files
+    return value
 
 
 @contextmanager

@@ -92,6 +92,7 @@ def command(
     -o my_bushing.toml; for several parts, a campaign each and batch.toml.
     """
     from bushfit.geometry import Specimen
+    from bushfit.inspection.gathering import gather
     from bushfit.inspection.record import campaign_text, campaigns_of_parts, with_specimens_named
 
     at_terminal = sys.stdin is not None and sys.stdin.isatty()
@@ -105,9 +106,10 @@ def command(
         folder, target = output.output.parent, output.output.name
     size = partial(make_bushing, name)
     bushing = questions.complete(sizes, size) if any(sizes.values()) else None
+    sources, left_out = gather(files, test_options)
     check_free(folder, [target], overwrite=output.force)
-    inspections, left_out = inspect_files(files, test_options, questions, is_sized=bushing is not None)
-    inspections = with_specimens_named(inspections)
+    inspections, histories = inspect_sources(sources, questions, is_sized=bushing is not None)
+    inspections, sentences = with_specimens_named(inspections), [*left_out, *histories]
     if bushing is None and not all(isinstance(inspection.direction, Specimen) for inspection in inspections):
         bushing = questions.complete(sizes, size)
     table = bushing and bushing[1]
@@ -131,12 +133,12 @@ def command(
     for sentence, count in Counter(inspection.assumed for inspection in inspections).items():
         if sentence:
             output.print(f"{count} test{'s' * (count > 1)}: {sentence}")
-    for sentence in left_out:
+    for sentence in sentences:
         output.print(f"left out: {sentence}")
     document: InspectionDocument = {
         "campaign": written[target],
         "files": [inspection.to_document() for inspection in inspections],
-        "left_out": left_out,
+        "left_out": sentences,
     }
     results = [ResultFile(file, "raw", text.encode()) for file, text in written.items()]
     output.write(folder, results, document, files)
@@ -161,58 +163,51 @@ def make_bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, d
     from bushfit.campaign.bodies import BushingSettings
     from bushfit.validation import validate_tables
 
-    table, halved = dict[str, str](), list[str]()
+    stated = {key: text for key, text in sizes.items() if text is not None}
+    for key, text in stated.items():
+        with error_location(place=option_name(key)):
+            parse_quantity(text, "m")
     for side in _SIDES:
-        radius, diameter = sizes[f"{side}_radius"], sizes[f"{side}_diameter"]
-        options = f"--{side}-radius", f"--{side}-diameter"
-        if radius is not None and diameter is not None:
-            raise click.UsageError(f"'{options[0]}' and '{options[1]}' state the same size; give one of them.")
-        if radius is None and diameter is None:
-            hint = f'state it: {options[1]} "20 mm", or {options[0]} "10 mm"'
+        radius, diameter = f"--{side}-radius", f"--{side}-diameter"
+        given = {f"{side}_radius", f"{side}_diameter"} & stated.keys()
+        if len(given) > 1:
+            raise click.UsageError(f"'{radius}' and '{diameter}' state the same size; give one of them.")
+        if not given:
+            hint = f'state it: {diameter} "20 mm", or {radius} "10 mm"'
             raise CampaignError(f"the {side} size of the rubber is not stated", hint=hint)
-        if diameter is not None:
-            halved.append(f"{side}_radius")
-            with error_location(place=options[1]):
-                radius = f"{1e3 * parse_quantity(diameter, 'm') / 2.0:.12g} mm"
-        table[f"{side}_radius"] = radius or ""
-    if (length := sizes["length"]) is None:
+    if "length" not in stated:
         raise CampaignError("the length of the rubber is not stated", hint='state it: --length "34 mm"')
-    table["length"] = length
     try:
-        bushing = validate_tables({"name": name, **table}, None, BushingSettings).to_bushing()
+        bushing = validate_tables({"name": name, **stated}, None, BushingSettings).to_bushing()
     except BushfitError as error:
-        error.file, keys = None, (error.place or "").split(", ")
-        names = [key.replace("radius", "diameter") if key in halved else key for key in keys]
-        error.place = ", ".join(map(option_name, names)) if error.place else None
-        if set(keys) & set(halved):
+        keys = (error.place or "").split(", ")
+        names = [key if key in stated else key.replace("radius", "diameter") for key in keys]
+        error.file, error.place = None, ", ".join(map(option_name, names)) if error.place else None
+        if names != keys:
             error.hint = "a diameter is halved; check that inner and outer are not swapped"
         raise
-    return bushing, table | ({"shape": "calibrated"} if bushing.correction is not None else {})
+    return bushing, stated | ({"shape": "calibrated"} if bushing.correction is not None else {})
 
 
-def inspect_files(
-    files: Sequence[Path], test_options: Mapping[str, Any], questions: Questions, *, is_sized: bool
+def inspect_sources(
+    sources: Sequence[TestSource], questions: Questions, *, is_sized: bool
 ) -> tuple[list[Inspection], list[str]]:
-    """Read the loops and sweeps among files, and determine the direction or specimen of each.
+    """Read loops and sweeps from files, and determine the direction or specimen of each.
 
     Args:
-        files: files and folders.
-        test_options: metadata from the command line, for all tests.
+        sources: files, and sheets of workbooks, with what the user states on their tests.
         questions: asks for missing options at a terminal.
         is_sized: True if sizes of a bushing are given: a file that names a direction is then a test of the bushing, not
             of a block in shear.
 
     Returns:
-        The inspections, and a sentence on each file that is left out.
+        The inspections, and a sentence on each file that is left out, such as a raw history in a folder.
     """
-    from bushfit.inspection.gathering import gather
-
-    sources, left_out = gather(files, test_options)
     keys = [(source.file.resolve(), str(source.test_options)) for source in sources]
     if twice := [source for source, key in zip(sources, keys, strict=True) if keys.count(key) > 1]:
         raise CampaignError("a file is given twice", found=str(twice[0]), expected="each file once")
     inspections: list[Inspection] = []
-    sentences = list(left_out)
+    sentences: list[str] = []
     for source in sources if questions.enabled else track("tests looked at", sources):
         look = partial(inspect_source, source, is_sized=is_sized, is_asking=questions.enabled)
         try:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import click
 
+from bushfit.errors import error_location
+
 #: Names of the directions of a bushing test; copied from `geometry`, which is slow to import.
 DIRECTIONS = ("axial", "radial", "torsion")
 Function = Callable[..., Any]
@@ -32,6 +34,11 @@ class Option(click.Option):
     def get_help_extra(self, ctx: click.Context) -> Any:
         """Texts that click appends to the help text of the option: none, since the text states the default."""
         return {}
+
+    def type_cast_value(self, ctx: click.Context, value: Any) -> Any:
+        """Convert the text of the option by its type; errors name the option."""
+        with error_location(place=self.opts[0]):
+            return super().type_cast_value(ctx, value)
 
 
 def option(names: str, metavar: str | None, words: str | None = None, **more: Any) -> Parameter:

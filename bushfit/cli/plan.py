@@ -12,7 +12,7 @@ import click
 
 from bushfit.cli.options import FILE, Size, command_called, direction_option, file_option, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.shared_options import grid_options, grid_values, parse_positive
+from bushfit.cli.shared_options import Grid, grid_options, quantity
 from bushfit.errors import error_location
 from bushfit.units import display_unit, number
 
@@ -26,6 +26,14 @@ _MOST_HOURS = 2000.0
 _MOST_EFFECTS = 6
 #: Maximum number of amplitudes or frequencies of a test that are all printed.
 _MOST_VALUES = 6
+
+
+def parse_target(text: str) -> tuple[str, float]:
+    """Parse a target such as "stiffness.axial=1 %" into its name and its relative size (0.01)."""
+    name, equals, size = text.rpartition("=")
+    if not equals:
+        raise click.BadParameter(f"'{text}' is not NAME=SIZE, such as \"mu=2 %\".", param_hint="'--target'")
+    return name.strip(), quantity("1")(size.strip())
 
 
 @command_called("plan", "configs/arm_bushing.toml --hours 4", 'configs/new_bushing.toml --target "stiffness=1 %"')
@@ -54,6 +62,7 @@ _MOST_VALUES = 6
         "--target targets",
         "NAME=SIZE",
         'Accuracy to reach, as half the width of the 95 % interval: "mu=2 %", "stiffness=1 %"; may be given again.',
+        type=parse_target,
         multiple=True,
     ),
     option("--parameters", "NAME,...", "With --for parameters: the parameters to determine [all]."),
@@ -76,10 +85,10 @@ def command(
     directions: tuple[str, ...],
     parameters: str | None,
     rivals: str | None,
-    targets: tuple[str, ...],
+    targets: tuple[tuple[str, float], ...],
     campaign: Path | None,
     output: Output,
-    **grids: str | None,
+    **grids: Grid | None,
 ) -> None:
     """Select the most informative next tests within the limits of the rig.
 
@@ -101,13 +110,13 @@ def command(
         raise click.UsageError("'--target' cannot be combined with '--for', '--parameters' and '--rivals'.")
     implied = "targets" if targets else "rivals" if rivals else "parameters" if parameters else "predictions"
     settings: dict[str, Any] = {
-        **grid_values((), grids),
+        **grids,
         "aim": aim or implied,
         "hours": hours,
         "test_directions": directions,
         "parameters": _names(parameters),
         "rivals": _names(rivals),
-        "targets": dict(map(_target, targets)),
+        "targets": dict(targets),
     }
     opened, settings_campaign = load_source(source), load_campaign(campaign) if campaign else None
     if settings_campaign and isinstance(opened, Campaign):
@@ -127,14 +136,6 @@ def command(
 def _names(text: str | None) -> tuple[str, ...]:
     """Split a comma-separated text into names without duplicates."""
     return tuple(dict.fromkeys(filter(None, (name.strip() for name in (text or "").split(",")))))
-
-
-def _target(text: str) -> tuple[str, float]:
-    """Parse a target such as "stiffness.axial=1 %" into its name and its relative size (0.01)."""
-    name, equals, size = text.rpartition("=")
-    if not equals:
-        raise click.BadParameter(f"'{text}' is not NAME=SIZE, such as \"mu=2 %\".", param_hint="'--target'")
-    return name.strip(), parse_positive(size.strip(), "--target", "1") or 0.0
 
 
 def _print_plan(output: Output, outcome: PlanOutput) -> None:

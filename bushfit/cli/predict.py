@@ -10,16 +10,7 @@ import click
 from bushfit.cli.options import FILE, command_called, flag, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.printing import print_tests
-from bushfit.cli.shared_options import (
-    displacement_rates,
-    displacement_unit,
-    grid_values,
-    parse_positive,
-    parse_temperature,
-    prediction_options,
-    static_rate_option,
-)
-from bushfit.errors import error_location
+from bushfit.cli.shared_options import displacement_unit, prediction_options, quantity, static_rate_option
 
 if TYPE_CHECKING:
     from bushfit.commands.predicted import PredictionOutput
@@ -32,13 +23,25 @@ if TYPE_CHECKING:
 _MOST_AMPLITUDES = 8
 
 
+def parse_motion(text: str) -> LargeMotion:
+    """Parse --over: a slow sine ("2 Hz 3 mm") or offset ("3 mm") under the predicted vibration."""
+    from bushfit.prediction.superposed import LargeMotion
+    from bushfit.units import parse_quantity
+
+    frequency, hertz, size = (part.strip(" ,;") for part in text.rpartition("Hz"))
+    unit = displacement_unit(size)
+    if not hertz:
+        return LargeMotion(parse_quantity(size, unit), unit)
+    return LargeMotion(quantity(unit)(size), unit, quantity("Hz")(f"{frequency} Hz"))
+
+
 @command_called("predict", 'data/arm_bushing/truth.json --frequencies "10:100:10 Hz" --amplitudes "0.1, 0.5 mm"')
 @click.argument("model", metavar="MODEL", type=FILE)
 @prediction_options("Use the frequencies and amplitudes of this campaign, and show its measured sweeps.")
 @option_group(
     "Further predictions",
     option(
-        "--preload",
+        "--preload preloads",
         "LOAD",
         'Predict at this preload, "500 N" or "1.5 mm", between the tested preloads; may be given again [none].',
         multiple=True,
@@ -49,12 +52,13 @@ _MOST_AMPLITUDES = 8
         "Predict this bushing: the name of one of several fitted bushings, or a TOML file with the [bushing] table of "
         "another bushing of the same compound.",
     ),
-    option("--mass", "MASS"),
+    option("--mass", "MASS", type=quantity("kg")),
     option(
         "--base-acceleration",
         "ACCELERATION",
         'Also predict the resonance of this mass, such as "1.2 kg", on the bushing. The base of the bushing '
         'vibrates with this acceleration, such as "0.1 g".',
+        type=quantity("m/s^2"),
     ),
     flag("--static", "Also write the static curve: force over displacement in a slow motion, and its slope."),
     static_rate_option("Rate of this motion"),
@@ -62,6 +66,7 @@ _MOST_AMPLITUDES = 8
         "--over",
         "MOTION",
         'Predict a small vibration on a slow large motion, such as "0.5 Hz 1 mm", or on an offset, such as "1 mm".',
+        type=parse_motion,
     ),
     flag("--wide", "Also write tables with one column per amplitude, without bands."),
     option(
@@ -70,6 +75,7 @@ _MOST_AMPLITUDES = 8
         "Also write Maxwell arms (a Prony series) that represent the springpot within this error [1 %].",
         is_flag=False,
         flag_value="1 %",
+        type=quantity("1"),
     ),
 )
 @with_output("results/<name>/predict", "tables", "pictures")
@@ -77,18 +83,10 @@ def command(
     model: Path,
     campaign: Path | None,
     bushing: str | None,
-    directions: tuple[str, ...],
-    temperature: str | None,
-    preload: tuple[str, ...],
-    mass: str | None,
-    base_acceleration: str | None,
-    static: bool,
-    static_rate: str | None,
-    over: str | None,
-    wide: bool,
-    arms: str | None,
+    mass: float | None,
+    base_acceleration: float | None,
     output: Output,
-    **grids: str | None,
+    **settings: Any,
 ) -> None:
     """Predict dynamic stiffness and loss factor over frequency and amplitude, with 95 % bands.
 
@@ -104,32 +102,22 @@ def command(
     result, loaded = load_model(model), load_campaign(campaign) if campaign else None
     if (mass is None) != (base_acceleration is None):
         raise click.UsageError("'--mass' and '--base-acceleration' go together.")
-    settings: dict[str, Any] = {
-        **grid_values(directions, grids),
-        "temperature": parse_temperature(temperature),
-        "preloads": preload,
-        "bushing": None if bushing is None else _bushing_of(result, bushing),
-        "mass": parse_positive(mass, "--mass", "kg"),
-        "base_acceleration": parse_positive(base_acceleration, "--base-acceleration", "m/s^2"),
-        "arms": parse_positive(arms, "--arms", "1"),
-        "static": static,
-        "static_rates": displacement_rates(static_rate),
-        "over": _large_motion(over),
-    }
-    predicted = predict(result, loaded, wide=wide, **settings)
+    other = None if bushing is None else _bushing_of(result, bushing)
+    predicted = predict(result, loaded, bushing=other, mass=mass, base_acceleration=base_acceleration, **settings)
     _print_summary(output, predicted)
     print_predictions(output, predicted)
     for resonance in predicted.resonances:
         frequency, largest = resonance.peak
         peak = f"resonance at {frequency:.4g} Hz, |T| {largest:.3g}"
-        output.print(f"{resonance.place} with a mass of {mass}, base acceleration {base_acceleration}: {peak}")
+        shaken = f"{resonance.mass:.4g} kg, base acceleration {resonance.base_acceleration:.4g} m/s^2"
+        output.print(f"{resonance.place} with a mass of {shaken}: {peak}")
     for curve in predicted.static:
         _print_static(output, curve)
     for part in predicted.arms:
         output.print(part.sentence)
     print_tests(output, predicted.tests, predicted.usable)
     inputs = [model_file(model), *(input_files(loaded) if loaded else [])]
-    if bushing and not isinstance(settings["bushing"], str):
+    if bushing and not isinstance(other, str):
         inputs.append(Path(bushing))
     folder = output.folder((loaded or predicted.result).name)
     output.write(folder, predicted.files, predicted.document, inputs)
@@ -170,22 +158,6 @@ def _print_summary(output: Output, predicted: PredictionOutput) -> None:
             f"{format_range(force.name, stiffness.min(), stiffness.max())}, loss factor "
             f"{format_range('', loss.min(), loss.max()).strip()}, {format_range('Hz', *prediction.frequency[[0, -1]])}"
         )
-
-
-def _large_motion(text: str | None) -> LargeMotion | None:
-    """Parse --over: a slow sine ("2 Hz 3 mm") or offset ("3 mm") under the predicted vibration; None if not given."""
-    from bushfit.prediction.superposed import LargeMotion
-    from bushfit.units import parse_quantity
-
-    if text is None:
-        return None
-    frequency, hertz, size = text.rpartition("Hz")
-    unit = displacement_unit(size.strip(" ,;"))
-    with error_location(place="--over"):
-        if not hertz:
-            return LargeMotion(parse_quantity(size, unit), unit)
-    slow = parse_positive(frequency + hertz, "--over", "Hz")
-    return LargeMotion(parse_positive(size.strip(" ,;"), "--over", unit) or 0.0, unit, slow or 0.0)
 
 
 def _print_static(output: Output, curve: StaticCurve) -> None:

@@ -14,8 +14,8 @@ import click
 from bushfit.cli.file_options import direction_error, metadata_options, options_named
 from bushfit.cli.options import command_called, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.shared_options import parse_grid, parse_positive
-from bushfit.errors import BushfitError, MeasurementError
+from bushfit.cli.shared_options import grid, quantity
+from bushfit.errors import BushfitError, MeasurementError, error_location
 from bushfit.report import plots
 from bushfit.report.results import ResultFile
 from bushfit.units import format_aligned, number
@@ -47,17 +47,19 @@ _DISPLAYED = ("displacement", "stiffness")
 )
 @option_group(
     "Resonance test",
-    option("--mass", "MASS", 'Mass that the mount carries on the shaker, such as "0.5 kg".'),
+    option("--mass", "MASS", 'Mass that the mount carries on the shaker, such as "0.5 kg".', type=quantity("kg")),
     option(
         "--mass-added",
         "MASS",
         'Further mass that moves with it, such as "15 g" of accelerometer and cable; added to --mass.',
+        type=quantity("kg"),
     ),
     option("--specimen", "NAME", "Name of the tested specimen, if the test is not of a bushing."),
     option(
         "--base-acceleration",
         "ACCELERATION",
         'Acceleration amplitude of the base, such as "0.1 g", if no column states it.',
+        type=quantity("m/s^2"),
     ),
 )
 @with_output("results/<first file>", "tables", "pictures")
@@ -67,7 +69,7 @@ def command(
     levels: str | None,
     cycles: int,
     output: Output,
-    **shaker: str | None,
+    **shaker: Any,
 ) -> None:
     """Reduce raw stepped-sine histories or a resonance test to a sweep.
 
@@ -95,7 +97,8 @@ def command(
         histories = _read(files, test_options)
         body, direction = "direction", histories[0].direction
         name = str(direction)
-        nominal_levels = parse_grid(levels, "--levels", direction.motion.displacement_unit) or ()
+        with error_location(place="--levels"):
+            nominal_levels = grid(direction.motion.displacement_unit)(levels) if levels else ()
         reduction = reduce(histories, fewest_cycles=cycles, levels=nominal_levels)
         points, warnings = reduced_table(reduction), reduction.warnings
         records = histories[0].name if len(histories) == 1 else f"{len(histories)} histories"
@@ -111,13 +114,13 @@ def command(
     output.print(f"for a campaign in {folder} (in another folder, add the path):\n\n{snippet}")
 
 
-def _resonance_table(file: Path, test_options: Mapping[str, Any], shaker: Mapping[str, str | None]) -> Table | None:
+def _resonance_table(file: Path, test_options: Mapping[str, Any], shaker: Mapping[str, Any]) -> Table | None:
     """Open a test file as a resonance test; None for other files, unless an option such as the mass states this kind.
 
     Args:
         file: test file.
         test_options: metadata from the command line.
-        shaker: texts of the options of a resonance test, such as the mass.
+        shaker: options of a resonance test by key: masses [kg], base acceleration [m/s^2], specimen; None if not given.
     """
     from bushfit.inspection.recognition import open_table
     from bushfit.reading.resonance import RESONANCE_COLUMNS, is_resonance
@@ -137,7 +140,7 @@ def _reduce_resonance(
     files: Sequence[Path],
     table: Table,
     test_options: Mapping[str, Any],
-    shaker: Mapping[str, str | None],
+    shaker: Mapping[str, Any],
     levels: str | None,
 ) -> tuple[Resonance, str, str]:
     """Reduce a resonance test to a sweep.
@@ -146,7 +149,7 @@ def _reduce_resonance(
         files: the test file; more than one is an error.
         table: table of the file.
         test_options: metadata from the command line.
-        shaker: texts of the options of a resonance test, such as the mass.
+        shaker: options of a resonance test by key: masses [kg], base acceleration [m/s^2], specimen; None if not given.
         levels: text of the option --levels, which is an error here; None if it is not given.
 
     Returns:
@@ -174,7 +177,7 @@ def _reduce_resonance(
         raise MeasurementError(
             "a mass resists no rotation", file=table.file, found=str(direction), expected="a translation"
         )
-    if (mass := parse_positive(shaker["mass"], "--mass", "kg")) is None:
+    if (mass := shaker["mass"]) is None:
         raise MeasurementError(
             "this is a resonance test, and its mass is not stated",
             file=table.file,
@@ -183,11 +186,10 @@ def _reduce_resonance(
             expected="the mass that moves on the mount",
             hint='state it: --mass "0.5 kg"',
         )
-    mass += parse_positive(shaker["mass_added"], "--mass-added", "kg") or 0.0
-    base_acceleration = parse_positive(shaker["base_acceleration"], "--base-acceleration", "m/s^2")
+    mass += shaker["mass_added"] or 0.0
     read_as = direction or Direction.AXIAL  # which translation it is makes no difference to reading
     with options_named():
-        resonance = reduce_resonance(read_resonance(table, read_as, base_acceleration), mass)
+        resonance = reduce_resonance(read_resonance(table, read_as, shaker["base_acceleration"]), mass)
     return (resonance, "specimen", specimen) if specimen else (resonance, "direction", str(direction))
 
 

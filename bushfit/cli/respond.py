@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.file_options import metadata_options, options_named
+from bushfit.cli.file_options import metadata_options, options_named, require_tests
 from bushfit.cli.options import FILE, command_called, direction_option, flag, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.shared_options import TEMPERATURE, parse_positive, parse_temperature
-from bushfit.errors import MeasurementError
+from bushfit.cli.shared_options import TEMPERATURE, quantity
 
 if TYPE_CHECKING:
     from bushfit.commands.respond import ResponseOutput
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 
 @command_called("respond", "data/arm_bushing/truth.json data/road/axial_radial.csv")
 @click.argument("model", metavar="MODEL", type=FILE)
-@click.argument("history", metavar="HISTORY", type=FILE)
+@click.argument("history", metavar="HISTORY", type=FILE, callback=require_tests)
 @option_group(
     "Motion and conditions",
     direction_option("Direction of the motion (axial, radial, torsion) or specimen [from headers or the file name]."),
@@ -31,6 +30,7 @@ if TYPE_CHECKING:
         "FREQUENCY",
         'Remove the noise of the displacement above this frequency, such as "200 Hz"; friction would turn the '
         "noise into force [no filter].",
+        type=quantity("Hz"),
     ),
     TEMPERATURE,
 )
@@ -40,11 +40,9 @@ def command(
     model: Path,
     history: Path,
     directions: tuple[str, ...],
-    steady: bool,
-    lowpass: str | None,
-    temperature: str | None,
     test_options: Mapping[str, Any],
     output: Output,
+    **settings: Any,
 ) -> None:
     """Predict the force over time for a displacement history, with its 95 % band.
 
@@ -56,7 +54,6 @@ def command(
     """
     from bushfit.commands.loading import load_model, model_file
     from bushfit.commands.respond import respond
-    from bushfit.reading.files import view_bytes
     from bushfit.reading.layout import FileFormat
 
     if len(directions) > 1:
@@ -64,8 +61,6 @@ def command(
             "'--direction' takes one direction; a file with several directions states them in its headers."
         )
     result = load_model(model)
-    if not history.exists():
-        view_bytes(history, MeasurementError)
     folder = output.folder(result.name, output.formats.table("response"))
     file_format = FileFormat(**{key.name: test_options.get(key.name) for key in fields(FileFormat)})
     with options_named():
@@ -76,9 +71,7 @@ def command(
             columns=test_options.get("columns"),
             units=test_options.get("units"),
             file_format=file_format,
-            steady=steady,
-            lowpass=parse_positive(lowpass, "--lowpass", "Hz"),
-            temperature=parse_temperature(temperature),
+            **settings,
         )
     print_response(output, response)
     output.write(folder, response.files, response.document, [model_file(model), history])

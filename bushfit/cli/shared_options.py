@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -18,23 +18,20 @@ from bushfit.cli.options import (
     file_option,
     option,
     option_group,
-    option_name,
 )
-from bushfit.errors import UnitError, error_location
-from bushfit.units import is_compatible, parse_quantity, regular_steps
+from bushfit.errors import UnitError
+from bushfit.units import is_compatible, parse_quantity, parse_temperature, regular_steps
 
 if TYPE_CHECKING:
     from bushfit.campaign.campaign import Campaign
     from bushfit.model.result import Result
-
-#: SI units of the grid options, by key.
-_UNITS = {"frequencies": "Hz", "amplitudes": "m", "torsion_amplitudes": "rad", "strain_amplitudes": "1"}
 
 #: Option of commands that predict from a model.
 TEMPERATURE = option(
     "--temperature",
     "TEMP",
     'Temperature, such as "40 degC", if the model was fitted with --effect temperature [23 degC].',
+    type=parse_temperature,
 )
 
 
@@ -94,21 +91,20 @@ def exit_above(max_nrmse: float | None, result: Result) -> None:
 
 def grid_options(default: str) -> Parameter:
     """Create the options for the frequencies and amplitudes of a prediction; `default` is the default in the help."""
-    return lambda function: add_parameters(
-        function,
-        option(
-            "--frequencies",
-            "GRID",
-            f'Frequencies as start:stop:step, "5:155:10 Hz", or as a list, "20, 50 Hz" [{default}].',
-        ),
-        option("--amplitudes", "GRID", f'Displacement amplitudes, zero-to-peak, such as "0.1, 0.5 mm" [{default}].'),
-        option(
-            "--torsion-amplitudes",
-            "GRID",
-            'Rotation amplitudes for --direction torsion, zero-to-peak ["0.5, 1, 2 deg"].',
-        ),
-        option("--strain-amplitudes", "GRID", 'Strain amplitudes for specimens tested by modulus (DMA) ["1, 2, 5 %"].'),
-    )
+    options = [
+        option(f"--{name}", "GRID", words, type=grid(unit))
+        for name, unit, words in (
+            ("frequencies", "Hz", f'Frequencies: start:stop:step, "5:155:10 Hz", or a list, "20, 50 Hz" [{default}].'),
+            ("amplitudes", "m", f'Displacement amplitudes, zero-to-peak, such as "0.1, 0.5 mm" [{default}].'),
+            (
+                "torsion-amplitudes",
+                "rad",
+                'Rotation amplitudes for --direction torsion, zero-to-peak ["0.5, 1, 2 deg"].',
+            ),
+            ("strain-amplitudes", "1", 'Strain amplitudes for specimens tested by modulus (DMA) ["1, 2, 5 %"].'),
+        )
+    ]
+    return lambda function: add_parameters(function, *options)
 
 
 def prediction_options(campaign: str) -> Parameter:
@@ -127,9 +123,8 @@ def prediction_options(campaign: str) -> Parameter:
 
 def static_rate_option(subject: str) -> Parameter:
     """Create the option --static-rate, the loading rate of static curves; its help text begins with `subject`."""
-    return option(
-        "--static-rate", "RATE", f'{subject}, such as "10 mm/min" [rate of the slowest loop, else 10 mm/min].'
-    )
+    words = f'{subject}, such as "10 mm/min" [rate of the slowest loop, else 10 mm/min].'
+    return option("--static-rate static_rates", "RATE", words, type=parse_rate)
 
 
 def displacement_unit(text: str, per: str = "") -> str:
@@ -138,62 +133,53 @@ def displacement_unit(text: str, per: str = "") -> str:
     return next((unit for unit in ("rad", "1") if is_compatible(suffix, unit + per)), "m")
 
 
-def displacement_rates(text: str | None) -> dict[str, float] | None:
-    """Parse the text of --static-rate to {SI unit of the displacement (m, rad, 1): rate in SI}; None without a text."""
-    unit = displacement_unit(text or "", "/s")
-    rate = parse_positive(text, "--static-rate", f"{unit}/s")
-    return None if rate is None else {unit: rate}
+def parse_rate(text: str) -> dict[str, float]:
+    """Parse a rate such as "10 mm/min" to {SI unit of the displacement (m, rad, 1): rate in SI}."""
+    unit = displacement_unit(text, "/s")
+    return {unit: quantity(f"{unit}/s")(text)}
 
 
-def grid_values(directions: Sequence[str], grids: Mapping[str, str | None]) -> dict[str, Any]:
-    """Convert grid options to keyword arguments: directions, frequencies and amplitudes [SI]; None for a default."""
-    axes = {key: parse_grid(grids[key], option_name(key), unit) for key, unit in _UNITS.items()}
-    return {"directions": tuple(directions) or None, **axes}
-
-
-def parse_positive(text: str | None, option: str, unit: str) -> float | None:
-    """Parse the value of an option to a positive number in SI units; None if the option was not given.
+def quantity(
+    unit: str, expected: str = "a value above zero", is_valid: Callable[[float], bool] = lambda value: value > 0.0
+) -> Callable[[str], float]:
+    """Make the parser of an option such as "0.5 kg", which is the type of the option.
 
     Args:
-        text: text of the option.
-        option: name of the option, for errors.
-        unit: SI unit of the result.
+        unit: SI unit of the value.
+        expected: permitted values, for the error.
+        is_valid: function that returns True for a permitted value in SI.
 
-    Raises:
-        UnitError: the text is not a value with a unit, or not positive.
+    Returns:
+        Function that returns the SI value of a text, and raises a UnitError for other texts and values.
     """
-    if text is None:
-        return None
-    with error_location(place=option):
+
+    def parse(text: str) -> float:
         value = parse_quantity(text, unit)
-        if not value > 0.0:
-            raise UnitError("this is not positive", found=f'"{text}"', expected="a value above zero")
-    return value
+        if not is_valid(value):
+            raise UnitError("impossible size", found=f'"{text}"', expected=expected)
+        return value
+
+    return parse
 
 
-def parse_temperature(text: str | None) -> float | None:
-    """Parse the text of --temperature, such as "40 degC", to kelvin; None if the option was not given."""
-    from bushfit.units import parse_temperature
+class Grid(tuple[float, ...]):
+    """Frequencies or amplitudes of an option in SI, with the `text` that stated them."""
 
-    with error_location(place="--temperature"):
-        return None if text is None else parse_temperature(text)
+    text: str
 
 
-def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | None:
-    """Parse a list "0.1, 0.2, 0.5 mm" or a range start:stop:step "5:155:10 Hz" to values in SI; None if not given.
+def grid(unit: str) -> Callable[[str], Grid]:
+    """Make the parser of an option with a list "0.1, 0.2, 0.5 mm" or a range start:stop:step "5:155:10 Hz".
 
     Args:
-        text: text of the option.
-        option: name of the option, for errors.
-        unit: SI unit of the result.
+        unit: SI unit of the values.
 
-    Raises:
-        UnitError: the text has no numbers, no unit, or a unit of another dimension.
+    Returns:
+        Function that returns the SI values of a text, and raises a UnitError if it has no numbers or no such unit.
     """
-    if text is None:
-        return None
-    expected = 'such as "5:155:10 Hz" (start:stop:step) or "0.1, 0.2, 0.5 mm", with one unit at the end'
-    with error_location(place=option):
+
+    def parse(text: str) -> Grid:
+        expected = 'such as "5:155:10 Hz" (start:stop:step) or "0.1, 0.2, 0.5 mm", with one unit at the end'
         if re.search(r"\d,\d", text):
             raise UnitError(
                 "a comma between two digits can separate numbers or be a decimal comma",
@@ -207,14 +193,14 @@ def parse_grid(text: str | None, option: str, unit: str) -> tuple[float, ...] | 
             hint = "write the step, too: start:stop:step" if is_span else None
             raise UnitError("these are not values with a unit", found=repr(text), expected=expected, hint=hint)
         is_range = ":" in parts[1]
-        values = tuple(
-            parse_quantity(f"{number} {parts[2]}", unit) for number in parts[1].split(":" if is_range else ",")
-        )
-        hint = "predict --static writes the static curve" if unit == "Hz" and values[0] == 0.0 else None
-        if is_range:
-            values = tuple(regular_steps(*values))
-            if not values:
-                raise UnitError("start:stop:step does not count upward", found=text, expected=expected, hint=hint)
-        elif min(values) <= 0.0:
+        stated = [parse_quantity(f"{number} {parts[2]}", unit) for number in parts[1].split(":" if is_range else ",")]
+        hint = "predict --static writes the static curve" if unit == "Hz" and stated[0] == 0.0 else None
+        values = Grid(regular_steps(*stated) if is_range else stated)
+        values.text = text
+        if not values:
+            raise UnitError("start:stop:step does not count upward", found=text, expected=expected, hint=hint)
+        if min(values) <= 0.0:
             raise UnitError("frequencies and amplitudes are above zero", found=text, expected=expected, hint=hint)
-    return values
+        return values
+
+    return parse

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.options import FILE, command_called, option, option_group, option_name
+from bushfit.cli.options import FILE, command_called, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.errors import ModelError, UnitError, error_location
+from bushfit.cli.shared_options import quantity
+from bushfit.errors import ModelError, error_location
 from bushfit.units import is_number, parse_quantity
 
 if TYPE_CHECKING:
@@ -32,19 +33,18 @@ if TYPE_CHECKING:
 )
 @option_group(
     "Noise and errors of the rig [from the campaign, else none]",
-    option("--noise", "SHARE", 'Random error of each sweep point, relative to the stiffness |K|, such as "0.5 %".'),
-    option("--force-noise", "SHARE", 'Noise of the force in loops, relative to half the force range, such as "0.3 %".'),
-    option(
-        "--displacement-noise",
-        "SHARE",
-        'Noise of the displacement in loops, relative to the amplitude, such as "0.02 %".',
+    *(
+        option(
+            f"--{name}", metavar, words, type=quantity(unit, "0 up to 100 %, or below 1 rad", lambda x: 0.0 <= x < 1.0)
+        )
+        for name, metavar, unit, words in (
+            ("noise", "SHARE", "1", 'Random error of each sweep point, relative to the stiffness |K|: "0.5 %".'),
+            ("force-noise", "SHARE", "1", 'Noise of the force in loops, relative to half its range: "0.3 %".'),
+            ("displacement-noise", "SHARE", "1", 'Noise of the displacement in loops, of the amplitude: "0.02 %".'),
+            ("gain-error", "SHARE", "1", 'Gain error of all points of a run (one repeat of one amplitude): "0.4 %".'),
+            ("phase-error", "ANGLE", "rad", 'Phase error of all points of a run, drawn for each run: "0.2 deg".'),
+        )
     ),
-    option(
-        "--gain-error",
-        "SHARE",
-        'Gain error shared by all points of a run (one repeat of one amplitude), such as "0.4 %".',
-    ),
-    option("--phase-error", "ANGLE", 'Phase error that all points of a run share, drawn for each run: "0.2 deg".'),
 )
 @with_output("results/<name>/simulate", "tables")
 def command(source: Path, effects: tuple[str, ...], output: Output, **settings: Any) -> None:
@@ -69,12 +69,6 @@ def command(source: Path, effects: tuple[str, ...], output: Output, **settings: 
         campaign = load_campaign(source)
         truth, tests = model_of(campaign), campaign.simulate or SimulateSettings()
     changes = {name: value for name, value in settings.items() if value is not None}
-    for name, value in changes.items():
-        if isinstance(value, str):
-            with error_location(place=option_name(name)):
-                changes[name] = parse_quantity(value, "rad" if name == "phase_error" else "1")
-                if not 0.0 <= changes[name] < 1.0:
-                    raise UnitError("impossible size", found=value, expected="0 up to 100 %, or below 1 rad")
     for text in effects:
         truth = _with_effect(truth, text)
     with error_location(source):

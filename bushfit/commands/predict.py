@@ -110,7 +110,7 @@ def predict(
     if len(preloads) > 1 and (wide or mass):
         problem = "wide tables and resonances require a single preload"
         raise ModelError(problem, found=", ".join(preloads), expected="one, or none")
-    if preloads and directions is None and result.measured:
+    if preloads and not directions and result.measured:
         directions = [tested.place for tested in result.measured.preloads] or None
     requested = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
     settings = grid_settings(requested, campaign)
@@ -225,8 +225,7 @@ def grid_of(directions: Sequence[str] | None, *axes: Numbers | None) -> PredictS
     frequencies, amplitudes, rotations, strains = (
         None if axis is None else tuple(float(value) for value in axis) for axis in axes
     )
-    places = None if directions is None else tuple(directions)
-    return PredictSettings(frequencies, amplitudes, rotations, places, strains)
+    return PredictSettings(frequencies, amplitudes, rotations, tuple(directions or ()) or None, strains)
 
 
 def _predictable_sweeps(result: Result, campaign: Campaign) -> list[MeasuredSweep]:
