@@ -1,17 +1,17 @@
 """compare: several results compared with the first, or model families on one campaign."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from string import ascii_uppercase
-from typing import Any
+from typing import Unpack
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import PredictSettings
 from bushfit.commands.families import COMPOUND, family_to_use, fit_campaign_families
 from bushfit.commands.fit import fit
 from bushfit.commands.loading import HasResult, as_result
-from bushfit.commands.predict import Numbers, grid_of, requested_preloads
+from bushfit.commands.predict import GridOptions, requested_preloads, requested_settings
 from bushfit.commands.predicted import table_columns
 from bushfit.diagnosis.families import FittedFamily
 from bushfit.errors import BushfitError, ModelError
@@ -23,7 +23,7 @@ from bushfit.prediction.caveats import warnings_of
 from bushfit.prediction.comparison import Comparison, with_holm
 from bushfit.prediction.comparison import compare as compare_two
 from bushfit.prediction.grid import common_grid, requested_grid
-from bushfit.reading.measurement import Source, Sweep
+from bushfit.reading.measurement import Sweep
 from bushfit.report import plots
 from bushfit.report.compare_document import SCHEMA, ComparedEntry, ComparisonFile, FamilyEntry
 from bushfit.report.compared import ComparisonDocument, contrast_table
@@ -34,8 +34,6 @@ from bushfit.version import __version__
 
 #: Maximum number of results, limited by the colours of a figure and the columns of a table.
 MOST = 8
-#: `asdict` for records whose type the type checker does not know.
-_plain: Callable[[Any], Any] = asdict
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,13 +95,9 @@ def compare(
     reference: Comparable,
     *others: Comparable,
     families: Sequence[str] | None = None,
-    directions: Sequence[str] | None = None,
-    frequencies: Numbers | None = None,
-    amplitudes: Numbers | None = None,
-    torsion_amplitudes: Numbers | None = None,
-    strain_amplitudes: Numbers | None = None,
     preload: str | None = None,
     command: str = "",
+    **grid: Unpack[GridOptions],
 ) -> ComparisonOutput:
     """Compare parameters and predicted stiffness of results with a reference, and test the differences for chance.
 
@@ -111,13 +105,10 @@ def compare(
         reference: result, output with a result, or campaign, which is fitted as by `fit`; also a `ComparedResult`.
         others: results, outputs or campaigns that are compared with the reference.
         families: model families to fit to a single campaign, such as "sliders" or "kraus+inertia"; () for all.
-        directions: directions or specimens; default those in which all results were fitted.
-        frequencies: frequencies [Hz]; by default, frequencies and amplitudes are those measured for all results.
-        amplitudes: zero-to-peak displacements [m].
-        torsion_amplitudes: zero-to-peak rotations [rad].
-        strain_amplitudes: zero-to-peak strains of specimens that give a modulus.
         preload: preload with its unit, such as "500 N", within the tested range of each result; default none.
         command: command line for the document.
+        grid: directions (default those in which all results were fitted), frequencies and amplitudes (default those
+            measured for all results), as of `predict`.
 
     Returns:
         Differences of parameters and of predicted stiffness from the reference, with tables, figure and page.
@@ -125,23 +116,23 @@ def compare(
     Raises:
         BushfitError: too few or too many results, or directions and points that one of them cannot predict.
     """
-    grid = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
+    settings, directions = requested_settings(grid), grid.get("directions") or ()
     if families is not None and isinstance(reference, Campaign) and not others:
-        fitted, results, notes = fit_campaign_families(reference, families, directions)
+        fitted, results, notes = fit_campaign_families(reference, families, directions or None)
         origin = str(reference.path), reference.sweeps, reference.sha256
         entries = [
             ComparedResult(family.name, origin[0], result, *origin[1:])
             for family, result in zip(fitted, results, strict=True)
         ]
-        return _compared(entries, grid, families=fitted, notes=notes, preload=preload, command=command)
+        return _compared(entries, settings, families=fitted, notes=notes, preload=preload, command=command)
     if families is not None or not 1 <= len(others) < MOST:
         raise BushfitError(
             "this cannot be compared",
             found=f"{1 + len(others)} results{' and families' if families is not None else ''}",
             expected=f"2 to {MOST} results, or one campaign and families",
         )
-    entries = [compared_result(source, directions=directions or ()) for source in (reference, *others)]
-    return _compared(entries, grid, preload=preload, command=command)
+    entries = [compared_result(source, directions=directions) for source in (reference, *others)]
+    return _compared(entries, settings, preload=preload, command=command)
 
 
 def compared_result(
@@ -207,7 +198,7 @@ def _compared(
         f"{label}, {family.name}: {family.words}" for label, family in zip(labels[1:], families[1:], strict=False)
     ]
     warnings = [*notes, *_warnings(labels, entries, comparisons, are_families=bool(families))]
-    document: ComparisonFile = {
+    records: ComparisonFile = {
         "schema": SCHEMA,
         "compared": [_entry_document(label, entry) for label, entry in zip(labels, entries, strict=True)],
         "pairs": [
@@ -216,7 +207,7 @@ def _compared(
                 "other": label,
                 "shared_inputs": list(comparison.shared),
                 "joint": {"p": comparison.joint[0], "parameters": comparison.joint[1]} if comparison.joint else None,
-                "parameters": [_plain(row) for row in comparison.parameters],
+                "parameters": list(comparison.parameters),
                 "places": {
                     str(contrast.place): table_columns(contrast_table(comparison, contrast))
                     for contrast in comparison.contrasts
@@ -234,6 +225,7 @@ def _compared(
         "command": command,
         "versions": {"bushfit": __version__, **versions()},
     }
+    document = to_json_data(records, ComparisonFile)
     side_by_side = ComparisonDocument.from_document(document)
     names = ("parameters", *(["families"] if families else []), "differences")
     figure = ResultFile("compare", "figure", lambda: plots.comparison.comparison_figure(side_by_side))
@@ -312,12 +304,12 @@ def _entry_document(label: str, entry: ComparedResult) -> ComparedEntry:
         "name": entry.name,
         "source": entry.source,
         "sha256": entry.sha256,
-        "bushing": bushing and _plain(BushingTable(**bushing)),
+        "bushing": BushingTable(**bushing) if bushing else None,
         "effects": list(result.model.effects),
         "reduced_chi_square": result.quality.reduced_chi_square if result.quality else None,
         "nrmse": result.quality.nrmse if result.quality else None,
-        "measured": result.measured and _plain(result.measured),
-        "inputs": to_json_data(result.inputs, tuple[Source, ...]),
+        "measured": result.measured,
+        "inputs": result.inputs,
     }
 
 
@@ -336,6 +328,6 @@ def _family_document(label: str, family: FittedFamily, result: Result) -> Family
         "p": family.p,
         "probability": family.probability,
         "parts": [{"part": part.part, "first": part.before, "heldout": part.after} for part in held_out.parts],
-        "skipped": [_plain(skipped) for skipped in held_out.skipped],
+        "skipped": list(held_out.skipped),
         "words": family.words if label != "A" else "",
     }

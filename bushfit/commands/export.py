@@ -5,13 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 from typing_extensions import TypedDict
 
 from bushfit.campaign.campaign import Campaign
-from bushfit.commands.predict import predict
+from bushfit.commands.predict import GridOptions, predict
 from bushfit.commands.predicted import PredictionOutput
 from bushfit.export.contract import Dialect, Exported, ExportRequest, UnitSystem
 from bushfit.model.arms import ACCURACY
@@ -87,7 +87,8 @@ def export(
     static_rates: Mapping[str, float] | None = None,
     time_domain: bool = False,
     cardanic: complex | None = None,
-    **grid: Any,
+    temperature: float | None = None,
+    **grid: Unpack[GridOptions],
 ) -> ExportOutput:
     """Convert a fitted model to files for other programs.
 
@@ -104,8 +105,8 @@ def export(
             default the rate of the slowest loop.
         time_domain: True to write the materials of abaqus as Prony series.
         cardanic: complex stiffness of the rotations about x and y in decks [N m/rad]; None for no stiffness.
-        grid: directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes and temperature, as of
-            `predict`; all directions share one list of frequencies.
+        temperature: temperature [K], if the model has the effect of temperature.
+        grid: directions, frequencies and amplitudes, as of `predict`; all directions share one list of frequencies.
 
     Returns:
         Predictions, the content for each format with its omissions, and the result files.
@@ -113,11 +114,12 @@ def export(
     Raises:
         ModelError: a model that a format cannot represent, or an invalid grid.
     """
-    predicted = predict(result, campaign, **grid)
+    predicted = predict(result, campaign, temperature=temperature, **grid)
     frequencies = [np.unique(prediction.frequency) for prediction in predicted.predictions]
     if not all(np.array_equal(axis, frequencies[0]) for axis in frequencies):
-        predicted = predict(result, campaign, **{**grid, "frequencies": np.unique(np.concatenate(frequencies))})
-    settings = (accuracy, units, dialect, decimal_comma, grid.get("temperature"), static_rates, time_domain, cardanic)
+        grid["frequencies"] = np.unique(np.concatenate(frequencies))
+        predicted = predict(result, campaign, temperature=temperature, **grid)
+    settings = (accuracy, units, dialect, decimal_comma, temperature, static_rates, time_domain, cardanic)
     today = datetime.now(UTC).date().isoformat()
     request = ExportRequest(result, source, tuple(predicted.predictions), *settings, today)
     exported: dict[str, Exported] = {}

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
+from typing import Unpack
 
 import numpy as np
 import pandas as pd
@@ -13,7 +14,7 @@ from bushfit.campaign.campaign import Campaign, model_of
 from bushfit.campaign.schema import RigSettings
 from bushfit.campaign.simulated import SimulatedLoop
 from bushfit.commands.fit import prepare_tests
-from bushfit.commands.predict import Numbers, grid_of
+from bushfit.commands.predict import GridOptions, requested_settings
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError, did_you_mean
 from bushfit.geometry import default_places, get_places
@@ -64,11 +65,7 @@ def plan(
     parameters: Sequence[str] = (),
     rivals: Sequence[str] = (),
     targets: Mapping[str, float] | None = None,
-    directions: Sequence[str] | None = None,
-    frequencies: Numbers | None = None,
-    amplitudes: Numbers | None = None,
-    torsion_amplitudes: Numbers | None = None,
-    strain_amplitudes: Numbers | None = None,
+    **grid: Unpack[GridOptions],
 ) -> PlanOutput:
     """Choose the next tests of a campaign, of a fitted model, or of a compound that was not tested yet.
 
@@ -82,11 +79,7 @@ def plan(
         rivals: effects to distinguish; default those that the diagnosis cannot distinguish.
         targets: wanted half-width of the 95 % interval relative to the value, by parameter, or by "stiffness" or
             "loss_factor" everywhere or in one direction, such as "stiffness.axial".
-        directions: directions of the wanted predictions.
-        frequencies: frequencies of the wanted predictions [Hz].
-        amplitudes: zero-to-peak displacements of the wanted predictions [m].
-        torsion_amplitudes: zero-to-peak rotations of the wanted predictions [rad].
-        strain_amplitudes: zero-to-peak strains of the wanted predictions [1].
+        grid: directions, frequencies and amplitudes of the wanted predictions, as of `predict`.
 
     Returns:
         Tests in their order with their expected results, and the result files.
@@ -110,8 +103,7 @@ def plan(
     specimens = knowledge.specimens
     default = default_places(knowledge.model.bushing, () if knowledge.model.bushing else specimens)
     places = tuple(place for name in test_directions for place in get_places(name, specimens)) or tuple(default)
-    grid = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
-    settings, sweeps = grid_settings(grid, campaign), campaign.sweeps if campaign else ()
+    settings, sweeps = grid_settings(requested_settings(grid), campaign), campaign.sweeps if campaign else ()
     wanted_places = [place for name in settings.directions or () for place in get_places(name, specimens)]
     start, points = Result(knowledge.model, specimens=specimens), list[Points]()
     for place in wanted_places or default:

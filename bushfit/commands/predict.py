@@ -1,7 +1,8 @@
 """predict: stiffness and loss factor of a fitted model over frequency and amplitude."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import TypedDict, Unpack
 
 import numpy as np
 
@@ -35,15 +36,28 @@ Numbers = Sequence[float] | Array
 _DIRECTIONS = (Direction.AXIAL, Direction.RADIAL)
 
 
+class GridOptions(TypedDict, total=False):
+    """Directions and operating points of a prediction; a missing key, or None, selects the default.
+
+    Args:
+        directions: directions or specimens by name.
+        frequencies: frequencies [Hz].
+        amplitudes: zero-to-peak displacements [m].
+        torsion_amplitudes: zero-to-peak rotations [rad].
+        strain_amplitudes: zero-to-peak strains of specimens that give a modulus.
+    """
+
+    directions: Sequence[str] | None
+    frequencies: Numbers | None
+    amplitudes: Numbers | None
+    torsion_amplitudes: Numbers | None
+    strain_amplitudes: Numbers | None
+
+
 def predict(
     model: Result | HasResult,
     campaign: Campaign | None = None,
     *,
-    directions: Sequence[str] | None = None,
-    frequencies: Numbers | None = None,
-    amplitudes: Numbers | None = None,
-    torsion_amplitudes: Numbers | None = None,
-    strain_amplitudes: Numbers | None = None,
     temperature: float | None = None,
     preloads: Sequence[str] = (),
     bushing: Bushing | str | None = None,
@@ -55,17 +69,13 @@ def predict(
     static_rates: Mapping[str, float] | None = None,
     over: LargeMotion | None = None,
     notes: Sequence[str] = (),
+    **grid: Unpack[GridOptions],
 ) -> PredictionOutput:
     """Predict stiffness and loss factor over a grid, with 95 % bands.
 
     Args:
         model: result, or output with a result.
         campaign: campaign whose sweeps the figures show for comparison, and whose grid is the default.
-        directions: directions or specimens; default axial and radial, and all specimens.
-        frequencies: frequencies [Hz].
-        amplitudes: zero-to-peak displacements [m].
-        torsion_amplitudes: zero-to-peak rotations [rad].
-        strain_amplitudes: zero-to-peak strains of specimens that give a modulus.
         temperature: temperature [K], if the model has the effect of temperature.
         preloads: preloads with their unit, such as "500 N", within the tested range; default none.
         bushing: one of several fitted bushings by its name, or another bushing of the same compound.
@@ -78,6 +88,8 @@ def predict(
             default the rate of the slowest loop.
         over: slow large motion or static offset under the harmonic of each frequency and amplitude.
         notes: further warnings.
+        grid: directions (default axial and radial, and all specimens), frequencies [Hz], amplitudes [m],
+            torsion_amplitudes [rad], strain_amplitudes; see `GridOptions`.
 
     Returns:
         Predictions by direction, resonances and Maxwell arms, with the result files.
@@ -86,7 +98,7 @@ def predict(
         ModelError: a direction, frequency, amplitude, temperature or preload for which the model cannot predict.
         UnitError: a preload that is no displacement or force of a direction.
     """
-    result = as_result(model)
+    result, directions = as_result(model), grid.get("directions")
     if isinstance(bushing, str):
         of_bushing = [place for place in result.specimens if place.bushing and place.body == bushing]
         preloaded = [tested.place for tested in result.measured.preloads] if preloads and result.measured else []
@@ -112,8 +124,7 @@ def predict(
         raise ModelError(problem, found=", ".join(preloads), expected="one, or none")
     if preloads and not directions and result.measured:
         directions = [tested.place for tested in result.measured.preloads] or None
-    requested = grid_of(directions, frequencies, amplitudes, torsion_amplitudes, strain_amplitudes)
-    settings = grid_settings(requested, campaign)
+    settings = grid_settings(requested_settings({**grid, "directions": directions}), campaign)
     specimens = {specimen.name: specimen for specimen in (*result.specimens, *(campaign.specimens if campaign else ()))}
     places = [place for name in settings.directions or () for place in get_places(name, [*specimens.values()])]
     places = places or default_places(result.model.bushing, [*specimens.values()])
@@ -215,17 +226,10 @@ def requested_preloads(result: Result, place: Place, preloads: Sequence[str]) ->
     return [tested_preload(result, place, preload) for preload in parsed]
 
 
-def grid_of(directions: Sequence[str] | None, *axes: Numbers | None) -> PredictSettings:
-    """Make the grid settings of a prediction; None selects the default of an axis.
-
-    Args:
-        directions: directions or specimens by name.
-        axes: frequencies [Hz], amplitudes [m], torsion amplitudes [rad] and strain amplitudes.
-    """
-    frequencies, amplitudes, rotations, strains = (
-        None if axis is None else tuple(float(value) for value in axis) for axis in axes
-    )
-    return PredictSettings(frequencies, amplitudes, rotations, tuple(directions or ()) or None, strains)
+def requested_settings(grid: GridOptions) -> PredictSettings:
+    """Settings of the prediction grid that a user states; None for the default of an axis."""
+    stated = {key: tuple(values) for key, values in grid.items() if isinstance(values, Iterable)}
+    return PredictSettings(**{key: values for key, values in stated.items() if values})
 
 
 def _predictable_sweeps(result: Result, campaign: Campaign) -> list[MeasuredSweep]:
