@@ -92,15 +92,18 @@ class _Commands(click.Group):
 def cli() -> None:
     """Fit the stiffness and loss of rubber bushings over frequency and amplitude.
 
-    A CAMPAIGN is a text file (TOML) that names a bushing, its hysteresis loops and its stepped-sine sweeps. `bushfit
-    init FILES` makes a campaign from test files. Then evaluate it:
+    A CAMPAIGN is a text file (TOML) that describes a bushing and lists its hysteresis loops and stepped-sine sweeps.
+    Make a campaign from test files, and evaluate it:
 
+    \b
+        bushfit init FILES
         bushfit run CAMPAIGN.toml
 
-    prints the verdict on the model and writes parameters, stiffness tables, plots and a report to results/<campaign
-    name>. The other commands on a campaign or model write to a folder in it, such as results/<campaign name>/predict.
-    `bushfit COMMAND -h` explains one command. Exit status: 0 done; 1 done, but a stated limit is missed; 2 wrong
-    usage or unusable input.
+    `run` prints the verdict on the model and writes parameters, stiffness tables, plots and a report to
+    results/<campaign name>. Other commands on a campaign or model write to a folder in it, such as results/<campaign
+    name>/predict. `bushfit COMMAND -h` explains one command.
+
+    Exit status: 0 done; 1 done, but a stated limit is missed; 2 wrong usage or unusable input.
     """
 
 

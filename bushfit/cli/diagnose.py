@@ -47,7 +47,7 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
     ),
     file_option("--model", "Start from the model in this model.json [the paper's model]."),
 )
-@campaign_options(soft_l1="outliers are left out")
+@campaign_options
 @with_output("results/<campaign name>/diagnose", "tables", "pictures", "pages")
 def command(
     campaigns: tuple[Path, ...],

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @command_called("fit-static", "configs/cmp_15961.toml")
 @option_group("Fit", file_option("--dynamic", "Keep m and alpha fixed at their values in this dynamic.json."))
-@campaign_options()
+@campaign_options
 @with_output("results/<campaign name>/fit-static", "tables", "pictures")
 def static(
     campaigns: tuple[Path, ...], dynamic: Path | None, loss: Loss | None, max_nrmse: float | None, output: Output
@@ -52,7 +52,7 @@ def static(
         "Take mu, sigma_fmax and eps_half, with their errors, from this static.json [from a fit of the loops].",
     ),
 )
-@campaign_options()
+@campaign_options
 @with_output("results/<campaign name>/fit-dynamic", "tables", "pictures")
 def dynamic(
     campaigns: tuple[Path, ...], static: Path | None, loss: Loss | None, max_nrmse: float | None, output: Output
@@ -92,7 +92,7 @@ def dynamic(
     ),
     flag("--profile", "Compute additional 95 % intervals by profile likelihood; takes some seconds."),
 )
-@campaign_options()
+@campaign_options
 @with_output("results/<campaign name>/fit", "tables", "pictures")
 def command(
     campaigns: tuple[Path, ...],

@@ -1,9 +1,8 @@
 """Option types, options shared by several commands, and commands with examples."""
 
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any
 
 import click
 
@@ -101,34 +100,12 @@ class Command(click.Command):
                     formatter.write_text(", ".join(names))
 
 
-if TYPE_CHECKING:  # click before 8.2 has no generic types at run time
-    NumberType: TypeAlias = click.ParamType[float]
-else:
-    NumberType = click.ParamType
-
-
 class Folder(click.Path):
     """Option type for a results folder; an empty text is an error."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Convert the text of an option to the path of a folder; an empty text is an error."""
         return super().convert(value, param, ctx) if value else self.fail("an empty text is not a folder", param, ctx)
-
-
-class Size(NumberType):
-    """Option type for a positive number up to a maximum, also in percent, such as 0.02 or "2 %"."""
-
-    def __init__(self, name: str, maximum: float) -> None:
-        """Create the type for the quantity `name`, as error messages call it, with its largest permitted value."""
-        self.name, self._maximum = name, maximum
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Convert the text of an option to a number, 0.02 for "2 %"; a number out of range is an error."""
-        text = str(value).strip()
-        with suppress(ValueError):
-            if 0.0 < (size := float(text.removesuffix("%")) * (0.01 if "%" in text else 1.0)) <= self._maximum:
-                return size
-        return self.fail(f"{text} is not a {self.name}", param, ctx)
 
 
 def command_called(name: str, *examples: str) -> Callable[[Function], click.Command]:

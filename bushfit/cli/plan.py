@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bushfit.cli.options import FILE, Size, command_called, direction_option, file_option, option, option_group
+from bushfit.cli.options import FILE, command_called, direction_option, file_option, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.shared_options import Grid, grid_options, quantity
+from bushfit.cli.shared_options import Grid, grid_options, number_up_to, quantity
 from bushfit.errors import error_location
 from bushfit.units import display_unit, number
 
@@ -44,8 +44,8 @@ def parse_target(text: str) -> tuple[str, float]:
         "--hours",
         "HOURS",
         "Available time on the rig, in hours [8].",
-        type=Size("time in hours such as 8", _MOST_HOURS),
-        default=8.0,
+        type=number_up_to(_MOST_HOURS, "time in hours such as 8"),
+        default="8",
     ),
     option(
         "--for aim",

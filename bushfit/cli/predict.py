@@ -61,7 +61,7 @@ def parse_motion(text: str) -> LargeMotion:
         type=quantity("m/s^2"),
     ),
     flag("--static", "Also write the static curve: force over displacement in a slow motion, and its slope."),
-    static_rate_option("Rate of this motion"),
+    static_rate_option("Rate of the static curve"),
     option(
         "--over",
         "MOTION",

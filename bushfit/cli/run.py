@@ -25,7 +25,7 @@ _AGREED = 2
 
 
 @command_called("run", "configs/cmp_15961.toml")
-@campaign_options()
+@campaign_options
 @with_output("results/<campaign name>", "tables", "pictures", "pages")
 def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | None, output: Output) -> None:
     """Fit, diagnose and predict in one go.
@@ -33,9 +33,9 @@ def command(campaigns: tuple[Path, ...], loss: Loss | None, max_nrmse: float | N
     Prints the verdict on the model, the parameters, the tested range, and the predicted stiffness at the lowest and
     highest frequency. -v prints every step. Steps for which tests are missing are skipped and listed.
 
-    Writes model.json (the model to use), report.html, diagnosis.json, candidates.csv, static.json and dynamic.json;
-    tables and plots of loops, sweeps, gap (measured minus model) and of each direction and specimen. If the diagnosis
-    adds an effect to the model, joint.json contains the fit without this effect.
+    Writes model.json (the model to use), report.html, diagnosis.json, candidates.csv, static.json and dynamic.json; and
+    a table and a plot of the loops, the sweeps, the gap (measured minus model), and each direction and specimen. If the
+    diagnosis adds an effect to the model, joint.json contains the fit without this effect.
     """
     from bushfit.commands.fit import prepare_tests
     from bushfit.commands.provenance import input_files

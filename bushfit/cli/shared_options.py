@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,8 +12,8 @@ import click
 
 from bushfit.cli.options import (
     FILE,
+    Function,
     Parameter,
-    Size,
     add_parameters,
     direction_option,
     file_option,
@@ -35,31 +36,31 @@ TEMPERATURE = option(
 )
 
 
-def campaign_options(soft_l1: str = "less weight for points far from the model, none for outliers") -> Parameter:
-    """Create the argument CAMPAIGN (`campaigns`) and the options of all commands that fit a campaign.
-
-    Args:
-        soft_l1: help text on the loss function soft_l1.
-    """
-    return lambda function: add_parameters(
+def campaign_options(function: Function) -> Function:
+    """Add the argument CAMPAIGN (`campaigns`) and the options of all commands that fit a campaign."""
+    loss = "linear: least squares; soft_l1: little or no weight for points far from the model [from the campaign]."
+    limit = "Exit with status 1 if the misfit (NRMSE) exceeds this share of the stiffness, such as 2 %."
+    return add_parameters(
         function,
         click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=FILE),
         option_group(
             "Fit",
-            option(
-                "--loss",
-                "LOSS",
-                f"linear: least squares; soft_l1: {soft_l1} [from the campaign, else linear].",
-                type=click.Choice(["linear", "soft_l1"]),
-            ),
-            option(
-                "--max-nrmse",
-                "SHARE",
-                "Exit with status 1 if the misfit (NRMSE) exceeds this share of the stiffness, such as 2 %.",
-                type=Size("share up to 1, such as 0.02 or 2 %", 1.0),
-            ),
+            option("--loss", "LOSS", loss, type=click.Choice(["linear", "soft_l1"])),
+            option("--max-nrmse", "SHARE", limit, type=number_up_to(1.0, "share up to 1, such as 0.02 or 2 %")),
         ),
     )
+
+
+def number_up_to(maximum: float, name: str) -> Callable[[str], float]:
+    """Make the parser of an option for a positive number, also in percent, up to a maximum; errors call it `name`."""
+
+    def parse(text: str) -> float:
+        with suppress(ValueError):
+            if 0.0 < (number := float(text.removesuffix("%")) * (0.01 if "%" in text else 1.0)) <= maximum:
+                return number
+        raise click.BadParameter(f"{text} is not a {name}")
+
+    return parse
 
 
 def open_campaign(campaigns: Sequence[Path]) -> Campaign:

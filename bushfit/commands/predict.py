@@ -228,7 +228,11 @@ def requested_preloads(result: Result, place: Place, preloads: Sequence[str]) ->
 
 def requested_settings(grid: GridOptions) -> PredictSettings:
     """Settings of the prediction grid that a user states; None for the default of an axis."""
-    stated = {key: tuple(values) for key, values in grid.items() if isinstance(values, Iterable)}
+    stated = {
+        key: tuple(value if isinstance(value, str) else float(value) for value in values)
+        for key, values in grid.items()
+        if isinstance(values, Iterable)
+    }
     return PredictSettings(**{key: values for key, values in stated.items() if values})
 
 
