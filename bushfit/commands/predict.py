@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
@@ -228,7 +228,7 @@ def requested_preloads(result: Result, place: Place, preloads: Sequence[str]) ->
 
 def requested_settings(grid: GridOptions) -> PredictSettings:
     """Settings of the prediction grid that a user states; None for the default of an axis."""
-    stated = {
+    stated: dict[str, Any] = {
         key: tuple(value if isinstance(value, str) else float(value) for value in values)
         for key, values in grid.items()
         if isinstance(values, Iterable)
