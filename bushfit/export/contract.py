@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
+import numpy as np
+
 from bushfit.effects.contract import RubberConditions
 from bushfit.effects.temperature import REFERENCE
 from bushfit.errors import UnitError
@@ -151,11 +153,19 @@ class ExportRequest:
         if measured:
             for place in self.places:
                 unit, factor = place.display.displacement
-                amplitudes = [factor * strain / model.unit_strain(place) for strain in measured.strain]
+                fitted = str(place) in measured.directions
+                tests = [test for test in campaign.tests if test.place == str(place)] if campaign and fitted else []
+                strained = tuple(strain / model.unit_strain(place) for strain in measured.strain)
+                frequencies = np.array([test.frequency_Hz for test in tests] or measured.frequency)
+                amplitudes = factor * np.array([test.amplitude for test in tests] or strained)
+                parts = [
+                    str(place),
+                    format_range("Hz", frequencies.min(), frequencies.max()),
+                    format_range(unit, amplitudes.min(), amplitudes.max()),
+                ]
                 temperatures = [kelvin - CELSIUS for kelvin in measured.temperature or ()]
-                parts = [str(place), format_range("Hz", *measured.frequency), format_range(unit, *amplitudes)]
                 parts.append(format_range("degC", *temperatures) if temperatures else "temperature not stated")
-                parts.append("fitted there" if str(place) in measured.directions else "not fitted there")
+                parts.append("fitted there" if fitted else "not fitted there")
                 yield "valid", ", ".join(parts)
         yield from (("limit", omission) for omission in omissions)
         warnings = warnings_of(self.result, [prediction.warnings for prediction in self.predictions])
