@@ -54,24 +54,29 @@ def picture(chart: Chart, name: str, title: str) -> Picture:
     Returns:
         Title, caption and drawing for the template.
     """
+    full_height, full_ends = chart.get_figheight(), (chart.subplotpars.bottom, chart.subplotpars.top)
     for text in (chart.heading, chart.footer):
         text.set_visible(False)
-    image = plots.style.to_image(chart, "svg", outlines=False)
+    chart.set_figheight(chart.panel_height / 2.54)
+    chart.subplots_adjust(bottom=chart.panel_ends[0], top=chart.panel_ends[1])
+    image, axes = plots.style.to_image(chart, "svg", outlines=False), list(panel_axes(chart))
+    width, height = 72.0 * chart.get_size_inches()
     for text in (chart.heading, chart.footer):
         text.set_visible(True)
-    width, above, height = (72.0 / 2.54 * size for size in (plots.style.WIDTH, chart.above, chart.panel_height))
+    chart.set_figheight(full_height)
+    chart.subplots_adjust(bottom=full_ends[0], top=full_ends[1])
     ElementTree.register_namespace("", _SVG.strip("{}"))
     root = ElementTree.parse(io.BytesIO(image)).getroot()
     _rewrite(root, name)
     _share_attributes(root)
     root.attrib.clear()
     root.attrib |= {
-        "viewBox": f"0 {above:.1f} {width:.1f} {height:.1f}",
+        "viewBox": f"0 0 {width:.1f} {height:.1f}",
         "role": "img",
         "aria-label": f"{title}. {chart.caption}".strip(". "),
         "stroke-linejoin": "round",
         "font-family": _FAMILY,
-        "data-axes": json.dumps(list(panel_axes(chart)), separators=(",", ":")),
+        "data-axes": json.dumps(axes, separators=(",", ":")),
     }
     svg = ElementTree.tostring(root, encoding="unicode").replace("\n", "").replace(" />", "/>")
     return Picture(title, chart.caption, Markup(re.sub(r">\s+<", "><", svg)))

@@ -29,7 +29,7 @@ from bushfit.model.covariance import Z95
 from bushfit.report.tables import spread_indices
 
 #: Width of a figure [cm]: the text of a page of A4.
-WIDTH = 16.0
+_WIDTH = 16.0
 #: Height of a panel with its labels [cm]: two in a row are a little wider than high.
 ROW = 5.4
 #: Heights [cm]: margin above a title and below an explanation, with the gap to the panels, and a line of each.
@@ -123,14 +123,15 @@ class Chart(Figure):
         height: height of the panels with their labels [cm].
 
     Attributes:
-        panel_height, above: height of the panels and of the space above them [cm].
+        panel_height: height of the panels with their labels [cm].
+        panel_ends: lower and upper end of the panels' axes, relative to this height.
         heading, footer: matplotlib texts above and below the panels.
         caption: explanation without the note, in one line, for use in a page.
     """
 
     def __init__(self, title: str, height: float) -> None:
         self._title, self.panel_height = printable(title, lines=True), height
-        super().__init__(figsize=(WIDTH / 2.54, height / 2.54), dpi=_DPI, facecolor="white")
+        super().__init__(figsize=(_WIDTH / 2.54, height / 2.54), dpi=_DPI, facecolor="white")
 
     def explain(self, *sentences: str, note: str = "") -> Self:
         """Compute the layout of the panels, and add title and explanation above and below them.
@@ -146,14 +147,14 @@ class Chart(Figure):
         self.caption = printable(" ".join(filter(None, sentences)), lines=True)
         title = textwrap.wrap(self._title, _TITLE_LETTERS)
         lines = textwrap.wrap(f"{self.caption} {printable(note, lines=True)}", _NOTE_LETTERS)
-        self.above, below = _MARGIN + _TITLE_LINE * len(title), _MARGIN + _NOTE_LINE * len(lines)
-        height = self.above + self.panel_height + below
+        above, below = _MARGIN + _TITLE_LINE * len(title), _MARGIN + _NOTE_LINE * len(lines)
+        height = above + self.panel_height + below
         self.heading = self.suptitle("\n".join(title), y=1.0 - 0.25 / height, fontsize=TEXT + 1.5, weight="bold")
         below_panels: dict[str, Any] = {"x": 0.01, "y": 0.2 / height, "ha": "left", "fontsize": SMALL, "color": GREY}
         self.footer = self.supxlabel("\n".join(lines), **below_panels)
-        bottom, top = self.subplotpars.bottom, self.subplotpars.top  # the panels keep their size and distances
+        self.panel_ends = self.subplotpars.bottom, self.subplotpars.top  # the panels keep their size and distances
         self.set_figheight(height / 2.54)
-        ends = ((below + end * self.panel_height) / height for end in (bottom, top))
+        ends = ((below + end * self.panel_height) / height for end in self.panel_ends)
         self.subplots_adjust(**dict(zip(("bottom", "top"), ends, strict=True)))
         return self
 
