@@ -21,7 +21,7 @@ from bushfit.geometry import default_places, get_places
 from bushfit.model.result import Result
 from bushfit.planning.campaign import campaign_toml
 from bushfit.planning.compound import guess_parameters
-from bushfit.planning.contract import Aim, Knowledge, Plan, PlanRequest, Points, Target, Test, operating_points
+from bushfit.planning.contract import Aim, Knowledge, Plan, PlanRequest, PredictionGrid, Target, Test, operating_points
 from bushfit.planning.document import PlanFile, plan_document
 from bushfit.planning.knowledge import from_campaign, from_result, with_rig_class
 from bushfit.planning.plan import plan as choose_tests
@@ -105,15 +105,15 @@ def plan(
     places = tuple(place for name in test_directions for place in get_places(name, specimens)) or tuple(default)
     settings, sweeps = grid_settings(requested_settings(grid), campaign), campaign.sweeps if campaign else ()
     wanted_places = [place for name in settings.directions or () for place in get_places(name, specimens)]
-    start, points = Result(knowledge.model, specimens=specimens), list[Points]()
-    for place in wanted_places or default:
-        axes = [np.unique(axis) for axis in requested_grid(default_grid(start, place, sweeps), settings, place)]
-        amplitude, frequency = np.meshgrid(axes[1], axes[0], indexing="ij")
-        points.append(Points(place, frequency.ravel(), amplitude.ravel()))
+    start = Result(knowledge.model, specimens=specimens)
+    grids = tuple(
+        PredictionGrid(place, *requested_grid(default_grid(start, place, sweeps), settings, place))
+        for place in wanted_places or default
+    )
     rig = with_rig_class(campaign.rig if campaign else RigSettings(), knowledge.noise)
-    named = (_targets(name, half, knowledge, points) for name, half in (targets or {}).items())
+    named = (_targets(name, half, knowledge, grids) for name, half in (targets or {}).items())
     wanted = tuple(chain.from_iterable(named))
-    request = PlanRequest(aim, hours, rig, places, tuple(points), tuple(parameters) or knowledge.names, wanted)
+    request = PlanRequest(aim, hours, rig, places, grids, tuple(parameters) or knowledge.names, wanted)
     chosen = choose_tests(knowledge, request)
     document = plan_document(chosen)
     files = [ResultFile("plan", "json", document), ResultFile("plan", "table", partial(plan_sheet, chosen))]
@@ -140,18 +140,18 @@ def _knowledge(source: Campaign | Result | Knowledge, rivals: Sequence[str] | No
     return from_result(Result(model_of(source), specimens=source.specimens))
 
 
-def _targets(name: str, half_width: float, knowledge: Knowledge, points: Sequence[Points]) -> list[Target]:
+def _targets(name: str, half_width: float, knowledge: Knowledge, grids: Sequence[PredictionGrid]) -> list[Target]:
     """List the targets of a plan that a name selects: "mu", "stiffness" (all directions) or "stiffness.axial".
 
     Args:
         name: name of a parameter or prediction, with or without a direction.
         half_width: half-width that the 95 % interval shall reach, relative to the value.
         knowledge: knowledge before the tests, with the names of the parameters.
-        points: operating points of the predictions.
+        grids: operating points of the predictions.
     """
     possible = {parameter: [Target(parameter, half_width)] for parameter in knowledge.names}
     for quantity in PREDICTED:
-        targets = [Target(quantity, half_width, part.place) for part in points]
+        targets = [Target(quantity, half_width, grid.place) for grid in grids]
         possible |= {quantity: targets, **{str(target): [target] for target in targets}}
     if name not in possible:
         expected, hint = ", ".join(possible), did_you_mean(name, tuple(possible))

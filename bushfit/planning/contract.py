@@ -119,18 +119,18 @@ class Knowledge:
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
-    """Operating points at which a plan reports the standard error of the predicted stiffness, in one direction.
+class PredictionGrid:
+    """Frequencies and amplitudes at which a plan reports the standard error of the predicted stiffness of a direction.
 
     Args:
         place: direction of the bushing, or specimen.
-        frequency: frequency of each point [Hz], (n,).
-        amplitude: zero-to-peak amplitude of each point [m, rad or strain], (n,).
+        frequencies: frequencies [Hz].
+        amplitudes: zero-to-peak amplitudes [m, rad or strain].
     """
 
     place: Place
-    frequency: Array
-    amplitude: Array
+    frequencies: Array
+    amplitudes: Array
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class PlanRequest:
         hours: largest duration on the rig [h].
         rig: limits of the rig, and its time for a point and for a set-up.
         places: directions or specimens that the rig can test.
-        points: operating points at which the plan reports the errors of the stiffness, whatever the aim.
+        grids: operating points at which the plan reports the errors of the stiffness, whatever the aim.
         parameters: names of the parameters whose errors aim "parameters" minimises.
         targets: targets of aim "targets", which plans no further test once the targets are met.
     """
@@ -170,7 +170,7 @@ class PlanRequest:
     hours: float
     rig: RigSettings
     places: tuple[Place, ...]
-    points: tuple[Points, ...]
+    grids: tuple[PredictionGrid, ...]
     parameters: tuple[str, ...] = ()
     targets: tuple[Target, ...] = ()
 
@@ -183,9 +183,8 @@ class Programme:
         tests: runs of the rig, in the order in which they are made.
         minutes: duration of each test with the change of direction before it [min], (tests,).
         errors: standard error of each parameter's relative change, (k,).
-        stiffness: relative standard error of |K| at the operating points of the request, one direction after the other,
-            (n,).
-        loss: absolute standard error of the loss factor at these points, (n,).
+        predictions: standard error at each operating point of the request: relative error of |K| by names such as
+            "stiffness.axial", absolute error of the loss factor by names such as "loss_factor.axial", (n,) each.
         rival_chi_square: expected chi-square between the two nearest rivals that can be separated, after the best
             refit of either; None without rivals.
         half_widths: half width of the 95 % interval of each target, relative to the value, at its worst point.
@@ -196,8 +195,7 @@ class Programme:
     tests: tuple[Test, ...]
     minutes: Array
     errors: Array
-    stiffness: Array
-    loss: Array
+    predictions: Mapping[str, Array]
     rival_chi_square: float | None
     half_widths: tuple[float, ...]
     detectable: Mapping[str, float]

@@ -162,12 +162,11 @@ def plan_document(plan: Plan) -> PlanFile:
             "met": reason is None,
             "why": reason,
         }
-    predicted: dict[str, dict[str, ErrorComparison]] = {"stiffness": {}, "loss": {}}
-    ends = np.cumsum([points.frequency.size for points in request.points])[:-1]
+    predicted: dict[str, dict[str, ErrorComparison]] = {"stiffness": {}, "loss_factor": {}}
     for quantity, by_place in predicted.items():
-        by_programme = (np.split(getattr(programme, quantity), ends) for programme in programmes)
-        for points, *errors in zip(request.points, *by_programme, strict=True):
-            by_place[str(points.place)] = _error_comparison(np.sqrt(np.mean(np.square(error))) for error in errors)
+        for place in (str(grid.place) for grid in request.grids):
+            errors = (programme.predictions[f"{quantity}.{place}"] for programme in programmes)
+            by_place[place] = _error_comparison(np.sqrt(np.mean(np.square(error))) for error in errors)
     visible: dict[str, DetectableEntry] = {}
     for name, amount in planned.detectable.items():
         effect, standard_amount = get_effect(name), standard.detectable[name]
@@ -206,7 +205,7 @@ def plan_document(plan: Plan) -> PlanFile:
         "targets": targets,
         "parameters": {name: _error_comparison(errors) for name, *errors in parameter_errors},
         "stiffness": predicted["stiffness"],
-        "loss_factor": predicted["loss"],
+        "loss_factor": predicted["loss_factor"],
         "visible": visible,
         "rivals": rivals,
         "warnings": list(plan.notes),

@@ -13,7 +13,7 @@ from bushfit.planning.candidates import unlimited_rig_warning
 from bushfit.planning.contract import Knowledge, Plan, PlanRequest, Programme
 from bushfit.planning.criterion import add_runs, order_runs
 from bushfit.planning.search import DETECTABLE, RIVALS_APART, PlanSearch
-from bushfit.planning.targets import UNLIMITED_RUNS, TargetSensitivity, format_half_width
+from bushfit.planning.targets import UNLIMITED_RUNS, PlannedQuantity, format_half_width
 from bushfit.units import number
 
 #: Fractions of the hours that are tried before all of them: for rivals, and in steps of a tenth for targets.
@@ -92,17 +92,11 @@ def programme(search: PlanSearch, runs: Sequence[int]) -> Programme:
     model, k = search.models[0], len(search.knowledge.names)
     information = model.total(counts)
     covariance = model.error_covariance(information)[0]
-    errors = []
-    for points in search.wanted:
-        gain, phase = np.sqrt(np.einsum("cnk,kl,cnl->cn", points.slopes, covariance, points.slopes))
-        errors.append(np.hypot([gain, phase * (1.0 + np.square(points.loss_factor))], points.model_error))
-    stiffness, loss = np.concatenate(errors, axis=1)
     return Programme(
         tests=tuple(search.tests[run] for run in runs),
         minutes=search.budget.minutes[list(runs)] + search.budget.setup_minutes * (np.diff(places, prepend=-1) != 0),
         errors=np.sqrt(np.diag(covariance))[:k],
-        stiffness=stiffness,
-        loss=loss,
+        predictions={quantity.name: quantity.standard_errors(covariance) for quantity in search.predictions},
         rival_chi_square=search.nearest_rivals(counts) if search.knowledge.rivals else None,
         half_widths=tuple(goal.half_width(covariance) for goal in search.goals),
         detectable=detectable_amounts(search, counts),
@@ -137,7 +131,7 @@ def detectable_amounts(search: PlanSearch, counts: Array) -> Mapping[str, float]
     return {name: float(np.median(sizes)) for name, sizes in amounts.items()}
 
 
-def explain_miss(search: PlanSearch, goal: TargetSensitivity) -> str | None:
+def explain_miss(search: PlanSearch, goal: PlannedQuantity) -> str | None:
     """Sentence on the reason why the chosen tests miss a target, and on the hours that would meet the target.
 
     Args:
@@ -149,7 +143,7 @@ def explain_miss(search: PlanSearch, goal: TargetSensitivity) -> str | None:
     """
     counts, limit, covariance = search.counts, search.limit_covariance, search.error_covariance
     if sentence := search.untested_warning(goal, counts):
-        origin = "in the plan" if goal.target.place in search.request.places else "on offer"
+        origin = "in the plan" if goal.place in search.request.places else "on offer"
         return f"no test so far or {origin} covers this: {sentence}"
     if not goal.met(limit):
         reached, reason = format_half_width(goal.half_width(limit)), goal.explain_limit(search.knowledge, limit)
@@ -191,9 +185,9 @@ def describe_purpose(search: PlanSearch, test: int) -> str:
             goal for goal in search.goals if goal.half_width(wider) >= _NOTABLE_RATIO * goal.half_width(covariance)
         ]
         if widened:
-            goal = max(widened, key=lambda goal: goal.half_width(wider) / goal.target.half_width)
+            goal = max(widened, key=lambda goal: goal.half_width(wider) / goal.target)
             without, planned = (format_half_width(goal.half_width(errors), 3) for errors in (wider, covariance))
-            return f"{goal.target}: {without} without this run, {planned} with this run"
+            return f"{goal.name}: {without} without this run, {planned} with this run"
     else:
         if request.aim == "predictions":
             name, ratio = "stiffness", np.sqrt(np.sum(wider * search.weight) / np.sum(covariance * search.weight))
@@ -248,7 +242,8 @@ def plan_warnings(search: PlanSearch, planned: Programme, missed: Sequence[str |
     knowledge, request = search.knowledge, search.request
     if sentence := unlimited_rig_warning(knowledge, request.rig, planned.tests):
         yield sentence
-    model_error = max((float(points.model_error[0].max(initial=0.0)) for points in search.wanted), default=0.0)
+    stiffnesses = (quantity for quantity in search.predictions if quantity.name.startswith("stiffness"))
+    model_error = max((float(quantity.model_error.max()) for quantity in stiffnesses), default=0.0)
     if model_error > _NOTABLE_RATIO - 1.0:
         yield (
             f"the errors of the stiffness include the model error, up to {number(100.0 * model_error, 2)} %, "

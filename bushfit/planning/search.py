@@ -21,7 +21,7 @@ from bushfit.planning.candidates import candidates, standard_tests
 from bushfit.planning.contract import Knowledge, PlanRequest, Test
 from bushfit.planning.criterion import Budget, Criterion, best_runs
 from bushfit.planning.information import CandidateGrid, ModelInformation, rival_chi_squares
-from bushfit.planning.targets import UNLIMITED_RUNS, PointSensitivity, TargetSensitivity
+from bushfit.planning.targets import UNLIMITED_RUNS, PlannedQuantity
 from bushfit.prediction.caveats import unfitted_warnings
 
 #: The 90 % quantile of the normal distribution.
@@ -54,8 +54,8 @@ class PlanSearch:
         effects: the e missing effects, each repeated for its shapes (such as frequencies of a resonance).
         models: Fisher information of each test on the likeliest model and the missing effects, then on each rival model
             and its differences from the other rivals.
-        wanted: derivatives, by parameter, of the stiffness at the operating points of each direction of the request.
-        goals: for each target of the request, its derivatives by parameter, and the variance that no test reduces.
+        predictions: stiffness and loss factor of each direction of the request.
+        goals: parameter or prediction of each target of the request.
         budget: durations of the tests, and available hours.
     """
 
@@ -64,8 +64,8 @@ class PlanSearch:
     tests: tuple[Test, ...]
     effects: list[Effect]
     models: list[ModelInformation]
-    wanted: list[PointSensitivity]
-    goals: list[TargetSensitivity]
+    predictions: list[PlannedQuantity]
+    goals: list[PlannedQuantity]
     budget: Budget
 
     @classmethod
@@ -91,14 +91,10 @@ class PlanSearch:
         )
         for index, rival in enumerate(knowledge.rivals):
             models.append(grid.information(rival, np.delete(residuals, index, axis=0) - residuals[index]))
-        wanted = {points.place: PointSensitivity.from_knowledge(knowledge, points) for points in request.points}
-        names = (*knowledge.names, *knowledge.bounded)
-        goals = [
-            TargetSensitivity.from_target(target, names, wanted[target.place] if target.place else None)
-            for target in request.targets
-        ]
-        budget = Budget.from_tests(tests, request)
-        return cls(knowledge, request, tests, effects, models, list(wanted.values()), goals, budget)
+        predictions = [quantity for grid in request.grids for quantity in PlannedQuantity.predictions(knowledge, grid)]
+        named = {quantity.name: quantity for quantity in (*PlannedQuantity.parameters(knowledge), *predictions)}
+        goals = [replace(named[str(target)], target=target.half_width) for target in request.targets]
+        return cls(knowledge, request, tests, effects, models, predictions, goals, Budget.from_tests(tests, request))
 
     def within(self, hours: float) -> PlanSearch:
         """Copy of the search for another available time on the rig [h]."""
@@ -160,7 +156,7 @@ class PlanSearch:
         if self.goals:
             values = self.strict_criterion.values_with_one_more(required)
             for goal in self.goals:
-                chosen = np.array([test.direction == goal.target.place for test in self.tests])
+                chosen = np.array([test.direction == goal.place for test in self.tests])
                 chosen &= self.budget.maximum_runs > 0
                 tested = self.knowledge.tests or required.any()
                 if chosen.any() and (not tested or self.untested_warning(goal, required)):
@@ -186,12 +182,12 @@ class PlanSearch:
             return self.nearest_rivals(counts) >= 2.0 * RIVALS_APART
         covariance = self.error_covariance(counts)
         reached = all(goal.reached(covariance, self.limit_covariance) for goal in self.goals)
-        testable = [goal for goal in self.goals if goal.target.place in self.request.places]
+        testable = [goal for goal in self.goals if goal.place in self.request.places]
         if not self.goals or not reached or any(self.untested_warning(goal, counts) for goal in testable):
             return False
         return not with_checks or (not self.less_visible_effects(counts) and self.determines_scatter(counts))
 
-    def untested_warning(self, goal: TargetSensitivity, counts: Array) -> str | None:
+    def untested_warning(self, goal: PlannedQuantity, counts: Array) -> str | None:
         """Warning that no test in a target's direction shows the error of its stiffness formula.
 
         Args:
@@ -201,7 +197,7 @@ class PlanSearch:
         Returns:
             Sentence; None if the direction is tested or the target is a parameter.
         """
-        place, knowledge = goal.target.place, self.knowledge
+        place, knowledge = goal.place, self.knowledge
         measured = knowledge.result.measured if knowledge.result else None
         planned = (self.tests[test] for test in np.flatnonzero(counts))
         tested = [*(measured.directions if measured else ())]
@@ -319,8 +315,8 @@ class PlanSearch:
         if self.request.aim == "targets":
             return np.sum([goal.weight(self.limit_covariance) for goal in self.goals], axis=0)
         if self.request.aim == "predictions":
-            slopes = np.concatenate([points.slopes for points in self.wanted], axis=1)
-            return np.asarray(np.einsum("cnk,cnl->kl", slopes, slopes) / slopes.shape[1])
+            slopes = np.concatenate([quantity.rows for quantity in self.predictions])  # of gain and phase
+            return np.asarray(2.0 * slopes.T @ slopes / len(slopes))
         names = (*self.knowledge.names, *self.knowledge.bounded)
         return np.diag(np.isin(names, self.request.parameters).astype(float))
 

@@ -27,7 +27,7 @@ from bushfit.planning.contract import (
     Noise,
     Plan,
     PlanRequest,
-    Points,
+    PredictionGrid,
     Programme,
     Target,
     Test,
@@ -51,9 +51,9 @@ SWEEPS = (
     SimulatedSweep(RADIAL, (5e-4,), BAND),
 )
 TESTS: tuple[Test, ...] = (*SWEEPS, SimulatedLoop(AXIAL, 1e-3, 0.1), SimulatedLoop(RADIAL, 2e-4, 1.0))
-POINTS = tuple(Points(at, np.tile(BAND, 3), np.repeat([1e-4, 2e-4, 5e-4], len(BAND))) for at in (AXIAL, RADIAL))
+GRIDS = tuple(PredictionGrid(place, np.array(BAND), np.array([1e-4, 2e-4, 5e-4])) for place in (AXIAL, RADIAL))
 RIG = RigSettings(gain_error=0.005, phase_error=0.0044, max_force=5e3, max_frequency=200.0)
-WANTED = Points(AXIAL, np.array([10.0, 50.0, 150.0]), np.array([2e-4, 2e-4, 5e-4]))
+WANTED = PredictionGrid(AXIAL, np.array([10.0, 50.0, 150.0]), np.array([2e-4, 5e-4]))
 BUSHING = Bushing("guessed", 0.010, 0.018, 0.034)
 #: Table 1 of Garcia Tarrago et al. 2007; the compound is that of its section 2: 61 Shore A, 27 phr, natural rubber.
 TABLE_1 = {"mu": 1.09e6, "m": 2e5, "alpha": 0.24, "sigma_fmax": 14.6e3, "eps_half": 0.013}
@@ -70,7 +70,7 @@ def planned(known) -> Plan:
 
 
 def wanted(aim: Aim, hours: float, **rig: float) -> PlanRequest:
-    return PlanRequest(aim, hours, RigSettings(**rig), (AXIAL, RADIAL), POINTS, ("sigma_fmax",))
+    return PlanRequest(aim, hours, RigSettings(**rig), (AXIAL, RADIAL), GRIDS, ("sigma_fmax",))
 
 
 def view_of(known: Knowledge, tests: tuple[Test, ...]) -> ModelInformation:
@@ -89,7 +89,8 @@ def points_of(test: SimulatedSweep) -> tuple[Place, Array, Array]:
 
 def mean_error(programme: Programme) -> float:
     """Root mean square of the relative errors of the stiffness."""
-    return float(np.sqrt(np.mean(np.square(programme.stiffness))))
+    errors = [programme.predictions[f"stiffness.{grid.place}"] for grid in GRIDS]
+    return float(np.sqrt(np.mean(np.square(errors))))
 
 
 def slopes_of(model: Model, test: SimulatedSweep) -> Array:
@@ -185,20 +186,24 @@ def test_a_plan_is_better_than_the_standard_programme_and_errors_before_are_thos
         tests = [test for test in planned.planned.tests if test.direction is place]
         assert tests[0] == tests[-1], "a session begins and ends with one test in each direction"
 
-    # Of |K|, relative, and of the loss factor at the points that are wanted, by central differences.
-    def wanted_of(name: str, factor: float) -> Array:
+    # Of |K|, relative, and of the loss factor over the grid of a direction, by central differences.
+    def predicted(grid: PredictionGrid, name: str, factor: float) -> Array:
         model = known.model.with_values({name: factor * known.model.values[name]})
-        k = np.concatenate([model.stiffness(each.place, each.frequency, each.amplitude) for each in POINTS])
+        k = model.stiffness(grid.place, np.tile(grid.frequencies, 3), np.repeat(grid.amplitudes, len(BAND)))
         return np.array([np.log(np.abs(k)), k.imag / k.real])
 
-    slopes = np.array([(wanted_of(name, 1.0 + 1e-4) - wanted_of(name, 1.0 - 1e-4)) / 2e-4 for name in known.names])
-    expected = np.sqrt(np.einsum("kcn,kl,lcn->cn", slopes, np.linalg.inv(known.precision), slopes))
-    np.testing.assert_allclose([planned.before.stiffness, planned.before.loss], expected, rtol=1e-3)
-    request = replace(planned.request, targets=(Target("loss_factor", 0.05, RADIAL),))
-    (goal,) = PlanSearch.from_request(known, request).goals
-    relative = 1.96 * expected[1] / wanted_of("mu", 1.0)[1]
-    radial = slice(POINTS[0].frequency.size, None)
-    assert goal.half_width(np.linalg.inv(known.precision)) == pytest.approx(relative[radial].max(), rel=2e-3)
+    covariance = np.linalg.inv(known.precision)
+    for grid in GRIDS:
+        slopes = np.array(
+            [(predicted(grid, name, 1.0 + 1e-4) - predicted(grid, name, 1.0 - 1e-4)) / 2e-4 for name in known.names]
+        )
+        expected = np.sqrt(np.einsum("kcn,kl,lcn->cn", slopes, covariance, slopes))
+        told = [planned.before.predictions[f"{name}.{grid.place}"] for name in ("stiffness", "loss_factor")]
+        np.testing.assert_allclose(told, expected, rtol=1e-3)
+        request = replace(planned.request, targets=(Target("loss_factor", 0.05, grid.place),))
+        (goal,) = PlanSearch.from_request(known, request).goals
+        relative = 1.96 * expected[1] / predicted(grid, "mu", 1.0)[1]
+        assert goal.half_width(covariance) == pytest.approx(relative.max(), rel=2e-3)
 
 
 def test_a_detectable_mass_exceeds_the_class_of_the_rig_somewhere(planned, known):
@@ -236,13 +241,12 @@ def test_a_rig_without_limits_and_an_error_of_the_model_are_told(root):
     assert "m/s" in limits
     assert model.startswith("the errors of the stiffness include the model error, up to ")
     assert all(row["planned"] > 0.01 for row in found.document["stiffness"].values())
-    points = found.plan.request.points
-    assert points[0].amplitude.max() < 1e-2 < points[0].frequency.min(), "m and Hz"
-    errors = found.plan.planned.stiffness
-    assert errors.size == sum(part.frequency.size for part in points)
-    first = errors[: points[0].frequency.size]
-    row = found.document["stiffness"][str(points[0].place)]
-    assert row["planned"] == pytest.approx(np.sqrt(np.mean(first**2)))
+    grid = found.plan.request.grids[0]
+    assert grid.amplitudes.max() < 1e-2 < grid.frequencies.min(), "m and Hz"
+    errors = found.plan.planned.predictions[f"stiffness.{grid.place}"]
+    assert errors.size == grid.frequencies.size * grid.amplitudes.size
+    row = found.document["stiffness"][str(grid.place)]
+    assert row["planned"] == pytest.approx(np.sqrt(np.mean(errors**2)))
 
 
 @pytest.fixture(scope="module")
