@@ -51,6 +51,8 @@ class Stack:
         values: parameter values [SI] by qualified name; arrays whose last axis has length 1 add leading axes.
         layers: layers to include, from the rubber outward, with their parameter values.
         modified: False to leave out the modifiers.
+        last_moduli: time step [s] of the last steady cycle, and the modulus [Pa] of the linear branches at each of its
+            harmonics, by number of samples.
     """
 
     model: Model
@@ -58,6 +60,7 @@ class Stack:
     values: Values
     layers: list[tuple[Layer, Values]] = field(default_factory=list)
     modified: bool = True
+    last_moduli: dict[int, tuple[Any, Array]] = field(default_factory=dict)
 
     @cached_property
     def below(self) -> Stack:
@@ -118,30 +121,17 @@ class Stack:
         for modifier in structure.modifiers:
             if modifier.stress:
                 stress = stress + modifier.stress(values_for_effect(modifier, self.values), strain, setting)
-        if together:
-            moduli = self._harmonic_moduli(strain, values)
-            stress = stress + 2.0 * np.fft.irfft(moduli * strain.spectrum, n=strain.value.shape[-1])
+        if together:  # the linear branches add up harmonic by harmonic; motions of one time step share their moduli
+            count = strain.value.shape[-1]
+            step, moduli = self.last_moduli.get(count, (None, np.zeros(1)))
+            if step is not strain.step or structure.modifiers:
+                moduli = np.zeros(1)
+                for branch in structure.viscoelastic:
+                    branch_values = values_for_effect(branch, values)
+                    moduli = moduli + branch.modulus(branch_values, strain.harmonics, strain.amplitude)
+                self.last_moduli[count] = strain.step, moduli
+            stress = stress + 2.0 * np.fft.irfft(moduli * strain.spectrum, n=count)
         return model.stiffness_per_modulus(setting.direction) / (2.0 * per_displacement) * stress
-
-    def _harmonic_moduli(self, strain: History, values: Values) -> Array:
-        """Complex modulus [Pa] of all linear viscoelastic branches together at each harmonic of a cycle, (..., m).
-
-        Motions of one time step share these moduli, if no modifier adjusts the values.
-        """
-        count, structure = strain.value.shape[-1], self.model.structure
-        step, moduli = self._last_moduli.get(count, (None, np.zeros(1)))
-        if step is not strain.step or structure.modifiers:
-            moduli = np.zeros(1)
-            for branch in structure.viscoelastic:
-                values_of_branch = values_for_effect(branch, values)
-                moduli = moduli + branch.modulus(values_of_branch, strain.harmonics, strain.amplitude)
-            self._last_moduli[count] = strain.step, moduli
-        return moduli
-
-    @cached_property
-    def _last_moduli(self) -> dict[int, tuple[Any, Array]]:
-        """Time step [s] of the last motion and the moduli at its harmonics, by number of samples."""
-        return {}
 
     def adjusted_values(self, omega: Array, amplitude: Array, strain: Array) -> Values:
         """Compute the parameter values at operating points, after the changes by all modifiers.
