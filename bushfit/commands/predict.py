@@ -111,7 +111,7 @@ def predict(
         campaign, shape_notes = _assign_bushing(campaign, result)
         notes = (*notes, *shape_notes)
     sweeps = campaign.sweeps if campaign else ()
-    depends_on_temperature = result.model.depends_on("temperature")
+    depends_on_temperature = "temperature" in result.model.depends_on
     if temperature is not None and not depends_on_temperature:
         raise ModelError(
             "the model has no effect of temperature",

@@ -147,7 +147,7 @@ class ExportRequest:
             days = sorted({str(test.conditions["date"]) for test in campaign.tests if "date" in test.conditions})
             yield "campaign", f"{campaign.name}, {campaign.file}, sha256 {campaign.sha256}"
             yield "tests", f"{len(campaign.tests)}, {'made ' + ', '.join(days) if days else 'no date stated'}"
-        if model.depends_on("temperature"):
+        if "temperature" in model.depends_on:
             celsius = number((self.temperature or REFERENCE) - CELSIUS, 3)
             yield "temperature", f"{celsius} degC, as if it were the same at all times and throughout"
         if measured:

@@ -69,7 +69,7 @@ class FittedTests:
         """Frequency [Hz], equivalent strain and, if the model uses it, temperature [K] of the points, (p,) each."""
         model = self.solution.model
         axes = [*operating_conditions(model.bushing, self.data_sets)]
-        if model.depends_on("temperature"):
+        if "temperature" in model.depends_on:
             pairs = [(test.conditions.temperature, test.frequency.shape) for test in self.data_sets]
             kelvin = [np.broadcast_to(REFERENCE if value is None else value, shape) for value, shape in pairs]
             axes.append(np.concatenate(kelvin))

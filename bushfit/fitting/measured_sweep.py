@@ -185,7 +185,7 @@ class MeasuredSweep(MeasuredBase):
             Frequency [Hz], amplitude [m or rad] and conditions of the distinct operating points, or of all points if
             the model depends on temperature or earlier strains; and the index among them of each point of the sweep.
         """
-        if model.depends_on_conditions:
+        if model.depends_on:
             reached = self.sweep.amplitude_reached[self.order]
             return self.frequency, reached, self.conditions, slice(None)
         frequency, amplitude, distinct_index = self._distinct

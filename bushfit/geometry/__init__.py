@@ -306,8 +306,9 @@ def unit_strain(bushing: Bushing | None, place: Place) -> float:
     >>> unit_strain(None, Specimen("coupon", "modulus"))
     0.5
     """
-    if not isinstance(place, Specimen) or place.axis:
-        return _present(bushing, place).unit_strain(_axis_of(place))
+    if place.axis:
+        return _require_bushing(bushing, place).unit_strain(place.axis)
+    assert isinstance(place, Specimen)
     if place.thickness is not None:
         return 0.5 / place.thickness
     return math.sqrt(3.0) / 2.0 if place.strain == "tension" else 0.5
@@ -326,8 +327,9 @@ def stiffness_per_modulus(bushing: Bushing | None, place: Place) -> float:
     >>> stiffness_per_modulus(None, Specimen("mount", "shear", area=1e-3, thickness=0.01, elements=2))
     0.2
     """
-    if not isinstance(place, Specimen) or place.axis:
-        return _present(bushing, place).stiffness_per_modulus(_axis_of(place))
+    if place.axis:
+        return _require_bushing(bushing, place).stiffness_per_modulus(place.axis)
+    assert isinstance(place, Specimen)
     if place.area is not None and place.thickness is not None:
         return place.elements * place.area / place.thickness
     return 3.0 if place.strain == "tension" else 1.0
@@ -347,13 +349,8 @@ def bushing_at(bushing: Bushing | None, place: Place) -> Bushing | None:
     return place.bushing if isinstance(place, Specimen) else bushing
 
 
-def _axis_of(place: Place) -> Direction:
-    """Direction of the bushing in which the motion of a test is."""
-    return place.axis if isinstance(place, Specimen) and place.axis else Direction(str(place))
-
-
-def _present(bushing: Bushing | None, place: Place) -> Bushing:
-    """Bushing to which a direction or specimen belongs; without one, a ModelError is raised."""
+def _require_bushing(bushing: Bushing | None, place: Place) -> Bushing:
+    """Return the bushing to which a direction or specimen belongs; without one, raise a ModelError."""
     if (bushing := bushing_at(bushing, place)) is None:
         raise ModelError(
             "there is no bushing",

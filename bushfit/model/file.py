@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, astuple, fields
 from functools import cache
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
@@ -231,25 +231,15 @@ def _require_object(document: object, file: Path | None, kind: str) -> dict[str,
 
 
 def _read_json(file: Path) -> Any:
-    """Read and parse a JSON file; raise a ModelError for invalid JSON, repeated keys, NaN and infinity."""
+    """Read and parse a JSON file; raise a ModelError for invalid JSON and repeated keys."""
     data = read_utf8(file, ModelError, largest=_LARGEST_BYTES, hint="bushfit fit writes a model.json")
-    place, found = None, "brackets in brackets, too deep"
     try:
-        text = data.decode("utf-8-sig")
-        return json.loads(text, object_pairs_hook=_refuse_duplicates, parse_constant=_refuse_constant)
-    except json.JSONDecodeError as error:
-        place, found = f"line {error.lineno}, column {error.colno}", error.msg
-    except ValueError as error:
-        found = "a whole number of thousands of digits" if "int_max" in str(error) else str(error)
-    except RecursionError:
-        pass
-    hint = "give the file as bushfit fit wrote it"
-    raise ModelError("this is not valid JSON", file=file, place=place, found=found, expected="a model file", hint=hint)
-
-
-def _refuse_constant(constant: str) -> NoReturn:
-    """Raise a ValueError for NaN or Infinity in a JSON file."""
-    raise ValueError(f"{constant}, which is not a number")
+        return json.loads(data.decode("utf-8-sig"), object_pairs_hook=_refuse_duplicates)
+    except (ValueError, RecursionError) as error:
+        hint = "give the file as bushfit fit wrote it"
+        raise ModelError(
+            "this is not valid JSON", file=file, found=str(error), expected="a model file", hint=hint
+        ) from error
 
 
 def _refuse_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -133,23 +133,14 @@ class Model:
         return [effect.name for effect in self.structure.modifiers if not effect.shift_factor]
 
     @property
-    def only_branches(self) -> bool:
-        """True if the model consists of branches only: their stresses add up, and no modifier and no layer acts."""
-        return len(self.structure.branches) == len(self.records)
-
-    @property
-    def depends_on_conditions(self) -> bool:
-        """True if the response depends on the temperature or the earlier strains of the rubber in a test."""
-        return any(effect.depends_on for effect in self.records)
+    def depends_on(self) -> set[str]:
+        """Conditions of a test, named as in `RubberConditions` ("temperature"), that the response depends on."""
+        return {condition for effect in self.records for condition in effect.depends_on}
 
     @property
     def is_transient(self) -> bool:
         """True if the response changes from cycle to cycle until it is steady."""
         return any(effect.is_transient for effect in self.records)
-
-    def depends_on(self, condition: str) -> bool:
-        """True if the response depends on a condition of the test, named as in `RubberConditions`: "temperature"."""
-        return any(condition in effect.depends_on for effect in self.records)
 
     @property
     def name(self) -> str:

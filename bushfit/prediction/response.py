@@ -146,7 +146,7 @@ def _force(result: Result, model: Model, place: Place, history: History, conditi
     amplitude = np.maximum(amplitude, np.finfo(float).eps)
     errors = uncertainty(result, model, place, np.full(2, history.frequency), amplitude, conditions)
     named = model.without(UNNAMED)
-    if not named.only_branches:  # one model's solution of implicit equations is the start for its derivatives
+    if named.structure.layers:  # one model's solution of implicit equations is the start for its derivatives
         named.force(place, history, kind="loop", conditions=conditions)
     force, slopes = force_and_slopes(named, place, history, errors.covariance.names, conditions)
     if model.unnamed:

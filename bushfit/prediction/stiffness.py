@@ -212,7 +212,7 @@ def tested_preload(result: Result, place: Place, preload: Preload | None) -> Pre
     tested = next((preload_range for preload_range in ranges if preload_range.place == str(place)), None)
     if preload is None:
         return Preload(float(np.clip(0.0, tested.low, tested.high)), tested.unit) if tested else None
-    if result.measured is None and result.model.depends_on("preload"):  # of a simulation: exact, without a range
+    if result.measured is None and "preload" in result.model.depends_on:  # of a simulation: exact, without a range
         return preload
     refuse = partial(ModelError, place=str(place), found=f"a preload of {preload.text(place)}")
     if tested is None:

@@ -164,7 +164,7 @@ def _noisy_sweep(
         of_frequency = of_frequency if test.stepped == "frequency" else of_frequency[:, None, None]
         ratios = np.exp(test.reached * np.sqrt(0.5) * (of_frequency + random.standard_normal(shape)))
         reached = level * ratios.ravel()
-    if test.reached or truth.depends_on_conditions:
+    if test.reached or truth.depends_on:
         planned = frequency, level, stiffness.ravel(), RubberConditions(test.temperature, preload=test.static)
         nearby = extrapolate_stiffness(truth, test.direction, *planned, conditions)
         stiffness = nearby(level if reached is None else reached).reshape(shape)

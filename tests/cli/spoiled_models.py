@@ -23,7 +23,7 @@ IN_MODEL = [
     ("a correction with a value too few", entry("unnamed", value={"size": 0.1, "lengths": [1.0, 1.0], "patches": [{**PATCH, "strain": []}]}), "model.json, unnamed", "no values at nodes"),
     ("a correction at no strain", entry("unnamed", value={"size": 0.1, "lengths": [1.0, 1.0], "patches": [{**PATCH, "strain": [0.0]}]}), "model.json, unnamed", "a node without motion"),
     ("parameter is missing", without("parameters", "mu"), "model.json, mu: a parameter has no value", "a number [Pa]"),
-    ("value is NaN", entry("parameters", "mu", "value", value=nan), "model.json: this is not valid JSON", "give the file as bushfit fit wrote it"),
+    ("value is NaN", entry("parameters", "mu", "value", value=nan), "model.json, parameters.mu.value: this value is not understood", "a finite number"),
     ("value below zero", entry("parameters", "mu", "value", value=-1.0), "model.json, mu: impossible value", "0 to 1e+09 Pa (static shear modulus)"),
     ("alpha above one", entry("parameters", "alpha", "value", value=1.5), "model.json, alpha: impossible value", "0.02 to 1 (exponent of the frequency dependence (order of the fractional derivative))"),
     ("vary is a text", entry("parameters", "mu", "vary", value="yes"), "model.json, parameters.mu.vary: this value is not understood", "true or false"),

@@ -93,7 +93,7 @@ def with_session(campaign: Campaign, hidden: Simulated, tests: tuple[Test, ...])
     What depends on the order of the tests is measured anew as a whole, all in one session.
     """
     before, further = hidden.plan, simulation_settings(tests, Noise())
-    loops, sweeps, anew = further.loops, further.sweeps, hidden.truth.depends_on_conditions
+    loops, sweeps, anew = further.loops, further.sweeps, hidden.truth.depends_on
     if anew:
         repeated = (replace(sweep, repeats=sweep.repeats or before.repeats) for sweep in before.sweeps)
         loops, sweeps = (*before.loops, *loops), (*repeated, *sweeps)

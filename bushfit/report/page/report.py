@@ -200,7 +200,7 @@ def comparable_sweeps(sweeps: pd.DataFrame | None, result: Result) -> pd.DataFra
     Returns:
         Table of the sweeps to draw; None if there are none.
     """
-    if sweeps is None or "temperature [degC]" not in sweeps or not result.model.depends_on("temperature"):
+    if sweeps is None or "temperature [degC]" not in sweeps or "temperature" not in result.model.depends_on:
         return sweeps
     degrees = sweeps.groupby("sweep" if "sweep" in sweeps else "test")["temperature [degC]"].transform("mean")
     return sweeps[~((degrees - (REFERENCE - CELSIUS)).abs() > SAME_TEMPERATURE)]

@@ -173,7 +173,7 @@ def _model_line(group: SweepGroup, curve: Curve, header: str, result: Result) ->
     Returns:
         x and y in the units of the table, (m,) each.
     """
-    if not group.shares_levels or result.model.depends_on_conditions:
+    if not group.shares_levels or result.model.depends_on:
         x, values = average_at_x(curve.rows, group.x_header, f"model {header}")
         return x, values
     x = curve.rows[group.x_header].to_numpy()
