@@ -28,6 +28,11 @@ class Record:
     displacement: Array
     force: Array
 
+    def select(self, rows: slice) -> "Record":
+        """Copy some rows of the record, with time from 0."""
+        time = self.time[rows]
+        return Record(time - time[0], self.displacement[rows].copy(), self.force[rows].copy())
+
 
 def wave(waveform: str, phase: Array) -> Array:
     """Waveform of amplitude 1 at phases [cycles] of any shape, "sine" or "triangle", rising from 0 at phase 0.
@@ -48,7 +53,6 @@ def simulate_cycles(
     *,
     cycles: int,
     run_in: int = 0,
-    swell: tuple[int, float] = (0, 1.0),
     steps_per_cycle: int = STEPS_PER_CYCLE,
     waveform: str = "sine",
     kind: Kind = "sweep",
@@ -63,9 +67,6 @@ def simulate_cycles(
         amplitude: zero-to-peak amplitude [m or rad].
         cycles: number of recorded cycles.
         run_in: number of cycles before the record.
-        swell: number and amplitude factor of preceding cycles that grow and decay (Hann window), so that friction
-            forgets its start without a step in the motion. Not for models with parameters that depend on the
-            amplitude, which is that of the whole motion.
         steps_per_cycle: time steps per cycle; the error of the Gruenwald-Letnikov sum is inversely proportional.
         waveform: "sine" or "triangle".
         kind: "loop" or "sweep"; only effects of the instrument depend on it.
@@ -74,20 +75,10 @@ def simulate_cycles(
     Returns:
         Time from 0, displacement and force of the last `cycles`.
     """
-    before = swell[0] + run_in
-    phase = np.arange((before + cycles) * steps_per_cycle + 1) / steps_per_cycle
-    motion = amplitude * wave(waveform, phase)
-    if swell[0]:
-        motion *= 1.0 + (swell[1] - 1.0) * np.sin(np.pi * np.minimum(phase / swell[0], 1.0)) ** 2
-    whole = simulate_motion(
-        model, direction, motion, 1.0 / (frequency * steps_per_cycle), frequency, kind=kind, conditions=conditions
-    )
-    recorded = slice(before * steps_per_cycle, None)
-    return Record(
-        whole.time[recorded] - whole.time[recorded][0],
-        whole.displacement[recorded].copy(),
-        whole.force[recorded].copy(),
-    )
+    motion = amplitude * wave(waveform, np.arange((run_in + cycles) * steps_per_cycle + 1) / steps_per_cycle)
+    step = 1.0 / (frequency * steps_per_cycle)
+    whole = simulate_motion(model, direction, motion, step, frequency, kind=kind, conditions=conditions)
+    return whole.select(slice(run_in * steps_per_cycle, None))
 
 
 def simulate_motion(

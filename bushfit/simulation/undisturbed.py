@@ -19,7 +19,7 @@ from bushfit.campaign.simulated import (
     SimulatedSweep,
     SimulateSettings,
 )
-from bushfit.effects import Level, Modifier, friction
+from bushfit.effects import Level, friction
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
 from bushfit.effects.history import History
 from bushfit.errors import CampaignError
@@ -119,62 +119,51 @@ def _clean_loop(truth: Model, test: SimulatedLoop, conditions: RubberConditions)
         test: settings of the loop.
         conditions: temperature and earlier strains of the rubber.
     """
-    if len(test.parts) > 1:
-        record = _clean_programme(truth, test, conditions)
-    else:
-        ((frequency, amplitude),) = test.parts
-        run_in, swell = _run_in(truth, test.direction, amplitude)
-        record = rig.simulate_cycles(
-            truth,
-            test.direction,
-            frequency,
-            amplitude,
-            cycles=test.cycles,
-            run_in=run_in,
-            swell=swell,
-            steps_per_cycle=_ROWS_PER_CYCLE * _STEPS_PER_ROW,
-            waveform=test.waveform,
-            kind="loop",
-            conditions=conditions,
-        )
-    rows = slice(None, None, _STEPS_PER_ROW)
-    return rig.Record(record.time[rows], record.displacement[rows], record.force[rows])
+    motion, step, recorded = _programme(test) if len(test.parts) > 1 else _steady_loop(truth, test)
+    frequency = test.parts[0][0]
+    record = rig.simulate_motion(truth, test.direction, motion, step, frequency, conditions=conditions)
+    return record.select(slice(recorded, None, _STEPS_PER_ROW))
 
 
-def _run_in(truth: Model, place: Place, amplitude: float) -> tuple[int, tuple[int, float]]:
-    """Choose the motion before the record of a steady loop.
-
-    The mean friction stress from the start must decay to a thousandth. One cycle at a strain of a tenth of eps_half
-    leaves 95 % of it, at a hundredth 99.96 %.
+def _steady_loop(truth: Model, test: SimulatedLoop) -> tuple[Array, float, int]:
+    """Motion of a loop from rest, with so many cycles before the record that its friction is steady.
 
     Args:
         truth: true model.
-        place: direction or specimen.
-        amplitude: zero-to-peak amplitude of the loop [m or rad].
+        test: settings of the loop.
 
     Returns:
-        Number of cycles at this amplitude before the record; then the number of cycles before these whose amplitude
-        grows and decays, and their largest amplitude relative to that of the loop.
+        Displacement [m or rad], time step [s], and number of steps before the record.
+
+    Notes:
+        The mean friction stress from the start must decay to a thousandth. One cycle at a strain of a tenth of eps_half
+        leaves 95 % of it, at a hundredth 99.96 %. Where this takes too many cycles, others come first, whose amplitude
+        grows and decays (Hann window).
     """
+    ((frequency, amplitude),) = test.parts
+    run_in, swell_cycles, swell_factor = _LEAST_RUN_IN, 0, 1.0
     if truth.is_transient:
-        return 0, (0, 1.0)
-    if "eps_half" not in truth.values:
-        return _LEAST_RUN_IN, (0, 1.0)
-    strain = np.array(amplitude * truth.unit_strain(place) / truth.values["eps_half"])
-    cycles = -np.log(1e-3) / np.maximum(friction.mean_stress_decay(strain), np.finfo(float).tiny)
-    follows = any(isinstance(effect, Modifier) for effect in truth.records)
-    if cycles > _LEAST_RUN_IN + _SWELL_CYCLES and not follows:
-        return _LEAST_RUN_IN, (_SWELL_CYCLES, float(_SWELL_TO / strain))
-    return int(np.clip(np.ceil(cycles), _LEAST_RUN_IN, _MOST_RUN_IN)), (0, 1.0)
+        run_in = 0
+    elif "eps_half" in truth.values:
+        strain = np.array(amplitude * truth.unit_strain(test.direction) / truth.values["eps_half"])
+        cycles = -np.log(1e-3) / np.maximum(friction.mean_stress_decay(strain), np.finfo(float).tiny)
+        if cycles > _LEAST_RUN_IN + _SWELL_CYCLES and not truth.structure.modifiers:
+            swell_cycles, swell_factor = _SWELL_CYCLES, float(_SWELL_TO / strain)
+        else:
+            run_in = int(np.clip(np.ceil(cycles), _LEAST_RUN_IN, _MOST_RUN_IN))
+    before, steps = swell_cycles + run_in, _ROWS_PER_CYCLE * _STEPS_PER_ROW
+    phase = np.arange((before + test.cycles) * steps + 1) / steps
+    motion = amplitude * rig.wave(test.waveform, phase)
+    if swell_cycles:
+        motion *= 1.0 + (swell_factor - 1.0) * np.sin(np.pi * np.minimum(phase / swell_cycles, 1.0)) ** 2
+    return motion, 1.0 / (frequency * steps), before * steps
 
 
-def _clean_programme(truth: Model, test: SimulatedLoop, conditions: RubberConditions) -> rig.Record:
-    """Simulate the record of a programme (loops one after the other, from rest) without noise.
+def _programme(test: SimulatedLoop) -> tuple[Array, float, int]:
+    """Motion of a programme from rest: loops one after the other, with pauses.
 
-    Args:
-        truth: true model, including effects of the rig.
-        test: settings of the programme.
-        conditions: temperature and earlier strains of the rubber at the start.
+    Returns:
+        Displacement [m or rad], time step [s], and 0 steps before the record.
     """
     fastest = max(frequency for frequency, _ in test.parts)
     step = 1.0 / (fastest * _ROWS_PER_CYCLE * _STEPS_PER_ROW)
@@ -192,8 +181,7 @@ def _clean_programme(truth: Model, test: SimulatedLoop, conditions: RubberCondit
     for frequency, amplitude in test.parts:
         phase = np.arange(round(test.cycles / (frequency * step))) * (frequency * step)
         motions += [amplitude * rig.wave(test.waveform, phase), rest]
-    motion = np.concatenate([*motions[:-1], [0.0]])
-    return rig.simulate_motion(truth, test.direction, motion, step, test.parts[0][0], conditions=conditions)
+    return np.concatenate([*motions[:-1], [0.0]]), step, 0
 
 
 def _clean_record(truth: Model, test: SimulatedRecord, seed: list[int]) -> rig.Record:
@@ -237,8 +225,7 @@ def _clean_record(truth: Model, test: SimulatedRecord, seed: list[int]) -> rig.R
     conditions = RubberConditions(test.temperature)
     mean_frequency = History.sampled(motion, step).frequency
     record = rig.simulate_motion(truth, test.direction, motion, step, mean_frequency, conditions=conditions)
-    rows = slice(None, None, _STEPS_PER_RECORD_ROW)
-    return rig.Record(record.time[rows], record.displacement[rows], record.force[rows])
+    return record.select(slice(None, None, _STEPS_PER_RECORD_ROW))
 
 
 def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Array:
