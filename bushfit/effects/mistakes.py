@@ -5,7 +5,7 @@ user adopts the mistake.
 """
 
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -24,6 +24,8 @@ _Test = TypeVar("_Test", bound=Loop | Sweep)
 #: Ranges of plausible shear moduli of rubber [Pa] and strain amplitudes of tests [-]; chosen: a tenth of the softest to
 #: ten times the stiffest compound, a tenth of the smallest to twice the largest test.
 _MODULI, _STRAINS = (2e4, 3e8), (3e-4, 5.0)
+#: The direction that a test may have been exchanged with, by its direction.
+_EXCHANGED: Mapping[Place, Direction] = {Direction.AXIAL: Direction.RADIAL, Direction.RADIAL: Direction.AXIAL}
 #: Separator between the name of a mistake and the name of the test, in options.
 SEPARATOR = ":"
 
@@ -101,7 +103,7 @@ class Mistake(Effect):
         kind, place = "loop" if isinstance(test, Loop) else "sweep", test.direction
         fits = kind in self.kinds and self.motion in (None, place.motion)
         doubtful = self.doubt is None or (isinstance(test, Sweep) and self.doubt(test.stiffness))
-        return fits and doubtful and not (self.swaps and other_direction(place) is None)
+        return fits and doubtful and not (self.swaps and place not in _EXCHANGED)
 
     def explains(self, test: Loop | Sweep, modulus: float, strain: float) -> bool:
         """Test if a recording that is implausible for rubber becomes plausible when this factor of 1000 is corrected.
@@ -121,7 +123,7 @@ class Mistake(Effect):
 
     def _direction(self, place: Place) -> Place:
         """True direction of a test that states `place`."""
-        return (other_direction(place) if self.swaps else None) or place
+        return _EXCHANGED.get(place, place) if self.swaps else place
 
     def corrected_bushing(self, bushing: Bushing) -> Bushing:
         """Return a bushing with its radii corrected for this mistake, such as diameters given as radii."""
@@ -132,9 +134,10 @@ class Mistake(Effect):
         """Line of the campaign file that corrects the mistake in a test, or in the bushing if `test` is None."""
         if test is None:
             return self.line
-        swapped = other_direction(test.direction) if self.swaps else None
         kind, line = ("loops", self.line) if isinstance(test, Loop) else ("sweeps", self.sweep_line or self.line)
-        return f"[[{kind}]] of {file_or_name(test)}: {line.replace('{direction}', str(swapped))}"
+        return (
+            f"[[{kind}]] of {file_or_name(test)}: {line.replace('{direction}', str(self._direction(test.direction)))}"
+        )
 
     def in_words(self, test: Loop | Sweep) -> str:
         """Sentence that states the mistake in a test, with the line of the campaign file that corrects it."""
@@ -148,13 +151,6 @@ def file_or_name(test: Loop | Sweep) -> str:
     'slow'
     """
     return test.source.file.name if test.source else test.name
-
-
-def other_direction(place: Place) -> Direction | None:
-    """Return radial for axial and axial for radial; None for other directions and specimens."""
-    if place is Direction.AXIAL:
-        return Direction.RADIAL
-    return Direction.AXIAL if place is Direction.RADIAL else None
 
 
 def _is_of_rubber(modulus: float, strain: float) -> bool:

@@ -47,23 +47,23 @@ class Arms:
     """Parallel Maxwell arms (spring and dashpot in series): mu^ = sum_k G_k i w tau_k/(1 + i w tau_k), G_k, tau_k > 0.
 
     Args:
-        stands_for: names of the effects that the arms replace, such as "springpot".
-        size: name, in files and reports, of the model parameter that all moduli are proportional to.
         modulus: G_k [Pa], contributions to the shear modulus mu^, shortest relaxation time first, (k,).
         time: relaxation times tau_k [s], (k,).
         band: lowest and highest frequency [Hz] of the approximation.
         error: largest relative error of the complex modulus in the band.
+        stands_for: names of the effects that the arms replace, such as "springpot"; empty for the whole rubber.
+        size: name, in files and reports, of the model parameter that all moduli are proportional to; empty for none.
         conditions: temperature of the rubber; unknown for the reference temperature of the model.
 
     Notes: because all moduli and times are positive, the arms dissipate energy in any motion.
     """
 
-    stands_for: str
-    size: str
     modulus: Array
     time: Array
     band: tuple[float, float]
     error: float
+    stands_for: str = ""
+    size: str = ""
     conditions: RubberConditions = UNKNOWN
 
     @property
@@ -79,8 +79,6 @@ def fitted_arms(
     band: tuple[float, float],
     accuracy: float = ACCURACY,
     *,
-    stands_for: str = "",
-    size: str = "",
     spring: float = 0.0,
     overhang_factor: float = _BEYOND,
     closest: bool = False,
@@ -91,8 +89,6 @@ def fitted_arms(
         modulus: complex modulus [Pa] at angular frequencies [rad/s], (n,) -> (n,).
         band: lowest and highest frequency [Hz].
         accuracy: largest relative error of the modulus.
-        stands_for: names of the effects that the arms replace.
-        size: qualified name of the parameter that scales the modulus.
         spring: modulus of a spring in parallel [Pa]; errors are relative to the sum of spring and modulus.
         overhang_factor: factor by which relaxation times may lie outside the band.
         closest: True to return the closest arms if no number of arms reaches the accuracy.
@@ -128,7 +124,7 @@ def fitted_arms(
     error, moduli, times = best
     if closest or error <= accuracy:
         order = np.argsort(times)
-        return Arms(stands_for, size, moduli[order], times[order], band, error)
+        return Arms(moduli[order], times[order], band, error)
     raise ModelError(
         "no set of springs and dashpots represents the frequency dependence closely enough",
         found=f"an error of {100.0 * error:.3g} % with up to {arms} arms",
@@ -161,8 +157,8 @@ def model_arms(
     for size, names in parts.items():
         if model.values[size]:
             modulus = partial(part_modulus, model, size, conditions=conditions)
-            arms = fitted_arms(modulus, band, accuracy, stands_for=" and ".join(names), size=size)
-            fitted.append(replace(arms, conditions=conditions))
+            arms = fitted_arms(modulus, band, accuracy)
+            fitted.append(replace(arms, stands_for=" and ".join(names), size=size, conditions=conditions))
     return tuple(fitted)
 
 

@@ -19,7 +19,7 @@ from bushfit.errors import ModelError
 from bushfit.geometry import Bushing, Direction, Place
 from bushfit.model.constraints import UNCONSTRAINED, Constraints
 from bushfit.model.stack import Stack, acting_layers
-from bushfit.model.structure import Structure, values_for_effect
+from bushfit.model.structure import Structure, structure_of, values_for_effect
 from bushfit.units import display_unit
 
 #: Kind of test: stepped-sine sweep or hysteresis loop. The two may use different force channels of the rig.
@@ -96,7 +96,7 @@ class Model:
     @cached_property
     def structure(self) -> Structure:
         """Effects of the model sorted by kind (branches, modifiers, layers), with their parameters; cached."""
-        return Structure.from_names(self.effects)
+        return structure_of(self.effects)
 
     @property
     def records(self) -> tuple[Effect, ...]:
@@ -227,17 +227,14 @@ class Model:
             The changed model, or the same model if it includes no twin of the effect.
         """
         twins = [effect for effect in self.records if effect.name in twins_of(name) and effect.name != name]
-        effects = [effect.name for effect in self.records if effect not in twins]
-        twin_values = {
-            qualified_name(get_effect(name), new): self.values[qualified_name(twin, old)]
-            for twin in twins
-            for old, new in zip(twin.parameters, get_effect(name).parameters, strict=True)
-        }
-        added = [name] if twins and name not in effects else []
         if not twins:
             return self
-        values = {**self.values, **twin_values}
-        return Model.with_defaults(self.bushing, [*effects, *added], values, self.unnamed, self.constraints)
+        values = dict(self.values)
+        for twin in twins:
+            for old, new in zip(twin.parameters, get_effect(name).parameters, strict=True):
+                values[qualified_name(get_effect(name), new)] = self.values[qualified_name(twin, old)]
+        effects = dict.fromkeys([*(effect.name for effect in self.records if effect not in twins), name])
+        return Model.with_defaults(self.bushing, [*effects], values, self.unnamed, self.constraints)
 
     def without(self, *left: Level | str) -> "Model":
         """Create a model without the effects of the given levels (such as the rig's) or names.

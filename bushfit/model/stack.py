@@ -116,8 +116,9 @@ class Stack:
             if any(modifier.shift_factor for modifier in structure.modifiers):
                 strain = strain.faster(model.shift_factor(setting.conditions, self.values))
         together = displacement.periodic and structure.viscoelastic
-        for branch in structure.others if together else structure.branches:
-            stress = stress + branch.stress(values_for_effect(branch, values), strain)
+        for branch in structure.branches:
+            if not (together and branch.size):
+                stress = stress + branch.stress(values_for_effect(branch, values), strain)
         for modifier in structure.modifiers:
             if modifier.stress:
                 stress = stress + modifier.stress(values_for_effect(modifier, self.values), strain, setting)

@@ -1,7 +1,6 @@
 """Structure of a model: its effects by kind, their parameters, and the values that each effect reads."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
 
@@ -10,40 +9,27 @@ from bushfit.effects.contract import Values
 from bushfit.errors import ModelError
 
 
-@dataclass(frozen=True)
 class Structure:
     """Effects of a model sorted by kind, and their parameters; equal for all models with the same effects.
 
     Args:
+        names: names of the effects, in any order.
+
+    Attributes:
         records: all effects, from the rubber outward.
         parameters: definitions of all parameters by name in files and reports.
         branches: effects that add a stress, in parallel.
         viscoelastic: linear viscoelastic branches, whose steady responses add up harmonic by harmonic.
-        others: all other branches.
         modifiers: effects that change parameter values of other effects.
         layers: effects around the rubber, such as the rig, from the rubber outward.
         moduli: names of the moduli and stresses; if all are scaled by a factor, so is the stiffness of the rubber.
+
+    Raises:
+        ModelError: an effect is unknown or listed twice.
     """
 
-    records: tuple[Effect, ...]
-    parameters: Mapping[str, Parameter]
-    branches: tuple[Branch, ...]
-    viscoelastic: tuple[Branch, ...]
-    others: tuple[Branch, ...]
-    modifiers: tuple[Modifier, ...]
-    layers: tuple[Layer, ...]
-    moduli: tuple[str, ...]
-
-    @classmethod
-    @lru_cache(maxsize=256)
-    def from_names(cls, names: tuple[str, ...]) -> "Structure":
-        """Create the structure of a model from the names of its effects, in any order; cached for fits.
-
-        Returns:
-            Effects by kind, from the rubber outward, and their parameters.
-        """
-        doubles = {name for name in names if names.count(name) > 1}
-        if doubles:
+    def __init__(self, names: tuple[str, ...]) -> None:
+        if doubles := {name for name in names if names.count(name) > 1}:
             raise ModelError("an effect is listed twice", found=", ".join(sorted(doubles)))
         kinds = [name.partition(".")[0] for name in LIBRARY]
 
@@ -51,25 +37,24 @@ class Structure:
             kind = effect.name.partition(".")[0]
             return effect.level, kinds.index(kind) if kind in kinds else len(kinds), effect.name
 
-        records = tuple(sorted(map(get_effect, names), key=outward))
-        branches = tuple(effect for effect in records if isinstance(effect, Branch))
-        return cls(
-            records,
-            MappingProxyType(
-                {qualified_name(effect, parameter): parameter for effect in records for parameter in effect.parameters}
-            ),
-            branches,
-            tuple(branch for branch in branches if branch.size),
-            tuple(branch for branch in branches if not branch.size),
-            tuple(effect for effect in records if isinstance(effect, Modifier)),
-            tuple(effect for effect in records if isinstance(effect, Layer)),
-            tuple(
-                qualified_name(branch, parameter)
-                for branch in branches
-                for parameter in branch.parameters
-                if parameter.unit.startswith("Pa")
-            ),
+        self.records = tuple(sorted(map(get_effect, names), key=outward))
+        self.parameters: Mapping[str, Parameter] = MappingProxyType(
+            {qualified_name(effect, parameter): parameter for effect in self.records for parameter in effect.parameters}
         )
+        self.branches = tuple(effect for effect in self.records if isinstance(effect, Branch))
+        self.viscoelastic = tuple(branch for branch in self.branches if branch.size)
+        self.modifiers = tuple(effect for effect in self.records if isinstance(effect, Modifier))
+        self.layers = tuple(effect for effect in self.records if isinstance(effect, Layer))
+        self.moduli = tuple(
+            qualified_name(branch, parameter)
+            for branch in self.branches
+            for parameter in branch.parameters
+            if parameter.unit.startswith("Pa")
+        )
+
+
+#: Structure of the models with the given names of effects; cached for fits.
+structure_of = lru_cache(maxsize=256)(Structure)
 
 
 def values_for_effect(effect: Effect, values: Values) -> Values:

@@ -25,7 +25,7 @@ from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.model.rig import lock_in, simulate_cycles
 from bushfit.model.sensitivity import force_and_slopes, stiffness_and_slopes
-from bushfit.model.structure import Structure
+from bushfit.model.structure import structure_of
 from bushfit.testing import CONDITIONS, check_effect, operating_point, random_model
 
 HARMONIC_ONLY = tuple(name for name in ADDED if LIBRARY[name].harmonic_only)
@@ -97,10 +97,10 @@ def test_the_effect_keeps_its_contract(effect, add):
 )
 def test_a_broken_effect_is_found(name, change, words, monkeypatch):
     monkeypatch.setitem(LIBRARY, name, replace(get_effect(name), **change))
-    Structure.from_names.cache_clear()
+    structure_of.cache_clear()
     with pytest.raises((AssertionError, IndexError), match=words):
         check_effect(name)
-    Structure.from_names.cache_clear()
+    structure_of.cache_clear()
 
 
 @pytest.mark.parametrize("name", [name for name in ADDED if name not in {"fixture_resonance", *HARMONIC_ONLY}])
