@@ -21,7 +21,7 @@ from bushfit.batch.quantities import Point, PointText
 from bushfit.campaign.toml import parse_toml
 from bushfit.effects import Effect, get_effect
 from bushfit.effects.mistakes import get_candidate
-from bushfit.errors import CampaignError
+from bushfit.errors import CampaignError, error_location
 from bushfit.reading.files import read_utf8
 from bushfit.reading.tablefile import folder_name
 from bushfit.validation import Frequency, Share, Text, converter, unknown_key, validate_tables
@@ -208,37 +208,35 @@ def read_csv_entries(path: Path) -> list[Entry]:
     text = read_utf8(path, CampaignError).decode("utf-8-sig")
     delimiter = max(",;\t", key=text.lstrip().partition("\n")[0].count)
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
-    keys, header, entries, line = [key.name for key in fields(Entry)], list[str](), list[Entry](), 0
+    lines, entries = list[list[str]](), list[Entry]()
     try:
-        for row in reader:
-            if reader.line_num > line + 1:
+        for cells in reader:
+            if reader.line_num > len(lines) + 1:
                 raise csv.Error("a quoted cell continues in the next line")
-            line += 1
-            cells, place = [cell.strip() for cell in row], f"line {line}"
-            if not header:
-                header = cells if any(cells) else []
-                if unknown := [column for column in header if column not in keys]:
-                    error = unknown_key(unknown[0], keys)
-                    error.file, error.place, error.hint = path, "header", error.hint or _INIT_HINT
-                    raise error
-                if repeated := [column for column in header if header.count(column) > 1]:
-                    problem, expected = f'two columns are called "{repeated[0]}"', "each column once"
-                    raise CampaignError(problem, file=path, place="header", expected=expected)
-            elif len(cells) > len(header):
-                found, expected = str(len(cells)), str(len(header))
-                raise CampaignError("more cells than columns", file=path, place=place, found=found, expected=expected)
-            elif any(cells):
-                filled = {key: cell for key, cell in zip(header, cells, strict=False) if cell}
-                entries.append(validate_tables(filled, path, Entry, place=place))
+            lines.append([cell.strip() for cell in cells])
     except csv.Error as error:
         raise CampaignError(
             "a quote is not closed",
             file=path,
-            place=f"line {line + 1}",
+            place=f"line {len(lines) + 1}",
             found=str(error),
             expected="one line for each bushing, and quotes in pairs",
             hint="a quote that belongs to a name is written twice, in a cell in quotes",
         ) from None
+    filled = [(number, cells) for number, cells in enumerate(lines, start=1) if any(cells)]
+    header, keys = filled[0][1] if filled else [], [key.name for key in fields(Entry)]
+    if unknown := [column for column in header if column not in keys]:
+        with error_location(path, "header"):
+            raise unknown_key(unknown[0], keys, _INIT_HINT)
+    if repeated := [column for column in header if header.count(column) > 1]:
+        problem = f'two columns are called "{repeated[0]}"'
+        raise CampaignError(problem, file=path, place="header", expected="each column once")
+    for number, cells in filled[1:]:
+        place, counts = f"line {number}", {"found": str(len(cells)), "expected": str(len(header))}
+        if len(cells) > len(header):
+            raise CampaignError("more cells than columns", file=path, place=place, **counts)
+        stated = {key: cell for key, cell in zip(header, cells, strict=False) if cell}
+        entries.append(validate_tables(stated, path, Entry, place=place))
     return entries
 
 
@@ -332,10 +330,8 @@ def refuse_unused_settings(
     """
     for name, users in _COMMANDS_USING.items():
         # after a fit, predict and respond use the fitted model
-        without_fit = {"diagnose"} if name == "model" else {*users}
-        is_used = any(
-            not (without_fit if "fit" in commands else {*users}).isdisjoint(commands) for commands in commands_of_rows
-        )
+        after_fit = ("diagnose",) if name == "model" else users
+        is_used = any({*commands} & {*(after_fit if "fit" in commands else users)} for commands in commands_of_rows)
         if getattr(settings, name) is not None and not is_used:
             another = "" if ("run",) in commands_of_rows else f"--command {users[0]} too, or "
             raise CampaignError(

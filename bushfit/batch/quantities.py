@@ -14,6 +14,7 @@ from bushfit.effects import get_parameter, is_parameter, parameter_names
 from bushfit.errors import UnitError, did_you_mean
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Motion
 from bushfit.reading.measurement import Sweep
+from bushfit.report.tables import spread_indices
 from bushfit.units import display_unit, is_compatible, parse_quantity
 from bushfit.validation import converter
 
@@ -183,7 +184,7 @@ def measured_curve(sweeps: Iterable[Sweep]) -> dict[str, float]:
         level = float(levels[(len(levels) - 1) // 2])
         steps = np.unique(step[constant == level])
         curve = {}
-        for x in steps[np.linspace(0, steps.size - 1, min(steps.size, _CURVE_POINTS)).round().astype(int)].tolist():
+        for x in steps[spread_indices(steps.size, _CURVE_POINTS)].tolist():
             frequency, amplitude = (x, level) if sweep.stepped == "frequency" else (level, x)
             point = Point(str(sweep.direction), frequency, amplitude, sweep.direction.motion.displacement_unit)
             curve[str(point)] = float(np.abs(sweep.stiffness[(constant == level) & (step == x)]).mean())

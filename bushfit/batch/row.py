@@ -62,10 +62,8 @@ class RowTask:
             BatchError: this process runs another version of bushfit.
         """
         if self.version != __version__:
-            hint = "install the same version on all workers"
-            raise BatchError(
-                "a worker runs another bushfit version", found=__version__, expected=self.version, hint=hint
-            )
+            problem, hint = "a worker runs another bushfit version", "install the same version on all workers"
+            raise BatchError(problem, found=__version__, expected=self.version, hint=hint)
         limit_threads()
         key = store.row_key(row, self.points, self.formats)
         if self.resume and (earlier := store.load_row(self.output, row, key)):
@@ -217,18 +215,12 @@ def estimate_quantities(result: Result, points: Sequence[Point]) -> tuple[dict[s
             expected = " or ".join(f'"{name} ..."' for name in places)
             raise BatchError("this operating point is of several places", found=str(point), expected=expected)
         if place.motion != point.motion:
+            problem = "the unit of this amplitude does not suit this direction or specimen"
             expected = f"an amplitude in {place.display.displacement.name}"
-            raise BatchError(
-                "the unit of this amplitude does not suit this direction or specimen",
-                found=str(point),
-                expected=expected,
-            )
+            raise BatchError(problem, found=str(point), expected=expected)
         predicted = predict_stiffness(result, place, [point.frequency], [point.amplitude])
-        bands = {
-            STIFFNESS: (predicted.stiffness, place.motion.stiffness_unit),
-            LOSS_FACTOR: (predicted.loss_factor, "1"),
-        }
-        for name, (band, unit) in bands.items():
+        bands, units = (predicted.stiffness, predicted.loss_factor), (place.motion.stiffness_unit, "1")
+        for name, band, unit in zip((STIFFNESS, LOSS_FACTOR), bands, units, strict=True):
             value, low, high = (float(values[0]) for values in (band.value, band.low, band.high))
             estimates[f"{name} {point}"] = Estimate.finite(value, low, high, None, unit)
         warnings.append(predicted.warnings)

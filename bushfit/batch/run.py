@@ -10,8 +10,6 @@ from dataclasses import replace
 from functools import partial
 from typing import get_args
 
-import numpy as np
-
 from bushfit.batch import store
 from bushfit.batch.document import RowFile
 from bushfit.batch.executor import Workers, run_rows
@@ -19,6 +17,7 @@ from bushfit.batch.junit import junit_report
 from bushfit.batch.summary import BatchPlan, BatchResult
 from bushfit.errors import OutputError
 from bushfit.progress import track
+from bushfit.report import plots
 from bushfit.report.batch_document import BatchFile
 from bushfit.report.results import Picture, ResultFile, check_free, encode_all, unwritable, write_files
 from bushfit.validation import to_json_data
@@ -120,36 +119,14 @@ def remove_unlisted_parts(plan: BatchPlan) -> list[str]:
 
 
 def batch_files(result: BatchResult) -> list[ResultFile]:
-    """Result files of the whole batch, not yet written.
-
-    The figure has a panel for each quantity that has limits or is known for at least three parts.
-
-    Args:
-        result: results of all rows.
-
-    Returns:
-        Document, table, and page and figure if the formats include them.
-    """
+    """Document, table, and page and figure of the whole batch, if the formats include them; not yet written."""
     from bushfit.report.page.index import index_page
-    from bushfit.report.plots.batch import Panel, batch_figure
 
-    plan, panels = result.plan, list[Panel]()
-    for name, quantity in result.quantities.items() if plan.formats.pictures else ():
-        allowed = result.allowed[0].get(name, ())
-        values, low, high, _ = result.estimates.get(name, np.full((4, 1), np.nan))
-        is_known = np.isfinite(values)
-        if is_known.sum() < (1 if allowed else 3):
-            continue
-        displayed = quantity.displayed(float(np.median(values[is_known])))
-        missed = [k for k, part in enumerate(result.document.parts) if name in part.misses and is_known[k]]
-        limits, ends = tuple(limit * displayed.factor for limit in allowed), np.stack((low, high)) * displayed.factor
-        interval = ends if np.isfinite(ends).all(axis=0).any() else None
-        panels.append(Panel(displayed.header, values * displayed.factor, limits, missed, interval))
-    document = ResultFile("batch", "json", to_json_data(result.document, BatchFile))
-    files = [document, ResultFile("batch", "table", result.table)]
-    if plan.formats.pages:
-        files.append(ResultFile("index", "page", partial(index_page, result.document, plan.task.output)))
-    if panels:
-        names = [row.name for row in plan.rows]
-        files.append(ResultFile("batch", "figure", partial(batch_figure, panels, plan.title, names)))
+    formats, document = result.plan.formats, result.document
+    table = ResultFile("batch", "table", result.table)
+    files = [ResultFile("batch", "json", to_json_data(document, BatchFile)), table]
+    if formats.pages:
+        files.append(ResultFile("index", "page", partial(index_page, document, result.plan.task.output)))
+    if formats.pictures and plots.batch.quantities_to_draw(document, table.content):
+        files.append(ResultFile("batch", "figure", partial(plots.batch.batch_figure, document), table))
     return files

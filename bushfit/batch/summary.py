@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from bushfit.batch.comparison import FEWEST, capability, find_outliers, smallest_deviation, usual_parts
-from bushfit.batch.document import RowFile
+from bushfit.batch.document import Estimate, RowFile
 from bushfit.batch.limits import Limits, describe_poor_fit, judge_part, resolve_limits
 from bushfit.batch.manifest import Row
 from bushfit.batch.quantities import FIT_NAMES, STIFFNESS, PartQuantity, list_quantities, parse_point, point_quantity
@@ -86,13 +86,10 @@ class BatchResult:
 
         The keys are the names of the quantities; numbers that are not known are NaN.
         """
-        figures = dict[str, Array]()
-        for index, record in enumerate(self.records):
-            for name, estimate in record.quantities.items():
-                column = figures.setdefault(name, np.full((4, len(self.records)), np.nan))
-                numbers = (estimate.value, estimate.low, estimate.high, estimate.stderr)
-                column[:, index] = np.array(numbers, dtype=float)
-        return figures
+        names, unknown = dict.fromkeys(name for record in self.records for name in record.quantities), Estimate(np.nan)
+        estimates = {name: [record.quantities.get(name, unknown) for record in self.records] for name in names}
+        rows = {name: [(one.value, one.low, one.high, one.stderr) for one in of] for name, of in estimates.items()}
+        return {name: np.array(row, dtype=float).T for name, row in rows.items()}
 
     @cached_property
     def is_poor(self) -> Array:
@@ -216,10 +213,9 @@ class BatchResult:
             limit = smallest_deviation(int(np.isfinite(compared).sum()), len(self.compared_values))
             usual = usual_parts(compared, name, self.outliers[1])
             detectable = limit and limit * float(values[usual].std(ddof=1))
+        bounds = self.plan.limits.bounds.get(name) if self.plan.limits and name not in FIT_NAMES else None
         low, high = self.allowed[0].get(name, (-np.inf, np.inf))
-        fixed = (-np.inf, np.inf)
-        if self.plan.limits and name in self.allowed[0] and name not in FIT_NAMES:
-            fixed = self.plan.limits.bounds[name].fixed
+        fixed = bounds.fixed if bounds else (-np.inf, np.inf)
         median, sigma = median_and_scatter(known_values)
         cp, cpk = capability(known_values, *(end * column.factor for end in fixed))
         minimum, maximum = (end * column.factor if np.isfinite(end) else None for end in (low, high))

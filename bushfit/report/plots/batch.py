@@ -3,17 +3,18 @@
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from bushfit.effects.contract import Array
 from bushfit.reduction.arrays import median_and_scatter
+from bushfit.report.batch_document import BatchFile
 from bushfit.report.plots import style
 from bushfit.report.tables import shorten
-from bushfit.units import number
+from bushfit.units import number, split_header
 
 #: Colours of limits and of values outside the limits, and of values within the limits.
 _OUT, _GOOD = "#c1272d", "#31688e"
@@ -35,62 +36,42 @@ _POINT = re.compile(
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Panel:
-    """One quantity of all bushings of a batch, for a panel of `batch_figure`.
+def quantities_to_draw(batch: BatchFile, table: pd.DataFrame) -> list[str]:
+    """Headers of the quantities for `batch_figure`: those with limits, and those known for at least three parts.
 
     Args:
-        title: name of the quantity, with its unit.
-        values: value of each bushing in that unit, NaN if it is not known, (n,).
-        allowed: lowest and highest allowed value, infinite if there is no limit on that side; empty without limits.
-        missed: indices of the bushings that are outside the limits.
-        intervals: low and high ends of the 95 % intervals, (2, n); None if they are not known.
+        batch: content of batch.json.
+        table: table of the batch, batch.csv.
     """
-
-    title: str
-    values: Array
-    allowed: tuple[float, ...] = ()
-    missed: Sequence[int] = ()
-    intervals: Array | None = None
-
-    def y_limits(self) -> tuple[float, float]:
-        """Range of the y axis: all values that are not far from the median, the limits, and a typical 95 % interval.
-
-        Returns:
-            Lower and upper end, in the unit of the panel.
-        """
-        values = self.values[np.isfinite(self.values)]
-        middle, sigma = median_and_scatter(values)
-        near = values[np.abs(values - middle) <= _FURTHEST * sigma] if sigma > 0.0 else values
-        limits = [limit for limit in self.allowed if math.isfinite(limit)]
-        widths = np.empty(0) if self.intervals is None else np.ptp(self.intervals, axis=0)
-        widths = widths[np.isfinite(widths)]
-        half = max(float(np.median(widths)) / 2.0 if widths.size else 0.0, 5e-4 * abs(middle)) or 1.0
-        return min(float(near.min()), *limits, middle - half), max(float(near.max()), *limits, middle + half)
+    quantities = batch.quantities.items()
+    unlimited = {header for header, quantity in quantities if quantity.min is None and quantity.max is None}
+    return [header for header, _ in quantities if table[header].count() >= (3 if header in unlimited else 1)]
 
 
 @style.fixed_settings()
-def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> style.Chart:
+def batch_figure(batch: BatchFile, table: pd.DataFrame) -> style.Chart:
     """Figure of the scatter of a batch: one panel per quantity, with a point per bushing in the order of the manifest.
 
+    Up to forty quantities are drawn. The names of up to forty bushings are ticks along x.
+
     Args:
-        panels: quantities of the batch; the first forty are drawn.
-        title: name of the batch.
-        names: names of the bushings, (n,); up to forty names are ticks along x.
+        batch: content of batch.json: names of the bushings, limits, and missed limits.
+        table: table of the batch, batch.csv: values and 95 % intervals.
 
     Returns:
         Figure with two columns of panels.
     """
-    drawn = panels[:_MOST_PANELS]
+    headers, names = quantities_to_draw(batch, table), [part.name for part in batch.parts]
+    drawn = headers[:_MOST_PANELS]
     tick_names = [shorten(name, _MOST_LETTERS_ALONG) for name in names] if len(names) <= _MOST_ALONG else []
     rows = math.ceil(len(drawn) / _COLUMNS)
     letters = max(map(len, tick_names), default=0)
-    figure = style.Chart(f"{title}: {len(names)} bushings", style.ROW * rows + 0.12 * letters)
+    figure = style.Chart(f"{batch.title}: {len(names)} bushings", style.ROW * rows + 0.12 * letters)
     grid = figure.subplots(rows, _COLUMNS, sharex=True, squeeze=False)
     for axes in grid.flat[len(drawn) :]:
         axes.remove()
-    for index, (axes, panel) in enumerate(zip(grid.flat, drawn, strict=False)):
-        _draw_panel(axes, panel, names)
+    for index, (axes, header) in enumerate(zip(grid.flat, drawn, strict=False)):
+        _draw_quantity(axes, batch, table, header)
         lowest = index + _COLUMNS >= len(drawn)
         axes.tick_params(labelbottom=lowest)
         axes.xaxis.set_in_layout(index // _COLUMNS == rows - 1)  # its labels may extend into the empty cell below
@@ -102,39 +83,58 @@ def batch_figure(panels: Sequence[Panel], title: str, names: Sequence[str]) -> s
     return figure.explain(
         "Grey line: median of the batch.",
         "Bars: 95 % intervals." * (len(names) <= _MOST_INTERVALS),
-        "Dashed: limits; red: outside the limits." * any(panel.allowed for panel in drawn),
+        "Dashed: limits; red: outside the limits." * any(_limits(batch, header) for header in drawn),
         "Triangles: outside the panel.",
-        f"The first {len(drawn)} of {len(panels)} quantities." * (len(panels) > len(drawn)),
+        f"The first {len(drawn)} of {len(headers)} quantities." * (len(headers) > len(drawn)),
     )
 
 
-def _draw_panel(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
+def _limits(batch: BatchFile, header: str) -> list[float]:
+    """Lower and upper limit of a quantity, in the unit of its header; empty without limits."""
+    quantity = batch.quantities[header]
+    return [limit for limit in (quantity.min, quantity.max) if limit is not None]
+
+
+def _draw_quantity(axes: Axes, batch: BatchFile, table: pd.DataFrame, header: str) -> None:
     """Draw one quantity of all bushings, with its median and limits; the title names bushings outside the limits.
+
+    The y axis contains the limits, a typical 95 % interval, and all values that are not far from the median.
 
     Args:
         axes: panel.
-        panel: quantity of the n bushings.
-        names: names of the bushings, (n,).
+        batch: content of batch.json.
+        table: table of the batch, with n rows.
+        header: column header of the quantity.
     """
-    x, (low, high), bad = np.arange(1, len(names) + 1), panel.y_limits(), np.isin(range(len(names)), list(panel.missed))
-    values = np.clip(panel.values, low, high)
-    if panel.intervals is not None and len(names) <= _MOST_INTERVALS:
-        axes.vlines(x, *panel.intervals, color=np.where(bad, _OUT, _GOOD), lw=0.8, alpha=0.6, zorder=2)
-    look = style.POINT if len(names) <= _MOST_INTERVALS else style.DOT
-    markers = (("o", values == panel.values), ("^", values < panel.values), ("v", values > panel.values))
+    all_values, limits, name = table[header].to_numpy(dtype=float), _limits(batch, header), split_header(header)[0]
+    missed = [part.name for part in batch.parts if name in part.misses]
+    bad = np.array([name in part.misses for part in batch.parts]) & np.isfinite(all_values)
+    x, finite, widths = np.arange(1, len(table) + 1), all_values[np.isfinite(all_values)], np.empty(0)
+    if f"{header}, low" in table:
+        low_ends, high_ends = (table[f"{header}, {end}"].to_numpy(dtype=float) for end in ("low", "high"))
+        widths = (high_ends - low_ends)[np.isfinite(high_ends - low_ends)]
+        if len(table) <= _MOST_INTERVALS:
+            axes.vlines(x, low_ends, high_ends, color=np.where(bad, _OUT, _GOOD), lw=0.8, alpha=0.6, zorder=2)
+    middle, sigma = median_and_scatter(finite)
+    near = finite[np.abs(finite - middle) <= _FURTHEST * sigma] if sigma > 0.0 else finite
+    half = max(float(np.median(widths)) / 2.0 if widths.size else 0.0, 5e-4 * abs(middle)) or 1.0
+    low, high = min(near.min(), *limits, middle - half), max(near.max(), *limits, middle + half)
+    values = np.clip(all_values, low, high)
+    look = style.POINT if len(table) <= _MOST_INTERVALS else style.DOT
+    markers = (("o", values == all_values), ("^", values < all_values), ("v", values > all_values))
     for marker, mask in markers:
         for color, chosen in ((_GOOD, mask & ~bad), (_OUT, mask & bad)):
             axes.plot(x[chosen], values[chosen], marker, color=color, zorder=3, rasterized=True, **look)
-    axes.axhline(float(np.nanmedian(panel.values)), color=style.GREY, lw=0.9, zorder=1)
-    for limit in filter(math.isfinite, panel.allowed):
+    axes.axhline(middle, color=style.GREY, lw=0.9, zorder=1)
+    for limit in limits:
         axes.axhline(limit, color=_OUT, lw=0.9, ls=(0, (5, 2)), zorder=3)
     style.label_axes(axes, "", "")
     margin = 0.08 * (high - low)
     axes.set_ylim(low - margin, high + margin)
     axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.yaxis.get_offset_text().set_fontsize(style.SMALL)
-    title, color = panel.title, style.INK
-    if missed := [names[index] for index in panel.missed]:
+    title, color = header, style.INK
+    if missed:
         more = f" and {len(missed) - _MOST_NAMED} more" if len(missed) > _MOST_NAMED else ""
         named = shorten(", ".join(missed[:_MOST_NAMED]), _MOST_LETTERS)
         title, color = f"{title}: {len(missed)} out\n{named}{more}", _OUT

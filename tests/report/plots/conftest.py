@@ -14,6 +14,13 @@ from bushfit.model.model import Model
 from bushfit.reading.measurement import Loop, Sweep
 
 
+@pytest.fixture
+def stiff(paper_model) -> Model:
+    """The paper's model, 20 % too stiff."""
+    values = vars(paper_model)["values"]
+    return paper_model.with_values({name: 1.2 * values[name] for name in ("mu", "m", "sigma_fmax")})
+
+
 @pytest.fixture(scope="session")
 def swept() -> Callable[..., MeasuredSweep]:
     """A sweep of a model, 1 % noise; `left_out` rows are missing."""

@@ -61,9 +61,7 @@ def test_settings_of_the_user_do_not_matter(root, tmp_path):
     assert (tmp_path / "saved/static.json").exists()
 
 
-def test_differences_are_measured_minus_model_everywhere(paper_model, swept, looped):
-    values = vars(paper_model)["values"]
-    stiff = paper_model.with_values({name: 1.2 * values[name] for name in ("mu", "m", "sigma_fmax")})
+def test_differences_are_measured_minus_model_everywhere(paper_model, stiff, swept, looped):
     residuals = sweeps(stiff, swept(paper_model)).axes[2]
     assert all(np.mean(line.get_ydata()) < -5.0 for line in points(residuals))
     phase = loops(stiff, looped(paper_model, 1e-3)).axes[1]
