@@ -85,16 +85,14 @@ def draw_curves(pair: Sequence[Axes], group: SweepGroup, result: Result) -> None
     stiffness, x_header = response_headers(group.place)[1], group.x_header
     to_table = group.place.display.stiffness.factor
     largest = max(float(curve.rows[stiffness].max()) for curve in group.curves)
-    factor, labels = stiffness_scale(group.place, largest / to_table)
+    all_x = np.concatenate([curve.rows[x_header] for curve in group.curves])
+    factor = label_response(pair, group.place, largest / to_table, x_header, all_x) / to_table
     looks = style.styles(len(group.curves), group.palette)
-    for axes, label, header, scale in zip(
-        pair, labels, (stiffness, "loss factor [-]"), (factor / to_table, 1.0), strict=True
-    ):
+    for axes, header, scale in zip(pair, (stiffness, "loss factor [-]"), (factor, 1.0), strict=True):
         for curve, look in zip(group.curves, looks, strict=True):
             draw_points(axes, points_to_draw(curve.rows), x_header, header, scale, look, len(group.curves))
             x, values = _model_line(group, curve, header, result)
             axes.plot(x, scale * values, color=look.color, ls=look.dashes, lw=1.3)
-        style.label_axes(axes, x_header, label, np.concatenate([curve.rows[x_header] for curve in group.curves]))
     names = [shorten(curve.name, 30) for curve in group.curves]
     if group.shares_levels:
         style.name_levels(pair[-1], names, group.palette)
@@ -102,20 +100,25 @@ def draw_curves(pair: Sequence[Axes], group: SweepGroup, result: Result) -> None
         style.legend(pair[-1], [look.handle(True) for look in looks], names, "test")
 
 
-def stiffness_scale(place: Place, largest: float) -> tuple[float, tuple[str, str]]:
-    """Choose the stiffness unit of a figure, and make the labels of its stiffness and loss factor axes.
+def label_response(pair: Sequence[Axes], place: Place, largest: float, x_label: str, x: Array | None = None) -> float:
+    """Label two panels for the stiffness magnitude (left) and the loss factor (right) of a direction or specimen.
 
     Args:
+        pair: left and right panel.
         place: direction or specimen of the tests.
-        largest: largest stiffness or modulus to draw [SI].
+        largest: largest stiffness or modulus to draw [SI], which determines the unit.
+        x_label: label of the x axes, with unit.
+        x: values along x, which decide between linear and logarithmic axes, (n,); None for linear.
 
     Returns:
-        Factor from SI to the unit of the figure, and the two labels with units.
+        Factor from SI to the unit of the left panel.
     """
     unit, factor = display_unit(*place.display.stiffness, largest)
     quantity = response_headers(place)[1].partition(" [")[0]
     symbol = " |K|" if quantity == "stiffness" else ""
-    return factor, (f"{place} {quantity}{symbol} [{unit}]", f"{place} loss factor [-]")
+    style.label_axes(pair[0], x_label, f"{place} {quantity}{symbol} [{unit}]", x)
+    style.label_axes(pair[1], x_label, f"{place} loss factor [-]", x)
+    return factor
 
 
 def points_to_draw(rows: pd.DataFrame) -> pd.DataFrame:

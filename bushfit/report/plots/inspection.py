@@ -15,7 +15,7 @@ from bushfit.reading.measurement import Loop, Sweep, loss_factor
 from bushfit.reduction.resonance import LARGEST_ERROR, Resonance
 from bushfit.reduction.result import Reduction
 from bushfit.report.plots import style
-from bushfit.report.plots.fits import stiffness_scale
+from bushfit.report.plots.fits import label_response
 from bushfit.report.plots.measured import header_of
 from bushfit.report.plots.response import extreme_rows
 from bushfit.report.tables import shorten
@@ -97,19 +97,19 @@ def _draw_sweep(pair: Sequence[Axes], sweep: Sweep) -> Axes:
     """Draw stiffness and loss factor over the stepped quantity of a sweep; return the left panel."""
     place, length = sweep.direction, sweep.direction.display.displacement
     magnitude = np.abs(sweep.stiffness)
-    factor, labels = stiffness_scale(place, float(magnitude.max()))
     by_amplitude = sweep.stepped == "amplitude"
     fixed_quantity, unit, scale = ("frequency", "Hz", 1.0) if by_amplitude else ("amplitude", *length)
     x = sweep.step * (length.factor if by_amplitude else 1.0)
+    x_label = header_of(place, "amplitude" if by_amplitude else "frequency")
+    factor = label_response(pair, place, float(magnitude.max()), x_label, x)
     table = pd.DataFrame({"x": x, "stiffness": factor * magnitude, "loss": loss_factor(sweep.stiffness)})
     levels = np.unique(sweep.held_value)
-    for axes, quantity, label in zip(pair, ("stiffness", "loss"), labels, strict=True):
+    for axes, quantity in zip(pair, ("stiffness", "loss"), strict=True):
         for level, look in zip(levels, style.styles(levels.size, fixed_quantity), strict=True):
             rows = table[sweep.held_value == level]
             means = rows.groupby("x")[quantity].mean()
             axes.plot(means.index, means, color=look.color, ls=look.dashes, lw=0.8)
             axes.plot(rows["x"], rows[quantity], look.marker, color=look.color, alpha=0.75, **style.POINT)
-        style.label_axes(axes, header_of(place, "amplitude" if by_amplitude else "frequency"), label, x)
     if sweep.stepped:
         names = [format_range(unit, scale * level) for level in levels]
         style.name_levels(pair[-1], names, fixed_quantity)
@@ -191,7 +191,8 @@ def _draw_points(
         looks: colour and marker by nominal amplitude [m, rad or 1].
     """
     unit, length = reduction.direction.display.displacement
-    factor, labels = stiffness_scale(reduction.direction, float(steps["stiffness"].abs().max()))
+    x = steps["frequency"].to_numpy()
+    factor = label_response(pair, reduction.direction, float(steps["stiffness"].abs().max()), "", x)
     for level, look in looks.items():
         rows = steps[steps["level"] == level]
         frequency, magnitude = rows["frequency"], (factor * rows["stiffness"].abs()).to_numpy()
@@ -206,9 +207,7 @@ def _draw_points(
         quality[0].plot(frequency, noise, look.marker, color=look.color, **style.POINT)
         quality[1].plot(frequency, force, look.marker, color=look.color, **style.POINT)
         quality[1].plot(frequency, motion, look.marker, color=look.color, ms=3.4, mfc="none", mew=0.7)
-    x = steps["frequency"].to_numpy()
-    for axes, label in zip(pair, labels, strict=True):
-        style.label_axes(axes, "", label, x)
+    for axes in pair:
         axes.tick_params(labelbottom=False)
     for axes, label in zip(quality, ("noise [%]", "distortion [%]"), strict=True):
         style.label_axes(axes, "frequency [Hz]", label, x)

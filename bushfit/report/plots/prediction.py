@@ -14,7 +14,7 @@ from bushfit.prediction.static_curve import StaticCurve
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.runs import nominal
 from bushfit.report.plots import style
-from bushfit.report.plots.fits import draw_curves, draw_points, points_note, points_to_draw, stiffness_scale
+from bushfit.report.plots.fits import draw_curves, draw_points, label_response, points_note, points_to_draw
 from bushfit.report.plots.measured import Axis, header_of, rows_at_preload, sweep_groups
 from bushfit.report.tables import IF_RIGS, displacement_header, quantity_words, response_headers, spread_indices
 from bushfit.units import display_unit, format_range
@@ -179,13 +179,13 @@ def draw_prediction(
     measured = np.array([len(rows) > 0 for rows in points])
     chosen = np.flatnonzero(measured) if measured.sum() > 1 else np.arange(levels.size)
     chosen = chosen[spread_indices(chosen.size, _MOST_LEVELS[axis])]
-    factor, labels = stiffness_scale(place, float(prediction.stiffness.value.max()))
     x, looks = scales[axis] * getattr(prediction, axis), style.styles(chosen.size, fixed)
+    factor = label_response(pair, place, float(prediction.stiffness.value.max()), x_header, x)
     kinds = (
         ("stiffness", response_headers(place)[1], factor / place.display.stiffness.factor, factor),
         ("loss_factor", "loss factor [-]", 1.0, 1.0),
     )
-    for axes, label, (name, header, from_table, from_si) in zip(pair, labels, kinds, strict=True):
+    for axes, (name, header, from_table, from_si) in zip(pair, kinds, strict=True):
         band = getattr(prediction, name)
         for look, index in zip(looks, chosen, strict=True):
             mask, rows = getattr(prediction, fixed) == levels[index], points_to_draw(points[index])
@@ -201,7 +201,6 @@ def draw_prediction(
                 axes.plot(x[mask], from_si * getattr(rig, name).value[mask], color=look.color, lw=_THIN)
             if len(rows):
                 draw_points(axes, rows, x_header, header, from_table, look, chosen.size)
-        style.label_axes(axes, x_header, label, x)
         style.widen_span(axes, 0.04 * from_si * band.high.max() if name == "stiffness" else 0.01)  # flat stays flat
     extra_lines: dict[str, Line2D | tuple[Line2D, ...]] = {}
     if (with_rig := bool(measured[chosen].any() and rig)) or prediction.if_rigs:

@@ -8,7 +8,7 @@ from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.preload import Preload
 from bushfit.report.plots import style
-from bushfit.report.plots.fits import stiffness_scale
+from bushfit.report.plots.fits import label_response
 from bushfit.report.tables import spread_indices
 from bushfit.units import format_range
 
@@ -40,11 +40,11 @@ def preload_figure(
     ends = min(preloads).value, max(preloads).value
     loads = [Preload(value, preloads[0].unit) for value in np.linspace(*ends, _FINE).tolist()]
     fine = [predict(result, place, [frequency], amplitudes, temperature=temperature, preload=load) for load in loads]
-    factor, labels = stiffness_scale(place, max(float(one.stiffness.value.max()) for one in fine))
     figure = style.Chart(title, style.ROW)
-    pair = figure.subplots(1, 2)
+    pair, unit = figure.subplots(1, 2), preloads[0].in_display_unit(place)[1]
+    factor = label_response(pair, place, max(float(one.stiffness.value.max()) for one in fine), f"preload [{unit}]")
     quantities = (("stiffness", factor), ("loss_factor", 1.0))
-    for axes, label, (name, scale) in zip(pair, labels, quantities, strict=True):
+    for axes, (name, scale) in zip(pair, quantities, strict=True):
         for index, look in enumerate(style.styles(amplitudes.size, "amplitude")):
             bands = [getattr(prediction, name) for prediction in fine]
             x = [preload.in_display_unit(place)[0] for preload in loads]
@@ -57,7 +57,6 @@ def preload_figure(
                     stiffness = prediction.measured[mask]
                     point = np.abs(stiffness) if name == "stiffness" else stiffness.imag / stiffness.real
                     axes.plot(preload.in_display_unit(place)[0], scale * point, color=look.color, marker=look.marker)
-        style.label_axes(axes, f"preload [{preloads[0].in_display_unit(place)[1]}]", label)
     unit, to_people = place.display.displacement
     style.name_levels(pair[-1], [format_range(unit, to_people * level) for level in amplitudes], "amplitude")
     sentence = f"Lines: model at {format_range('Hz', frequency)}; shaded: its 95 % band."

@@ -70,18 +70,14 @@ class Tab:
     @property
     def complaints(self) -> list[str]:
         """Errors and warnings of the console, and of the browser."""
-        said = [
-            event["params"]
-            for event in self.events
-            if event.get("method") in ("Log.entryAdded", "Runtime.consoleAPICalled", "Runtime.exceptionThrown")
-        ]
-        return [json.dumps(each) for each in said]
+        kinds = ("Log.entryAdded", "Runtime.consoleAPICalled", "Runtime.exceptionThrown")
+        return [json.dumps(event["params"]) for event in self.events if event.get("method") in kinds]
 
     @property
     def requests(self) -> list[str]:
         """All addresses that were asked for."""
-        asked = (event for event in self.events if event.get("method") == "Network.requestWillBeSent")
-        return [event["params"]["request"]["url"] for event in asked]
+        asked = (event["params"] for event in self.events if event.get("method") == "Network.requestWillBeSent")
+        return [params["request"]["url"] for params in asked]
 
     def sheets(self) -> int:
         """Sheets of A4 that the page prints to."""
@@ -98,17 +94,11 @@ def tab(profile: Path) -> Iterator[Tab]:
 
     def on_three_and_four() -> None:
         """Where the browser reads and writes; first out of the way of each other."""
-        read, write = os.dup(from_us), os.dup(to_us)
-        os.dup2(read, 3)
-        os.dup2(write, 4)
+        for number, copy in enumerate((os.dup(from_us), os.dup(to_us)), start=3):
+            os.dup2(copy, number)
 
-    process = subprocess.Popen(
-        [program, *FLAGS, f"--user-data-dir={profile}", "about:blank"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        close_fds=False,
-        preexec_fn=on_three_and_four,
-    )
+    command, quiet = [program, *FLAGS, f"--user-data-dir={profile}", "about:blank"], subprocess.DEVNULL
+    process = subprocess.Popen(command, stdout=quiet, stderr=quiet, close_fds=False, preexec_fn=on_three_and_four)
     os.close(from_us)
     os.close(to_us)
     try:

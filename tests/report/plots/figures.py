@@ -27,6 +27,8 @@ from bushfit.report.tables import loops_table, sweeps_table
 FREQUENCIES = np.arange(5.0, 156.0, 10.0)
 AMPLITUDES = np.array([1e-4, 2e-4, 5e-4])
 TORSION = np.radians([0.5, 1.0, 2.0])
+#: A picture that is higher does not fit on three pages of A4 [inch].
+HIGHEST = 33.0
 
 
 def fitted(model: Model) -> Result:
@@ -103,26 +105,18 @@ def note(figure: Figure) -> str:
 
 
 @fixed_settings()
-def inside(figure: Figure) -> Figure:
-    """The figure, once it is seen that nothing leaves it."""
+def whole(figure: Figure, *, apart: bool = True) -> Figure:
+    """The figure, once it is seen that nothing leaves it, no panel is too small, and none, with its texts, lies on
+    another; `apart` is False for the panels of figures with many levels."""
     figure.draw_without_rendering()
-    legends = [box.get_window_extent() for axes in figure.axes if (box := axes.get_legend())]
-    for box in (*panels(figure), *legends):
+    panels = [box for axes in figure.axes if (box := axes.get_tightbbox())]
+    for box in (*panels, *(box.get_window_extent() for axes in figure.axes if (box := axes.get_legend()))):
         assert min(box.x0, box.y0) >= -1
         assert max(box.x1 - figure.bbox.x1, box.y1 - figure.bbox.y1) <= 1
+    width, height = figure.get_size_inches()
+    assert height < HIGHEST
+    for place in (axes.get_position() for axes in figure.axes if axes.axison):
+        assert (place.height * height > 0.5, place.width * width > 1.2) == (True, True)
+    common = [Bbox.intersection(*pair) for pair in combinations(panels, 2)] if apart else []
+    assert not [box for box in common if box is not None and min(box.width, box.height) > 1.0]
     return figure
-
-
-def whole(figure: Figure) -> Figure:
-    """The figure, once it is seen that nothing leaves it and no panel, with all its texts, lies on another."""
-    assert not [pair for pair in combinations(panels(inside(figure)), 2) if overlap(*pair)]
-    return figure
-
-
-def panels(figure: Figure) -> list[Bbox]:
-    return [box for axes in figure.axes if (box := axes.get_tightbbox())]
-
-
-def overlap(one: Bbox, other: Bbox) -> bool:
-    common = Bbox.intersection(one, other)
-    return common is not None and common.width > 1.0 and common.height > 1.0
