@@ -25,7 +25,6 @@ from bushfit.prediction.caveats import BEYOND
 from bushfit.reduction.arrays import median_and_scatter
 from bushfit.report.batch_document import BatchFile, PartTable, QuantityTable
 from bushfit.report.results import Formats
-from bushfit.report.tables import BETWEEN
 from bushfit.units import number
 from bushfit.validation import to_json_data
 
@@ -330,7 +329,7 @@ class BatchResult:
                 figures = self.estimates.get(name, unknown)[line]
                 columns[quantity.tabled.header + ending] = figures * quantity.tabled.factor
         columns["on a bound"] = bounds
-        columns["warnings"] = [BETWEEN.join(record.warnings) for record in records]
+        columns["warnings"] = [" | ".join(record.warnings) for record in records]
         columns["campaign name"], columns["subgroup"] = last
         columns["differs in"] = [part.differs for part in parts]
         columns["poor fit"] = [part.poor_fit for part in parts]

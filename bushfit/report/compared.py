@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.model.file import require_schema
 from bushfit.prediction.comparison import Comparison, Contrast
@@ -63,6 +64,76 @@ def contrast_table(comparison: Comparison, contrast: Contrast) -> pd.DataFrame:
 
 
 @dataclass(frozen=True, eq=False)
+class PlaceDifferences:
+    """Differences of one result from the reference at one direction or specimen, as compare.json lists them.
+
+    Args:
+        label: letter of the result.
+        place: name of the direction or specimen.
+        table: a row per operating point: label and place, frequency and amplitude; values of both results; relative
+            difference of |K| [1] and difference of the loss factor (result minus reference), with their 95 % bands;
+            "yes" or "no" for a significant difference.
+        amplitude: header of the amplitude.
+        stiffness: header of the stiffness or modulus; in the table it follows "reference " or "other ".
+        relative: header of the relative difference of the stiffness or modulus.
+        loss: header of the difference of the loss factor.
+    """
+
+    label: str
+    place: str
+    table: pd.DataFrame
+    amplitude: str
+    stiffness: str
+    relative: str
+    loss: str = "difference of loss factor [-]"
+
+    @classmethod
+    def from_columns(cls, label: str, place: str, columns: Mapping[str, Sequence[Any]]) -> PlaceDifferences:
+        """Make the table, and find its headers; the quantity may be a stiffness or a modulus, in any unit.
+
+        Args:
+            label: letter of the result.
+            place: name of the direction or specimen.
+            columns: columns of the table by header.
+
+        Returns:
+            Table and headers.
+
+        Raises:
+            ModelError: a column is missing, or columns have different lengths.
+        """
+        texts = [name for name, cells in columns.items() if isinstance(next(iter(cells), None), str)]
+        sizes = {len(cells) for cells in columns.values()}
+        if len(sizes) != 1 or 0 in sizes or not all(name.endswith(", sure") for name in texts):
+            raise ModelError(
+                "columns that do not go together",
+                place=f"pairs, {label}, places, {place}",
+                expected="as many numbers in each, and yes or no in those that end in sure",
+            )
+        types = dict.fromkeys(columns.keys() - {*texts}, float)
+        table = pd.DataFrame({"other": label, "place": place, **columns}).astype(types)
+        amplitude = next((name for name in columns if split_header(name)[0].endswith("amplitude")), "amplitude [mm]")
+        stiffness = next((name for name in columns if name.startswith("reference ")), "reference stiffness [N/mm]")
+        stiffness = stiffness.removeprefix("reference ")
+        relative = f"relative difference of {split_header(stiffness)[0]} [-]"
+        differences = cls(label, place, table, amplitude, stiffness, relative)
+        names = (relative, differences.loss)
+        banded = [f"{side} {name}" for side in ("reference", "other") for name in (stiffness, "loss factor [-]")]
+        ends = [f"{name}{end}" for name in (*banded, *names) for end in ("", ", low", ", high")]
+        require_columns(table, "frequency [Hz]", amplitude, *ends, *(f"{name}, sure" for name in names))
+        return differences
+
+    def band(self, header: str) -> Array:
+        """Value, low and high end of the 95 % band of the column `header`, (3, n), in the unit of the header."""
+        ends = [f"{header}{end}" for end in ("", ", low", ", high")]
+        return self.table[ends].to_numpy(dtype=float).T
+
+    def grid(self) -> Array:
+        """Frequency [Hz] and amplitude (unit of its header) of the operating points, (2, n)."""
+        return self.table[["frequency [Hz]", self.amplitude]].to_numpy(dtype=float).T
+
+
+@dataclass(frozen=True, eq=False)
 class ComparisonDocument:
     """Comparison of two or more results, or of model families, read from a validated `compare.json`."""
 
@@ -103,10 +174,16 @@ class ComparisonDocument:
         repeated = len({entry["name"] for entry in compared}) < len(compared)
         return {entry["label"]: entry["source"] if repeated else entry["name"] for entry in compared}
 
-    @property
-    def places(self) -> list[str]:
-        """Names of the directions and specimens at which the results are compared."""
-        return [*self.document["pairs"][0]["places"]]
+    @cached_property
+    def differences(self) -> dict[str, list[PlaceDifferences]]:
+        """Differences of each result but the reference, by name of the direction or specimen.
+
+        Raises:
+            ModelError: columns of a pair that do not go together.
+        """
+        pairs, columns = self.document["pairs"], PlaceDifferences.from_columns
+        places = pairs[0]["places"]
+        return {place: [columns(pair["other"], place, pair["places"][place]) for pair in pairs] for place in places}
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Build the tables of the comparison for spreadsheets.
@@ -135,8 +212,8 @@ class ComparisonDocument:
             for pair in pairs
             for row in pair["parameters"]
         ]
-        by_place = [self.differences_at(place) for place in self.places]
-        differences = pd.concat([tables[pair["other"]] for pair in pairs for tables in by_place], ignore_index=True)
+        by_result = zip(*self.differences.values(), strict=True)
+        differences = pd.concat([one.table for of_result in by_result for one in of_result], ignore_index=True)
         tables = {"parameters": pd.DataFrame(parameters), "differences": differences}
         families = []
         for family in self.document["families"] or ():
@@ -175,75 +252,6 @@ class ComparisonDocument:
                 *("" if size is None else number(size, 3) for size in (family["heldout"], family["first_there"])),
                 f"{parts} of {parts + len(family['skipped'])}",
             ]
-
-    def differences_at(self, place: str) -> dict[str, pd.DataFrame]:
-        """Tables of the differences of stiffness and loss factor from the reference, at one direction or specimen.
-
-        Args:
-            place: name of the direction or specimen.
-
-        Returns:
-            Table of each result but the reference, by its label; a row per operating point. Columns: values of both
-            results; relative difference of |K| [1] and absolute difference of the loss factor (result minus reference),
-            with their 95 % bands; "yes" or "no" for a significant difference.
-
-        Raises:
-            ModelError: a direction or specimen that a pair does not have, or columns of different lengths.
-        """
-        tables = {}
-        for pair in self.document["pairs"]:
-            columns = pair["places"].get(place, {})
-            texts = [name for name, cells in columns.items() if isinstance(next(iter(cells), None), str)]
-            sizes = {len(cells) for cells in columns.values()}
-            if len(sizes) != 1 or 0 in sizes or not all(name.endswith(", sure") for name in texts):
-                raise ModelError(
-                    "columns that do not go together",
-                    place=f"pairs, {pair['other']}, places, {place}",
-                    expected="as many numbers in each, and yes or no in those that end in sure",
-                )
-            table = pd.DataFrame({name: pd.Series(column, dtype=object) for name, column in columns.items()})
-            table = table.astype(dict.fromkeys(table.columns.difference(texts), float))
-            table.insert(0, "other", pair["other"])
-            table.insert(1, "place", place)
-            tables[pair["other"]] = table
-        return tables
-
-
-class ContrastHeaders(NamedTuple):
-    """Column headers, with units, of a table of differences from `ComparisonDocument.differences_at`.
-
-    Args:
-        amplitude: header of the amplitude.
-        stiffness: header of the stiffness or modulus; in the table it follows "reference " or "other ".
-        relative: header of the relative difference of the stiffness or modulus.
-        loss: header of the difference of the loss factor.
-    """
-
-    amplitude: str
-    stiffness: str
-    relative: str
-    loss: str
-
-    @classmethod
-    def from_table(cls, table: pd.DataFrame) -> ContrastHeaders:
-        """Find the headers in a table; the quantity may be a stiffness or a modulus, in any unit.
-
-        Returns:
-            Headers of the columns of the table.
-
-        Raises:
-            ModelError: a column is missing.
-        """
-        names = [str(name) for name in table]
-        amplitude = next((name for name in names if split_header(name)[0].endswith("amplitude")), "amplitude [mm]")
-        stiffness = next((name for name in names if name.startswith("reference ")), "reference stiffness [N/mm]")
-        stiffness = stiffness.removeprefix("reference ")
-        relative = f"relative difference of {split_header(stiffness)[0]} [-]"
-        headers = cls(amplitude, stiffness, relative, "difference of loss factor [-]")
-        values = [f"{side} {name}" for side in ("reference", "other") for name in (stiffness, "loss factor [-]")]
-        banded = [f"{name}{end}" for name in (*values, *headers[2:]) for end in ("", ", low", ", high")]
-        require_columns(table, "frequency [Hz]", amplitude, *banded, *(f"{name}, sure" for name in headers[2:]))
-        return headers
 
 
 def parameter_cells(row: ParameterContrast) -> list[str]:

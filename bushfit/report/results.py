@@ -73,8 +73,8 @@ def place_names(places: Iterable[Place]) -> list[str]:
     names: list[str] = []
     for place in places:
         name = folder_name(str(place))
-        earlier_names = [earlier.casefold() for earlier in names]
-        names.append(name if name.casefold() not in earlier_names else f"{name}_{len(names) + 1}")
+        is_taken = name.casefold() in map(str.casefold, names)
+        names.append(f"{name}_{len(names) + 1}" if is_taken else name)
     return names
 
 
@@ -228,23 +228,19 @@ def check_free(folder: Path, names: Sequence[str], *, overwrite: bool, inputs: I
             raise NotADirectoryError(errno.ENOTDIR, "Not a directory", str(nearest))
         if not os.access(nearest, os.W_OK | os.X_OK):
             raise PermissionError(errno.EACCES, "no permission to write there", str(nearest))
-        existing = {name: folder / name for name in names if os.path.lexists(folder / name)}
-        read = [file for file in inputs if file.exists()]
-        for file in existing.values():
+        existing, read = dict[str, str](), [file for file in inputs if file.exists()]
+        # digests before the record: a command that runs now records its files, then moves them here
+        for name in (name for name in names if os.path.lexists(folder / name)):
+            file, hint = folder / name, f"move it away, or {elsewhere}"
             if file.is_dir():
-                raise OutputError(
-                    "a folder has the name of a result file", file=file, hint=f"move it away, or {elsewhere}"
-                )
+                raise OutputError("a folder has the name of a result file", file=file, hint=hint)
             if file.exists() and any(file.samefile(path) for path in read):
                 raise OutputError("a result would replace an input of this run", file=file, hint=elsewhere)
-        # digests before the record: a command that runs now records its files, then moves them here
-        lines = {}
-        for name, file in existing.items():
             is_plain = file.is_file() and not file.is_symlink()
-            lines[f"{hashlib.sha256(file.read_bytes()).hexdigest() if is_plain else ''}  {name}"] = name
+            existing[name] = hashlib.sha256(file.read_bytes()).hexdigest() if is_plain else ""
         record = folder / _RECORD
         recorded = record.read_text(encoding="utf-8", errors="replace").splitlines() if record.exists() else []
-        foreign = [name for line, name in lines.items() if line not in recorded]
+        foreign = [name for name, digest in existing.items() if f"{digest}  {name}" not in recorded]
     except OSError as error:
         raise unwritable(folder, error) from error
     if foreign:

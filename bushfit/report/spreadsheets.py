@@ -51,22 +51,19 @@ def parameters_table(result: Result) -> pd.DataFrame:
     Returns:
         A row per parameter: value, unit, standard error and 95 % interval (empty if not known), fitted, and meaning.
     """
-    model, rows = result.model, []
-    for name, value in model.values.items():  # noqa: PD011  # no frame
-        parameter, (low, high) = model.parameters[name], result.interval(name) or (None, None)
-        rows.append(
-            {
-                "parameter": name,
-                "value": value,
-                "unit": parameter.unit,
-                "std error": result.covariance.stderr(name),
-                "95 %, low": low,
-                "95 %, high": high,
-                "fitted": "yes" if name in result.fitted else "no",
-                "meaning": parameter.meaning,
-            }
-        )
-    return pd.DataFrame(rows)
+    parameters, values = result.model.parameters, result.model.values  # noqa: PD011 - no frame
+    low, high = zip(*(result.interval(name) or (None, None) for name in values), strict=True)
+    columns = {
+        "parameter": [*values],
+        "value": [*values.values()],
+        "unit": [parameters[name].unit for name in values],
+        "std error": [result.covariance.stderr(name) for name in values],
+        "95 %, low": low,
+        "95 %, high": high,
+        "fitted": ["yes" if name in result.fitted else "no" for name in values],
+        "meaning": [parameters[name].meaning for name in values],
+    }
+    return pd.DataFrame(columns)
 
 
 def _provenance_rows(request: ExportRequest) -> Iterator[tuple[str, str]]:

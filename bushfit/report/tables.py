@@ -23,8 +23,6 @@ from bushfit.prediction.stiffness import Prediction
 from bushfit.reading.measurement import loss_factor
 from bushfit.units import CELSIUS
 
-#: Separator of the warnings of a bushing in the table of a batch.
-BETWEEN = " | "
 #: Display unit of amplitudes and its factor from SI, by SI unit: mm for m, % for strain.
 DISPLAYS = {motion.displacement_unit: motion.display.displacement for motion in (TRANSLATION, ROTATION, STRAINING)}
 #: Suffix of headers and labels of predictions that assume an unresolved effect to belong to the test rig.
@@ -103,7 +101,7 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
         f"storage {force}": ("storage_stiffness", factor),
         f"loss {force}": ("loss_stiffness", factor),
     }
-    columns = {
+    columns: dict[str, Any] = {
         "frequency [Hz]": prediction.frequency,
         f"{motion_name} [{length}]": prediction.amplitude * length_factor,
     }
@@ -117,11 +115,10 @@ def prediction_table(prediction: Prediction, display: Display | None = None) -> 
         columns |= {f"measured {force}": np.abs(measured) * factor, "measured loss factor [-]": loss_factor(measured)}
     if prediction.preload is not None:
         value, unit = prediction.preload.in_display_unit(prediction.direction)
-        columns[f"preload [{unit}]"] = np.full(prediction.frequency.shape, value)
+        columns[f"preload [{unit}]"] = value
     if over := prediction.over:
-        columns["large motion, frequency [Hz]"] = np.full(prediction.frequency.shape, over.frequency)
-        displacement = over.displacement * length_factor
-        columns[f"large motion, displacement [{length}]"] = np.full(prediction.frequency.shape, displacement)
+        columns["large motion, frequency [Hz]"] = over.frequency
+        columns[f"large motion, displacement [{length}]"] = over.displacement * length_factor
     return pd.DataFrame(columns)
 
 
@@ -369,15 +366,6 @@ def shorten(name: str, letters: int) -> str:
 def spread_indices(count: int, maximum: int) -> Array:
     """Indices of at most `maximum` of `count` elements, evenly from the first to the last, (min(count, maximum),)."""
     return np.linspace(0, count - 1, min(maximum, count)).round().astype(int)
-
-
-def numeric_columns(rows: pd.DataFrame, *headers: str) -> Array:
-    """Columns of a table with the k given headers as an array of floats, (k, n).
-
-    Raises:
-        ModelError: a column is missing.
-    """
-    return require_columns(rows, *headers)[list(headers)].to_numpy(dtype=float).T
 
 
 def require_columns(rows: pd.DataFrame, *headers: str) -> pd.DataFrame:

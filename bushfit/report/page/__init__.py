@@ -46,7 +46,7 @@ def templates() -> jinja2.Environment:
     """Make the environment of the templates, which escapes texts.
 
     Returns:
-        Environment with the filters `number` (significant digits), `formula` and `px` (pixels).
+        Environment with the filters `number` (significant digits) and `formula`.
     """
     import jinja2
 
@@ -59,8 +59,7 @@ def templates() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    pixels = {"px": lambda length: f"{length:.1f}".removesuffix(".0")}
-    environment.filters |= {"number": number, "formula": formula, **pixels}
+    environment.filters |= {"number": number, "formula": formula}
     return environment
 
 

@@ -11,7 +11,7 @@ from bushfit.report import plots
 from bushfit.report.compared import (
     FAMILY_HEADS,
     ComparisonDocument,
-    ContrastHeaders,
+    PlaceDifferences,
     format_difference,
     format_p_value,
     parameter_cells,
@@ -21,7 +21,6 @@ from bushfit.report.page.report import MOST, group_warnings, summarize_condition
 from bushfit.report.page.svg import picture
 from bushfit.report.page.values import spread_points
 from bushfit.report.results import ResultFile
-from bushfit.report.tables import numeric_columns
 from bushfit.units import format_aligned, format_range, number, split_header
 
 #: Largest product of the numbers of results and of directions and specimens for which the page has a figure.
@@ -42,10 +41,8 @@ def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = N
     Returns:
         The page as HTML.
     """
-    document, names, places = comparison.document, comparison.names, comparison.places
+    document, names, differences = comparison.document, comparison.names, comparison.differences
     compared, (reference, *other_names) = document["compared"], names.values()
-    tables = [next(iter(comparison.differences_at(place).values())) for place in places]
-    stiffness = [ContrastHeaders.from_table(table).stiffness for table in tables]
     title = (
         f"{other_names[0]} compared with {reference}"
         if len(other_names) == 1
@@ -70,17 +67,19 @@ def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = N
             if sha256:
                 labels.setdefault((file, sha256), []).append(entry["label"])
     pictures = []
-    if len(names) * len(places) <= _MOST_DRAWN:
+    if len(names) * len(differences) <= _MOST_DRAWN:
         figure = chart.content if chart else plots.comparison.comparison_figure(comparison)
         pictures.append(picture(figure, "compare", figure.heading.get_text()))
     context = {
         "document": document,
         "names": names,
-        "resisted": "modulus" if all(header.startswith("modulus") for header in stiffness) else "stiffness",
+        "resisted": "modulus"
+        if all(of[0].stiffness.startswith("modulus") for of in differences.values())
+        else "stiffness",
         "title": title,
         "entries": entries,
         "differ": [name for name in _CONDITIONS if len({row["conditions"].get(name) for row in entries}) > 1],
-        "sizes": [row for place in places for row in difference_sizes(comparison, place)],
+        "sizes": [difference_sizes(one) for of_place in differences.values() for one in of_place],
         "family_heads": FAMILY_HEADS,
         "family_rows": [*comparison.family_cells()],
         "judged": families and len(other_names) + document["words"][0].startswith("use "),
@@ -95,32 +94,28 @@ def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = N
     return render_page("compare.html", context)
 
 
-def difference_sizes(comparison: ComparisonDocument, place: str) -> Iterator[dict[str, Any]]:
-    """Summarise the differences of each result from the first one in a direction or specimen, as texts.
+def difference_sizes(differences: PlaceDifferences) -> dict[str, str]:
+    """Summarise the differences of a result from the first one in a direction or specimen, as texts.
 
-    Args:
-        comparison: validated comparison.
-        place: name of the direction or specimen.
-
-    Yields:
-        Texts of a result by key: `label`, `place`, range over the operating points of the relative difference of the
-        stiffness |K| [%] (`stiffness`) and of the absolute difference of the loss factor (`loss`), and the number of
-        significant points (`stiffness_sure`, `loss_sure`).
+    Returns:
+        Texts by key: `label`, `place`, range over the operating points of the relative difference of the stiffness |K|
+        [%] (`stiffness`) and of the absolute difference of the loss factor (`loss`), and the number of significant
+        points (`stiffness_sure`, `loss_sure`).
     """
-    for label, table in comparison.differences_at(place).items():
-        heads = ContrastHeaders.from_table(table)
-        row: dict[str, Any] = {"label": label, "place": place}
-        for key, header, scale, unit in (("stiffness", heads.relative, 100.0, " %"), ("loss", heads.loss, 1.0, "")):
-            (values,) = scale * numeric_columns(table, header)
-            finite_ends = np.sort(values[np.isfinite(values)])[[0, -1]].tolist() if np.isfinite(values).any() else []
-            ends = dict.fromkeys(format_difference(end, 0.1 * max(map(abs, finite_ends))) for end in finite_ends)
-            row[key] = " to ".join(ends) + unit
-            significant = int((table[f"{header}, sure"] == "yes").sum())
-            count = "all" if significant == len(table) else f"{significant} of"
-            certain = np.ptp(numeric_columns(table, f"{header}, low", f"{header}, high"), axis=0).any()
-            sentence = f"significant at {count} {len(table)} points" if significant else "not significant"
-            row[f"{key}_sure"] = sentence if certain else "error not known"
-        yield row
+    row, table = {"label": differences.label, "place": differences.place}, differences.table
+    for key, header, scale, unit in (
+        ("stiffness", differences.relative, 100.0, " %"),
+        ("loss", differences.loss, 1.0, ""),
+    ):
+        values, low, high = scale * differences.band(header)
+        finite_ends = np.sort(values[np.isfinite(values)])[[0, -1]].tolist() if np.isfinite(values).any() else []
+        ends = dict.fromkeys(format_difference(end, 0.1 * max(map(abs, finite_ends))) for end in finite_ends)
+        row[key] = " to ".join(ends) + unit
+        significant = int((table[f"{header}, sure"] == "yes").sum())
+        count = "all" if significant == len(table) else f"{significant} of"
+        sentence = f"significant at {count} {len(table)} points" if significant else "not significant"
+        row[f"{key}_sure"] = sentence if (high - low).any() else "error not known"
+    return row
 
 
 def value_rows(comparison: ComparisonDocument) -> Iterator[tuple[Any, ...]]:
@@ -133,17 +128,18 @@ def value_rows(comparison: ComparisonDocument) -> Iterator[tuple[Any, ...]]:
         Direction or specimen, label, frequency, amplitude; then for stiffness and for loss factor a tuple: both values,
         difference, 95 % interval of the difference, and True if it is significant when all points are tested together.
     """
-    places = comparison.places
-    tables = [(label, place, table) for place in places for label, table in comparison.differences_at(place).items()]
-    point_limit = max(_ROWS // max(len(tables), 1), 1)
+    all_differences = [one for of_place in comparison.differences.values() for one in of_place]
+    point_limit = max(_ROWS // max(len(all_differences), 1), 1)
     amplitudes = min(point_limit, _AMPLITUDES)
-    for label, place, table in tables:
-        heads, loss = ContrastHeaders.from_table(table), "loss factor [-]"
-        ((_, length), (_, unit)) = (split_header(header) for header in heads[:2])
-        kinds = ((heads.stiffness, heads.relative, f" {unit}", 100.0, " %"), (loss, heads.loss, "", 1.0, ""))
-        amplitude, frequency = numeric_columns(table, heads.amplitude, "frequency [Hz]")
+    for one in all_differences:
+        (_, length), (_, unit) = split_header(one.amplitude), split_header(one.stiffness)
+        kinds = (
+            (one.stiffness, one.relative, f" {unit}", 100.0, " %"),
+            ("loss factor [-]", one.loss, "", 1.0, ""),
+        )
+        frequency, amplitude = one.grid()
         for index in spread_points(amplitude, frequency, amplitudes, min(point_limit // amplitudes, _FREQUENCIES)):
-            row, cells = table.iloc[index], []
+            row, cells = one.table.iloc[index], []
             for quantity, difference, suffix, scale, percent in kinds:
                 value, low, high = (scale * row[f"{difference}{end}"] for end in ("", ", low", ", high"))
                 size, *ends = (format_difference(end, high - low) for end in (value, low, high))
@@ -151,4 +147,4 @@ def value_rows(comparison: ComparisonDocument) -> Iterator[tuple[Any, ...]]:
                 significant = row[f"{difference}, sure"] == "yes"
                 cells.append((*(side + suffix for side in sides), size + percent, " to ".join(ends), significant))
             point = f"{number(frequency[index], 4)} Hz", format_range(length or "", amplitude[index])
-            yield place, label, *point, *cells
+            yield one.place, one.label, *point, *cells

@@ -20,7 +20,7 @@ _MOST_CELLS = 4000
 #: Largest number of parts that a list names.
 _MOST_NAMED = 20
 #: Size of a sparkline [pixels], and smallest relative deviation at its upper and lower edge.
-_WIDTH, _HEIGHT, _LEAST_SCALE = 110.0, 26.0, 0.005
+_WIDTH, _HEIGHT, _LEAST_SCALE = 110, 26, 0.005
 _DIFFERENT, _USUAL = "#b4500c", "#1f4e9c"
 #: Order of the rows: parts that need attention first.
 _ORDER = ("error", "fail", "conditional fail", "not judged", "differs", "conditional pass", "")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -31,8 +30,6 @@ from bushfit.units import CELSIUS, format_range, number
 if TYPE_CHECKING:
     from bushfit.report.plots.style import Chart
 
-#: Functions that make the figures of a page, by file name of the figure and heading in the page.
-_Figures = dict[tuple[str, str], "Callable[[], Chart]"]
 #: CSS class that colours each verdict; all others are "fair".
 _TONES = {"consistent": "good", "named": "good", "unexplained": "bad"}
 #: Consequence of each verdict for the use of the numbers.
@@ -44,20 +41,15 @@ _CONSEQUENCES = {
     "partly": "Part of the difference is not explained. Use the numbers with their bands, within the tested range.",
     "unexplained": "Do not release these numbers: the model misses the tests, and the cause is not known.",
 }
-#: Labels of test conditions by campaign key; temperature, preload and date are listed even if they are not stated.
+#: Label of each test condition, and its text in the table of tests, by campaign key; empty where it is not shown.
+#: Temperature, preload and date are listed even if they are not stated.
 _CONDITIONS = {
-    "temperature_degC": "Temperature",
-    "preload": "Preload",
-    "date": "Date of tests",
-    "operator": "Operator",
-    "specimen_number": "Specimen no.",
-}
-#: Format of the conditions in the table of tests, by campaign key.
-_CONDITION_FORMATS = {
-    "specimen_number": "part {}",
-    "temperature_degC": "{} °C",
-    "preload": "{} preload",
-    "order": "no. {} of the session",
+    "temperature_degC": ("Temperature", "{} °C"),
+    "preload": ("Preload", "{} preload"),
+    "date": ("Date of tests", ""),
+    "operator": ("Operator", ""),
+    "specimen_number": ("Specimen no.", "part {}"),
+    "order": ("", "no. {} of the session"),
 }
 #: Largest numbers of tests and regions, and of directions and specimens, in a page; the result files contain all.
 MOST, _MOST_PLACES = 12, 6
@@ -158,31 +150,31 @@ def draw_figures(record: ReportRecord) -> tuple[list[Picture], bool]:
     """
     result, diagnosis = record.result, record.diagnosis
     sweeps, loops, gap = (record.tables.get(name) for name in ("sweeps", "loops", "gap"))
-    drawn_sweeps, figures = comparable_sweeps(sweeps, result), _Figures()
+    drawn_sweeps, title = comparable_sweeps(sweeps, result), result.name
+    # file name, heading, function and its arguments
+    figures: list[tuple[str, str, Callable[..., Chart], tuple[Any, ...]]] = []
     for name, prediction in [*record.predictions.items()][:_MOST_PLACES]:
-        title = f"{prediction.direction}: prediction and measurement"
-        draw = plots.prediction.prediction_figure
-        figures[name, title] = partial(draw, result, prediction, drawn_sweeps, result.name)
+        heading, draw = f"{prediction.direction}: prediction and measurement", plots.prediction.prediction_figure
+        figures.append((name, heading, draw, (result, prediction, drawn_sweeps, title)))
     if gap is not None and diagnosis is not None:
-        figures["gap", "Measured minus model"] = partial(plots.gap.gap_figure, gap, result, diagnosis, result.name)
+        figures.append(("gap", "Measured minus model", plots.gap.gap_figure, (gap, result, diagnosis, title)))
     elif sweeps is not None:
-        title = "Sweeps and their residuals"
-        figures["sweeps", title] = partial(plots.fits.sweeps_figure, result, sweeps, result.name)
+        figures.append(("sweeps", "Sweeps and their residuals", plots.fits.sweeps_figure, (result, sweeps, title)))
     if loops is not None:
-        figures["loops", "Hysteresis loops"] = partial(plots.fits.loops_figure, result, loops, result.name)
+        figures.append(("loops", "Hysteresis loops", plots.fits.loops_figure, (result, loops, title)))
     for name, table in record.tables.items():
         if name.startswith("validation_"):
-            title = f"Validation record {name.removeprefix('validation_')}, never fitted"
-            figures[name, title] = partial(plots.response.response_figure, result.name, table)
+            heading = f"Validation record {name.removeprefix('validation_')}, never fitted"
+            figures.append((name, heading, plots.response.response_figure, (title, table)))
     pictures, room = list[Picture](), _LARGEST_FIGURES
-    for (name, title), make in figures.items():
+    for name, heading, draw, arguments in figures:
         try:
-            chart = record.charts[name].content if name in record.charts else make()
+            chart = record.charts[name].content if name in record.charts else draw(*arguments)
         except KeyError as error:
             if not isinstance(error.__cause__, KeyError):  # pandas chains the error of a missing header
                 raise
             raise missing_column(str(error.args[0])) from error
-        drawing = picture(chart, f"f{len(pictures)}-", title)
+        drawing = picture(chart, f"f{len(pictures)}-", heading)
         room -= len(drawing.svg)
         if room <= 0:
             break
@@ -242,8 +234,10 @@ def summarize_conditions(test_conditions: Iterable[Mapping[str, str | float]]) -
         An iterator over pairs of name and text: a range of numbers, or the distinct values.
     """
     tests = list(test_conditions)
-    for key, name in _CONDITIONS.items():
+    for key, (name, _) in _CONDITIONS.items():
         values = list(dict.fromkeys(test[key] for test in tests if key in test))
+        if not name:
+            continue
         if numbers := sorted(value for value in values if not isinstance(value, str)):
             unit = " °C" if key == "temperature_degC" else ""
             yield name, " to ".join(dict.fromkeys(f"{number(end, 3)}{unit}" for end in (numbers[0], numbers[-1])))
@@ -263,8 +257,7 @@ def test_rows(result: Result, tests: Iterable[TestTable]) -> list[dict[str, str 
     rows = list[dict[str, str | int]]()
     for test in tests:
         unit, factor = DISPLAYS[test.unit]
-        test_conditions = {key: value for key in _CONDITION_FORMATS if (value := test.conditions.get(key)) is not None}
-        texts = {key: value if isinstance(value, str) else number(value, 3) for key, value in test_conditions.items()}
+        texts = {key: text if isinstance(text, str) else number(text, 3) for key, text in test.conditions.items()}
         row: dict[str, str | int] = {
             "test": test.test,
             "kind": "hysteresis loop" if test.kind == "loop" else test.kind,
@@ -272,7 +265,9 @@ def test_rows(result: Result, tests: Iterable[TestTable]) -> list[dict[str, str 
             "frequency": format_range("Hz", *test.frequency_Hz),
             "amplitude": format_range(unit, *(factor * end for end in test.amplitude)),
             "rows": test.rows,
-            "conditions": ", ".join(_CONDITION_FORMATS[key].format(text) for key, text in texts.items()),
+            "conditions": ", ".join(
+                form.format(texts[key]) for key, (_, form) in _CONDITIONS.items() if form and key in texts
+            ),
             **dict.fromkeys(("use", "nrmse", "chi"), ""),
         }
         if misfit := misfits.get(test.test):

@@ -3,9 +3,9 @@
 import numpy as np
 from matplotlib.lines import Line2D
 
-from bushfit.report.compared import ComparisonDocument, ContrastHeaders
+from bushfit.report.compared import ComparisonDocument
 from bushfit.report.plots import style
-from bushfit.report.tables import numeric_columns, shorten
+from bushfit.report.tables import shorten
 from bushfit.units import display_unit, format_range, split_header
 
 #: Width of a line [point].
@@ -29,44 +29,37 @@ def comparison_figure(comparison: ComparisonDocument) -> style.Chart:
         Figure with four panels per direction or specimen: values above, differences below.
     """
     first, *other_labels = comparison.names
-    figure = style.Chart(f"{', '.join(other_labels)} against {first}", 2 * len(comparison.places) * style.ROW)
-    grid = figure.subplots(2 * len(comparison.places), 2, squeeze=False)
+    figure = style.Chart(f"{', '.join(other_labels)} against {first}", 2 * len(comparison.differences) * style.ROW)
+    grid = figure.subplots(2 * len(comparison.differences), 2, squeeze=False)
     looks = dict(zip(comparison.names, style.styles(len(comparison.names), "loop"), strict=True))
-    for row, place in enumerate(comparison.places):
-        tables = comparison.differences_at(place)
-        heads = ContrastHeaders.from_table(tables[other_labels[0]])
-        frequency, amplitude = numeric_columns(tables[other_labels[0]], "frequency [Hz]", heads.amplitude)
-        over_frequency = bool(np.ptp(frequency))
-        x_header, fixed_header = ("frequency [Hz]", heads.amplitude)[:: 1 if over_frequency else -1]
-        levels = np.unique(np.unique(amplitude if over_frequency else frequency)[[0, -1]])
-        values = [
-            (first, tables[other_labels[0]], "reference "),
-            *((label, tables[label], "other ") for label in other_labels),
-        ]
-        differences = [(label, tables[label], "") for label in other_labels]
-        name, unit = split_header(heads.stiffness)
-        largest = max(float(np.nanmax(table[f"{side}{heads.stiffness}"], initial=0.0)) for _, table, side in values)
-        display, factor = display_unit(unit or "", 1.0, largest)
+    for row, (place, differences) in enumerate(comparison.differences.items()):
+        reference = differences[0]
+        over_frequency = bool(np.ptp(reference.grid()[0]))
+        step = 1 if over_frequency else -1  # frequency along x and fixed amplitudes, or the other way round
+        x_header, fixed_header = ("frequency [Hz]", reference.amplitude)[::step]
+        levels = np.unique(np.unique(reference.grid()[::step][1])[[0, -1]])
+        values = [(first, reference, "reference "), *((one.label, one, "other ") for one in differences)]
+        changes = [(one.label, one, "") for one in differences]
+        name, unit = split_header(reference.stiffness)
+        largest = max(np.nanmax(one.band(side + one.stiffness)[0], initial=0.0) for _, one, side in values)
+        display, factor = display_unit(unit or "", 1.0, float(largest))
         panels = (
-            (heads.stiffness, f"{place} {name} [{display}]", factor, values, 0.0),
+            (reference.stiffness, f"{place} {name} [{display}]", factor, values, 0.0),
             ("loss factor [-]", f"{place} loss factor [-]", 1.0, values, 0.0),
-            (heads.relative, f"{name} minus {first} [% of {first}]", 100.0, differences, _LEAST_PERCENT),
-            (heads.loss, f"loss factor minus {first} [-]", 1.0, differences, _LEAST_LOSS),
+            (reference.relative, f"{name} minus {first} [% of {first}]", 100.0, changes, _LEAST_PERCENT),
+            (reference.loss, f"loss factor minus {first} [-]", 1.0, changes, _LEAST_LOSS),
         )
-        for axes, (header, y_label, scale, sides, least_span) in zip(
-            grid[2 * row : 2 * row + 2].flat, panels, strict=True
-        ):
-            for label, table, side in sides:
-                ends = [f"{side}{header}{end}" for end in ("", ", low", ", high")]
-                x, level, *band = numeric_columns(table, x_header, fixed_header, *ends)
-                look = looks[label]
+        of_place = grid[2 * row : 2 * row + 2].flat
+        for axes, (header, y_label, scale, sides, least_span) in zip(of_place, panels, strict=True):
+            for label, one, side in sides:
+                (x, level), band, look = one.grid()[::step], scale * one.band(side + header), looks[label]
                 for drawn_level, dashes in zip(levels, style.DASHES, strict=False):
-                    value, low, high = (scale * end[level == drawn_level] for end in band)
-                    line = axes.plot(x[level == drawn_level], value, color=look.color, ls=dashes, lw=_STROKE)[0]
+                    drawn_x, (value, low, high) = x[level == drawn_level], band[:, level == drawn_level]
+                    line = axes.plot(drawn_x, value, color=look.color, ls=dashes, lw=_STROKE)[0]
                     line.set(marker=look.marker, markevery=max(value.size // _MARKS, 1), **style.POINT)
                     # transparent: bands of several results overlap
-                    axes.fill_between(x[level == drawn_level], low, high, color=look.color, alpha=0.18, lw=0)
-            style.label_axes(axes, x_header, y_label, numeric_columns(tables[other_labels[0]], x_header)[0])
+                    axes.fill_between(drawn_x, low, high, color=look.color, alpha=0.18, lw=0)
+            style.label_axes(axes, x_header, y_label, reference.grid()[::step][0])
             if least_span:
                 axes.axhline(0.0, color=looks[first].color, lw=_STROKE)
                 style.widen_span(axes, least_span)
