@@ -17,6 +17,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, ProcessPoolExecutor, wait
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeVar
@@ -119,19 +120,12 @@ def dask_workers(address: str) -> Workers:
         raise BatchError(problem, place="--scheduler", found=found, expected=expected, hint=hint) from None
 
     def count() -> int:
-        """Count the worker threads of the cluster.
-
-        Returns:
-            Number of threads; a lost connection to the scheduler raises a BatchError.
-        """
-        try:
+        """Count the worker threads of the cluster; a lost connection to the scheduler raises a BatchError."""
+        with suppress(OSError, RuntimeError):
             if client.status == "running":
                 return sum(client.nthreads().values())
-            found = "the connection is lost"
-        except (OSError, RuntimeError) as error:
-            found = str(error) or address
         hint = "the same command with --resume continues from here"
-        raise BatchError("the Dask scheduler is lost", found=found, hint=hint)
+        raise BatchError("the connection to the Dask scheduler is lost", found=address, hint=hint)
 
     return Workers(address, partial(client.get_executor, pure=False), count, partial(client.close, _ANSWER_SECONDS))
 

@@ -10,7 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import partial
+from functools import lru_cache, partial
 from itertools import chain
 from pathlib import Path
 from typing import Annotated, Literal
@@ -292,8 +292,7 @@ def make_rows(entries: Sequence[Entry], base: Path, settings: RowSettings, sourc
     commands = {entry.commands or settings.commands or _DEFAULT_COMMANDS for entry in entries}
     refuse_unused_settings(settings, commands, source)
     stems = Counter(Path(entry.campaign).stem for entry in entries)
-    used_folders, namesakes = set[str](), Counter[str]()
-    completed, rows = dict[RowSettings, RowSettings](), list[Row]()
+    used_folders, namesakes, rows = set[str](), Counter[str](), list[Row]()
     for entry in entries:
         path = Path(entry.campaign)
         is_shared = stems[path.stem] > 1 and path.parent.name not in ("", "..")
@@ -303,15 +302,13 @@ def make_rows(entries: Sequence[Entry], base: Path, settings: RowSettings, sourc
             namesakes[plain] += 1
             folder = f"{plain} {namesakes[plain] + 1}"
         used_folders.add(folder.casefold())
-        row_settings = entry.with_defaults(RowSettings())
-        if row_settings not in completed:
-            try:
-                completed[row_settings] = complete_settings(row_settings, settings, base, source)
-            except CampaignError as error:
-                error.place = f"{entry.campaign}, {error.place}"
-                raise
+        try:
+            completed = complete_settings(entry.with_defaults(RowSettings()), settings, base, source)
+        except CampaignError as error:
+            error.place = f"{entry.campaign}, {error.place}"
+            raise
         campaign = os.path.abspath(base / path)  # noqa: PTH100 - links stay as named
-        rows.append(Row(name, folder, entry.campaign, campaign, completed[row_settings], entry.subgroup))
+        rows.append(Row(name, folder, entry.campaign, campaign, completed, entry.subgroup))
     return rows
 
 
@@ -344,6 +341,7 @@ def refuse_unused_settings(
             )
 
 
+@lru_cache(maxsize=64)
 def complete_settings(row_settings: RowSettings, defaults: RowSettings, base: Path, source: str) -> RowSettings:
     """Fill in every default of a row's settings, and check them against each other.
 

@@ -43,17 +43,8 @@ def row_key(row: Row, points: Collection[Point], formats: Formats) -> str:
     Returns:
         SHA-256 in hexadecimal digits.
     """
-    # their tables are always written
-    predicts = not {"run", "predict", "respond"}.isdisjoint(row.settings.commands or ())
-    settings = {
-        "settings": asdict(row.settings),
-        "points": [str(point) for point in points],
-        "tables": formats.tables,
-        "table_form": formats.table_form if formats.tables or predicts else None,
-        "pictures": formats.picture_forms if formats.pictures else (),
-        "pages": formats.pages and row.settings.diagnoses,
-    }
-    return hashlib.sha256(json.dumps([__version__, ROW_SCHEMA, settings], sort_keys=True).encode()).hexdigest()
+    settings = [asdict(row.settings), asdict(formats), [str(point) for point in points]]
+    return digest(json.dumps([__version__, ROW_SCHEMA, *settings], sort_keys=True).encode())
 
 
 def load_row(output: Path, row: Row, key: str) -> RowFile | None:

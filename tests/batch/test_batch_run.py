@@ -81,8 +81,8 @@ def test_the_table_is_in_order_with_units_and_the_numbers_of_the_models(typed, s
     assert all("mu" in text for text in table["on a bound"][~known])
     for header, values in {
         "mu [MPa]": [1e-6 * parameter["value"] for parameter in mu],
-        "mu [MPa], std error": [1e-6 * parameter.get("stderr", math.nan) for parameter in mu],
-        "mu [MPa], low": [1e-6 * parameter["ci95"][0] if "stderr" in parameter else math.nan for parameter in mu],
+        "mu [MPa], std error": [1e-6 * (parameter.get("stderr") or math.nan) for parameter in mu],
+        "mu [MPa], low": [1e-6 * (parameter.get("ci95") or [math.nan])[0] for parameter in mu],
         "sigma_fmax [kPa]": [1e-3 * parameter["value"] for parameter in friction],
         "NRMSE [%]": [100.0 * model["fit"]["nrmse"] for model in models],
     }.items():

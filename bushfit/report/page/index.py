@@ -41,20 +41,19 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
         The page as HTML.
     """
     parts, units = batch.parts, {header: split_header(header) for header in batch.quantities}
-    unknown = [np.nan] * len(batch.curve_points)
-    curves = np.array([unknown if part.curve is None else part.curve for part in parts], dtype=float)
-    usual = np.array([not (part.deviations or part.poor_fit or part.curve is None) for part in parts])
-    has_curves = bool(unknown) and bool(usual.any())
+    curves = np.array([part.curve or [np.nan] * len(batch.curve_points) for part in parts], dtype=float)
+    usual = np.array([bool(part.curve) and not (part.deviations or part.poor_fit) for part in parts])
+    has_curves = bool(usual.any())
     relative = curves / np.nanmedian(curves, axis=0) - 1.0 if has_curves else curves
     scale = max(_LEAST_SCALE, 1.5 * float(np.abs(relative[usual]).max())) if has_curves else 0.0
-    status, links, listed = list[str](), list[str](), dict[str, list[tuple[PartTable, str]]]()
+    status, links, listed = list[str](), list[str](), {name: list[tuple[PartTable, str]]() for name in _ORDER}
     for part in parts:
-        result = "" if part.result in ("pass", None) else str(part.result)
-        differs = part.deviations and result in ("", "conditional pass")
+        differs = part.deviations and part.result in (None, "pass", "conditional pass")
+        result = "" if part.result == "pass" else part.result or ""
         status.append("differs" if differs else "error" if part.error else result)
-        reported = (folder / part.folder / "report.html").exists()
-        links.append(base + quote(part.folder) + ("/report.html" if reported else "/") if part.folder else "")
-        listed.setdefault(status[-1], []).append((part, links[-1]))
+        page = "report.html" if (folder / part.folder / "report.html").exists() else ""
+        links.append(f"{base}{quote(part.folder)}/{page}" if part.folder else "")
+        listed[status[-1]].append((part, links[-1]))
     named_twice = all(part.labels.get("campaign name") in ("", part.name) for part in parts)
     labels = [name for name in _LABELS[named_twice:] if len({part.labels.get(name, "") for part in parts}) > 1]
     heads = ["result"] * bool(batch.limits) + labels
@@ -68,10 +67,10 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
     for index in chosen:
         part = parts[index]
         mean = 100.0 * float(np.expm1(np.log1p(relative[index]).mean())) if has_curves else np.nan
-        numbers = ", ".join(str(warnings.index(line) + 1) for line in part.warnings)
-        remark = numbers and f"see warning{'s' * (len(part.warnings) > 1)} {numbers}"
         remarks = [part.error, part.poor_fit and "poor fit", part.differs and f"differs: {part.differs}"]
-        remarks += [*([] if part.poor_fit else part.doubtful.values()), remark]
+        remarks += [] if part.poor_fit else part.doubtful.values()
+        if numbers := ", ".join(str(warnings.index(line) + 1) for line in part.warnings):
+            remarks.append(f"see warning{'s' * (len(part.warnings) > 1)} {numbers}")
         color = _DIFFERENT if part.deviations else _USUAL
         tones = ["bad" if name in part.misses else "fair" * (name in part.deviations) for name, _ in units.values()]
         values = ["" if value is None else number(value, 4) for value in part.values]
@@ -91,17 +90,18 @@ def index_page(batch: BatchFile, folder: Path, base: str = "") -> str:
         singles = {part.name: curves[k] for k, part in enumerate(parts) if part.curve and not usual[k]}
         chart = plots.batch.curves_figure(batch.curve_points, curves[usual], singles)
         pictures.append(picture(chart, "curves", chart.heading.get_text()))
-    compared = [table.parts for table in batch.quantities.values() if table.detectable]
+    tables = batch.quantities.values()
+    compared = [table for table in tables if table.detectable] or tables
     context: dict[str, Any] = {
         "batch": batch,
         "bad": bool(batch.missed or batch.failed),
         "results": [(result, batch.limits[result]) for result in reversed(_TONES) if result in batch.limits],
-        "fails": [*listed.get("fail", []), *listed.get("conditional fail", [])][:_MOST_NAMED],
-        "unjudged": listed.get("not judged", [])[:_MOST_NAMED],
-        "errors": listed.get("error", [])[:_MOST_NAMED],
-        "differing": listed.get("differs", [])[:_MOST_NAMED],
+        "fails": [*listed["fail"], *listed["conditional fail"]][:_MOST_NAMED],
+        "unjudged": listed["not judged"][:_MOST_NAMED],
+        "errors": listed["error"][:_MOST_NAMED],
+        "differing": listed["differs"][:_MOST_NAMED],
         "most_named": _MOST_NAMED,
-        "parts_compared": max(compared or [table.parts for table in batch.quantities.values()], default=0),
+        "parts_compared": max((table.parts for table in compared), default=0),
         "quantities": [
             (table, units[header][0], "" if units[header][1] in (None, "-") else f" {units[header][1]}")
             for header, table in batch.quantities.items()

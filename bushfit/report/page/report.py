@@ -91,12 +91,6 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
     ends = [20.0 * math.log10(end) for end in (min(map(np.min, sizes)), max(map(np.max, sizes)))] if sizes else []
     named = [(file.file, file.sha256) for file in ([campaign] if campaign else []) + [*tests]]
     inputs = [(str(source.file), source.sha256) for source in result.inputs]
-    gaps = dict[str, list[str]]()
-    if diagnosis:
-        gap = diagnosis["gap"]
-        for name, part in (("held-out data", gap["heldout"]), ("fitted data", gap["calibration"])):
-            misfits = (part["before"], part["after"]) if part else (None, None)
-            gaps[name] = ["not known" if misfit is None else f"{misfit:.2f}" for misfit in misfits]
     context = {
         "name": campaign.name if campaign else result.name,
         "subject": "rubber compound" if not tubes else "rubber bushing" if tubes == 1 else "rubber bushings",
@@ -125,7 +119,6 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
         "conditioned": any(test.conditions for test in tests),
         "more_tests": max(0, len(tests) - MOST),
         "tabled": [*value_rows(predictions)],
-        "gaps": gaps,
         "warnings": group_warnings(warnings),
         "campaign": campaign,
         "files": list(dict.fromkeys((file, sha256) for file, sha256 in (*named, *inputs) if file and sha256)),

@@ -142,16 +142,13 @@ def draw_points(
         look: colour and marker of the points.
         curves: number of curves in the panel; the more there are, the more points are omitted.
     """
-    x, index = np.unique(rows[x_header].to_numpy(), return_inverse=True)
-    values = scale * rows[header].to_numpy()[np.argsort(index, kind="stable")]
-    counts = np.bincount(index)
-    starts = np.cumsum(counts) - counts
-    thinned = slice(None, None, max(1, -(-x.size // max(_CURVE_POINTS, _PANEL_POINTS // curves))))
-    if x.size < len(rows):
-        low, high = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
-        axes.vlines(x[thinned], low[thinned], high[thinned], color=look.color, lw=0.7, alpha=0.7)
-    points = style.POINT if x.size <= _MANY_POINTS else style.DOT | {"alpha": 0.5}
-    axes.plot(x[thinned], (np.add.reduceat(values, starts) / counts)[thinned], look.marker, color=look.color, **points)
+    repeats = rows.groupby(x_header)[header]
+    step = max(1, -(-repeats.ngroups // max(_CURVE_POINTS, _PANEL_POINTS // curves)))
+    means, low, high = (scale * values[::step] for values in (repeats.mean(), repeats.min(), repeats.max()))
+    if repeats.ngroups < len(rows):
+        axes.vlines(means.index, low, high, color=look.color, lw=0.7, alpha=0.7)
+    points = style.POINT if repeats.ngroups <= _MANY_POINTS else style.DOT | {"alpha": 0.5}
+    axes.plot(means.index, means, look.marker, color=look.color, **points)
 
 
 def points_note(table: pd.DataFrame) -> str:

@@ -284,8 +284,9 @@ SPOILED: dict[str, list[tuple[Spoil, tuple[str, ...]]]] = {
         (changed("diagnosis.json", gap=7), ("diagnosis.json, gap", "a table")),
         *(
             (without_column("sweeps.csv", header), ("a column of a table is missing", header))
-            for header in ("stepped", "stiffness [N/mm]", "loss residual [noise]", "stiffness [N m/rad]")
+            for header in ("amplitude [mm]", "stiffness [N/mm]", "loss residual [noise]", "stiffness [N m/rad]")
         ),
+        (written("sweeps.csv", "sweep,direction\na,axial\n"), ("a column of a table is missing", "stepped")),
         *(
             (written("validation_road.csv", f"{headers}\n"), ("a column of a table is missing", header))
             for headers, header in (
