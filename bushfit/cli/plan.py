@@ -150,7 +150,14 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
     result = outcome.plan.knowledge.result
     misses = result is not None and result.model_error is not None
     condition, included = (", if the model were right", ", model error included") if misses else ("", "")
-    output.print(f"{runs} reduce the standard error of the stiffness{included}: {', '.join(gains)}")
+    if rivals := document["rivals"]:
+        chi_square, standard = (number(rivals[key], 3) for key in ("planned", "standard"))
+        output.print(
+            f"{runs}: expected chi-square between {' and '.join(rivals['effects'])} {chi_square}, with the standard "
+            f"programme {standard}; {number(rivals['enough'], 3)} distinguishes them in nine of ten cases"
+        )
+    else:
+        output.print(f"{runs} reduce the standard error of the stiffness{included}: {', '.join(gains)}")
     output.print(f"starting point: {document['source']}")
     _print_tests(output, outcome)
     standard = f"standard, {number(document['hours_standard'], 3)} h"
@@ -174,16 +181,9 @@ def _print_plan(output: Output, outcome: PlanOutput) -> None:
             if target["why"]:
                 output.print(f"{name} is not met: {target['why']}")
     _print_effects(output, document)
-    if rivals := document["rivals"]:
-        chi_squares = ", ".join(f"{number(rivals[key], 3)} by the {key} tests" for key in ("planned", "standard"))
-        output.print(
-            f"expected chi-square between {' and '.join(rivals['effects'])}: {chi_squares}; "
-            f"{number(rivals['enough'], 3)} distinguishes them in nine of ten cases"
-        )
     if document["enough"]:
         output.print(document["enough"])
-    reasons = [target["why"] for target in targets.values() if target["why"]]
-    output.warn([line for line in document["warnings"] if not any(reason in line for reason in reasons)])
+    output.warn(document["warnings"])
 
 
 def _print_tests(output: Output, outcome: PlanOutput) -> None:

@@ -90,9 +90,7 @@ def from_campaign(data: PreparedCampaign, rivals: Sequence[str] | None = None) -
         result = replace(result_of(evidence, data.bounds, ()), specimens=data.campaign.specimens)
         strain = max(float(np.max(tests.amplitude)) * model.unit_strain(tests.direction) for tests in data_sets)
         plain = replace(from_result(result, noise, source), strain=strain, tests=tuple(_campaign_runs(data)))
-        bounded = tuple(
-            name for name in evidence.solution.at_bound if name not in plain.names
-        )  # the others have errors
+        bounded = tuple(name for name in evidence.solution.at_bound if name not in plain.names)
         return _with_bounded_parameters(plain, bounded, data_sets) if bounded else plain
 
     if diagnosis is None or rivals is None:

@@ -74,7 +74,7 @@ def plan(knowledge: Knowledge, request: PlanRequest) -> Plan:
         purposes=purposes,
         missed=missed,
         enough=explain_free_hours(search, planned, missed),
-        notes=tuple(plan_warnings(search, planned, missed)),
+        notes=tuple(plan_warnings(search, planned)),
     )
 
 
@@ -228,13 +228,12 @@ def explain_free_hours(search: PlanSearch, planned: Programme, missed: Sequence[
     )
 
 
-def plan_warnings(search: PlanSearch, planned: Programme, missed: Sequence[str | None]) -> Iterator[str]:
+def plan_warnings(search: PlanSearch, planned: Programme) -> Iterator[str]:
     """Generate the warnings of a plan, the most important first.
 
     Args:
         search: search with the chosen tests.
         planned: programme of the chosen tests.
-        missed: reason why each target is missed; None for a target that is met.
 
     Returns:
         Iterator over sentences.
@@ -250,16 +249,12 @@ def plan_warnings(search: PlanSearch, planned: Programme, missed: Sequence[str |
             "which no test reduces; bushfit diagnose looks for the missing effect"
         )
     yield from knowledge.warnings
-    for target, half, reason in zip(request.targets, planned.half_widths, missed, strict=True):
-        if reason:
-            sizes = f"{format_half_width(target.half_width)} asked for, {format_half_width(half)} planned"
-            yield f"{target}: {sizes}: {reason}"
     if knowledge.bounded:
         yield (
             f"{' and '.join(knowledge.bounded)} ended at a bound: the planned errors of the other parameters "
             "include half of the additional error of a fit without the bound"
         )
-    if missed and not search.determines_scatter(search.counts):
+    if search.goals and not search.determines_scatter(search.counts):
         yield "too few repeats determine the scatter of sweeps: intervals may become 1.5 times as wide as planned"
     if effects := search.less_visible_effects(search.counts):
         yield f"the standard programme shows these effects better: {', '.join(effects)}"

@@ -144,7 +144,7 @@ class PlannedQuantity:
             limit: covariance of the parameters with unlimited tests, (k, k).
 
         Returns:
-            Sentence such as "+/-1.2 % at 5 Hz and 0.1 mm is the model error: ...".
+            Sentence such as "+/-1.2 % at 5 Hz and 0.1 mm comes from the model error: ...".
         """
         worst, variance = int(np.argmax(self.half_widths(limit))), self.variances(limit)
         contributions = np.abs(self.rows[worst]) * np.sqrt(np.diag(limit))
@@ -169,7 +169,7 @@ class PlannedQuantity:
             unit, factor = self.prediction.direction.display.displacement
             frequency, amplitude = self.prediction.frequency[worst], self.prediction.amplitude[worst]
             location = f" at {format_range('Hz', frequency)} and {format_range(unit, factor * amplitude)}"
-        return f"{format_half_width(size)}{location} is {cause}"
+        return f"{format_half_width(size)}{location} comes from {cause}"
 
 
 def format_half_width(half_width: float, digits: int = 2) -> str:

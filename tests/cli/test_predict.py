@@ -279,7 +279,7 @@ def test_a_plan_for_targets_stops_once_they_are_met(root, tmp_path):
         (NEW, ("loss_factor=0.01 %",), "the class of the rig, 0.5 % of gain and 4.4 mrad of phase"),
         (NEW, ("mu=0.25 %", "--hours", "2"), "2 h are too few, about"),
         (NEW, ("stiffness.radial=5 %", "--direction", "axial"), "so far or on offer covers this: radial: not fitted"),
-        (OTHER, ("stiffness.axial=1 %",), "+/-26 % at 145 Hz and 0.08 mm is the model error"),
+        (OTHER, ("stiffness.axial=1 %",), "+/-26 % at 145 Hz and 0.08 mm comes from the model error"),
     ],
 )
 def test_what_keeps_a_target_from_being_met_is_named(root, tmp_path, source, options, said):
