@@ -11,6 +11,8 @@ from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Composition, Finding
 from bushfit.effects import get_effect
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.model.covariance import Covariance
+from bushfit.model.model import Model
 
 #: Texts for the parts of an explanation that are no known effect.
 NAMELESS = "something without a name"
@@ -89,7 +91,7 @@ def explanation_odds(finding: Finding, data: PreparedCampaign) -> Odds:
         Explanations, the most probable first.
     """
     compositions = sorted(finding.reported, key=lambda composition: -composition.probability)
-    sentences, models = [], []
+    sentences, fits = list[str](), list[tuple[Model, Covariance] | None]()
     for composition in compositions:
         claim = composition.best.claim
         parts = [claim.sentence(data)] if claim else []
@@ -97,10 +99,13 @@ def explanation_odds(finding: Finding, data: PreparedCampaign) -> Odds:
         parts += [f"a faulty test: {part.name}" for part in composition.faulty_parts]
         *parts, last = (*parts, *_nameless(composition))
         sentences.append(", and ".join(filter(None, (", ".join(parts), last))))
-        models.append(composition.best.state.evidence.model if composition.best.refitted else None)
+        evidence = composition.best.state.evidence
+        fits.append(
+            (evidence.model, evidence.covariance_of(evidence.model.values)) if composition.best.refitted else None
+        )
     pairs = tuple(zip(sentences, (composition.probability for composition in compositions), strict=True))
     labels = tuple(label(composition, data) for composition in compositions)
-    return Odds(finding.nothing, pairs, tuple(models), labels, finding.verdict == "ambiguous")
+    return Odds(finding.nothing, pairs, tuple(fits), labels, finding.verdict == "ambiguous")
 
 
 def list_candidates(

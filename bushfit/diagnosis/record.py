@@ -22,6 +22,7 @@ from bushfit.effects import effect_name_of, get_parameter
 from bushfit.effects.mistakes import get_candidate, labelled
 from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.geometry import Place
+from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Alternative, Result
 from bushfit.prediction.caveats import warnings_of
@@ -108,14 +109,14 @@ class Odds:
     Args:
         nothing: probability that nothing is missing beyond noise and tolerance.
         explanations: text and probability (if anything is missing) of each explanation, the most probable first.
-        models: fitted model of each explanation; None for an explanation that was not fitted.
+        fits: fitted model of each explanation, with its covariance; None for an explanation that was not fitted.
         labels: names of the effects, mistakes and faults of each explanation, joined by " + ".
         are_alternatives: True if the tests cannot decide between the explanations, so that each is an alternative.
     """
 
     nothing: float
     explanations: tuple[tuple[str, float], ...] = ()
-    models: tuple[Model | None, ...] = ()
+    fits: tuple[tuple[Model, Covariance] | None, ...] = ()
     labels: tuple[str, ...] = ()
     are_alternatives: bool = False
 
@@ -131,13 +132,14 @@ class Odds:
         """
         cov, current = result.covariance, result.model.values
         matrix, alternatives = cov.matrix.copy(), list[Alternative]()
-        for (_, probability), model in zip(self.explanations, self.models, strict=True):
-            if model is None:
+        for (_, probability), fit in zip(self.explanations, self.fits, strict=True):
+            if fit is None:
                 continue
+            model, covariance = fit
             difference = np.array([model.values.get(name, current[name]) - current[name] for name in cov.names])
             matrix += (1.0 - self.nothing) * probability * np.outer(difference, difference)
             if self.are_alternatives:
-                alternatives.append(Alternative(model, (1.0 - self.nothing) * probability))
+                alternatives.append(Alternative(model, (1.0 - self.nothing) * probability, covariance))
         return replace(result, covariance=replace(cov, matrix=matrix), alternatives=tuple(alternatives))
 
 

@@ -103,6 +103,12 @@ class Covariance:
         ]
         return sorted(pairs, key=lambda pair: -abs(pair[2]))
 
+    def with_independent(self, names: tuple[str, ...], deviation: float) -> "Covariance":
+        """Add parameters of one standard deviation [their SI unit] that are independent of all others."""
+        variance, padding = np.diag([0.0] * len(self.names) + [deviation**2] * len(names)), (0, len(names))
+        spread = tuple(np.pad(part, padding) for part in self.spread)
+        return Covariance((*self.names, *names), np.pad(self.matrix, padding) + variance, spread)
+
     def restricted(self, names: Sequence[str]) -> "Covariance":
         """Covariance of the named parameters only, in the order of this covariance; unknown names are ignored."""
         indices = [i for i, name in enumerate(self.names) if name in names]

@@ -220,17 +220,19 @@ class ProvenanceTable:
 
 @dataclass(frozen=True)
 class AlternativeTable:
-    """Entry of a model file for another model that the tests do not rule out: effects, values and probability.
+    """Entry of a model file for another model that the tests do not rule out.
 
     Args:
         effects: names of the effects of the other model.
         values: parameter values of the other model by name [SI].
         probability: probability of the other model by the diagnosis.
+        covariance: covariance of the parameters in the fit of the other model.
     """
 
     effects: tuple[str, ...]
     values: Mapping[str, Number]
     probability: Annotated[Number, Field(ge=0.0, le=1.0)]
+    covariance: Annotated[CovarianceTable, AfterValidator(_check_covariance)] = CovarianceTable((), ())
 
 
 @dataclass(frozen=True)

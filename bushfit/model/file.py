@@ -84,16 +84,14 @@ def from_document(document: object, file: Path | None = None) -> Result:
         law_warnings = tuple(filter(None, (require_effect(name, origin) for name, origin in tables.laws.items())))
         bushing = Bushing(*astuple(tables.bushing)) if tables.bushing else None
         model = Model(bushing, tables.effects, values, tables.unnamed)
-        if table := tables.covariance:
-            if not set(table.names) <= model.parameters.keys():
-                raise ModelError("the covariance does not belong to the parameters", place="covariance")
-            matrix, *spread = (np.reshape(part, 2 * [len(table.names)]) for part in (table.matrix, *table.spread))
-            covariance = Covariance(table.names, matrix, tuple(spread))
+        if tables.covariance:
+            covariance = _covariance(tables.covariance, model)
         alternatives = []
         for rank, row in enumerate(tables.alternatives, 1):
             with error_location(place=f"alternatives, #{rank}"):
                 unnamed = tables.unnamed if UNNAMED in row.effects else None
-                alternatives.append(Alternative(Model(bushing, row.effects, row.values, unnamed), row.probability))
+                other = Model(bushing, row.effects, row.values, unnamed)
+                alternatives.append(Alternative(other, row.probability, _covariance(row.covariance, other)))
         result = Result(
             model,
             fitted=tuple(name for name, entry in entries.items() if entry.vary),
@@ -124,6 +122,20 @@ def from_document(document: object, file: Path | None = None) -> Result:
     return result
 
 
+def _covariance(table: CovarianceTable, model: Model) -> Covariance:
+    """Read the covariance of the parameters of a model; raise a ModelError if it has parameters of another model."""
+    if not set(table.names) <= model.parameters.keys():
+        raise ModelError("the covariance does not belong to the parameters", place="covariance")
+    matrix, *spread = (np.reshape(part, 2 * [len(table.names)]) for part in (table.matrix, *table.spread))
+    return Covariance(table.names, matrix, tuple(spread))
+
+
+def _covariance_table(covariance: Covariance) -> CovarianceTable:
+    """Entry of a model file for a covariance."""
+    matrix, *spread = (tuple(map(tuple, part.tolist())) for part in (covariance.matrix, *covariance.spread))
+    return CovarianceTable(covariance.names, matrix, tuple(spread))
+
+
 def to_document(result: Result) -> dict[str, Any]:
     """Convert a result to the JSON data of a model file.
 
@@ -131,7 +143,6 @@ def to_document(result: Result) -> dict[str, Any]:
         Content of the model file, as dictionaries, lists, texts and numbers.
     """
     model, covariance, fit = result.model, result.covariance, None
-    matrices = [tuple(map(tuple, matrix.tolist())) for matrix in (covariance.matrix, *covariance.spread)]
     if result.quality and (measured := result.measured):
         fit = FitTable(
             **asdict(result.quality),
@@ -175,14 +186,16 @@ def to_document(result: Result) -> dict[str, Any]:
             for coupon in result.specimens
             if not coupon.bushing
         ),
-        covariance=CovarianceTable(covariance.names, matrices[0], tuple(matrices[1:])),
+        covariance=_covariance_table(covariance),
         fit=fit,
         unresolved=result.unresolved,
         unnamed=model.unnamed,
         model_error=result.model_error,
         alternatives=tuple(
-            AlternativeTable(alternative.model.effects, dict(alternative.model.values), alternative.probability)
-            for alternative in result.alternatives
+            AlternativeTable(
+                other.model.effects, dict(other.model.values), other.probability, _covariance_table(other.covariance)
+            )
+            for other in result.alternatives
         ),
         warnings=result.warnings,
         outliers=result.outliers,

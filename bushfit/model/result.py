@@ -184,10 +184,12 @@ class Alternative:
     Args:
         model: the alternative model with its fitted values.
         probability: probability of this model by the diagnosis.
+        covariance: covariance of the parameters in the fit of this model.
     """
 
     model: Model
     probability: float
+    covariance: Covariance = field(default_factory=Covariance)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ import numpy as np
 
 from bushfit.effects import Level
 from bushfit.geometry import Bushing, Direction
-from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 from bushfit.model.result import Result
 from bushfit.units import number
@@ -43,20 +42,20 @@ def with_factor(result: Result, places: Sequence[str], spread: float) -> Result:
     Returns:
         Result with the factors in its models and in its covariance.
     """
-    names, covariance = tuple(f"stiffness_factor.{place}" for place in places), result.covariance
+    names = tuple(f"stiffness_factor.{place}" for place in places)
 
     def with_factors(model: Model) -> Model:
         effects = (*model.effects, *names)
         return Model.with_defaults(model.bushing, effects, model.values, model.unnamed, model.constraints)
 
-    padding = (0, len(names))
-    variance = np.diag([0.0] * len(covariance.names) + [spread**2] * len(names))
-    spreads = tuple(np.pad(part, padding) for part in covariance.spread)
     return replace(
         result,
         model=with_factors(result.model),
-        covariance=Covariance((*covariance.names, *names), np.pad(covariance.matrix, padding) + variance, spreads),
-        alternatives=tuple(replace(record, model=with_factors(record.model)) for record in result.alternatives),
+        covariance=result.covariance.with_independent(names, spread),
+        alternatives=tuple(
+            replace(other, model=with_factors(other.model), covariance=other.covariance.with_independent(names, spread))
+            for other in result.alternatives
+        ),
     )
 
 

@@ -65,17 +65,21 @@ def car_models(model: Model, unresolved: Sequence[str]) -> list[Model]:
     return [bare.without(*names) for size in count for names in combinations(unresolved, size)]
 
 
-def alternative_models(result: Result, *, rig: bool) -> Iterator[Model]:
+def alternative_models(result: Result, *, rig: bool) -> Iterator[tuple[Result, Model]]:
     """Yield each other model that the tests do not rule out, with or without the effects of the rig.
+
+    Yields:
+        The result with the errors of the other model, which has no model error; and the other model.
 
     Args:
         result: fitted result.
         rig: True to keep the effects of the rig, as in the tests; False for the models of `car_models`.
     """
     resolved = {*result.model.effects} - {*result.unresolved}
-    for model in (alternative.model for alternative in result.alternatives):
-        twins = [effect.name for effect in model.records if effect.twins and effect.name not in resolved]
-        yield from [model] if rig else car_models(model, twins)
+    for other in result.alternatives:
+        explained = replace(result, model_error=None, covariance=other.covariance)
+        twins = [effect.name for effect in other.model.records if effect.twins and effect.name not in resolved]
+        yield from ((explained, model) for model in ([other.model] if rig else car_models(other.model, twins)))
 
 
 def candidates(result: Result, *, rig: bool = False) -> list[tuple[Result, Model]]:
@@ -86,11 +90,10 @@ def candidates(result: Result, *, rig: bool = False) -> list[tuple[Result, Model
         rig: True to include the effects of the rig, as in the tests.
 
     Returns:
-        Models with the result that gives their errors: `car_models`, then the alternatives, which have no model error.
+        Models with the result that gives their errors: `car_models`, then `alternative_models`.
     """
     models = [result.model] if rig else car_models(result.model, result.unresolved)
-    explained = replace(result, model_error=None)
-    return [(result, model) for model in models] + [(explained, model) for model in alternative_models(result, rig=rig)]
+    return [*((result, model) for model in models), *alternative_models(result, rig=rig)]
 
 
 def envelope(bands: Sequence[Band]) -> Band:

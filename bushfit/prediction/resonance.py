@@ -118,7 +118,7 @@ def predict_resonance(
         *extrapolations(result, place, frequency[near], predicted.amplitude[near], temperature, subject),
     ]
     if result.alternatives:
-        peaks = np.array([shaken(model).peak for model in alternative_models(result, rig=False)])
+        peaks = np.array([shaken(model).peak for _, model in alternative_models(result, rig=False)])
         (low, smallest), (high, largest) = peaks.min(axis=0), peaks.max(axis=0)
         span = f"{number(low, 4)} to {number(high, 4)} Hz, |T| {number(smallest, 4)} to {number(largest, 4)}"
         warnings += [*result.undecided, f"{subject}: {span}, for all models that agree with the tests"]

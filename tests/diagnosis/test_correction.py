@@ -134,6 +134,10 @@ def test_bands_hold_each_model_that_may_be_right(measured):
     for each in result.alternatives:
         there = radial(each.model)
         assert np.all((band.low <= there * (1.0 + 1e-9)) & (there <= band.high * (1.0 + 1e-9)))
+        own = replace(result, model=each.model, covariance=each.covariance, model_error=None, alternatives=())
+        alone = predict(own, Direction.RADIAL, FREQUENCIES, AMPLITUDES).stiffness
+        assert np.all((band.low <= alone.low) & (alone.high <= band.high)), "with the errors of its own fit"
+        assert 0.0 < np.median((alone.high - alone.value) / alone.value) < 0.02
     assert any("the bands, low to high, include each alternative" in line for line in caveats(result))
     document = json.loads(json.dumps(to_document(result)))
     assert complaints("model", document, whole=False) == []
