@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,11 +15,17 @@ from bushfit.errors import error_location
 from bushfit.units import format_aligned, number, split_header
 
 if TYPE_CHECKING:
-    from bushfit.batch.manifest import Command
     from bushfit.batch.summary import BatchResult
 
 #: Maximum number of parts per verdict (failed, not judged, different) that the terminal lists; batch.csv has all.
 _MOST_SHOWN = 10
+
+
+def parse_effect(text: str) -> str:
+    """Name of a known effect."""
+    from bushfit.effects import get_effect
+
+    return get_effect(text).name
 
 
 @command_called("batch", '"data/practice/*/bushing.toml" --at "axial 25 Hz 0.1 mm"')
@@ -29,17 +35,16 @@ _MOST_SHOWN = 10
     option(
         "--command commands",
         "COMMAND",
-        "Command to run for each bushing: fit, diagnose, predict, respond or run; may be given again [fit].",
+        "Command to run for each bushing: fit, diagnose, predict, respond or run [fit].",
         type=click.Choice(["run", "fit", "diagnose", "predict", "respond"]),
         multiple=True,
     ),
-    direction_option("Fit only the tests in this direction (axial, radial, torsion) or of this specimen."),
-    option("--effect effects", "NAME", "Add this effect to each model, as in `bushfit fit`.", multiple=True),
+    direction_option("fit", "as of `bushfit fit`"),
+    option("--effect effects", "NAME", "Add this effect to each model.", type=parse_effect, multiple=True),
     option(
         "--at operating_points",
         "POINT",
-        'Add table columns with stiffness and loss factor at this point, such as "axial 25 Hz 0.1 mm"; may '
-        "be given again.",
+        'Add table columns with stiffness and loss factor at this point, such as "axial 25 Hz 0.1 mm".',
         multiple=True,
     ),
 )
@@ -63,9 +68,6 @@ _MOST_SHOWN = 10
 @with_output("results/<manifest>", "tables", "pictures", "pages")
 def command(
     manifest: tuple[str, ...],
-    commands: tuple[Command, ...],
-    directions: tuple[str, ...],
-    effects: tuple[str, ...],
     operating_points: tuple[str, ...],
     limits: Path | None,
     junit: Path | None,
@@ -76,6 +78,7 @@ def command(
     plots: bool,
     reports: bool,
     output: Output,
+    **row: Any,
 ) -> None:
     """Evaluate many campaigns and collect the results in one table.
 
@@ -99,10 +102,8 @@ def command(
     from bushfit.batch.row import RowTask
     from bushfit.batch.run import check_output, run_batch
     from bushfit.batch.summary import BatchPlan
-    from bushfit.effects import get_effect
 
-    names = tuple(get_effect(name).name for name in effects)
-    settings = RowSettings(commands=commands or None, directions=directions or None, effects=names or None)
+    settings = RowSettings(**{key: values or None for key, values in row.items()})
     listed = read_manifest(manifest[0], settings, *manifest[1:])
     judged_by = read_limits(limits, listed.rows) if limits else None
     with error_location(place="--at"):

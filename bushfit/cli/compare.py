@@ -26,10 +26,7 @@ _ALL = "all"
 @click.argument("sources", metavar="A [B]...", nargs=-1, required=True, type=FILE)
 @option_group(
     "Range of the comparison",
-    direction_option(
-        "Compare in this direction (axial, radial, torsion) or for this specimen; may be given again [all that "
-        "were fitted in every result]."
-    ),
+    direction_option("compare", "all that were fitted in every result"),
     grid_options("as measured"),
     option("--preload", "LOAD", 'Preload such as "500 N" or "1.5 mm", within the tests of each result [none].'),
     option(

@@ -34,10 +34,10 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
         "--adopt",
         "EFFECT",
         "Add this effect to the model, such as inertia, or correct this mistake in a test file, such as "
-        "peak_to_peak:sweep_axial; may be given again. If no effect has this name, all names are printed.",
+        "peak_to_peak:sweep_axial. If no effect has this name, all names are printed.",
         multiple=True,
     ),
-    option("--without", "EFFECT", "Exclude this effect or mistake from the search; may be given again.", multiple=True),
+    option("--without", "EFFECT", "Exclude this effect or mistake from the search.", multiple=True),
     option(
         "--tolerance",
         "SHARE",

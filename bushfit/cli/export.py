@@ -46,7 +46,7 @@ def parse_cardanic(text: str) -> complex:
     option(
         "--format formats",
         "FORMAT",
-        "Format to write: fmu, nastran, abaqus, adams, prony, csv or xlsx; required, may be given again.",
+        "Format to write: fmu, nastran, abaqus, adams, prony, csv or xlsx; required.",
         type=click.Choice(["fmu", "nastran", "abaqus", "adams", "prony", "csv", "xlsx"]),
         multiple=True,
         required=True,

@@ -79,15 +79,11 @@ def dynamic(
 @command_called("fit", "configs/arm_bushing.toml --direction axial --direction radial --profile")
 @option_group(
     "Tests and model",
-    direction_option(
-        "Fit the tests in this direction (axial, radial, torsion) or of this specimen; may be given again "
-        "[axial, and all specimens]."
-    ),
+    direction_option("fit", "axial, and all specimens"),
     option(
         "--effect effects",
         "NAME",
-        "Add this effect to the model, such as inertia; may be given again. If no effect has this name, all names are "
-        "printed.",
+        "Add this effect to the model, such as inertia. If no effect has this name, all names are printed.",
         multiple=True,
     ),
     flag("--profile", "Compute additional 95 % intervals by profile likelihood; takes some seconds."),

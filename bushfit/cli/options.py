@@ -46,9 +46,12 @@ def option(names: str, metavar: str | None, words: str | None = None, **more: An
     Args:
         names: names separated by blanks; the last may be the name of the Python argument.
         metavar: placeholder of the value in the help; None for an option without a value.
-        words: help text; None if the option shares the text of the next option.
-        **more: further arguments of click.option.
+        words: help text, which ends with the default in brackets; None if the option shares that of the next option.
+        **more: further arguments of click.option; an option with `multiple=True` says that it may be given again.
     """
+    if words and more.get("multiple"):
+        text, bracket, default = words.removesuffix(".").partition(" [")
+        words = f"{text}; may be given again{bracket}{default}."
     return click.option(*names.split(), cls=Option, metavar=metavar, help=words, **more)
 
 
@@ -146,9 +149,16 @@ def option_name(key: str) -> str:
     return "--" + key.replace("_", "-")
 
 
-def direction_option(words: str) -> Parameter:
-    """Create the option --direction for names of directions or specimens, with the help text `words`."""
-    return option("--direction directions", "PLACE", words, type=str, multiple=True)
+def direction_option(action: str, default: str, name: str = "directions") -> Parameter:
+    """Create the option --direction, for directions or specimens.
+
+    Args:
+        action: verb of what the command does with a direction, such as "fit".
+        default: default, as the help text states it.
+        name: argument of the command's function.
+    """
+    words = f"Direction (axial, radial, torsion) or specimen to {action} [{default}]."
+    return option(f"--direction {name}", "PLACE", words, multiple=True)
 
 
 def file_option(name: str, words: str) -> Parameter:

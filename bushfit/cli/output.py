@@ -42,7 +42,7 @@ _FORMAT_OPTIONS: dict[Written, Parameter] = {
     "pictures": option(
         "--plot-format",
         "FORM",
-        "Format of plots: png, svg or pdf; may be given again [png].",
+        "Format of plots: png, svg or pdf [png].",
         type=click.Choice(get_args(Picture)),
         multiple=True,
         default=["png"],

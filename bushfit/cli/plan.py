@@ -12,12 +12,13 @@ import click
 
 from bushfit.cli.options import FILE, command_called, direction_option, file_option, option, option_group
 from bushfit.cli.output import Output, with_output
-from bushfit.cli.shared_options import Grid, grid_options, number_up_to, quantity
+from bushfit.cli.shared_options import grid_options, number_up_to, quantity
 from bushfit.errors import error_location
 from bushfit.units import display_unit, number
 
 if TYPE_CHECKING:
     from bushfit.commands.plan import PlanOutput
+    from bushfit.planning.contract import Aim
     from bushfit.planning.document import PlanFile
 
 #: Maximum of --hours; larger values are typing errors.
@@ -34,6 +35,11 @@ def parse_target(text: str) -> tuple[str, float]:
     if not equals:
         raise click.BadParameter(f"'{text}' is not NAME=SIZE, such as \"mu=2 %\".", param_hint="'--target'")
     return name.strip(), quantity("1")(size.strip())
+
+
+def parse_names(text: str) -> tuple[str, ...]:
+    """Split a comma-separated text into names without duplicates."""
+    return tuple(dict.fromkeys(filter(None, (name.strip() for name in text.split(",")))))
 
 
 @command_called("plan", "configs/arm_bushing.toml --hours 4", 'configs/new_bushing.toml --target "stiffness=1 %"')
@@ -54,22 +60,20 @@ def parse_target(text: str) -> tuple[str, float]:
         "parameters), or rivals (a decision between possible effects) [predictions].",
         type=click.Choice(["parameters", "predictions", "rivals"]),
     ),
-    direction_option(
-        "Direction (axial, radial, torsion) or specimen that the rig can test; may be given again [axial and "
-        "radial, or all specimens]."
-    ),
+    direction_option("test", "axial and radial, or all specimens", "test_directions"),
     option(
         "--target targets",
         "NAME=SIZE",
-        'Accuracy to reach, as half the width of the 95 % interval: "mu=2 %", "stiffness=1 %"; may be given again.',
+        'Accuracy to reach, as half the width of the 95 % interval: "mu=2 %", "stiffness=1 %".',
         type=parse_target,
         multiple=True,
     ),
-    option("--parameters", "NAME,...", "With --for parameters: the parameters to determine [all]."),
-    option(
-        "--rivals",
-        "NAME,...",
-        "With --for rivals: the effects to distinguish [those that diagnose cannot distinguish].",
+    *(
+        option(name, "NAME,...", words, type=parse_names, default="")
+        for name, words in (
+            ("--parameters", "With --for parameters: the parameters to determine [all]."),
+            ("--rivals", "With --for rivals: the effects to distinguish [those that diagnose cannot distinguish]."),
+        )
     ),
     file_option(
         "--campaign",
@@ -80,15 +84,11 @@ def parse_target(text: str) -> tuple[str, float]:
 @with_output("results/<name>/plan", "tables")
 def command(
     source: Path,
-    aim: str | None,
-    hours: float,
-    directions: tuple[str, ...],
-    parameters: str | None,
-    rivals: str | None,
+    aim: Aim | None,
     targets: tuple[tuple[str, float], ...],
     campaign: Path | None,
     output: Output,
-    **grids: Grid | None,
+    **settings: Any,
 ) -> None:
     """Select the most informative next tests within the limits of the rig.
 
@@ -102,28 +102,20 @@ def command(
     from bushfit.commands.loading import load_source
     from bushfit.commands.plan import plan
 
+    parameters, rivals = settings["parameters"], settings["rivals"]
     if aim not in (None, "rivals") and rivals:
         raise click.UsageError("'--rivals' requires '--for rivals'.")
     if aim not in (None, "parameters") and parameters:
         raise click.UsageError("'--parameters' requires '--for parameters'.")
     if targets and (aim or rivals or parameters):
         raise click.UsageError("'--target' cannot be combined with '--for', '--parameters' and '--rivals'.")
-    implied = "targets" if targets else "rivals" if rivals else "parameters" if parameters else "predictions"
-    settings: dict[str, Any] = {
-        **grids,
-        "aim": aim or implied,
-        "hours": hours,
-        "test_directions": directions,
-        "parameters": _names(parameters),
-        "rivals": _names(rivals),
-        "targets": dict(targets),
-    }
+    implied: Aim = "targets" if targets else "rivals" if rivals else "parameters" if parameters else "predictions"
     opened, settings_campaign = load_source(source), load_campaign(campaign) if campaign else None
     if settings_campaign and isinstance(opened, Campaign):
         raise click.UsageError("'--campaign' requires MODEL.json.")
     folder = output.folder(opened.name, "plan.json")
     with error_location(source):
-        outcome = plan(opened, settings_campaign, **settings)
+        outcome = plan(opened, settings_campaign, aim=aim or implied, targets=dict(targets), **settings)
     _print_plan(output, outcome)
     output.write(folder, outcome.files, outcome.document, [source, *([campaign] if campaign else [])])
     if outcome.plan.planned.tests:
@@ -131,11 +123,6 @@ def command(
     if missed := [name for name, target in outcome.document["targets"].items() if not target["met"]]:
         click.echo(f"bushfit: these targets are not met: {', '.join(missed)}", err=True)
         click.get_current_context().exit(1)
-
-
-def _names(text: str | None) -> tuple[str, ...]:
-    """Split a comma-separated text into names without duplicates."""
-    return tuple(dict.fromkeys(filter(None, (name.strip() for name in (text or "").split(",")))))
 
 
 def _print_plan(output: Output, outcome: PlanOutput) -> None:

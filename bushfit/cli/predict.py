@@ -43,7 +43,7 @@ def parse_motion(text: str) -> LargeMotion:
     option(
         "--preload preloads",
         "LOAD",
-        'Predict at this preload, "500 N" or "1.5 mm", between the tested preloads; may be given again [none].',
+        'Predict at this preload, "500 N" or "1.5 mm", between the tested preloads [none].',
         multiple=True,
     ),
     option(

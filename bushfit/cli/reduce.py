@@ -137,11 +137,7 @@ def _resonance_table(file: Path, test_options: Mapping[str, Any], shaker: Mappin
 
 
 def _reduce_resonance(
-    files: Sequence[Path],
-    table: Table,
-    test_options: Mapping[str, Any],
-    shaker: Mapping[str, Any],
-    levels: str | None,
+    files: Sequence[Path], table: Table, test_options: Mapping[str, Any], shaker: Mapping[str, Any], levels: str | None
 ) -> tuple[Resonance, str, str]:
     """Reduce a resonance test to a sweep.
 

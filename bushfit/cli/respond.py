@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bushfit.cli.file_options import metadata_options, options_named, require_tests
-from bushfit.cli.options import FILE, command_called, direction_option, flag, option, option_group
+from bushfit.cli.options import FILE, Option, command_called, flag, option, option_group
 from bushfit.cli.output import Output, with_output
 from bushfit.cli.shared_options import TEMPERATURE, quantity
 
@@ -23,7 +23,13 @@ if TYPE_CHECKING:
 @click.argument("history", metavar="HISTORY", type=FILE, callback=require_tests)
 @option_group(
     "Motion and conditions",
-    direction_option("Direction of the motion (axial, radial, torsion) or specimen [from headers or the file name]."),
+    click.option(
+        *("--direction", "directions"),
+        cls=Option,
+        metavar="PLACE",
+        help="Direction (axial, radial, torsion) or specimen of the motion [from headers or the file name].",
+        multiple=True,  # more than one is an error
+    ),
     flag("--steady", "Treat the history as whole cycles of a steady motion [as a motion from rest]."),
     option(
         "--lowpass",

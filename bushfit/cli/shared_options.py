@@ -112,10 +112,7 @@ def prediction_options(campaign: str) -> Parameter:
     """Create --direction, the options of the grid, --temperature, and --campaign with the help text `campaign`."""
     return option_group(
         "Range and conditions",
-        direction_option(
-            "Predict in this direction (axial, radial, torsion) or for this specimen; may be given again [axial and "
-            "radial, and all specimens]."
-        ),
+        direction_option("predict", "axial and radial, and all specimens"),
         grid_options("from the campaign, else as tested"),
         TEMPERATURE,
         file_option("--campaign", campaign),

@@ -22,12 +22,7 @@ if TYPE_CHECKING:
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=FILE)
 @option_group(
     "Tests and effects",
-    option(
-        "--effect effects",
-        "EFFECT",
-        'Add an effect to the model, such as "inertia.mass=0.1 kg"; may be given again.',
-        multiple=True,
-    ),
+    option("--effect effects", "EFFECT", 'Add an effect to the model, such as "inertia.mass=0.1 kg".', multiple=True),
     option("--repeats", "N", "Number of repeats of each sweep [1].", type=click.IntRange(1, 1000)),
     option("--seed", "N", "Seed of the random numbers [0].", type=click.IntRange(0)),
 )
