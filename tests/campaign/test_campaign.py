@@ -57,7 +57,7 @@ def test_what_a_campaign_says_of_its_files_their_names_and_limits(folder):
     (folder / "loop.csv").write_text(LOOP.replace("force [N]", "Kraft").replace("time [s]", "x [s]"))
     said = """
 name = "of files"
-bushing = { name = "b", inner_radius = "1 cm", outer_radius = "18 mm", length = "34 mm" }
+bushing = { name = "b", inner_diameter = "2 cm", outer_radius = "18 mm", length = "34 mm" }
 sweeps = [{ file = "sweep.csv", direction = "axial", amplitude = "peak-to-peak", noise = "1 %" }]
 [[loops]]
 file = "loop.csv"
@@ -70,6 +70,7 @@ waveform = "sine"
 """
     campaign = campaign_from(said, folder)
     assert campaign.name == "of files"
+    assert (campaign.bushing.inner_radius, campaign.bushing.outer_radius) == (0.01, 0.018)
     assert campaign.loops[0].noise == 0.005
     assert campaign.loops[0].force.max() == pytest.approx(1000.0, rel=1e-2)
     assert campaign.sweeps[0].amplitude[0] == pytest.approx(0.05e-3)

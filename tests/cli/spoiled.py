@@ -136,7 +136,7 @@ def shaker() -> list[str]:
 FILES = {
     "campaign.toml": CAMPAIGN, "more.toml": CAMPAIGN + MORE, "model.json": json.dumps(MODEL, indent=1),
     "loop.csv": "\n".join(loop()) + "\n", "sweep.csv": "\n".join(sweep()) + "\n",
-    "shaker.csv": "\n".join(shaker()) + "\n",
+    "shaker.csv": "\n".join(shaker()) + "\n", "book.XLSX": "PK\x03\x04",
 }  # fmt: skip
 TAKING_MODELS = (
     ("predict", "model.json"), ("compare", "model.json", "campaign.toml"), ("simulate", "model.json"),

@@ -14,6 +14,8 @@ IN_CAMPAIGN = [
     ('"10 mm"', '"1e999 mm"', "campaign.toml, bushing.inner_radius: the number is too large", 'a length with its unit, such as "10 mm"'),
     ('"10 mm"', '"10,5 mm"', "campaign.toml, bushing.inner_radius: this is not a quantity", 'write "10.5 mm", with a decimal point'),
     ('"10 mm"', '"18 mm"', "campaign.toml, inner_radius, outer_radius: impossible bushing", "found: 18 mm and 18 mm", "check that radii were given, not diameters, and that they are not swapped"),
+    ('inner_radius = "10 mm"', 'inner_radius = "10 mm"\ninner_diameter = "20 mm"', "campaign.toml, bushing.inner_radius: the inner size of the rubber is stated twice", "inner_radius or inner_diameter"),
+    ('outer_radius = "18 mm"', "", "campaign.toml, bushing.outer_radius: the outer size of the rubber is missing", "outer_radius or outer_diameter"),
     ('"34 mm"', "34 mm", "campaign.toml, line 5, column 13: this is not valid TOML", "put texts and quantities in quotes"),
     ("length =", "lenght =", "campaign.toml, bushing.lenght: unknown key", 'did you mean "length"?'),
     ('length = "34 mm"', 'length = "34 mm"\ncolour = "black"', "campaign.toml, bushing.colour: unknown key", "one of name, length, inner_radius, outer_radius"),

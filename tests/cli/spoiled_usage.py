@@ -42,6 +42,8 @@ USAGE = [
     ("fit|campaign.toml|--max-nrmse|nan", "Invalid value for '--max-nrmse': nan is not a share up to 1"),
     ("fit|campaign.toml|--max-nrmse|2", "Invalid value for '--max-nrmse': 2 is not a share up to 1, such as 0.02 or 2 %"),
     ("fit|loop.csv", "loop.csv: a campaign is needed", "found: a test file", "try: bushfit init loop.csv --inner-radius"),
+    ("run|book.XLSX", "book.XLSX: a campaign is needed", "try: bushfit init book.XLSX "),
+    ("run|lost.xls", "lost.xls: there is no such file"),
     ("fit|.", ".: a campaign is needed", "found: a folder", "try: bushfit init . --inner-radius"),
     ("fit-static|model.json", "model.json: a campaign is needed", "found: a model", "bushfit predict model.json predicts from a model"),
     ("fit-static|campaign.toml|--dynamic", "Option '--dynamic' requires an argument."),

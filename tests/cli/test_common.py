@@ -108,13 +108,6 @@ def test_an_input_of_the_run_is_not_replaced(own, typed):
     assert {file.name: file.read_bytes() for file in own.glob("*.*")} == before
 
 
-def test_a_missed_limit_is_status_1(bushfit, tmp_path):
-    missed = bushfit("fit", CAMPAIGN, "-o", tmp_path / "x", "--no-plots", "--max-nrmse", "1e-4", status=1)
-    assert "is above --max-nrmse 0.0001" in missed.stderr
-    assert "model.json" in names(tmp_path / "x")
-    bushfit("fit", CAMPAIGN, "-o", tmp_path / "y", "--no-plots", "--max-nrmse", "5 %")
-
-
 def test_commands_one_after_the_other_need_no_folder_of_results(typed, root, work, tmp_path):
     folder = tmp_path / "results/CMP 15 961"
     typed("fit", work / CAMPAIGN, "--no-plots")

@@ -60,6 +60,8 @@ def test_where_it_is_written_and_that_the_next_line_can_be_pasted(typed, tests, 
     assert tomllib.loads(text)["bushing"]["name"] == "my tests"
     assert tomllib.loads(text)["loops"][0]["file"] == "my tests/loop_axial_1.csv"
     assert "next: bushfit run lab/my.toml" in done.stderr
+    assert load_campaign(tmp_path / "lab/my.toml").bushing.shape == "calibrated"
+    assert "# [report]" in text
     done = typed("init", *tests, *GEOMETRY)
     (line,) = (line for line in done.stderr.splitlines() if line.startswith("next: bushfit run "))
     _, *words = shlex.split(line.removeprefix("next: "))
@@ -275,36 +277,6 @@ def test_control_characters_of_a_name_are_escaped(typed, root, tmp_path):
     done = typed("inspect", "axial_\u202e\u0085.csv", "--no-plots")
     assert not {"\u202e", "\u0085"} & {*done.stdout, *done.stderr}
     assert tomllib.loads(done.stdout)["sweeps"][0]["file"].endswith("axial_\u202e\u0085.csv")
-
-
-def test_the_campaign_corrects_the_radial_formula_and_mentions_the_report(typed, root, tmp_path):
-    sweep(root, tmp_path / "axial.csv")
-    typed("init", "axial.csv", *GEOMETRY, "-o", "x.toml")
-    text = (tmp_path / "x.toml").read_text(encoding="utf-8")
-    assert load_campaign(tmp_path / "x.toml").bushing.shape == "calibrated"
-    assert "# [report]" in text
-
-
-@pytest.mark.parametrize(
-    ("keys", "problem"),
-    [
-        ('inner_diameter = "20 mm"\nouter_diameter = "36 mm"', None),
-        ('inner_diameter = "20 mm"\nouter_radius = "18 mm"', None),
-        ('inner_diameter = "20 mm"\ninner_radius = "10 mm"\nouter_radius = "18 mm"', "the inner size"),
-        ('inner_diameter = "20 mm"', "the outer size of the rubber is missing"),
-    ],
-)
-def test_a_campaign_has_radii_or_diameters(bushfit, own, keys, problem):
-    campaign = own / CAMPAIGN
-    text = campaign.read_text(encoding="utf-8")
-    campaign.write_text(text.replace('inner_radius = "10 mm"\nouter_radius = "18 mm"', keys), encoding="utf-8")
-    if problem:
-        done = bushfit("fit", campaign, "-o", own / "x", status=2)
-        assert problem in done.stderr
-        assert "_diameter" in done.stderr
-    else:
-        bushing = load_campaign(campaign).bushing
-        assert (bushing.inner_radius, bushing.outer_radius) == pytest.approx((0.01, 0.018))
 
 
 @pytest.mark.parametrize(("key", "words"), [("specimen_number", "of specimens"), ("preload", "under preloads of")])

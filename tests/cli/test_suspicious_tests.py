@@ -1,11 +1,10 @@
 """Copies of data, which count once, and units that are wrong by a power of 1000: the test to mend is named."""
 
-import json
 from pathlib import Path
 
 import pandas as pd
 import pytest
-from shell import CAMPAIGN
+from shell import CAMPAIGN, document
 
 from bushfit.model.file import load_result
 
@@ -56,10 +55,9 @@ def test_the_unit_and_not_another_test_is_named(bushfit, own, test, stated, wron
     file = own / f"data/cmp_15961/{test}.csv"
     pd.read_csv(file, comment="#").rename(columns={stated: wrong}).to_csv(file, index=False)
     bushfit("diagnose", own / CAMPAIGN, "-o", own / "x", "--no-plots")
-    diagnosis = json.loads((own / "x/diagnosis.json").read_text(encoding="utf-8"))
+    diagnosis = document(own / "x/diagnosis.json")
     assert diagnosis["verdict"] == "named"
     assert [(effect["name"], effect["test"]) for effect in diagnosis["effects"]] == [(mistake, test)]
     adopted = f"{mistake}:{test}"
     bushfit("diagnose", own / CAMPAIGN, "--adopt", adopted, "-o", own / "adopted", "--no-plots")
-    mended = json.loads((own / "adopted/diagnosis.json").read_text(encoding="utf-8"))
-    assert mended["verdict"] == "consistent"
+    assert document(own / "adopted/diagnosis.json")["verdict"] == "consistent"

@@ -1,13 +1,13 @@
 """Validation records: simulated, never fitted, compared by run, diagnose and report."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from commandline import typing
-from shell import BUSHING, RUBBER
+from shell import BUSHING, RUBBER, document
+from virtual_rig import LOOP
 
 SIMULATED = f"""{BUSHING}
 [simulate]
@@ -20,11 +20,7 @@ force_noise = "0.2 %"
 [simulate.effects.inertia]
 mass = "0.2 kg"
 
-[[simulate.loops]]
-direction = "axial"
-amplitude = "1 mm"
-frequency = "0.1 Hz"
-
+{LOOP.format("axial", "1 mm", "0.1 Hz")}
 [[simulate.sweeps]]
 direction = "axial"
 amplitudes = ["0.1 mm", "0.2 mm", "0.5 mm"]
@@ -94,7 +90,7 @@ def test_run_compares_measured_and_predicted_force(campaign, bushfit, tmp_path):
     assert table["NRMSE [%]"][0] == pytest.approx(nrmse, rel=1e-3)
     inside = record["measured force [N]"].between(record["force [N], low"], record["force [N], high"])
     assert table["points in band [%]"][0] == pytest.approx(100.0 * inside.mean(), abs=0.1)
-    entry = json.loads((tmp_path / "run/diagnosis.json").read_text())["validation"][0]
+    entry = document(tmp_path / "run/diagnosis.json")["validation"][0]
     assert (entry["test"], entry["direction"]) == ("record_axial_1", "axial")
     assert 100.0 * entry["nrmse"] == pytest.approx(nrmse, rel=1e-3)
     for key, header in (

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from shell import values
+from shell import GEOMETRY, values
 
 from bushfit.campaign.campaign import load_campaign
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
@@ -16,9 +16,6 @@ from bushfit.model.model import Model
 from bushfit.reading.measurement import Sweep
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import undisturbed
-
-GEOMETRY = ("--inner-diameter", "20 mm", "--outer-diameter", "36 mm", "--length", "34 mm")
-
 
 FREQUENCIES = tuple(float(f) for f in range(5, 156, 15))
 AMPLITUDES = (5e-5, 1e-4, 2e-4, 5e-4)
