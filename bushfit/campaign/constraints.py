@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from graphlib import CycleError, TopologicalSorter
 
 import numpy as np
 
@@ -135,19 +136,17 @@ def _tie(campaign: Campaign, name: str, setting: ParameterSetting) -> Tie:
 
 def _ties(campaign: Campaign) -> list[Tie]:
     """Parse the ties and sort them: each after the ties of the parameters that it uses."""
-    waiting, ordered = dict[str, Tie](), list[Tie]()
+    ties: dict[str, Tie] = {}
     for name, setting in campaign.fit.parameters.items():
         if setting.tie:
             with error_location(place=f"fit.{name}"):
-                waiting[name] = _tie(campaign, name, setting)
-    while waiting:
-        ready = [tie for tie in waiting.values() if not waiting.keys() & {*tie.names}]
-        if not ready:
-            circle = ", ".join(f"{tie.name} = {tie.expression}" for tie in waiting.values())
-            raise CampaignError(
-                "these parameters are tied in a circle", place="fit", found=circle, expected="one that is free"
-            )
-        ordered += ready
-        for tie in ready:
-            del waiting[tie.name]
-    return ordered
+                ties[name] = _tie(campaign, name, setting)
+    try:
+        order = [*TopologicalSorter({name: ties.keys() & {*tie.names} for name, tie in ties.items()}).static_order()]
+    except CycleError as error:
+        circle = ", ".join(f"{name} = {ties[name].expression}" for name in error.args[1][:0:-1])
+        expected = "one that is free"
+        raise CampaignError(
+            "these parameters are tied in a circle", place="fit", found=circle, expected=expected
+        ) from None
+    return [ties[name] for name in order]

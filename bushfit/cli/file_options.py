@@ -23,7 +23,7 @@ _OF_TESTS = {
     "at_frequency": ("FREQUENCY", 'Frequency of the whole file, such as "10 Hz" [from a column or the file name].'),
     "temperature": (
         "TEMP",
-        'Temperature of the test, such as "23 degC"; selects its rows if a file contains several temperatures.',
+        'Temperature of the test, such as "23 degC"; selects its rows in a file with several.',
     ),
     "preload": ("LOAD", 'Static preload of the test, such as "500 N axial" or "none"; shown in the report.'),
     "rate": ("SPEED", None),
@@ -42,7 +42,7 @@ _OF_TESTS = {
         'For a specimen of N rubber blocks in shear [1]: sheared area ("772 mm^2") and thickness ("6 mm") of '
         "one block.",
     ),
-    "specimen_number": ("NUMBER", "Serial number of the part; selects its rows if a file contains several parts."),
+    "specimen_number": ("NUMBER", "Serial number of the part; selects its rows in a file with several."),
 }
 #: Options for the file format: campaign key and metavar.
 _AS_WRITTEN = {

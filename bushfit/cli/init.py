@@ -70,7 +70,7 @@ _Read = TypeVar("_Read")
     option(
         "--length",
         "LENGTH",
-        'Length of the rubber along the axis, such as "34 mm"; the mean if it differs from inside to outside.',
+        'Length of the rubber along the axis, such as "34 mm"; the mean of inside and outside.',
     ),
     option("--name", "NAME", "Name of the bushing [name of the folder of the first file]."),
 )

@@ -73,13 +73,6 @@ def sweeps(folder: Path, *headers: str, cells: str = "0.1,{},0.1") -> list[str]:
     return files
 
 
-def test_an_error_names_the_option_that_settles_it(typed, root, tmp_path):
-    rows = (root / CLEAN[0]).read_text(encoding="utf-8").split("\n", 1)[1]
-    (tmp_path / "axial.csv").write_text(f"time [s],displacement [mm],force\n{rows}", encoding="utf-8")
-    assert '--unit "force=' in typed("inspect", "axial.csv", "--no-plots", status=2).stderr
-    assert "N" in typed("inspect", "axial.csv", "--no-plots", "--unit", "force=N").stdout
-
-
 @pytest.mark.parametrize(
     ("header", "said", "unsaid"),
     [
