@@ -142,7 +142,7 @@ def draw_points(
         look: colour and marker of the points.
         curves: number of curves in the panel; the more there are, the more points are omitted.
     """
-    repeats = rows.groupby(x_header)[header]
+    repeats = rows[header].groupby(rows[x_header])
     step = max(1, -(-repeats.ngroups // max(_CURVE_POINTS, _PANEL_POINTS // curves)))
     means, low, high = (scale * values[::step] for values in (repeats.mean(), repeats.min(), repeats.max()))
     if repeats.ngroups < len(rows):
