@@ -250,6 +250,6 @@ def describe_format(table: Table) -> dict[str, str]:
         }
     if table.numerals.thousands:
         written["thousands separated by"] = repr(table.numerals.thousands)
-    if layout.units_line:
+    if layout.units_line and any(layout.units):
         written["units"] = f"line {layout.units_line}"
     return written

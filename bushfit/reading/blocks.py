@@ -80,14 +80,10 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
     """
     if isinstance(source, Channels) or len(layout.headers) < 2 or layout.headerless:
         return source, layout
-    first = next(filter(None, layout.headers))
-    starts = [index for index, header in enumerate(layout.headers) if header == first]
-    columns = list(zip(layout.headers, layout.units, strict=True))
-    sides = [[one for one in columns[start:end] if one[0]] for start, end in pairwise([*starts, len(columns)])]
-    are_sides = 1 < len(sides[0]) == len(dict(sides[0])) and len(sides) > 1 and all(side == sides[0] for side in sides)
-    if are_sides:
-        blocks = _side_by_side(source, layout, [slice(start, start + len(sides[0])) for start in starts])
-        headers, in_row = zip(*sides[0], strict=True)
+    sides = _find_sides(layout)
+    if sides and (blocks := _side_by_side(source, layout, sides)):
+        shared = slice(0, sides[0].start)
+        headers, in_row = ((*row[shared], *row[sides[0]]) for row in (layout.headers, layout.units))
         layout = replace(layout, headers=headers, units=in_row)
     elif isinstance(source, Text) and _is_one_block(source, layout):
         return source, layout
@@ -97,14 +93,16 @@ def combined(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> tuple
         return _with_complex_parts(source, layout)
     titles = [block.above[-1].text if block.above else "" for block in blocks]
     labels = [labels_above(block.above) | labels_in_names(title) for block, title in zip(blocks, titles, strict=True)]
-    added = _label_columns(labels, titles, titles if are_sides else [], vocabulary.roles(layout.headers))
+    added = _label_columns(labels, titles, titles if sides else [], vocabulary.roles(layout.headers))
     numbers, content, width = list[int](), list[Sequence[str | float]](), len(layout.headers)
     for index, row in ((index, row) for index, block in enumerate(blocks) for row in block.rows):
         cells, texts = cells_of(row, layout.delimiter), [column[index] for column in added.values()]
         content.append([*cells, *[""] * (width - len(cells)), *texts] if len(cells) <= width else cells)
         numbers.append(row.number)
     layout = replace(layout, headers=(*layout.headers, *added), units=(*layout.units, *[""] * len(added)))
-    return _with_complex_parts(Sheet(source.sheet or "", content, numbers=numbers), layout)
+    head = [line for line in source.head() if line.number < layout.header_line]
+    above = [line for line in head if not labels_above([line]).quantities]  # those of a block are in its rows
+    return _with_complex_parts(Sheet(source.sheet or "", content, above=above, numbers=numbers), layout)
 
 
 def exchange_rows(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> Sheet | None:
@@ -146,18 +144,31 @@ def _is_one_block(source: Text, layout: Layout) -> bool:
     return not source.data[end:].translate(None, _NUMERIC + layout.delimiter.encode())
 
 
+def _find_sides(layout: Layout) -> list[slice]:
+    """Columns of each of several blocks with the same headers and units, behind columns that they share, if any."""
+    columns = list(zip(layout.headers, layout.units, strict=True))
+    first = next((column for column in columns if column[0] and columns.count(column) > 1), None)
+    starts = [index for index, column in enumerate(columns) if column == first]
+    sides = [[one for one in columns[start:end] if one[0]] for start, end in pairwise([*starts, len(columns)])]
+    is_block = len(sides) > 1 and 1 < len(sides[0]) == len(dict(sides[0])) and all(side == sides[0] for side in sides)
+    return [slice(start, start + len(sides[0])) for start in starts] if is_block else []
+
+
 def _side_by_side(source: RowSource, layout: Layout, sides: Sequence[slice]) -> list[Segment]:
-    """Separate blocks of columns side by side, each with the same headers and maybe a title above."""
+    """Separate blocks of columns side by side, each maybe with a title above.
+
+    Blocks that share columns are separated only if their titles differ; else the list is empty.
+    """
     head = [line for line in reversed(source.head()) if line.number < layout.header_line]
     rows = [line for line in source.lines(layout.lines_before_data) if not is_comment(line.content, layout.delimiter)]
     above, below = ([(line.number, cells_of(line, layout.delimiter)) for line in lines] for lines in (head, rows))
-    return [
-        Segment(
-            [Line(number, str(cell)) for number, cells in above for cell in cells[side] if cell != ""][:1],
-            [Line(number, cells[side]) for number, cells in below if any(cell != "" for cell in cells[side])],
-        )
-        for side in sides
-    ]
+    shared, blocks = slice(0, sides[0].start), list[Segment]()
+    for side in sides:
+        titles = [Line(number, str(cell)) for number, cells in above for cell in cells[side] if cell != ""]
+        data = [Line(n, [*cells[shared], *cells[side]]) for n, cells in below if any(c != "" for c in cells[side])]
+        blocks.append(Segment(titles[:1], data))
+    is_titled = len({title.text for block in blocks for title in block.above}) == len(blocks)
+    return blocks if is_titled or not sides[0].start else []
 
 
 def _stacked(source: RowSource, layout: Layout, vocabulary: Vocabulary) -> list[Segment]:

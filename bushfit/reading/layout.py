@@ -178,8 +178,8 @@ def find_layout(
     for commented in (False, True):
         candidates = _candidates(lines, before, delimiters, vocabulary, commented)
         if best := max(candidates, key=lambda candidate: candidate[0], default=None):
-            return _layout(lines, *best[1:])
-    return _layout(lines, *_likeliest(lines, before, end, delimiters))
+            return _layout(lines, vocabulary, *best[1:])
+    return _layout(lines, vocabulary, *_likeliest(lines, before, end, delimiters))
 
 
 def _candidates(
@@ -304,11 +304,16 @@ def _likeliest(
     return end, delimiter, row
 
 
-def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence[str]) -> Layout:
+def _layout(
+    lines: Sequence[Line], vocabulary: Vocabulary, index: int, delimiter: str, headers: Sequence[str]
+) -> Layout:
     """Layout of the table below a header, with its units row if there is one, and with columns that have no header.
+
+    Below a header of pandas with two levels, a row with the names of the first columns takes the place of the units.
 
     Args:
         lines: non-empty lines at the start of the file.
+        vocabulary: known column names.
         index: index of the header in `lines`.
         delimiter: character between cells.
         headers: header cells.
@@ -322,8 +327,11 @@ def _layout(lines: Sequence[Line], index: int, delimiter: str, headers: Sequence
         if delimiter == " " and isinstance(text := next(_below(lines, index, delimiter)).content, str):
             wide = [cell.strip("[]() ") for cell in _below_headers(str(lines[index].content), text)]
             cells = wide if len(wide) == len(headers) else cells
+        named = [vocabulary.heading(cell) for cell in cells]
         if len(cells) <= len(headers) and is_units_row(cells):
             units_line, row = below[0][0], [*cells, *row][: len(headers)]
+        elif any(named) and [*map(bool, named)] == [*map(bool, cells)] and not vocabulary.roles(headers[: len(cells)]):
+            units_line, headers = below[0][0], [*cells, *headers[len(cells) :]]
     widths = {len(cells) for _, cells in below if is_row(cells)}
     may_be_decimal = delimiter == "," and not any("." in cell for _, cells in below for cell in cells)
     if len(widths) == 1 and len(headers) < (width := widths.pop()) < 2 * len(headers) and not may_be_decimal:

@@ -30,6 +30,8 @@ from bushfit.reading.times import clock
 _MARK_RATIO = 3.0
 #: Quantity in a line above a table: "1 V = 200 N", "Crosshead speed: 10 mm/min".
 _QUANTITY = re.compile(r"[=:]\s*(\d+(?:[.,]\d+)?)\s*([^\s\d,;]+(?:\s*/\s*[^\s\d,;]+)?)")
+#: Mark of a footnote in a header, such as "Amplitude¹ [mm]".
+_FOOTNOTE_MARK = re.compile("[\u00b9\u00b2\u00b3\u2074\u2020\u2021]")
 #: Largest number of characters of a remark that is quoted.
 _LONGEST_QUOTE = 100
 #: Rows that are converted at a time if pandas cannot read them; chosen: their texts take a few MiB.
@@ -52,8 +54,11 @@ class Table(Cells):
 
     @cached_property
     def lines_above(self) -> list[Line]:
-        """Non-empty lines above the table."""
-        return [line for line in self.source.head() if line.number < self.layout.header_line]
+        """Non-empty lines above the table, and footnotes below it, each behind the header that refers to it."""
+        above = [line for line in self.source.head() if line.number < self.layout.header_line]
+        marks = {mark: header for header in self.headers for mark in _FOOTNOTE_MARK.findall(header)}
+        below = (line for line in self.source.lines(self.layout.header_line) if line.text[:1] in marks) if marks else ()
+        return above + [Line(line.number, f"{marks[line.text[0]]}: {line.text[1:]}") for line in below]
 
     @cached_property
     def labels_above(self) -> Labels:
