@@ -18,8 +18,9 @@ from bushfit.model.result import Result
 from bushfit.prediction.resonance import predict_resonance
 from bushfit.prediction.stiffness import predict
 from bushfit.reading.finding import find_table
+from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.measurement import loss_factor
-from bushfit.reading.resonance import RESONANCE_COLUMNS, read_resonance
+from bushfit.reading.resonance import read_resonance
 from bushfit.reduction.resonance import reduce_resonance
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import undisturbed

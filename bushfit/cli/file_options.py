@@ -114,9 +114,7 @@ def _test_options(kind: str, _: click.Context, values: dict[str, Any]) -> dict[s
         kind: kind of the files, as of `metadata_options`, which determines the roles.
         values: values of the options by key.
     """
-    from bushfit.reading.displacements import DISPLACEMENT_COLUMNS
-    from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS
-    from bushfit.reading.resonance import RESONANCE_COLUMNS
+    from bushfit.reading.headers import DISPLACEMENT_COLUMNS, LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS
 
     roles = {
         "tests": (*LOOP_COLUMNS, *SWEEP_COLUMNS),

@@ -123,7 +123,8 @@ def _resonance_table(file: Path, test_options: Mapping[str, Any], shaker: Mappin
         shaker: options of a resonance test by key: masses [kg], base acceleration [m/s^2], specimen; None if not given.
     """
     from bushfit.inspection.recognition import open_table
-    from bushfit.reading.resonance import RESONANCE_COLUMNS, is_resonance
+    from bushfit.reading.headers import RESONANCE_COLUMNS
+    from bushfit.reading.resonance import is_resonance
 
     is_stated = any(value is not None for value in shaker.values())
     try:

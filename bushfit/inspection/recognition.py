@@ -12,12 +12,12 @@ from bushfit.campaign.bodies import SpecimenSettings
 from bushfit.errors import BushfitError, NoTestError, quote_path
 from bushfit.geometry import STRAINING, TRANSLATION, Direction, Motion, Place, Specimen
 from bushfit.reading.finding import find_table
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Vocabulary
+from bushfit.reading.headers import LOOP_COLUMNS, RESONANCE_COLUMNS, SWEEP_COLUMNS, Vocabulary
 from bushfit.reading.labelled import Rows
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.names import direction_of_file
 from bushfit.reading.parts import OpenedFile, open_file
-from bushfit.reading.resonance import RESONANCE_COLUMNS, is_resonance
+from bushfit.reading.resonance import is_resonance
 from bushfit.reading.roles import PAIRS, of_motion
 from bushfit.reading.stiffness import hint_for_convertible_columns, refuse_ambiguous_damping
 from bushfit.reading.table import Table

@@ -287,15 +287,16 @@ def refuse_other_columns(table: Cells, left_out: Iterable[FaultyRow], vocabulary
         UnitError: a header or row of units states other units.
     """
     first = table.layout.units_line or table.layout.header_line
+    columns = sorted(table.roles.values(), key=lambda column: column.index)
     for line, cells, _ in left_out:
         texts = [str(cell) for cell in cells]
         is_header, compatible, different = table.layout.is_header(texts, vocabulary), 0, list[Column]()
-        for column in sorted(table.roles.values(), key=lambda column: column.index):
+        for column in columns:
             text = texts[column.index]
-            heading = vocabulary.heading(text) if is_header else None
             name, unit, convention = split_unit(text) if is_header else ("", *parse_unit(text.strip("[]() "))[:2])
-            has_name = plain(name) == plain(split_unit(column.header)[0]) or (heading and heading.role == column.role)
-            if is_header and not has_name:
+            heading = vocabulary.heading(text)
+            is_same = plain(name) == plain(split_unit(column.header)[0]) or (heading and heading.role == column.role)
+            if is_header and not is_same:
                 raise table.error(
                     "a header repeats the columns in another order",
                     line=line,
@@ -305,11 +306,12 @@ def refuse_other_columns(table: Cells, left_out: Iterable[FaultyRow], vocabulary
                 )
             if not (unit and column.unit) or unit == "-" or is_like_number(unit):
                 continue
-            degrees = [units.kelvin_scale(text) for text in (unit, column.unit)]
-            if all(degrees) or units.is_compatible(unit, column.unit):
+            scales = [units.kelvin_scale(one) for one in (unit, column.unit)]
+            if not all(scales) and units.is_compatible(unit, column.unit):
+                scales = [(units.si_factor(one, one), 0.0) for one in (unit, column.unit)]
+            if all(scales):
                 compatible += 1
-                scale, usual = degrees if all(degrees) else (units.si_factor(t, t) for t in (unit, column.unit))
-                different += [column] * (scale != usual or convention not in (None, column.convention))
+                different += [column] * (scales[0] != scales[1] or convention not in (None, column.convention))
         if different and (is_header or compatible > 1):
             raise UnitError(
                 f"the {different[0].role.replace('_', ' ')} has two units",

@@ -143,11 +143,10 @@ def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, 
     indices, role_by_text = dict[int, str](), dict[str, str]()
     named_roles = vocabulary.roles([header for header in cells.headers if header])
     for role, text in columns.items():
-        label, first_role = role.replace("_", " "), role_by_text.setdefault(plain(text), role)
-        if first_role != role:
+        if (first_role := role_by_text.setdefault(plain(text), role)) != role:
             raise cells.header_error(
                 "one column is named for two roles",
-                found=f'"{text}" for the {first_role.replace("_", " ")} and the {label}',
+                found=f'"{text}" for the {first_role.replace("_", " ")} and the {role.replace("_", " ")}',
                 expected="a column for each",
                 hint=f'name another column for one of them: columns = {{ {role} = "..." }} in the campaign',
             )
@@ -157,12 +156,12 @@ def _stated_indices(cells: Cells, vocabulary: Vocabulary, columns: Mapping[str, 
             indices[number - 1] = role
         elif role not in named_roles:
             near = next(iter(get_close_matches(text, cells.headers if cells.is_table else (), 1, _ALIKE)), "")
+            advice = f'did you mean "{near}"?' if near else "name one of this file:"
             raise cells.header_error(
                 f'there is no column "{text}"',
                 kind=NoColumnError,
                 expected=f"the header that was stated for the {role.replace('_', ' ')}, or its number",
-                hint=(f'did you mean "{near}"? ' if near else "name one of this file: ")
-                + f'columns = {{ {role} = "{near or "..."}" }} in the campaign',
+                hint=f'{advice} columns = {{ {role} = "{near or "..."}" }} in the campaign',
             )
     return indices
 
@@ -223,27 +222,20 @@ def _preferred(cells: Cells, first: Column, second: Column) -> Column:
     factors = np.array([ZERO_TO_PEAK[column.convention or "zero-to-peak"] for column in both])
     is_equal = all(row[first.index] == row[second.index] for row in cells.first_rows)
     is_numbered = first.header == second.header
-    choices = [str(column.index + 1) if is_numbered else column.header for column in both]
-    keys = " or ".join(f'columns = {{ {role} = "{choice}" }}' for choice in choices)
+    problem, expected = f"more than one column could be the {role.replace('_', ' ')}", "one"
     if factors[0] != factors[1] and first.unit == second.unit and len(numbers):
         sizes = factors * numbers
         if np.all(np.abs(sizes[:, 0] - sizes[:, 1]) <= _AGREEMENT * np.abs(sizes[:, 0])):
             return first
         if is_equal:
-            raise cells.header_error(
-                "two columns contradict each other",
-                found=f'equal numbers for "{first.header}" and "{second.header}"',
-                expected=f'"{second.header}" to be {factors[0] / factors[1]:.3g} times "{first.header}"',
-                hint=f"choose the right one in the campaign: {keys}",
-            )
-    if is_equal and all(row[first.index] == row[second.index] for _, row in cells.rows()):
+            problem = "two columns with equal numbers contradict each other"
+            expected = f'"{second.header}" to be {factors[0] / factors[1]:.3g} times "{first.header}"'
+    elif is_equal and all(row[first.index] == row[second.index] for _, row in cells.rows()):
         return first
-    raise cells.header_error(
-        f"more than one column could be the {role.replace('_', ' ')}",
-        found=f"{first.header}, {second.header}",
-        expected="one",
-        hint=f"{'give each column its own header, or ' if is_numbered else ''}choose it in the campaign: {keys}",
-    )
+    choices = [str(column.index + 1) if is_numbered else column.header for column in both]
+    keys = " or ".join(f'columns = {{ {role} = "{choice}" }}' for choice in choices)
+    hint = f"{'give each column its own header, or ' if is_numbered else ''}choose it in the campaign: {keys}"
+    raise cells.header_error(problem, found=f"{first.header}, {second.header}", expected=expected, hint=hint)
 
 
 def _add_by_unit(

@@ -9,24 +9,12 @@ import numpy as np
 from bushfit.errors import MeasurementError, error_location
 from bushfit.geometry import TRANSLATION, Direction, Place, Specimen, get_places
 from bushfit.reading.finding import find_table
-from bushfit.reading.headers import LOOP_COLUMNS
+from bushfit.reading.headers import DISPLACEMENT_COLUMNS
 from bushfit.reading.layout import FileFormat
 from bushfit.reading.loops import increasing_time, time_column
 from bushfit.reading.measurement import Floats
 from bushfit.reading.names import direction_of_file
 
-#: Names of the columns of a displacement history, by role: time, a displacement in each direction, or one in any.
-DISPLACEMENT_COLUMNS: Mapping[str, Sequence[str]] = {
-    "time": LOOP_COLUMNS["time"],
-    **{
-        str(direction): [
-            *words,
-            *(text for name in LOOP_COLUMNS["displacement"] for word in words for text in (word + name, name + word)),
-        ]
-        for direction, words in zip(Direction, (["axial"], ["radial"], ["torsion", "torsional"]), strict=False)
-    },
-    "displacement": LOOP_COLUMNS["displacement"],
-}
 #: Smallest number of rows of a history, and largest number of evenly sampled rows; chosen: their results take 2 GB.
 FEWEST_ROWS, _MOST_ROWS = 10, 10_000_000
 #: Largest deviation of a time from even sampling, relative to the step, that is taken as rounding.

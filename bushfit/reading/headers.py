@@ -16,10 +16,34 @@ from bushfit import units
 WORDS: Mapping[str, Mapping[str, Sequence[str]]] = tomllib.loads(
     Path(__file__).with_name("words.toml").read_text(encoding="utf-8")
 )
-#: Names of the columns of a loop, by role.
-LOOP_COLUMNS = WORDS["loop"]
-#: Names of the columns of a sweep, by role.
-SWEEP_COLUMNS = WORDS["sweep"]
+
+
+def _expand(name: str) -> list[str]:
+    """Names of a column in which a part in braces, such as {base}, is each of its words."""
+    if (part := re.search(r"{(\w+)}", name)) is None:
+        return [name]
+    words = {
+        **WORDS["parts"],
+        "displacement": WORDS["loop"]["displacement"],
+        "strain": WORDS["straining"]["displacement"],
+    }
+    return [full for word in words[part[1]] for full in _expand(name.replace(part[0], word, 1))]
+
+
+def _columns_of(test: str) -> dict[str, list[str]]:
+    """Names of the columns of a kind of test, by role; `test` is the name of its table in words.toml."""
+    return {role: [full for name in names for full in _expand(name)] for role, names in WORDS[test].items()}
+
+
+#: Names of the columns of a loop, a sweep, a test of strain and modulus, a resonance test (a mass on a mount on a
+#: shaker) and a displacement history, by role: the quantity in the column.
+LOOP_COLUMNS, SWEEP_COLUMNS, STRAINING_COLUMNS = _columns_of("loop"), _columns_of("sweep"), _columns_of("straining")
+RESONANCE_COLUMNS = {"frequency": SWEEP_COLUMNS["frequency"], **_columns_of("resonance")}
+DISPLACEMENT_COLUMNS = {
+    "time": LOOP_COLUMNS["time"],
+    **_columns_of("displacements"),
+    "displacement": LOOP_COLUMNS["displacement"],
+}
 #: Names of columns that assign rows to tests, by what they contain: direction, specimen_number or run.
 ROW_COLUMNS = {
     **WORDS["rows"],

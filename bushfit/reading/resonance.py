@@ -1,6 +1,6 @@
 """Resonance tests read from files: a mass on a mount on a shaker, as accelerations or as their ratio."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -8,39 +8,10 @@ import numpy as np
 
 from bushfit.errors import MeasurementError
 from bushfit.geometry import Place
-from bushfit.reading.headers import SWEEP_COLUMNS, WORDS, ZERO_TO_PEAK, Column
+from bushfit.reading.headers import RESONANCE_COLUMNS, ZERO_TO_PEAK, Column
 from bushfit.reading.measurement import Complex, Floats, Source
 from bushfit.reading.table import Table
 
-
-def _combined_names(body: str, quantity: str) -> list[str]:
-    """Column names that combine each name of a body, such as "base", with each name of a quantity, such as "phase"."""
-    parts = WORDS["resonance_parts"]
-    return [
-        name
-        for body_name in parts[body]
-        for word in parts[quantity]
-        for name in (f"{body_name} {word}", word + body_name)
-    ]
-
-
-#: Names of the columns of a resonance test (a mass on a mount on a shaker), by role.
-RESONANCE_COLUMNS: Mapping[str, Sequence[str]] = {
-    "frequency": SWEEP_COLUMNS["frequency"],
-    **{
-        f"{body}_{word}": _combined_names(body, word) for word in ("acceleration", "phase") for body in ("base", "mass")
-    },
-    **WORDS["resonance"],
-    **{
-        f"{body}_{part}": [
-            f"{name} {word}"
-            for name in _combined_names(body, "acceleration")
-            for word in WORDS["resonance_parts"][part]
-        ]
-        for body in ("base", "mass")
-        for part in ("real", "imaginary")
-    },
-}
 #: Sets of columns that give a transmissibility, in order of preference.
 _COLUMN_SETS = (
     ("transmissibility", "phase"),

@@ -2,21 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 
-from bushfit.geometry import STRAINING, Direction, Motion
-from bushfit.reading.headers import SWEEP_COLUMNS, WORDS
+from bushfit.geometry import STRAINING, Motion
+from bushfit.reading.headers import STRAINING_COLUMNS, SWEEP_COLUMNS, WORDS
 
 #: Names of columns in a test of strain and modulus, by role; they replace those of loops and sweeps.
-_STRAINING = {role: names for role, names in WORDS["straining"].items() if role != "amplitude_of"} | {
-    "amplitude": [
-        *SWEEP_COLUMNS["amplitude"],
-        *(
-            form.format(name)
-            for name in WORDS["straining"]["displacement"]
-            for form in WORDS["straining"]["amplitude_of"]
-        ),
-        *WORDS["straining"]["amplitude"],
-    ]
-}
+_STRAINING = STRAINING_COLUMNS | {"amplitude": SWEEP_COLUMNS["amplitude"] + STRAINING_COLUMNS["amplitude"]}
 #: Roles whose names depend on the motion: displacement or strain, force or stress, stiffness or modulus.
 OF_MOTION = (*_STRAINING, "amplitude_reached", "force_amplitude", "damping_coefficient")
 #: Pairs of columns that determine a complex stiffness and must agree, in order of preference.
@@ -32,14 +22,8 @@ PAIRS = (
     *(("storage_compliance", "loss_compliance"), ("compliance", "phase"), ("compliance", "loss_factor")),
     *(("force_amplitude", "phase"), ("force_amplitude", "loss_factor"), ("force_amplitude", "damping_ratio")),
 )
-#: SI units of the roles that do not depend on the motion; other roles are ratios.
-_UNITS = {"time": "s", "frequency": "Hz", "temperature": "K"}
-#: Roles by the attribute of a motion that is their SI unit.
-_UNITS_OF_MOTION = {
-    **dict.fromkeys(("displacement", "amplitude", "amplitude_reached", *Direction), "displacement_unit"),
-    **dict.fromkeys(("force", "force_amplitude"), "force_unit"),
-    **dict.fromkeys(("stiffness", "storage_stiffness", "loss_stiffness"), "stiffness_unit"),
-}
+#: SI unit, or the attribute of a motion that is the SI unit, by role; all other roles are ratios.
+_UNITS = {role: unit for unit, roles in WORDS["si_units"].items() for role in roles}
 
 
 def of_motion(names: Mapping[str, Sequence[str]], motion: Motion) -> dict[str, Sequence[str]]:
@@ -57,12 +41,9 @@ def of_motion(names: Mapping[str, Sequence[str]], motion: Motion) -> dict[str, S
 
 def si_unit(role: str, motion: Motion) -> str:
     """Return the SI unit of a role such as "force" in a test of a kind of motion; "1" for a ratio."""
-    if role in _UNITS_OF_MOTION:
-        return str(getattr(motion, _UNITS_OF_MOTION[role]))
     if role == "damping_coefficient":
         return "Pa*s" if motion is STRAINING else motion.stiffness_unit.replace("/", "*s/", 1)
     if role.endswith("compliance"):
         return {"N/m": "m/N", "Pa": "1/Pa"}.get(motion.stiffness_unit, "rad/N/m")
-    if role.endswith("phase"):
-        return "rad"
-    return "m/s^2" if role.startswith(("base_", "mass_")) else _UNITS.get(role, "1")
+    unit = _UNITS.get(role, "1")
+    return str(getattr(motion, unit, unit))

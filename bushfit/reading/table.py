@@ -16,7 +16,7 @@ from bushfit.errors import UnitError, error_location
 from bushfit.geometry import STRAINING, TRANSLATION, Motion, Place, strain_factor_of_files
 from bushfit.reading.blocks import refuse_other_columns
 from bushfit.reading.cells import Cells, FaultyRow
-from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Column, Vocabulary, is_angular, split_convention
+from bushfit.reading.headers import LOOP_COLUMNS, SWEEP_COLUMNS, Column, Vocabulary, is_angular, parse_unit, split_unit
 from bushfit.reading.labelled import find_labels
 from bushfit.reading.layout import Line
 from bushfit.reading.measurement import Floats
@@ -206,14 +206,15 @@ class Table(Cells):
         Returns:
             Keys for up to three unused headers with a unit of this dimension.
         """
-        usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS}, {})
-        free = [
-            (header, split_convention(units.split_header(split_convention(header)[0])[1] or in_row)[0])
+        usual = Vocabulary({**LOOP_COLUMNS, **SWEEP_COLUMNS})
+        fitting = [
+            header
             for header, in_row in zip(self.headers, self.layout.units, strict=True)
             if header
             and (not (heading := usual.heading(header)) or (role, heading.role) == ("amplitude", "displacement"))
+            and unit != "1"
+            and units.is_compatible(split_unit(header)[1] or parse_unit(in_row)[0], unit)
         ]
-        fitting = [header for header, text in free if unit != "1" and units.is_compatible(text, unit)]
         return " or ".join(f'columns = {{ {role} = "{header}" }}' for header in fitting[:3] or ["..."])
 
     def refuse_other_motion(self, role: str, headers: Sequence[str] | None = None) -> None:

@@ -13,8 +13,9 @@ from texts import refused, sweep_from
 from bushfit.errors import BushfitError
 from bushfit.geometry import Direction
 from bushfit.reading.finding import find_table
+from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.measurement import Sweep
-from bushfit.reading.resonance import RESONANCE_COLUMNS, ResonanceTest, is_resonance, read_resonance
+from bushfit.reading.resonance import ResonanceTest, is_resonance, read_resonance
 from bushfit.reading.stated import SweepFile
 from bushfit.reading.sweeps import read_sweep
 from bushfit.reduction.resonance import transmissibility

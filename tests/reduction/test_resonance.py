@@ -13,8 +13,9 @@ from bushfit.effects.contract import Array
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
 from bushfit.reading.finding import find_table
+from bushfit.reading.headers import RESONANCE_COLUMNS
 from bushfit.reading.measurement import Source
-from bushfit.reading.resonance import RESONANCE_COLUMNS, ResonanceTest, read_resonance
+from bushfit.reading.resonance import ResonanceTest, read_resonance
 from bushfit.reduction.resonance import MOST_POINTS, Resonance, reduce_resonance, shaken_response, transmissibility
 
 #: [kg] and [m/s^2]: the paper's bushing then has its resonance near 165 Hz, at some 0.1 mm.
