@@ -5,7 +5,7 @@ Each test and each run has its own figures, so that the thousands of rows of a l
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -32,15 +32,6 @@ _SHARE = 0.95
 _ENOUGH = 0.5
 #: Share of the information that comes from a prior, above which tests cannot contradict it.
 _ALL = 0.99
-
-
-class _Run(NamedTuple):
-    """Run of a test: constant quantity (None in a loop), its value and unit, and its points as mask or slice."""
-
-    held: Literal["amplitude", "frequency"] | None
-    value: float | None
-    unit: str | None
-    points: Any
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,20 +151,20 @@ def misfits(model: Model, fitted: Sequence[MeasuredTest], unfitted: Sequence[Mea
         relative, gain = test.relative(model), 1.0 - np.abs(test.noise_free(model).measured / test.measured)
         squares = np.square(test.residual(model)).reshape(test.residuals_per_point, -1).sum(axis=0)
         runs = list(_runs(test))
-        for run in (_Run(None, None, None, slice(None)), *(runs if len(runs) > 1 else ())):
-            of_run = relative[run.points]
+        for label, points in ((dict[str, Any](), slice(None)), *(runs if len(runs) > 1 else ())):
+            of_run = relative[points]
             counted = test.residual_count * of_run.size / relative.size * test.test.weight
             misfit = Misfit(
                 test=test.name,
                 place=str(test.direction),
                 fitted=index < len(fitted),
-                held=run.held,
-                value=run.value,
-                unit=run.unit,
+                held=label.get("held"),
+                value=label.get("value"),
+                unit=label.get("unit"),
                 points=of_run.size,
                 nrmse=float(np.sqrt(np.mean(of_run**2))),
-                reduced_chi_square=float(squares[run.points].sum()) / counted,
-                gain=float(gain[run.points].mean()),
+                reduced_chi_square=float(squares[points].sum()) / counted,
+                gain=float(gain[points].mean()),
             )
             found.append(misfit)
     return tuple(found)
@@ -208,11 +199,11 @@ def expected_errors(
             parts.append((str(test.direction), _absolute_difference(modelled, test.measured), False))
             continue
         slopes = (log_slopes(model, test, fit.names) * per_coordinate)[fit.moving]
-        for run in _runs(test):
-            points = np.broadcast_to(run.points, (test.residuals_per_point, test.size // test.residuals_per_point))
-            step = whole.step(rows.start + np.flatnonzero(points))
+        for _, points in _runs(test):
+            residuals = np.broadcast_to(points, (test.residuals_per_point, test.size // test.residuals_per_point))
+            step = whole.step(rows.start + np.flatnonzero(residuals))
             predicted = modelled if step is None else modelled * np.exp(step @ slopes)
-            counted = run.points & (test.weights > 0.0 if isinstance(test, MeasuredSweep) else True)
+            counted = points & (test.weights > 0.0 if isinstance(test, MeasuredSweep) else True)
             difference = _absolute_difference(predicted[counted], test.measured[counted])
             parts.append((str(test.direction), difference, step is not None))
     for test in unfitted:
@@ -296,12 +287,16 @@ def _absolute_difference(modelled: Array, measured: Array) -> Array:
     return np.abs([np.abs(modelled / measured) - 1.0, loss_factor(modelled) - loss_factor(measured)])
 
 
-def _runs(data_set: MeasuredTest) -> Iterator[_Run]:
-    """Yield the runs of a test, one for each constant amplitude or frequency; one for a loop or a sweep without."""
-    if not isinstance(data_set, MeasuredSweep) or data_set.sweep.stepped is None:
-        yield _Run(None, None, None, np.ones(data_set.frequency.size, dtype=bool))
+def _runs(test: MeasuredTest) -> Iterator[tuple[dict[str, Any], Array]]:
+    """Yield the runs of a test, one for each constant amplitude or frequency; one for a loop or a sweep without.
+
+    Yields:
+        Name ("held"), value and unit of the constant quantity, and the mask of the points of the run, (n,).
+    """
+    if not isinstance(test, MeasuredSweep) or test.sweep.stepped is None:
+        yield {}, np.ones(test.frequency.size, dtype=bool)
         return
-    quantity: Literal["amplitude", "frequency"] = "amplitude" if data_set.sweep.stepped == "frequency" else "frequency"
-    unit = data_set.direction.motion.displacement_unit if quantity == "amplitude" else "Hz"
-    for value in np.unique(data_set.held_value):
-        yield _Run(quantity, float(value), unit, data_set.held_value == value)
+    held = "amplitude" if test.sweep.stepped == "frequency" else "frequency"
+    unit = test.direction.motion.displacement_unit if held == "amplitude" else "Hz"
+    for value in np.unique(test.held_value):
+        yield {"held": held, "value": float(value), "unit": unit}, test.held_value == value

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -51,17 +50,3 @@ class CommonError:
         """Whiten residuals or derivatives in units of noise, (..., n), by the shared error; same shape."""
         directions, size = self.principal_errors
         return rows - (rows @ directions * (1.0 - 1.0 / np.hypot(1.0, size))) @ directions.T
-
-
-class ErrorProducts(NamedTuple):
-    """Inner products of m rows (residuals and derivatives), from which the size of an error of the model is estimated.
-
-    Args:
-        products: inner products of the rows in units of noise, (m, m).
-        components: components of the rows along the c independent directions of the shared error, (m, c).
-        variance: variance along each direction, in units of noise, if the error has size 1, (c,).
-    """
-
-    products: Array
-    components: Array
-    variance: Array

@@ -149,9 +149,9 @@ class Descent:
                 step, expected = fit._step(damping)
                 bend = fit._bend(step, damping)
             point = np.clip(fit.point + step + bend, *fit._reach)
-            has_failed, damped = fit.growth > _FIRST_GROWTH, damping * fit.growth
+            has_failed, growth = fit.growth > _FIRST_GROWTH, 2.0 * fit.growth
+            fit = replace(fit, damping=damping * fit.growth, growth=growth)
             fit = replace(fit, evaluations=fit.evaluations + 1, converged=converged)
-            fit = replace(fit, damping=damped, growth=2.0 * fit.growth)
             try:
                 model = fit.model.with_values(problem.coordinates.values(point))
                 with np.errstate(invalid="ignore", divide="ignore", over="ignore"):

@@ -56,7 +56,7 @@ class FittedTests:
     @property
     def data_sets(self) -> Sequence[MeasuredTest]:
         """Tests that the model was fitted to."""
-        return self.solution.minimised
+        return self.solution.problem.tests
 
     @cached_property
     def directions(self) -> Array:

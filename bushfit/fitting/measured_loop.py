@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Values
-from bushfit.fitting.common_error import CommonError, ErrorProducts
+from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.loop_harmonics import SMOOTH_HARMONICS, smooth_waves
 from bushfit.fitting.measured_test import MeasuredBase
 from bushfit.fitting.prepared_loop import PreparedLoop
@@ -154,6 +154,14 @@ class MeasuredLoop(MeasuredBase):
     def jacobian(
         self, model: Model, names: Sequence[str], added: Array | None = None, *, as_share: bool = False
     ) -> Array:
+        """Derivatives of the whitened residuals by parameter value [SI], (len(names), size); the last are cached.
+
+        Args:
+            model: model at whose values the derivatives are taken.
+            names: names of the parameters.
+            added: stiffness added to the model's at each operating point (one in a loop), complex [N/m or N m/rad].
+            as_share: True if the added stiffness remains proportional to the model's; False if it is constant.
+        """
         if (rows := self._recall("jacobian", model, tuple(names))) is None:
             history = self.prepared.history(model.is_transient)
             force, slopes = force_and_slopes(model, self.direction, history, names, self.test_conditions)
@@ -267,6 +275,14 @@ class MeasuredLoop(MeasuredBase):
         return self.whiten(waves * (self._per_noise * self.prepared.half_range))
 
     def whiten(self, difference: Array) -> Array:
+        """Remove the correlation of the noise of rows, and the errors that rows share.
+
+        Args:
+            difference: changes of the force at the rows, in units of noise, (..., n).
+
+        Returns:
+            Whitened residuals, (..., size), whose noise is independent with unit variance.
+        """
         return self._whiten_shared(self._whiten_rows(difference))
 
     @property
@@ -338,12 +354,21 @@ class MeasuredLoop(MeasuredBase):
         """Model error of 100 % of half the force range, as an error that the n rows share."""
         return CommonError(self._error_waves[2 * (self.first_error - 1) :])
 
-    def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
-        """Inner products of residuals and their derivatives by the named parameters, for `likeliest_model_error`."""
+    def error_products(self, model: Model, names: Sequence[str]) -> tuple[Array, Array, Array]:
+        """Compute what determines the size of a model error: the residuals and their k derivatives in units of noise.
+
+        Args:
+            model: model at whose values residuals and derivatives are taken.
+            names: names of the k parameters.
+
+        Returns:
+            Inner products of these m = k + 1 rows, (m, m); their components along the c independent directions of the
+            model error, (m, c); and the variance along each direction if the error has size 1, (c,).
+        """
         bare = replace(self, gain_error=0.0, model_error=0.0)
         white = np.vstack((self._whiten_rows(self.misfit(model)), bare.jacobian(model, names)))
         directions, size = self._unit_error.principal_errors
-        return ErrorProducts(white @ white.T, white @ directions * size, np.square(size))
+        return white @ white.T, white @ directions * size, np.square(size)
 
     def noise_sensitivity(self, influence: Array) -> dict[Hashable, Array]:
         """Sensitivity of k parameter estimates to errors of each noise variance that was itself estimated.

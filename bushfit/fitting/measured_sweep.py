@@ -9,7 +9,6 @@ import numpy as np
 
 from bushfit.campaign.schema import Residuals
 from bushfit.effects.contract import UNKNOWN, Array, RubberConditions, Values
-from bushfit.fitting.common_error import ErrorProducts
 from bushfit.fitting.measured_test import MeasuredBase
 from bushfit.fitting.noise import SweepNoise
 from bushfit.fitting.outliers import contradictions, outlying_points
@@ -304,7 +303,7 @@ class MeasuredSweep(MeasuredBase):
     def log_det_covariance(self) -> float:
         return self.covariance.log_det_covariance if self.model_error else 0.0
 
-    def error_products(self, model: Model, names: Sequence[str]) -> ErrorProducts:
+    def error_products(self, model: Model, names: Sequence[str]) -> tuple[Array, Array, Array]:
         bare = replace(self, noise=replace(self.noise, shared=(0.0, 0.0), level=(0.0, 0.0)), model_error=0.0)
         slopes = bare.jacobian(model, names)  # which keeps the response for the residuals
         return self.covariance.error_products(np.vstack((bare.residual(model), slopes)))

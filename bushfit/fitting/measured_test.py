@@ -1,7 +1,6 @@
 """Base class of measured loops and sweeps: one test with its noise."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
@@ -64,19 +63,6 @@ class MeasuredBase(ABC):
     def misfit(self, model: Model) -> Array:
         """Model minus measured in units of noise, (size,), for tables: whitened for a sweep, row by row for a loop."""
         return self.residual(model)
-
-    @abstractmethod
-    def jacobian(
-        self, model: Model, names: Sequence[str], added: Array | None = None, *, as_share: bool = False
-    ) -> Array:
-        """Derivatives of the whitened residuals by parameter value [SI], (len(names), size); the last are cached.
-
-        Args:
-            model: model at whose values the derivatives are taken.
-            names: names of the parameters.
-            added: stiffness added to the model's at each operating point (one in a loop), complex [N/m or N m/rad].
-            as_share: True if the added stiffness remains proportional to the model's; False if it is constant.
-        """
 
     def without(self, points: Array) -> Self:  # noqa: ARG002
         """Return a sweep with weight 0 at the points with the given indices; a loop is unchanged."""

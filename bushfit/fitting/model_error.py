@@ -89,14 +89,14 @@ def with_model_error(
     closest, size = closest_fit(plain_fit, bounds)
     if size >= SIZES[-1]:  # that is no error of a model, but another thing than it
         return plain_fit, None
-    tests = _fitted_tests(closest, _thinned(plain_fit.minimised, size))
+    tests = _fitted_tests(closest, _thinned(plain_fit.problem.tests, size))
     sizes = np.geomspace(_SMOOTH_RATIO[0] * size, _SMOOTH_RATIO[1] * size, 9)
     processes = [replace(process, sizes=sizes) for process in discrepancies(tests)]
     likeliest = max(processes, key=lambda process: process.best[0])
     error = averaged(processes)
     if error.rms >= SIZES[-1]:
         return plain_fit, None
-    weighed = [test.with_model_error(size) for test in plain_fit.covariance_tests or plain_fit.minimised]
+    weighed = [test.with_model_error(size) for test in plain_fit.covariance_tests or plain_fit.problem.tests]
     whole = Discrepancy.over_tests(_fitted_tests(closest, weighed), likeliest.groups, likeliest.lengths, MAXIMUM_NODES)
     process = SmoothError(likeliest.best[1] * whole.complex_shapes, likeliest.likelihood.freedom(likeliest.best[1]))
     closest = replace(closest, noise_weighted=plain_fit.data_sets, outliers=plain_fit.outliers)
@@ -115,7 +115,7 @@ def closest_fit(plain_fit: FitResult, bounds: Bounds) -> tuple[FitResult, float]
     Returns:
         The fit, and the standard deviation of the model error relative to the stiffness.
     """
-    tests, names, starts = plain_fit.minimised, plain_fit.names, [plain_fit.model]
+    tests, names, starts = plain_fit.problem.tests, plain_fit.names, [plain_fit.model]
     fixed = {name: value for name, value in plain_fit.model.values.items() if name not in names}
     with suppress(FitError):  # tests that no rubber gives
         # a second start, with the branches read off the tests: a fit bent by noise may have lost one for good
@@ -155,12 +155,13 @@ def likeliest_model_error(model: Model, data_sets: Sequence[MeasuredTest], names
     """
     from scipy.optimize import minimize_scalar  # slow to import, and only a model that misses its tests needs it
 
-    parts = [data_set.error_products(model, names) for data_set in data_sets]
+    parts = zip(*(data_set.error_products(model, names) for data_set in data_sets), strict=True)
+    products_of_tests, components_of_tests, variances = parts
     scale = np.append(1.0, Coordinates.of_parameters(model, names).slopes(model.values))
     of_priors = np.vstack(prior_rows(model, names))
-    products = np.sum([part.products for part in parts], axis=0) * np.outer(scale, scale) + of_priors @ of_priors.T
-    components = np.concatenate([part.components for part in parts], axis=1) * scale[:, None]
-    variance = np.concatenate([part.variance for part in parts])
+    products = np.sum(products_of_tests, axis=0) * np.outer(scale, scale) + of_priors @ of_priors.T
+    components = np.concatenate(components_of_tests, axis=1) * scale[:, None]
+    variance = np.concatenate(variances)
 
     def cost(log_size: float) -> float:
         """Minus twice the log of the restricted likelihood, given the natural log of the model error's size.
@@ -196,8 +197,8 @@ def log_likelihood(solution: FitResult, prior_precision: Mapping[str, float]) ->
     Returns:
         Natural log of the likelihood, up to a constant that is the same for all models.
     """
-    size = max(test.model_error for test in solution.minimised)
-    bare = [replace(test, model_error=0.0) for test in solution.minimised]
+    size = max(test.model_error for test in solution.problem.tests)
+    bare = [replace(test, model_error=0.0) for test in solution.problem.tests]
     tests = _fitted_tests(solution, _thinned(bare, size))
     rows, residual = tests.free_jacobian, tests.solution.residual
     information, gain = rows @ rows.T, 0.0
@@ -232,8 +233,8 @@ def model_error_warning(error: Unnamed) -> str:
 
 def _exceeds_noise(solution: FitResult, rig: RigSettings) -> bool:
     """True if chi-square of all tests, or of one, exceeds that of noise and errors of the rig's accuracy class."""
-    squares, counts = [], [test.residual_count for test in solution.minimised]
-    for test, rows in zip(solution.minimised, residual_slices(solution.minimised), strict=True):
+    squares, counts = [], [test.residual_count for test in solution.problem.tests]
+    for test, rows in zip(solution.problem.tests, residual_slices(solution.problem.tests), strict=True):
         whitened = CommonError(_errors_of_class(test, rig)).whiten(solution.residual[rows])
         squares.append(float(np.sum(np.square(whitened))))
     freedom = max(sum(counts) - len(solution.names), 1)
@@ -243,7 +244,7 @@ def _exceeds_noise(solution: FitResult, rig: RigSettings) -> bool:
 
 def _is_smooth(solution: FitResult, rig: RigSettings) -> bool:
     """True if a smooth error of the model is more probable than noise and errors of the rig's class alone."""
-    thinned = _thinned(solution.minimised)
+    thinned = _thinned(solution.problem.tests)
     solution = solution.reevaluate(solution.model, thinned)
     tests = FittedTests(solution, [_errors_of_class(test, rig) for test in thinned])
     names = tuple(dict.fromkeys(tests.directions.tolist()))

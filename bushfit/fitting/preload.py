@@ -83,10 +83,9 @@ def _probability_of_chance(data: PreparedCampaign, tests: Sequence[MeasuredTest]
     """
     tests = with_gain_weighting(tests, weigh=True)
     plain, full = _fits(data, data.problem(data.effects, tests, {}), fixed)
-    errors = level_errors(full.minimised, full.residual, full.jacobian, largest_error(data.campaign.rig))
+    errors = level_errors(full.problem.tests, full.residual, full.jacobian, largest_error(data.campaign.rig))
     if errors.significant:
-        loops, sweeps = split_by_kind(tests)
-        tests = [*loops, *with_level_errors(sweeps, errors.error, errors.freedom)]
+        tests = with_level_errors(tests, errors.error, errors.freedom)
         plain, full = _fits(data, replace(plain.problem, model=plain.model, tests=tests), fixed)
     # the errors that a run shares are as uncertain as the repeats are few
     estimated = [sweep.noise.freedom for sweep in split_by_kind(tests)[1] if sweep.noise.freedom]

@@ -135,18 +135,17 @@ def _with_contradictions(tests: Sequence[_Kind], conditions: Sequence[Array]) ->
     return marked
 
 
-def with_level_errors(
-    sweeps: Sequence[MeasuredSweep], error: tuple[float, float], freedom: int
-) -> tuple[MeasuredSweep, ...]:
-    """Return sweeps with other gain and phase errors that all runs of a level share.
+def with_level_errors(tests: Sequence[MeasuredTest], error: tuple[float, float], freedom: int) -> list[MeasuredTest]:
+    """Return tests with other gain and phase errors that all runs of a level of a sweep share; loops have none.
 
     Args:
-        sweeps: measured sweeps.
+        tests: tests, of which only sweeps change.
         error: standard deviation of gain and of phase [rad].
         freedom: degrees of freedom behind the error; 0 if it is exact.
     """
-    noises = {id(sweep.noise): replace(sweep.noise, level=error, level_freedom=freedom) for sweep in sweeps}
-    return tuple(replace(sweep, noise=noises[id(sweep.noise)]) for sweep in sweeps)
+    noises = {id(test.noise): test.noise for test in tests if isinstance(test, MeasuredSweep)}
+    noises = {key: replace(noise, level=error, level_freedom=freedom) for key, noise in noises.items()}
+    return [replace(test, noise=noises[id(test.noise)]) if isinstance(test, MeasuredSweep) else test for test in tests]
 
 
 def split_by_kind(data_sets: Iterable[MeasuredTest]) -> tuple[list[MeasuredLoop], list[MeasuredSweep]]:

@@ -23,6 +23,7 @@ from bushfit.fitting.preparation import (
     MeasuredTest,
     prepare_loops,
     prepare_sweeps,
+    split_by_kind,
     with_level_errors,
 )
 from bushfit.fitting.problem import FitProblem
@@ -145,12 +146,12 @@ class PreparedCampaign:
 
     def with_sweeps(self, sweeps: Sequence[Sweep]) -> "PreparedCampaign":
         """Return the campaign with other sweeps of the same rows, such as corrected ones, and their noise estimated."""
-        fit, new = self.campaign.fit, []
+        fit, new = self.campaign.fit, list[MeasuredTest]()
         for old, data_set in zip(self.sweeps, prepare_sweeps(sweeps, fit.residuals, self.campaign.rig), strict=True):
             rows = old.order[old.weights == 0.0]
             new.append(data_set.without(np.flatnonzero(np.isin(data_set.order, rows))))
         noise = self.sweeps[0].noise
-        return replace(self, sweeps=with_level_errors(new, noise.level, noise.level_freedom))
+        return replace(self, sweeps=tuple(split_by_kind(with_level_errors(new, noise.level, noise.level_freedom))[1]))
 
     @property
     def given_values(self) -> dict[str, float]:

@@ -197,11 +197,6 @@ class FitResult:
         return self.problem.coordinates
 
     @property
-    def minimised(self) -> Sequence[MeasuredTest]:
-        """Tests with the weights of the minimised sum of squares; `residual` contains their residuals."""
-        return self.problem.tests
-
-    @property
     def data_sets(self) -> Sequence[MeasuredTest]:
         """Tests weighted by their noise alone, for quality and warnings; excluded outliers have weight 0."""
         return self.noise_weighted or self.problem.tests

@@ -26,7 +26,7 @@ from bushfit.fitting.identify import undetermined_parameters
 from bushfit.fitting.levels import level_errors
 from bushfit.fitting.model_error import model_error_warning, with_model_error
 from bushfit.fitting.preload import PRELOAD
-from bushfit.fitting.preparation import MeasuredTest, sources, split_by_kind, with_level_errors
+from bushfit.fitting.preparation import MeasuredTest, sources, with_level_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.problem import FitResult
 from bushfit.fitting.profile import limit95, profile95
@@ -97,12 +97,11 @@ def fit_joint(
     problem = data.problem(effects, tests, {})
     found = estimate(problem, robust=data.robust)
     rig = data.campaign.rig
-    errors = level_errors(found.minimised, found.residual, found.jacobian, largest_error(rig))
+    errors = level_errors(found.problem.tests, found.residual, found.jacobian, largest_error(rig))
     found, error = with_model_error(found, data.bounds, rig)
     notes = [model_error_warning(error) + NEXT] if error else []
     if errors.freedom and any(errors.error) and not error:
-        loops, sweeps = split_by_kind(tests)
-        tests = [*loops, *with_level_errors(sweeps, errors.error, errors.freedom)]
+        tests = with_level_errors(tests, errors.error, errors.freedom)
         found = estimate(replace(problem, model=found.model, tests=tests), robust=data.robust)
     if errors.significant and found.names and not error:  # the rig or the model is the cause: the bands include both
         found, error = with_model_error(found, data.bounds, certain=True)
@@ -113,7 +112,7 @@ def fit_joint(
                 "the closest fit, and their intervals include this error"
             )
     notes += unfitted_warnings(found.model, unused, NEXT)
-    usable = expected_errors(found.model, found.minimised, unused, found)
+    usable = expected_errors(found.model, found.problem.tests, unused, found)
     result = replace(_result(data, [found], notes=notes, unused=unused), usable=usable, model_error=error)
     return replace(result, profile=profile95(found, result.covariance)) if profile else result
 
@@ -223,7 +222,7 @@ def _springpot_warning(data: PreparedCampaign, static: FitResult) -> str:
     except FitError:  # no sweep, or none that goes with the loops: a typical rubber tells as much as can be told
         ratio, alpha = _TYPICAL_SPRINGPOT
         fixed = {"m": ratio * values["mu"], "alpha": alpha}
-        better = _fit_step(data, static.minimised, BASE, fixed).model.values
+        better = _fit_step(data, static.problem.tests, BASE, fixed).model.values
         source = f"With the springpot of a typical filled rubber (m = {ratio} mu s^alpha, alpha = {alpha})"
     changes = ", ".join(f"{name} by {100 * (better[name] / values[name] - 1):+.1f} %" for name in STATIC)
     return (
@@ -378,5 +377,5 @@ def fit_warnings(model: Model, step: FitResult, bounds: Bounds, covariance: Cova
             how = f"at {'most' if end == 'min' else 'least'} {number(factor * limit, 2)} {unit}".rstrip(" -")
             sentences.append(f"{name} ended at a limit of the model: the tests only show that it is {how} (95 %)")
     judged = [name for name in names if name not in at_bound and effect_name_of(name) != PRELOAD]
-    sentences += undetermined_parameters(model, step.minimised, judged, covariance)
+    sentences += undetermined_parameters(model, step.problem.tests, judged, covariance)
     return sentences if step.smooth_error else [*sentences, *misfit_warnings(model, tests, len(names), advice)]

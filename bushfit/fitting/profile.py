@@ -132,8 +132,8 @@ def profile95(best: FitResult, covariance: Covariance) -> Mapping[str, Interval]
     linear = linear_errors(best.jacobian)
     half = np.array([covariance.half_widths.get(name, 0.0) for name in names])  # 0 of one at a bound
     # how far a model error, or a gain of a loop that the weights do not contain, bends parameters, no weight tells
-    loops, _ = split_by_kind(best.minimised)
-    missed = any(test.model_error for test in best.minimised) or not all(loop.gain_weighs for loop in loops)
+    loops, _ = split_by_kind(best.problem.tests)
+    missed = any(test.model_error for test in best.problem.tests) or not all(loop.gain_weighs for loop in loops)
     widest = np.inf if missed else _WIDEST * Z95 * np.sqrt(_excess(best))
     allowed = np.clip(half / best.coordinates.slopes(best.model.values) / linear, Z95, widest)
     found: dict[str, Interval] = {}
@@ -162,4 +162,4 @@ def limit95(best: FitResult, name: str) -> float | None:
 
 def _excess(best: FitResult) -> float:
     """Factor on the allowed rise of chi-square for a model that misses its tests: reduced chi-square, at least 1."""
-    return max(reduced_chi_square(best.model, best.minimised, len(best.names))[0], 1.0)
+    return max(reduced_chi_square(best.model, best.problem.tests, len(best.names))[0], 1.0)

@@ -9,7 +9,6 @@ Notes:
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 
@@ -25,6 +24,9 @@ from bushfit.model.result import Outlier
 
 #: Distance, in units of noise, around which soft_l1 turns from squares to distances; normal noise loses 4 % there.
 _SOFT = 2.0
+#: Efficiency (E psi')^2/E psi^2 of soft_l1 under normal noise, by the number of residuals of a point: psi is the
+#: derivative of the loss by the distance of a point in units of noise, and E the mean over all distances.
+_EFFICIENCY = {1: 0.9768665463299635, 2: 0.9892965108936514}
 #: A reweighted fit has settled when it moves by less than this, in standard errors: far below what matters.
 _SETTLED = 0.01
 #: Rounds of reweighting; chosen: most fits take five, what has not settled by then swings to and fro.
@@ -52,8 +54,8 @@ def estimate(problem: FitProblem, *, robust: bool = False, lmfit: bool = False) 
     """Fit to the end by least squares, or robustly by the loss soft_l1 without the outliers of sweeps.
 
     soft_l1 minimises the sum of 2 C^2 (sqrt(1 + (z/C)^2) - 1) over the distances z of the points in units of noise.
-    The covariance is that of least squares with all weights equal to (E psi')^2/E psi^2 for normal noise, where psi is
-    the derivative of the loss. Outliers of loops already have weight 0, see `prepared_loop`.
+    The covariance is that of least squares with all weights equal to the efficiency of this loss under normal noise.
+    Outliers of loops already have weight 0, see `prepared_loop`.
 
     Args:
         problem: parameters to fit, tests and bounds.
@@ -91,7 +93,7 @@ def estimate(problem: FitProblem, *, robust: bool = False, lmfit: bool = False) 
         change, current = (after - before) @ found.jacobian, replace(problem, model=found.model)
         if float(change @ change) < _SETTLED**2:
             model = found.model
-            weighed = [test.weighted(np.array(_efficiency(test.residuals_per_point))) for test in retained]
+            weighed = [test.weighted(np.array(_EFFICIENCY[test.residuals_per_point])) for test in retained]
             outliers = list_outliers(model, retained, outlying)
             return replace(found, covariance_tests=weighed, noise_weighted=retained, outliers=outliers)
     raise FitError(
@@ -99,21 +101,6 @@ def estimate(problem: FitProblem, *, robust: bool = False, lmfit: bool = False) 
         found=f"{_MOST_ROUNDS} rounds of reweighting",
         hint="look at the rows that --loss linear warns of, and take them out of the file",
     )
-
-
-@lru_cache(maxsize=4)
-def _efficiency(parts: int) -> float:
-    """Efficiency (E psi')^2/E psi^2 of soft_l1 under normal noise, for points with `parts` (1 or 2) residuals.
-
-    psi is the derivative of the loss by the distance z of a point in units of noise, and E the mean over all z.
-    """
-    z = np.linspace(0.0, 12.0, 4001)[1:]
-    density = z ** (parts - 1) * np.exp(-(z**2) / 2.0)
-    density /= density.sum()
-    ratio = z**2 / (parts * _SOFT**2)
-    weight = 1.0 / np.sqrt(1.0 + ratio)
-    slope = density @ (weight - ratio / parts * weight**3)
-    return float(slope**2 * parts / (density @ (weight * z) ** 2))
 
 
 def outlier_warnings(outliers: Sequence[Outlier], *, robust: bool) -> list[str]:

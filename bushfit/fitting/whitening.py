@@ -22,7 +22,6 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.fitting.common_error import ErrorProducts
 from bushfit.fitting.noise import SweepNoise
 
 
@@ -119,11 +118,11 @@ class Whitening:
             added += (sums * variance) @ sums.T
         return added
 
-    def error_products(self, rows: Array) -> ErrorProducts:
-        """Inner products of deviations in units of scatter, (m, 2 n), to estimate the size of the model error."""
+    def error_products(self, rows: Array) -> tuple[Array, Array, Array]:
+        """Inner products of deviations in units of scatter, (m, 2 n), as `MeasuredLoop.error_products` returns them."""
         order, starts = self._by_point
         components = np.add.reduceat((rows * self._block.unit)[:, order], starts, axis=-1)
-        return ErrorProducts(rows @ rows.T, components, self._point.weight)
+        return rows @ rows.T, components, self._point.weight
 
     @property
     def log_det_covariance(self) -> float:

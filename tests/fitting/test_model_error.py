@@ -259,7 +259,7 @@ def test_the_covariance_is_the_sandwich_of_noise_and_process(refitted):
 
 def test_the_likelihood_is_averaged_over_the_process(refitted):
     """In full: -(r^T C^-1 r + ln|C|)/2 over sizes and lengths, and Laplace's -ln|J C^-1 J^T + prior|/2 at the best."""
-    (sweep,) = (replace(test, model_error=0.0) for test in refitted.minimised)
+    (sweep,) = (replace(test, model_error=0.0) for test in refitted.problem.tests)
     solution, free = refitted.reevaluate(refitted.model, [sweep]), ["mu", "m"]
     cases, jacobian_rows = list[tuple[float, float]](), solution.jacobian
     for process in discrepancies(FittedTests(solution, [np.empty((0, sweep.size))])):
