@@ -5,7 +5,6 @@ friction, and evaluates force and displacement by lock-in. It shares no formula 
 state, so each checks the other.
 """
 
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -14,24 +13,11 @@ from bushfit.effects.contract import UNKNOWN, Array, RubberConditions
 from bushfit.effects.history import History
 from bushfit.geometry import Place
 from bushfit.model.model import Kind, Model
+from bushfit.reading.measurement import Loop
 from bushfit.reduction.harmonics import cycle_harmonics
 
 #: Default number of time steps per cycle: within 0.03 % of the closed form at 20 Hz.
 STEPS_PER_CYCLE = 2048
-
-
-@dataclass(frozen=True)
-class Record:
-    """Record of a simulated test: time [s], displacement [m or rad] and force [N or N m], (n,) each."""
-
-    time: Array
-    displacement: Array
-    force: Array
-
-    def select(self, rows: slice) -> "Record":
-        """Copy some rows of the record, with time from 0."""
-        time = self.time[rows]
-        return Record(time - time[0], self.displacement[rows].copy(), self.force[rows].copy())
 
 
 def wave(waveform: str, phase: Array) -> Array:
@@ -57,7 +43,7 @@ def simulate_cycles(
     waveform: str = "sine",
     kind: Kind = "sweep",
     conditions: RubberConditions = UNKNOWN,
-) -> Record:
+) -> Loop:
     """Simulate a cyclic test from rest: impose `run_in + cycles` cycles and record the last `cycles`.
 
     Args:
@@ -77,8 +63,8 @@ def simulate_cycles(
     """
     motion = amplitude * wave(waveform, np.arange((run_in + cycles) * steps_per_cycle + 1) / steps_per_cycle)
     step = 1.0 / (frequency * steps_per_cycle)
-    whole = simulate_motion(model, direction, motion, step, frequency, kind=kind, conditions=conditions)
-    return whole.select(slice(run_in * steps_per_cycle, None))
+    rows = slice(run_in * steps_per_cycle, None)
+    return simulate_motion(model, direction, motion, step, frequency, rows=rows, kind=kind, conditions=conditions)
 
 
 def simulate_motion(
@@ -88,9 +74,10 @@ def simulate_motion(
     step: float,
     frequency: float,
     *,
+    rows: slice = slice(None),
     kind: Kind = "loop",
     conditions: RubberConditions = UNKNOWN,
-) -> Record:
+) -> Loop:
     """Simulate a test with an arbitrary motion from rest.
 
     Args:
@@ -99,11 +86,12 @@ def simulate_motion(
         motion: displacement [m or rad], (n,).
         step: time between samples [s].
         frequency: frequency of the cycles [Hz], for effects that depend on it.
+        rows: samples to record.
         kind: "loop" or "sweep"; only effects of the instrument depend on it.
         conditions: temperature and history of the rubber, one number each.
 
     Returns:
-        Time, displacement and force at all n samples.
+        Time from 0, displacement and force at the recorded samples.
 
     Raises:
         ModelError: an effect of the model has no equation in time.
@@ -111,10 +99,11 @@ def simulate_motion(
     model.require_time_law()
     history = History(motion, step, periodic=False, frequency=frequency)
     force = model.force(direction, history, kind=kind, conditions=conditions)
-    return Record(np.arange(motion.size) * step, motion, force)
+    time = (np.arange(motion.size) * step)[rows]
+    return Loop("simulated", direction, time - time[0], motion[rows], force[rows])
 
 
-def lock_in(measured: Record, frequency: float) -> complex:
+def lock_in(measured: Loop, frequency: float) -> complex:
     """Complex dynamic stiffness [N/m or N m/rad] of a record, from the first harmonic at a frequency [Hz] (Eq. 9)."""
     channels = np.column_stack((measured.displacement, measured.force))
     _, (displacement, force), _ = cycle_harmonics(measured.time * frequency, channels, 1)

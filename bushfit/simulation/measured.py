@@ -16,7 +16,6 @@ from bushfit.effects.contract import Array, RubberConditions
 from bushfit.geometry import Specimen
 from bushfit.model.model import Model
 from bushfit.model.result import Result
-from bushfit.model.rig import Record
 from bushfit.reading.measurement import Loop, Source, Sweep
 from bushfit.reading.resonance import ResonanceTest
 from bushfit.reading.runs import runs_of
@@ -99,8 +98,8 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
         displacement = record.displacement + plan.displacement_noise * largest * random.standard_normal(rows)
         noise = _force_noise(record, plan, random)
         name, force = f"loop_{loop.direction}_{number}", gains[loop] * record.force + noise
-        noisy = Loop(name, loop.direction, record.time, displacement, force, temperature=loop.temperature)
-        loops.append(replace(noisy, preload=loop.static))
+        noisy = replace(record, name=name, displacement=displacement, force=force)
+        loops.append(replace(noisy, temperature=loop.temperature, preload=loop.static))
     named = zip(_test_names("sweep", [test for test, _ in clean.sweeps]), clean.sweeps, conditions, strict=False)
     sweeps = [
         _noisy_sweep(clean.truth, test, k, name, plan, random, conditions) for name, (test, k), conditions in named
@@ -113,9 +112,8 @@ def measure(clean: Undisturbed, plan: SimulateSettings) -> Simulated:
         resonances.append((test.mass, ResonanceTest(name, test.direction, frequency, measured, base, source)))
     records = []
     for name, (planned_record, record) in zip(_test_names("record", plan.validation), clean.validation, strict=True):
-        place, force = planned_record.direction, record.force + _force_noise(record, plan, random)
-        noisy = Loop(name, place, record.time, record.displacement, force, temperature=planned_record.temperature)
-        records.append(noisy)
+        force = record.force + _force_noise(record, plan, random)
+        records.append(replace(record, name=name, force=force, temperature=planned_record.temperature))
     tested = (*planned, *plan.validation)
     specimens = dict.fromkeys(test.direction for test in tested if isinstance(test.direction, Specimen))
     tests = tuple(loops), tuple(sweeps), tuple(resonances)
@@ -188,7 +186,7 @@ def _noisy_sweep(
     )
 
 
-def _force_noise(record: Record, plan: SimulateSettings, random: Generator) -> Array:
+def _force_noise(record: Loop, plan: SimulateSettings, random: Generator) -> Array:
     """Draw the noise of a recorded force [N or N m], (rows,), from a first-order autoregressive process, AR(1).
 
     Args:

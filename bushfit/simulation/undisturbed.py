@@ -27,6 +27,7 @@ from bushfit.geometry import Direction, Place
 from bushfit.model import rig
 from bushfit.model.model import Model
 from bushfit.progress import track
+from bushfit.reading.measurement import Loop
 from bushfit.reduction.resonance import shaken_response
 
 #: The paper's loop: 1 mm at 0.1 Hz.
@@ -67,10 +68,10 @@ class Undisturbed:
     """
 
     truth: Model
-    loops: tuple[tuple[SimulatedLoop, rig.Record], ...]
+    loops: tuple[tuple[SimulatedLoop, Loop], ...]
     sweeps: tuple[tuple[SimulatedSweep, Array], ...]
     resonances: tuple[tuple[SimulatedResonance, Array], ...] = ()
-    validation: tuple[tuple[SimulatedRecord, rig.Record], ...] = ()
+    validation: tuple[tuple[SimulatedRecord, Loop], ...] = ()
 
 
 def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = rig.STEPS_PER_CYCLE) -> Undisturbed:
@@ -111,7 +112,7 @@ def undisturbed(truth: Model, plan: SimulateSettings, *, steps_per_cycle: int = 
     )
 
 
-def _clean_loop(truth: Model, test: SimulatedLoop, conditions: RubberConditions) -> rig.Record:
+def _clean_loop(truth: Model, test: SimulatedLoop, conditions: RubberConditions) -> Loop:
     """Simulate the record of a steady loop, or of a programme from rest, without noise, 1000 rows per cycle.
 
     Args:
@@ -120,9 +121,8 @@ def _clean_loop(truth: Model, test: SimulatedLoop, conditions: RubberConditions)
         conditions: temperature and earlier strains of the rubber.
     """
     motion, step, recorded = _programme(test) if len(test.parts) > 1 else _steady_loop(truth, test)
-    frequency = test.parts[0][0]
-    record = rig.simulate_motion(truth, test.direction, motion, step, frequency, conditions=conditions)
-    return record.select(slice(recorded, None, _STEPS_PER_ROW))
+    frequency, rows = test.parts[0][0], slice(recorded, None, _STEPS_PER_ROW)
+    return rig.simulate_motion(truth, test.direction, motion, step, frequency, rows=rows, conditions=conditions)
 
 
 def _steady_loop(truth: Model, test: SimulatedLoop) -> tuple[Array, float, int]:
@@ -184,7 +184,7 @@ def _programme(test: SimulatedLoop) -> tuple[Array, float, int]:
     return np.concatenate([*motions[:-1], [0.0]]), step, 0
 
 
-def _clean_record(truth: Model, test: SimulatedRecord, seed: list[int]) -> rig.Record:
+def _clean_record(truth: Model, test: SimulatedRecord, seed: list[int]) -> Loop:
     """Simulate a validation record from rest without noise, 40 rows and 400 time steps per cycle of its fastest sine.
 
     The motion fades in over the first twentieth of its duration, so that it begins without a step.
@@ -194,38 +194,37 @@ def _clean_record(truth: Model, test: SimulatedRecord, seed: list[int]) -> rig.R
         test: settings of the record.
         seed: seed of the random phases.
     """
-    frequency, random = np.array(test.frequencies), np.random.default_rng(seed)
-    step = 1.0 / (frequency[-1] * _ROWS_PER_RECORD_CYCLE * _STEPS_PER_RECORD_ROW)
+    frequencies, random = np.array(test.frequencies), np.random.default_rng(seed)
+    step = 1.0 / (frequencies[-1] * _ROWS_PER_RECORD_CYCLE * _STEPS_PER_RECORD_ROW)
     count = round(test.duration / (step * _STEPS_PER_RECORD_ROW)) * _STEPS_PER_RECORD_ROW + 1
     if count > _MOST_STEPS:
         raise CampaignError(
             "a validation record is too long to simulate",
             place="simulate.validation",
-            found=f"{test.duration:.3g} s at up to {frequency[-1]:.3g} Hz",
+            found=f"{test.duration:.3g} s at up to {frequencies[-1]:.3g} Hz",
             expected=f"no more than {_MOST_STEPS} steps, {_ROWS_PER_RECORD_CYCLE * _STEPS_PER_RECORD_ROW} a cycle",
         )
     time = np.arange(count) * step
     if test.motion == "sines":
-        phases = 2.0 * np.pi * random.random(frequency.size)
+        phases = 2.0 * np.pi * random.random(frequencies.size)
         motion = np.zeros(count)
-        for f, amplitude, phase in zip(frequency, test.amplitudes, phases, strict=True):
+        for f, amplitude, phase in zip(frequencies, test.amplitudes, phases, strict=True):
             motion += amplitude * np.sin(2.0 * np.pi * f * time + phase)
     else:
         lines = np.fft.rfftfreq(count, step)
-        inside = (lines >= frequency[0]) & (lines <= frequency[-1])
-        sizes = 1.0 / frequency if test.motion == "road" else np.array(test.amplitudes)
+        inside = (lines >= frequencies[0]) & (lines <= frequencies[-1])
+        sizes = 1.0 / frequencies if test.motion == "road" else np.array(test.amplitudes)
         spectrum = np.zeros(lines.size, dtype=complex)
         spectrum[inside] = np.exp(
-            np.interp(np.log(lines[inside]), np.log(frequency), np.log(sizes))
+            np.interp(np.log(lines[inside]), np.log(frequencies), np.log(sizes))
             + 2j * np.pi * random.random(inside.sum())
         )
         motion = np.fft.irfft(spectrum, count)
         motion *= (test.rms or 0.0) / np.std(motion)
     motion *= np.minimum(time / (_FADE_IN * test.duration), 1.0)
+    frequency, rows = History.sampled(motion, step).frequency, slice(None, None, _STEPS_PER_RECORD_ROW)
     conditions = RubberConditions(test.temperature)
-    mean_frequency = History.sampled(motion, step).frequency
-    record = rig.simulate_motion(truth, test.direction, motion, step, mean_frequency, conditions=conditions)
-    return record.select(slice(None, None, _STEPS_PER_RECORD_ROW))
+    return rig.simulate_motion(truth, test.direction, motion, step, frequency, rows=rows, conditions=conditions)
 
 
 def _clean_sweep(truth: Model, test: SimulatedSweep, steps_per_cycle: int) -> Array:

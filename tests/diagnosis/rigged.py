@@ -15,8 +15,7 @@ from bushfit.effects.history import History
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
-from bushfit.model.rig import Record
-from bushfit.reading.measurement import Sweep
+from bushfit.reading.measurement import Loop, Sweep
 from bushfit.simulation.undisturbed import Undisturbed
 
 BOTH = [Direction.AXIAL, Direction.RADIAL]
@@ -52,7 +51,7 @@ def in_closed_form(truth: Model, plan: SimulateSettings) -> Undisturbed:
         motion = test.amplitude * np.tile(np.sin(2.0 * np.pi * phase), test.cycles)
         steady = History.steady(motion, test.frequency, test.cycles)
         force = truth.force(test.direction, steady, kind="loop")
-        loops.append((test, Record(steady.step * np.arange(motion.size), motion, force)))
+        loops.append((test, Loop("simulated", test.direction, steady.step * np.arange(motion.size), motion, force)))
     sweeps = [
         (test, truth.stiffness(test.direction, np.array(test.frequencies), np.array(test.amplitudes)[:, None]))
         for test in plan.sweeps
