@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bushfit.reduction.turning_points import reversals
+
 Array = NDArray[Any]
 #: Tolerance of implicit equations for any motion, relative to its maximum: far below the error of its sampling.
 _SAMPLED_ACCURACY = 1e-6
@@ -229,27 +231,3 @@ def _take(values: Array, indices: Array) -> Array:
     shape = np.broadcast_shapes(values.shape[:-1], indices.shape[:-1])
     rows, columns = (np.broadcast_to(array, (*shape, array.shape[-1])) for array in (values, indices))
     return np.take_along_axis(rows, columns, axis=-1)
-
-
-def reversals(value: Array) -> Array:
-    """Mark the samples at which a motion reverses.
-
-    Args:
-        value: samples of the motion in any unit, (..., n).
-
-    Returns:
-        True at each sample, except the last, at which the motion reverses, (..., n - 1). If the motion rests before it
-        reverses, the last sample of the rest is the reversal.
-
-    >>> reversals(np.array([0.0, 1.0, 1.0, 0.0]))
-    array([False, False,  True])
-    """
-    steps = np.diff(value, axis=-1)
-    rising = steps > 0.0
-    if not (moves := steps != 0.0).all():
-        moving = np.maximum.accumulate(np.where(moves, np.arange(steps.shape[-1]), 0), axis=-1)
-        rising, moves = (np.take_along_axis(array, moving, axis=-1) for array in (rising, moves))
-        moves[..., 1:] &= moves[..., :-1]
-    turned = np.zeros_like(rising)
-    turned[..., 1:] = (rising[..., 1:] != rising[..., :-1]) & moves[..., 1:]
-    return turned

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from bushfit.effects.contract import Array
-from bushfit.effects.history import History, reversals
+from bushfit.effects.history import History
 from bushfit.errors import FitError
 from bushfit.fitting.loop_cycles import steady_cycles, wrong_clock
 from bushfit.fitting.loop_harmonics import (
@@ -29,6 +29,7 @@ from bushfit.fitting.row_noise import RowNoise, noise_harmonics_of_single_cycle,
 from bushfit.reading.measurement import Loop
 from bushfit.reading.preload import Preload
 from bushfit.reduction.harmonics import as_complex, basis, least_squares, series
+from bushfit.reduction.turning_points import reversals
 from bushfit.units import number
 
 #: Share of the amplitude, or of half the force's range, above which a mean is reported as a preload; chosen: zero

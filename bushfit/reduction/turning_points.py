@@ -1,6 +1,7 @@
 """Turning points of a motion, without the turning points of noise and of a ripple on the motion."""
 
 from math import comb
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,16 +22,38 @@ _SAME_HALF_CYCLE = 0.1
 _PAUSE = 2.5
 
 
-def reversals(values: Floats, rows: Integers) -> Integers:
+def reversals(value: NDArray[Any]) -> NDArray[np.bool_]:
+    """Mark the samples at which a motion reverses.
+
+    Args:
+        value: samples of the motion in any unit, (..., n).
+
+    Returns:
+        True at each sample, except the last, at which the motion reverses, (..., n - 1). If the motion rests before it
+        reverses, the last sample of the rest is the reversal.
+
+    >>> reversals(np.array([0.0, 1.0, 1.0, 0.0]))
+    array([False, False,  True])
+    """
+    steps = np.diff(value, axis=-1)
+    rising = steps > 0.0
+    if not (moves := steps != 0.0).all():
+        moving = np.maximum.accumulate(np.where(moves, np.arange(steps.shape[-1]), 0), axis=-1)
+        rising, moves = (np.take_along_axis(array, moving, axis=-1) for array in (rising, moves))
+        moves[..., 1:] &= moves[..., :-1]
+    turned = np.zeros_like(rising)
+    turned[..., 1:] = (rising[..., 1:] != rising[..., :-1]) & moves[..., 1:]
+    return turned
+
+
+def reversal_rows(values: Floats, rows: Integers) -> Integers:
     """Select those of the given rows at which the values change direction, and the first and the last row.
 
     Args:
         values: values of a channel, (n,).
         rows: row indices, increasing.
     """
-    direction = np.sign(np.diff(values[rows]))
-    inner = 1 + np.flatnonzero(direction[1:] != direction[:-1])
-    return np.concatenate((rows[:1], rows[inner], rows[1:][-1:]))
+    return np.concatenate((rows[:1], rows[:-1][reversals(values[rows])], rows[1:][-1:]))
 
 
 def prominent_turns(values: Floats, turns: Integers, prominence: float) -> Integers:
@@ -92,7 +115,7 @@ def motion_turns(time: Floats, motion: Floats) -> tuple[Integers, float]:
     """
     prominence = noise_threshold(motion)
     moving = np.concatenate(([0], 1 + np.flatnonzero(np.diff(motion) != 0.0)))
-    fine = prominent_turns(motion, reversals(motion, moving), prominence)
+    fine = prominent_turns(motion, reversal_rows(motion, moving), prominence)
     small = max(prominence, _RIPPLE * float(np.ptp(motion)))
     coarse = prominent_turns(motion, fine, small)
     if coarse.size < 2 or coarse.size == fine.size:
@@ -112,7 +135,7 @@ def motion_turns(time: Floats, motion: Floats) -> tuple[Integers, float]:
         rippled[[0, -1]] = rippled[[1, -2]]  # the record cuts the first and the last half cycle short
     rippled &= duration < _PAUSE * neighbour
     ripple = rippled[half[fine]] & ~np.isin(fine, coarse)
-    return reversals(motion, fine[~ripple]), prominence
+    return reversal_rows(motion, fine[~ripple]), prominence
 
 
 def stroke_middles(height: Floats) -> Floats:

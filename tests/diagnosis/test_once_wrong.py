@@ -12,9 +12,10 @@ from bushfit.campaign.campaign import Campaign
 from bushfit.diagnosis.record import Diagnosis
 from bushfit.effects import twins_of
 from bushfit.effects.contract import Array
-from bushfit.effects.history import History, reversals
+from bushfit.effects.history import History
 from bushfit.geometry import Direction
 from bushfit.model.model import Model
+from bushfit.reduction.turning_points import reversals
 from bushfit.simulation.measured import measure
 from bushfit.simulation.undisturbed import undisturbed
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from bushfit import effects, geometry, model
+from bushfit import effects, geometry, model, reduction
 from bushfit.effects import History
 from bushfit.effects.contract import Array, Setting
 from bushfit.geometry import Direction
@@ -23,7 +23,7 @@ from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE, Model
 from bushfit.model.sensitivity import force_and_slopes, stepped_values, stiffness_and_slopes
 
-PACKAGES = (effects, geometry, model)
+PACKAGES = (effects, geometry, model, reduction)
 FREQUENCY = np.array([0.1, 5.0, 55.0, 155.0])
 AMPLITUDE = np.array([1e-3, 1e-4, 2e-4, 5e-4])
 
