@@ -276,7 +276,7 @@ SPOILED: dict[str, list[tuple[Spoil, tuple[str, ...]]]] = {
     "results": [
         (shutil.rmtree, ("a folder of results is needed", "nothing")),
         (without("*.json"), ("there is no model in this folder", "axial.csv", "bushfit run CAMPAIGN")),
-        (written("model.json", "{"), ("model.json, line 1", "not valid JSON")),
+        (written("model.json", "{"), ("model.json: this is not valid JSON", "line 1")),
         (written("model.json", "[]"), ("model.json: not a result", "a list")),
         (changed("model.json", schema="bushfit/model/9"), ("model.json, schema",)),
         (changed("model.json", campaign={"name": 3}), ("model.json, campaign.",)),
