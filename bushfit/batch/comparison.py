@@ -13,6 +13,8 @@ from bushfit.model.covariance import Z95
 FEWEST = 5
 #: Probability that any part of a batch of equal parts is reported as an outlier.
 _LEVEL = 0.05
+#: Number of parts for each that may be an outlier: two of eight do not hide each other.
+_LARGEST_SHARE = 4
 
 
 def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[str, Array], dict[str, Array]]:
@@ -26,8 +28,8 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
         quantity, in their standard deviations, NaN where not known; and a mask of the outliers.
 
     Notes:
-        Generalised extreme studentised deviate procedure (Rosner, Technometrics 25 (1983) 165) for up to a fifth of
-        the parts, with Bonferroni's correction for the number of quantities. Each value is held against the others
+        Generalised extreme studentised deviate procedure (Rosner, Technometrics 25 (1983) 165) for up to a quarter
+        of the parts, with Bonferroni's correction for the number of quantities. Each value is held against the others
         without it, so that their deviation has n - 2 degrees of freedom and the limit is that of `smallest_deviation`.
         A standard error above the usual one widens the deviation that a value may have. Outliers of one quantity are
         then compared in all quantities with the parts that are outliers in none, so that they do not hide each other.
@@ -36,7 +38,7 @@ def find_outliers(quantities: Mapping[str, tuple[Array, Array]]) -> tuple[dict[s
     for name, (values, errors) in quantities.items():
         usual = np.isfinite(values)
         removed, outlier_count = list[int](), 0
-        for step in range(int(usual.sum()) // FEWEST):
+        for step in range(int(usual.sum()) // _LARGEST_SHARE):
             z = _studentised(values, errors, usual)
             if not np.isfinite(z[usual]).any():  # the others agree to the digit
                 break

@@ -20,6 +20,7 @@ from bushfit.batch.row import RowTask
 from bushfit.batch.store import ROWS_FOLDER
 from bushfit.effects import is_parameter
 from bushfit.effects.contract import Array
+from bushfit.effects.unnamed import NAME as UNNAMED
 from bushfit.model.covariance import Z95
 from bushfit.prediction.caveats import BEYOND
 from bushfit.reduction.arrays import median_and_scatter
@@ -132,12 +133,15 @@ class BatchResult:
     def compared_values(self) -> dict[str, tuple[Array, Array]]:
         """Values and standard errors for the comparison of the parts, by name of the quantity, (n,) each.
 
-        Measures of the fit are left out; parameters at a bound and values of poor fits are NaN.
+        Measures of the fit are left out; parameters at a bound or beside an unnamed correction, which contain a part of
+        the gap, and values of poor fits are NaN.
         """
         compared = dict[str, tuple[Array, Array]]()
         for name in (name for name in self.quantities if name in self.estimates and name not in FIT_NAMES):
             value, low, high, stderr = self.estimates[name]
-            is_unknown = self.is_poor | np.array([name in record.at_bound for record in self.records])
+            is_unknown = self.is_poor | [
+                name in record.at_bound or (is_parameter(name) and UNNAMED in record.effects) for record in self.records
+            ]
             errors = np.where(np.isfinite(stderr), stderr, (high - low) / (2.0 * Z95))
             compared[name] = np.where(is_unknown, np.nan, value), errors
         compared[_CURVE] = self.curve_deviation, np.full(len(self.records), np.nan)
