@@ -1,12 +1,10 @@
 """Force over time: against the virtual rig at a tenth of the step, its band, its ranges, and long histories."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.signal import chirp
-from tries import some
 
 from bushfit.commands.respond import respond
 from bushfit.effects.contract import Array
@@ -25,9 +23,6 @@ STEP, ROWS, FINER = 1e-3, 3000, 10
 TIME = np.arange(ROWS) * STEP
 _RANDOM = np.random.default_rng(54)
 _FREQUENCIES, _PHASES = _RANDOM.uniform(0.5, 25.0, 30), _RANDOM.uniform(0.0, 2.0 * np.pi, 30)
-_BANDS = np.random.default_rng(9)
-_LOW, _HIGH = _BANDS.uniform(0.5, 3.0, 12), _BANDS.uniform(15.0, 25.0, 12)
-_BAND_PHASES = _BANDS.uniform(0.0, 2.0 * np.pi, 24)
 
 
 def random(time: Array) -> Array:
@@ -47,6 +42,22 @@ def steps(time: Array) -> Array:
     return np.interp(time, TIME, np.select([TIME < 0.5, TIME < 2.0], [0.0, 1e-3], 3e-4))
 
 
+def sweep(time: Array) -> Array:
+    return np.asarray(4e-4 * np.minimum(time / 0.1, 1.0) * chirp(time, 0.5, 3.0, 25.0, phi=-90))
+
+
+def rounded_trapezoid(time: Array) -> Array:
+    corners = [0.0, 0.2, 0.7, 1.4, 1.9, 3.0], [0.0, 0.0, 8e-4, 8e-4, -3e-4, -3e-4]
+    shifts = np.linspace(-0.05, 0.05, 201)
+    return np.asarray(sum(np.interp(time - shift, *corners) for shift in shifts) / shifts.size)
+
+
+def decaying_sine(time: Array) -> Array:
+    return np.asarray(1e-3 * np.exp(-1.5 * time) * np.sin(2.0 * np.pi * 8.0 * time))
+
+
+#: Motions of the axial channel, and of the channel in torsion.
+MOTIONS = ((random, sweep), (dual_sine, rounded_trapezoid), (ramp_and_hold, decaying_sine), (steps, random))
 LAWS: dict[str, dict[str, float]] = {
     "paper": {},
     "fractional_zener": {"fractional_zener.c": 0.2},
@@ -69,16 +80,20 @@ FURTHER = {
 }
 
 
-@pytest.mark.parametrize("motion", [random, dual_sine, ramp_and_hold, steps])
+@pytest.mark.parametrize("motions", MOTIONS)
 @pytest.mark.parametrize("law", [*LAWS, *(pytest.param(name, marks=pytest.mark.slow) for name in FURTHER)])
-def test_the_force_is_that_of_the_rig_at_a_tenth_of_the_step(paper_model, law, motion):
+def test_the_force_of_two_channels_is_that_of_the_rig_at_a_tenth_of_the_step(paper_model, law, motions):
     model = paper_model if law == "paper" else paper_model.with_effect(law, {**LAWS, **FURTHER}[law])
-    history = History.sampled(motion(TIME), STEP)
-    force = time_response(Result(model), Direction.AXIAL, history).force.value
     fine = np.arange((ROWS - 1) * FINER + 1) * STEP / FINER
-    record = rig.simulate_motion(model, Direction.AXIAL, motion(fine), STEP / FINER, history.frequency)
-    expected = record.force[::FINER]
-    assert np.sqrt(np.mean((force - expected) ** 2)) < 0.003 * np.sqrt(np.mean(expected**2))
+    turn = model.unit_strain(Direction.AXIAL) / model.unit_strain(Direction.TORSION)
+    channels = {"axial": motions[0](TIME), "torsion": turn * motions[1](TIME)}
+    output = respond(Result(model), channels, step=STEP)
+    for response, motion, scale in zip(output.responses, motions, (1.0, turn), strict=True):
+        place, frequency = response.direction, response.history.frequency
+        record = rig.simulate_motion(model, place, scale * motion(fine), STEP / FINER, frequency)
+        expected = record.force[::FINER]
+        error = np.sqrt(np.mean((response.force.value - expected) ** 2) / np.mean(expected**2))
+        assert error < 0.003, f"{motion.__name__}, {place}: {error:.3%} rms"
 
 
 @pytest.mark.parametrize("corrected", [False, True])
@@ -208,48 +223,3 @@ def test_sliders_in_blocks_are_sliders_at_once(paper_model, monkeypatch):
     monkeypatch.setattr("bushfit.effects.sliders._BLOCK", 1000)
     both = replace(history, value=np.stack([history.value, history.value[::-1]]))
     np.testing.assert_allclose(model.force("axial", both)[0], expected, rtol=1e-12, atol=1e-9)
-
-
-def sweep(time: Array) -> Array:
-    return np.asarray(4e-4 * np.minimum(time / 0.1, 1.0) * chirp(time, 0.5, 3.0, 25.0, phi=-90))
-
-
-def rounded_trapezoid(time: Array) -> Array:
-    corners = [0.0, 0.2, 0.7, 1.4, 1.9, 3.0], [0.0, 0.0, 8e-4, 8e-4, -3e-4, -3e-4]
-    shifts = np.linspace(-0.05, 0.05, 201)
-    return np.asarray(sum(np.interp(time - shift, *corners) for shift in shifts) / shifts.size)
-
-
-def two_bands(time: Array) -> Array:
-    phases = 2.0 * np.pi * np.concatenate((_LOW, _HIGH)) * time[:, None] + _BAND_PHASES
-    sizes = np.repeat([1.5e-4, 3e-5], 12)
-    return np.asarray(np.minimum(time / 0.2, 1.0) * (np.sin(phases) @ sizes))
-
-
-def decaying_sine(time: Array) -> Array:
-    return np.asarray(1e-3 * np.exp(-1.5 * time) * np.sin(2.0 * np.pi * 8.0 * time))
-
-
-MOTIONS = (sweep, rounded_trapezoid, two_bands, decaying_sine)
-
-
-@pytest.mark.parametrize("law", some(LAWS, ["paper", "clearance"]))
-def test_channels_of_hidden_motions_are_those_of_the_rig(paper_model, law):
-    """Two channels at once, axial and torsion."""
-    model = paper_model if law == "paper" else paper_model.with_effect(law, LAWS[law])
-    time, fine = np.arange(ROWS) * STEP, np.arange((ROWS - 1) * FINER + 1) * STEP / FINER
-    turn = model.unit_strain(Direction.AXIAL) / model.unit_strain(Direction.TORSION)
-    scales = {Direction.AXIAL: 1.0, Direction.TORSION: turn}
-    for number, motion in enumerate(MOTIONS):
-        other: Callable[[Array], Array] = MOTIONS[number - 1]
-        motions = {Direction.AXIAL: motion, Direction.TORSION: other}
-        channels = {str(place): scales[place] * motions[place](time) for place in motions}
-        output = respond(Result(model), channels, step=STEP)
-        for response in output.responses:
-            place = response.direction
-            frequency = History.sampled(channels[str(place)], STEP).frequency
-            record = rig.simulate_motion(model, place, scales[place] * motions[place](fine), STEP / FINER, frequency)
-            expected = record.force[::FINER]
-            error = np.sqrt(np.mean((response.force.value - expected) ** 2) / np.mean(expected**2))
-            print(f"{law}, {motions[place].__name__}, {place}: {error:.3%} rms")
-            assert error < 0.003

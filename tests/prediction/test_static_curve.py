@@ -18,12 +18,13 @@ from bushfit.reading.preload import Preload
 
 #: 10 mm/min.
 RATE = 10e-3 / 60.0
+#: Values of effects by name, each beside the laws of the paper.
 LAWS = {
     "paper": {},
-    "strain_stiffening": {"strain_stiffening.c3": 40.0},
+    "strain_stiffening": {"strain_stiffening.c3": 60.0},
     "fifth_power_stiffening": {"fifth_power_stiffening.c5": 4000.0},
     "asymmetry": {"asymmetry.c2": 3.0},
-    "bump_stop": {},
+    "bump_stop": {"bump_stop.gap": 7e-4, "bump_stop.stiffness": 2e5},
     "sleeve_compliance": {"sleeve_compliance.compliance": 3e-7},
 }
 #: Of the harmonic: frequency [Hz] and amplitude [m].
@@ -132,15 +133,6 @@ def test_an_alternative_without_a_law_in_time_is_left_out_with_a_sentence(paper_
     assert with_one.mean.high[-1] > with_one.mean.value[-1]
 
 
-SUPERPOSED_LAWS = {
-    "paper": {},
-    "strain_stiffening": {"strain_stiffening.c3": 60.0},
-    "asymmetry": {"asymmetry.c2": 3.0},
-    "bump_stop": {"bump_stop.gap": 7e-4, "bump_stop.stiffness": 2e5},
-    "sleeve_compliance": {"sleeve_compliance.compliance": 3e-7},
-}
-
-
 def on_the_rig(model: Model, motion: LargeMotion) -> complex:
     """From rest: six slow cycles, or a ramp to the offset and 300 cycles; the harmonic of the end of the record."""
     steps = 512
@@ -159,7 +151,7 @@ def on_the_rig(model: Model, motion: LargeMotion) -> complex:
     return complex(window @ record.force[-whole * steps :]) / complex(window @ record.displacement[-whole * steps :])
 
 
-@pytest.mark.parametrize("law", SUPERPOSED_LAWS)
+@pytest.mark.parametrize("law", [law for law in LAWS if law != "fifth_power_stiffening"])
 @pytest.mark.parametrize(
     ("displacement", "slow"),
     [(1e-3, 2.0), (2e-3, 2.0), (1e-3, 0.0), (-1e-3, 0.0)],
@@ -167,7 +159,7 @@ def on_the_rig(model: Model, motion: LargeMotion) -> complex:
 )
 def test_it_is_that_of_the_virtual_rig_within_a_percent(paper_model, law, displacement, slow):
     motion = LargeMotion(displacement, "m", slow)
-    model = paper_model if law == "paper" else paper_model.with_effect(law, SUPERPOSED_LAWS[law])
+    model = paper_model if law == "paper" else paper_model.with_effect(law, LAWS[law])
     found = predict(Result(model), Direction.AXIAL, [FREQUENCY], [AMPLITUDE], over=motion)
     stiffness = complex(found.storage_stiffness.value[0], found.loss_stiffness.value[0])
     expected = on_the_rig(model, motion)
@@ -194,15 +186,12 @@ def test_a_vanishing_motion_changes_nothing_and_the_band_is_that_of_the_harmonic
 
 
 @pytest.mark.parametrize(
-    ("effects", "motion", "words"),
+    ("effect", "motion", "words"),
     [
-        ([], LargeMotion(1e-3, "m", 1e-4), "is not fast compared with the slow motion"),
-        (["kraus"], LargeMotion(1e-3, "m"), "a law in time"),
+        ("maxwell", LargeMotion(1e-3, "m", 1e-4), "is not fast compared with the slow motion"),
+        ("kraus", LargeMotion(1e-3, "m"), "a law in time"),
     ],
 )
-def test_what_it_cannot_answer(paper_model, effects, motion, words):
-    model = paper_model
-    for effect in effects:
-        model = model.with_effect(effect)
+def test_what_it_cannot_answer(paper_model, effect, motion, words):
     with pytest.raises(ModelError, match=words):
-        predict(Result(model), Direction.AXIAL, [5.0, 20.0], [1e-4], over=motion)
+        predict(Result(paper_model.with_effect(effect)), Direction.AXIAL, [5.0, 20.0], [1e-4], over=motion)
