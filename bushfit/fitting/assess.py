@@ -46,10 +46,7 @@ _CHECK = "check the units of displacement and force, and the dimensions of what 
 
 
 def covariance(
-    model: Model,
-    stages: Sequence[FitProblem],
-    fixed: Covariance | None = None,
-    smooth_error: SmoothError | None = None,
+    model: Model, stages: Sequence[FitProblem], fixed: Covariance | None = None, smooth_error: SmoothError | None = None
 ) -> Covariance:
     """Covariance of all parameters that a procedure estimated, each stage with the results of the others fixed.
 

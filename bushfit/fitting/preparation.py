@@ -191,14 +191,7 @@ def sources(data_sets: Iterable[MeasuredTest]) -> tuple[Source, ...]:
 
 
 def planned_loop(
-    model: Model,
-    place: Place,
-    frequency: float,
-    amplitude: float,
-    noise: float,
-    *,
-    cycles: float = 1.0,
-    rows: int,
+    model: Model, place: Place, frequency: float, amplitude: float, noise: float, *, cycles: float = 1.0, rows: int
 ) -> MeasuredLoop:
     """Build a sinusoidal loop of a planned test, with the force of a model.
 

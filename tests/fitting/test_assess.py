@@ -102,7 +102,6 @@ def test_what_wrong_weights_cost_is_that_of_a_mean_of_two_groups(paper_model):
     plain, wide = (covariance(paper_model, [FitProblem(paper_model, stated(noise), ["mu"])]) for noise in (0.01, None))
     told = np.array([float(np.sum(np.square(loop.jacobian(paper_model, ["mu"])))) for loop in loops])
     share, freedom = told / told.sum(), np.array([loop.residual_count for loop in loops])
-    print("weights", share, "of rows", freedom)
     assert plain.matrix[0, 0] == pytest.approx(1.0 / told.sum(), rel=1e-6)
     grown = wide.matrix[0, 0] / plain.matrix[0, 0] - 1.0
     assert grown == pytest.approx(4.0 * np.sum(share * (1.0 - share) / freedom), rel=1e-3)

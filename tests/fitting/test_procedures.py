@@ -93,11 +93,6 @@ def test_radial_sweep_follows_from_axial_tests(measured, result):
     assert loss < 0.01
 
 
-def test_without_directions_a_fit_uses_the_axial_tests(measured):
-    assert {test.direction for test in measured.data_sets} == {Direction.AXIAL, Direction.RADIAL}
-    assert {test.direction for test in measured.select_tests(None)} == {Direction.AXIAL}
-
-
 def test_passes_agree_and_settle_where_plain_passes_would(measured):
     found = fit_two_step(measured)
     before, last = found.passes[-2], found.passes[-1]
@@ -112,13 +107,6 @@ def test_errors_of_held_parameters_are_carried_over(measured, result):
         alone = sharp.covariance.stderr(name)
         assert carried.covariance.stderr(name) > 1.1 * alone  # type: ignore[operator]
         assert alone < most * sharp.model.values[name]  # type: ignore[operator]
-
-
-def test_magnitude_and_loss_factor_residuals_give_the_same_answer(measured, result):
-    other = joint_fit(replace(measured.campaign, fit=FitSettings(residuals="magnitude_loss_factor")))
-    for name in FIVE:
-        error = 0.3 * (result.covariance.stderr(name) or 0.0)
-        assert other.model.values[name] == pytest.approx(result.model.values[name], abs=error)
 
 
 def test_missing_tests_are_said(measured, result):

@@ -8,7 +8,6 @@ import pytest
 from fits import joint_fit
 from tries import SEEDS
 
-from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import RigSettings
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -18,7 +17,6 @@ from bushfit.fitting.profile import limit95
 from bushfit.geometry import Direction
 from bushfit.model.file import from_document, to_document
 from bushfit.model.model import FIVE
-from bushfit.model.result import Result
 from bushfit.progress import report_progress_to
 from tests.fits import solve
 
@@ -31,10 +29,6 @@ def plan(largest: float, **changes: Any) -> dict[str, Any]:
     loop = SimulatedLoop(Direction.AXIAL, largest, 0.1, cycles=1)
     sweep = SimulatedSweep(Direction.AXIAL, (0.2 * largest, 0.5 * largest), FREQUENCIES)
     return {"loops": (loop,), "sweeps": (sweep,), **changes}
-
-
-def profiled(campaign: Campaign) -> Result:
-    return joint_fit(campaign, profile=True)
 
 
 def test_good_data_make_it_the_symmetric_interval(rig):
@@ -56,7 +50,7 @@ def test_good_data_make_it_the_symmetric_interval(rig):
 def test_what_the_data_leave_open_stays_open(rig, paper_model):
     """Tests that end at a tenth of eps_half show mu + sigma_fmax/eps_half alone: without friction that ever gives way,
     all of the stiffness may be friction's."""
-    result = profiled(rig(0, **plan(2e-5)))
+    result = joint_fit(rig(0, **plan(2e-5)), profile=True)
     low, high = result.profile["mu"]
     assert low is None
     assert high > paper_model.values["mu"]
@@ -71,7 +65,7 @@ def test_what_the_data_leave_open_stays_open(rig, paper_model):
 def test_an_end_is_where_chi_square_has_risen_as_far_as_is_allowed(rig, largest):
     data = PreparedCampaign.from_campaign(rig(3, **plan(largest, loops=())))
     data_sets = data.select_tests(None)
-    result = profiled(data.campaign)
+    result = joint_fit(data.campaign, profile=True)
     best = solve(FitProblem(result.model, data_sets, FIVE))
     linear = np.sqrt(np.diag(np.linalg.inv(best.jacobian @ best.jacobian.T)))
     slopes = best.coordinates.slopes(best.model.values)
@@ -105,7 +99,7 @@ def test_what_rests_on_a_bound_is_told_by_how_far_from_it_the_tests_let_it_be(ri
 
 def test_one_loop_bounds_mu_from_above_alone(rig, paper_model):
     """The storage of one loop is mu + m/2 omega^alpha cos(pi alpha/2): all may be mu's, and all the springpot's."""
-    result = profiled(rig(3, **plan(1e-3, sweeps=())))
+    result = joint_fit(rig(3, **plan(1e-3, sweeps=())), profile=True)
     values, omega = paper_model.values, 2.0 * np.pi * 0.1
     turn = np.pi * values["alpha"] / 2.0
     springpot = values["m"] / 2.0 * omega ** values["alpha"]
@@ -126,7 +120,7 @@ def test_profiles_hold_the_truth_as_often_as_they_say(rig, paper_model, shared):
     inside = []
     for seed in range(SEEDS // 2):
         campaign = rig(seed, shared=shared, **plan(1e-3))
-        result = profiled(replace(campaign, rig=RigSettings(gain_error=0.0)))
+        result = joint_fit(replace(campaign, rig=RigSettings(gain_error=0.0)), profile=True)
         for name in FIVE:
             low, high = result.profile[name]
             truth = paper_model.values[name]
@@ -143,10 +137,6 @@ def loop(amplitude: float, rate: float) -> SimulatedLoop:
 
 def sweep(*amplitudes: float, band: tuple[float, ...] = BAND) -> SimulatedSweep:
     return SimulatedSweep(Direction.AXIAL, amplitudes, band)
-
-
-def warnings(campaign: Campaign, **asked: Any) -> tuple[str, ...]:
-    return joint_fit(campaign, **asked).warnings
 
 
 #: Tests that lack something: loops, sweeps, what must be said, what is known.
@@ -170,7 +160,7 @@ LACKING = {
 def test_what_is_lacking_is_said_with_what_is_known(rig, case):
     loops, sweeps, reason, known = LACKING[case]
     for seed in (1, 2):
-        lines = warnings(rig(seed, loops=loops, sweeps=sweeps))
+        lines = joint_fit(rig(seed, loops=loops, sweeps=sweeps)).warnings
         (said,) = [line for line in lines if "standard errors:" in line]
         assert reason in said
         if known:

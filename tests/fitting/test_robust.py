@@ -80,7 +80,6 @@ def test_three_percent_outliers_move_no_parameter_by_a_standard_error(rig, kind,
         shifts.append(moved(after, joint_fit(clean)))
         assert (after.quality.reduced_chi_square if after.quality else 0.0) == pytest.approx(1.0, abs=0.1)
     worst = np.max(np.abs(shifts), axis=0)
-    print(f"{kind}, block errors {shared}: moved by at most {dict(zip(FIVE, worst.round(2), strict=True))} errors")
     # an error of the levels, told by three a direction, comes out 0 or 0.08 % by one point: this moves weights
     assert np.max(worst) < 1.25
 
@@ -93,7 +92,6 @@ def test_clean_tests_have_no_outliers_and_the_same_answer(rig, other_models, see
         before, after = joint_fit(campaign), robust(campaign)
         assert before.outliers == after.outliers == ()
         shifts.append(moved(after, before))
-    print(f"{len(shifts)} clean campaigns: soft_l1 moves a parameter by {np.max(np.abs(shifts)):.2f} errors at most")
     assert np.max(np.abs(shifts)) < 0.5
 
 

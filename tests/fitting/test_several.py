@@ -116,7 +116,6 @@ def test_intervals_hold_the_truth_in_95_of_100_campaigns_of_three_shapes(rig, tm
         for name, value in truth.items():
             low, high = result.interval(name) or (0.0, 0.0)
             inside.setdefault(name, []).append(low <= value <= high)
-    print({name: sum(hits) for name, hits in inside.items()})
     for name, hits in inside.items():
         assert binomtest(sum(hits), len(hits), 0.95, alternative="less").pvalue > 0.002, name
     assert 0.93 < np.mean([*inside.values()]) < 0.99

@@ -126,7 +126,6 @@ def test_all_temperatures_are_fitted_at_once(clean, truth):
         true = predict(replace(result, model=truth), Direction.AXIAL, [30.0], [2e-4], temperature=warm).stiffness
         bands += bool(found.low[0] < true.value[0] < found.high[0])
         assert found.value[0] == pytest.approx(true.value[0], rel=0.01)
-    print(f"shift off by {100 * np.std(off):.1f} %, in its interval {inside}, stiffness at 30 degC {bands} of {SEEDS}")
     assert np.max(np.abs(off)) < 0.05
     assert min(inside, bands) >= SEEDS - 2  # 11.4 are expected; 3 misses or more come once in 50
 
