@@ -34,7 +34,7 @@ def group_copies(tests: Sequence[_Test]) -> list[list[_Test]]:
         if isinstance(test, Loop):
             numbers: bytes | int = np.stack((test.time, test.displacement, test.force)).tobytes()
         else:
-            numbers = _digits(test) if test.frequency.size >= _FEWEST_POINTS else number
+            numbers = _fingerprint(test) if test.frequency.size >= _FEWEST_POINTS else number
         groups[test.direction, numbers].append(test)
     return list(groups.values())
 
@@ -68,7 +68,7 @@ def without_copied_repeats(sweep: Sweep) -> Sweep:
     is_copy, repeats = np.zeros(sweep.frequency.size, dtype=bool), dict[int, None]()
     for repeat, level in sorted(set(zip(sweep.repeat.tolist(), sweep.held_value.tolist(), strict=True))):
         rows = (sweep.repeat == repeat) & (sweep.held_value == level)
-        numbers = _digits(sweep, rows)
+        numbers = _fingerprint(sweep, rows)
         if numbers in runs:
             is_copy |= rows
             repeats[repeat] = None
@@ -86,7 +86,7 @@ def without_copied_repeats(sweep: Sweep) -> Sweep:
     return _with_note(replace(sweep, **columns), note)
 
 
-def _digits(sweep: Sweep, rows: NDArray[np.bool_] | slice = slice(None)) -> bytes:
+def _fingerprint(sweep: Sweep, rows: NDArray[np.bool_] | slice = slice(None)) -> bytes:
     """Encode frequency, amplitude and stiffness of rows of a sweep, rounded and sorted; equal data have equal bytes."""
     stiffness = sweep.stiffness[rows]
     numbers = np.stack([sweep.frequency[rows], sweep.amplitude_reached[rows], stiffness.real, stiffness.imag])

@@ -45,13 +45,13 @@ def measured_session(bushing: Bushing | None, tests: Sequence[Loop | Sweep]) -> 
     Returns:
         Conditions of each test: one entry per row of a sweep, one entry for a loop.
     """
-    visits = []
+    session_tests = []
     for test in tests:
         order = test.source.conditions.get("order") if test.source else None
         reached = test.amplitude_reached if isinstance(test, Sweep) else np.array([np.ptp(test.displacement) / 2.0])
         number = None if order is None else float(order)
-        visits.append(SessionTest(test.direction, reached, test.temperature, number, test.preload))
-    return session(bushing, visits)
+        session_tests.append(SessionTest(test.direction, reached, test.temperature, number, test.preload))
+    return session(bushing, session_tests)
 
 
 def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], repeats: int) -> list[RubberConditions]:
@@ -67,7 +67,7 @@ def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], rep
     Returns:
         Conditions of each test: one entry per row of a sweep or resonance test, one per part of a loop.
     """
-    visits = []
+    session_tests = []
     for test in tests:
         if isinstance(test, SimulatedSweep):
             amplitudes = np.repeat(test.points[1], test.repeats or repeats, axis=0).ravel()
@@ -76,34 +76,36 @@ def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], rep
         else:
             assert isinstance(test, SimulatedResonance)
             amplitudes = np.zeros(repeats * len(test.frequencies))
-        visits.append(SessionTest(test.direction, amplitudes, test.temperature, preload=test.static))
-    return session(bushing, visits)
+        session_tests.append(SessionTest(test.direction, amplitudes, test.temperature, preload=test.static))
+    return session(bushing, session_tests)
 
 
-def session(bushing: Bushing | None, visits: Sequence[SessionTest]) -> list[RubberConditions]:
+def session(bushing: Bushing | None, session_tests: Sequence[SessionTest]) -> list[RubberConditions]:
     """Conditions on which the stiffness of each test depends, from the sequence of all tests of a body (its session).
 
     Args:
         bushing: the bushing; None if only specimens were tested.
-        visits: tests of all bodies in the order of the campaign.
+        session_tests: tests of all bodies in the order of the campaign.
 
     Returns:
-        Conditions of each test, in the order of `visits`: temperature [K], time of each point in the session (from 0
+        Conditions of each test, in the order of `session_tests`: temperature [K], time of each point in the session (from 0
         to 1), strain amplitudes before each point, (n,) each, and preload.
     """
-    numbers = [place if visit.order is None else visit.order for place, visit in enumerate(visits, start=1)]
-    bodies = [visit.place.body for visit in visits]
+    numbers = [place if test.order is None else test.order for place, test in enumerate(session_tests, start=1)]
+    bodies = [test.place.body for test in session_tests]
     conditions: dict[int, RubberConditions] = {}
     for body in dict.fromkeys(bodies):
-        visited = sorted((i for i, tested in enumerate(bodies) if tested == body), key=numbers.__getitem__)
-        strains = [visits[i].amplitude * unit_strain(bushing, visits[i].place) for i in visited]
+        indices = sorted((i for i, other in enumerate(bodies) if other == body), key=numbers.__getitem__)
+        strains = [session_tests[i].amplitude * unit_strain(bushing, session_tests[i].place) for i in indices]
         ends = np.cumsum([strain.size for strain in strains])
         turn = np.arange(ends[-1]) / max(float(ends[-1]) - 1.0, 1.0)
         largest_strain = np.maximum.accumulate(np.concatenate([[0.0], *strains]))[:-1]
         histories = (turn, largest_strain, *_last_larger(np.concatenate(strains), turn))
-        for i, *columns in zip(visited, *(np.split(column, ends[:-1]) for column in histories), strict=True):
-            conditions[i] = replace(RubberConditions(visits[i].temperature, *columns), preload=visits[i].preload)
-    return [conditions[i] for i in range(len(visits))]
+        for i, *columns in zip(indices, *(np.split(column, ends[:-1]) for column in histories), strict=True):
+            conditions[i] = replace(
+                RubberConditions(session_tests[i].temperature, *columns), preload=session_tests[i].preload
+            )
+    return [conditions[i] for i in range(len(session_tests))]
 
 
 def _last_larger(strain: Array, session_time: Array) -> tuple[Array, Array]:

@@ -87,6 +87,8 @@ def test_results_are_not_replaced_unasked(bushfit, tmp_path, arguments, file):
     again = bushfit(*arguments, "-o", tmp_path, status=0 if arguments[0] == "inspect" else 2)
     assert ("--force replaces them" in again.stderr) == (arguments[0] != "inspect")
     assert "limit of" not in again.stderr  # nothing is computed in vain
+    lost = bushfit(arguments[0], "lost.csv", *arguments[2:], "-o", tmp_path, status=2)
+    assert "lost.csv: there is no such file" in lost.stderr, "first what goes in, then what comes out"
     bushfit(*arguments, "-o", tmp_path, "--force")
 
 
