@@ -80,32 +80,30 @@ def planned_session(bushing: Bushing | None, tests: Sequence[SimulatedTest], rep
     return session(bushing, session_tests)
 
 
-def session(bushing: Bushing | None, session_tests: Sequence[SessionTest]) -> list[RubberConditions]:
+def session(bushing: Bushing | None, tests: Sequence[SessionTest]) -> list[RubberConditions]:
     """Conditions on which the stiffness of each test depends, from the sequence of all tests of a body (its session).
 
     Args:
         bushing: the bushing; None if only specimens were tested.
-        session_tests: tests of all bodies in the order of the campaign.
+        tests: tests of all bodies in the order of the campaign.
 
     Returns:
-        Conditions of each test, in the order of `session_tests`: temperature [K], time of each point in the session (from 0
+        Conditions of each test, in the order of `tests`: temperature [K], time of each point in the session (from 0
         to 1), strain amplitudes before each point, (n,) each, and preload.
     """
-    numbers = [place if test.order is None else test.order for place, test in enumerate(session_tests, start=1)]
-    bodies = [test.place.body for test in session_tests]
+    numbers = [place if test.order is None else test.order for place, test in enumerate(tests, start=1)]
+    bodies = [test.place.body for test in tests]
     conditions: dict[int, RubberConditions] = {}
     for body in dict.fromkeys(bodies):
         indices = sorted((i for i, other in enumerate(bodies) if other == body), key=numbers.__getitem__)
-        strains = [session_tests[i].amplitude * unit_strain(bushing, session_tests[i].place) for i in indices]
+        strains = [tests[i].amplitude * unit_strain(bushing, tests[i].place) for i in indices]
         ends = np.cumsum([strain.size for strain in strains])
         turn = np.arange(ends[-1]) / max(float(ends[-1]) - 1.0, 1.0)
         largest_strain = np.maximum.accumulate(np.concatenate([[0.0], *strains]))[:-1]
         histories = (turn, largest_strain, *_last_larger(np.concatenate(strains), turn))
         for i, *columns in zip(indices, *(np.split(column, ends[:-1]) for column in histories), strict=True):
-            conditions[i] = replace(
-                RubberConditions(session_tests[i].temperature, *columns), preload=session_tests[i].preload
-            )
-    return [conditions[i] for i in range(len(session_tests))]
+            conditions[i] = replace(RubberConditions(tests[i].temperature, *columns), preload=tests[i].preload)
+    return [conditions[i] for i in range(len(tests))]
 
 
 def _last_larger(strain: Array, session_time: Array) -> tuple[Array, Array]:
