@@ -78,32 +78,22 @@ class Output:
 
     Args:
         default: default results folder, with a placeholder such as <name> for the name of the result.
+        formats: file formats of tables and figures, and the kinds of result file to write.
         output: results folder from --output; None for the default.
         verbose, quiet: True to print more, or errors only.
         as_json: True to print the result as JSON on standard output.
         force: True to replace files of an earlier result.
-        no_plots, no_report: True to leave out figures or HTML pages.
-        table_format, plot_format: formats of tables and figures.
     """
 
-    default: str = "results/<name>"
-    output: Path | None = None
-    verbose: bool = False
-    quiet: bool = False
-    as_json: bool = False
-    force: bool = False
-    no_plots: bool = False
-    no_report: bool = False
-    table_format: Form = Formats.table_form
-    plot_format: Sequence[Picture] = Formats.picture_forms
+    default: str
+    formats: Formats
+    output: Path | None
+    verbose: bool
+    quiet: bool
+    as_json: bool
+    force: bool
     _warnings: dict[str, None] = field(default_factory=dict)
     _headlines: list[str] = field(default_factory=list)
-
-    @property
-    def formats(self) -> Formats:
-        """File formats of tables and figures, and the kinds of result file to write, as the options state them."""
-        pictures = tuple(dict.fromkeys(self.plot_format))
-        return Formats(True, not self.no_plots, not self.no_report, self.table_format, pictures)
 
     @property
     def console(self) -> Console:
@@ -233,7 +223,13 @@ def with_output(folder: str, *written: Written) -> Parameter:
 
     def start(context: click.Context, values: dict[str, Any]) -> Output:
         """Make the output of a command, which shows its progress and, at its end, prints the collected warnings."""
-        output = Output(folder, **values)
+        formats = Formats(
+            pictures=not values.pop("no_plots"),
+            pages=not values.pop("no_report", False),
+            table_form=values.pop("table_format", Formats.table_form),
+            picture_forms=tuple(dict.fromkeys(values.pop("plot_format", Formats.picture_forms))),
+        )
+        output = Output(folder, formats, **values)
         context.with_resource(_progress(output.console))
         context.call_on_close(output.print_warnings)
         return output
