@@ -81,8 +81,7 @@ def command(
     output.warn(data.notes)
     diagnosed = diagnose(data, model=start, **settings)
     print_diagnosis(output, diagnosed)
-    inputs = [*input_files(campaign), *([model] if model else [])]
-    output.write(folder, diagnosed.files, diagnosed.document, inputs)
+    output.write(folder, diagnosed.files, diagnosed.document, input_files(campaign, model))
     exit_above(max_nrmse, diagnosed.result)
 
 

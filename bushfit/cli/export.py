@@ -126,5 +126,4 @@ def command(
             f"{remaining} more limit{'s' * (remaining > 1)} of the formats: -v prints all; the files state them"
         )
     output.warn(exported.predicted.warnings)
-    inputs = [file, *(input_files(loaded) if loaded else [])]
-    output.write(folder, exported.files, exported.document, inputs)
+    output.write(folder, exported.files, exported.document, input_files(loaded, file))

@@ -40,7 +40,7 @@ def static(
     folder = output.folder(campaign.name, "static.json")
     fitted = fit_static(campaign, dynamic=start, loss=loss)
     _print_fit(output, folder, fitted)
-    output.write(folder, fitted.files, fitted.document, [*input_files(campaign), *([dynamic] if dynamic else [])])
+    output.write(folder, fitted.files, fitted.document, input_files(campaign, dynamic))
     exit_above(max_nrmse, fitted.result)
 
 
@@ -72,7 +72,7 @@ def dynamic(
     folder = output.folder(campaign.name, "dynamic.json")
     fitted = fit_dynamic(campaign, static=start, loss=loss)
     _print_fit(output, folder, fitted)
-    output.write(folder, fitted.files, fitted.document, [*input_files(campaign), *([static] if static else [])])
+    output.write(folder, fitted.files, fitted.document, input_files(campaign, static))
     exit_above(max_nrmse, fitted.result)
 
 

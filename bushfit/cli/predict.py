@@ -116,9 +116,7 @@ def command(
     for part in predicted.arms:
         output.print(part.sentence)
     print_tests(output, predicted.tests, predicted.usable)
-    inputs = [model_file(model), *(input_files(loaded) if loaded else [])]
-    if bushing and not isinstance(other, str):
-        inputs.append(Path(bushing))
+    inputs = input_files(loaded, model_file(model), Path(bushing) if bushing and other != bushing else None)
     folder = output.folder((loaded or predicted.result).name)
     output.write(folder, predicted.files, predicted.document, inputs)
 

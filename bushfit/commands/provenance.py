@@ -68,12 +68,15 @@ def option_words(**options: str | bool | Iterable[str] | None) -> list[str]:
     return words
 
 
-def input_files(campaign: Campaign) -> list[Path]:
-    """Files that were read for a campaign: campaign file, test files and logo."""
+def input_files(campaign: Campaign | None, *others: Path | None) -> list[Path]:
+    """Files that a command has read: campaign file, its test files and logo, and the other files that were given."""
+    files = [file for file in others if file]
+    if campaign is None:
+        return files
     folder, logo = campaign.path.parent, campaign.report.logo
     tests: tuple[Loop | Sweep, ...] = (*campaign.loops, *campaign.sweeps, *campaign.validation)
-    files = [test.source.file for test in tests if test.source]
-    return [campaign.path, *(folder / file for file in files), *([folder / logo] if logo else [])]
+    names = [test.source.file for test in tests if test.source] + ([logo] if logo else [])
+    return [campaign.path, *(folder / name for name in names), *files]
 
 
 def _test_document(data_set: MeasuredTest) -> dict[str, Any]:
