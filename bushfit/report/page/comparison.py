@@ -43,14 +43,11 @@ def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = N
     """
     document, names, differences = comparison.document, comparison.names, comparison.differences
     compared, (reference, *other_names) = document["compared"], names.values()
-    title = (
-        f"{other_names[0]} compared with {reference}"
-        if len(other_names) == 1
-        else f"{len(other_names)} results and {reference}"
-    )
+    title, bushing = f"{len(other_names)} results and {reference}", compared[0]["bushing"]
     if families := bool(document["families"]):
-        bushing = compared[0]["bushing"]
         title = f"Model families of {bushing.name if bushing else compared[0]['source']}"
+    elif len(other_names) == 1:
+        title = f"{other_names[0]} compared with {reference}"
     entries = list[dict[str, Any]]()
     for entry in compared:
         measured, tests = entry["measured"], "parameters given, not fitted"
@@ -94,7 +91,7 @@ def comparison_page(comparison: ComparisonDocument, chart: ResultFile | None = N
     return render_page("compare.html", context)
 
 
-def difference_sizes(differences: PlaceDifferences) -> dict[str, str]:
+def difference_sizes(one: PlaceDifferences) -> dict[str, str]:
     """Summarise the differences of a result from the first one in a direction or specimen, as texts.
 
     Returns:
@@ -102,12 +99,9 @@ def difference_sizes(differences: PlaceDifferences) -> dict[str, str]:
         [%] (`stiffness`) and of the absolute difference of the loss factor (`loss`), and the number of significant
         points (`stiffness_sure`, `loss_sure`).
     """
-    row, table = {"label": differences.label, "place": differences.place}, differences.table
-    for key, header, scale, unit in (
-        ("stiffness", differences.relative, 100.0, " %"),
-        ("loss", differences.loss, 1.0, ""),
-    ):
-        values, low, high = scale * differences.band(header)
+    row, table = {"label": one.label, "place": one.place}, one.table
+    for key, header, scale, unit in (("stiffness", one.relative, 100.0, " %"), ("loss", one.loss, 1.0, "")):
+        values, low, high = scale * one.band(header)
         finite_ends = np.sort(values[np.isfinite(values)])[[0, -1]].tolist() if np.isfinite(values).any() else []
         ends = dict.fromkeys(format_difference(end, 0.1 * max(map(abs, finite_ends))) for end in finite_ends)
         row[key] = " to ".join(ends) + unit
@@ -133,10 +127,7 @@ def value_rows(comparison: ComparisonDocument) -> Iterator[tuple[Any, ...]]:
     amplitudes = min(point_limit, _AMPLITUDES)
     for one in all_differences:
         (_, length), (_, unit) = split_header(one.amplitude), split_header(one.stiffness)
-        kinds = (
-            (one.stiffness, one.relative, f" {unit}", 100.0, " %"),
-            ("loss factor [-]", one.loss, "", 1.0, ""),
-        )
+        kinds = (one.stiffness, one.relative, f" {unit}", 100.0, " %"), ("loss factor [-]", one.loss, "", 1.0, "")
         frequency, amplitude = one.grid()
         for index in spread_points(amplitude, frequency, amplitudes, min(point_limit // amplitudes, _FREQUENCIES)):
             row, cells = one.table.iloc[index], []

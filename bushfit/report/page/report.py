@@ -89,8 +89,7 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
     plain = plain if plain and plain.model.effects != result.model.effects else None
     sizes = [p.stiffness.value for p in predictions if p.direction.motion is TRANSLATION]
     ends = [20.0 * math.log10(end) for end in (min(map(np.min, sizes)), max(map(np.max, sizes)))] if sizes else []
-    named = [(file.file, file.sha256) for file in ([campaign] if campaign else []) + [*tests]]
-    inputs = [(str(source.file), source.sha256) for source in result.inputs]
+    sources: list[Any] = [*([campaign] if campaign else []), *tests, *result.inputs]
     context = {
         "name": campaign.name if campaign else result.name,
         "subject": "rubber compound" if not tubes else "rubber bushing" if tubes == 1 else "rubber bushings",
@@ -121,7 +120,7 @@ def report_page(files: Sequence[ResultFile], date: str | None = None, folder: Pa
         "tabled": [*value_rows(predictions)],
         "warnings": group_warnings(warnings),
         "campaign": campaign,
-        "files": list(dict.fromkeys((file, sha256) for file, sha256 in (*named, *inputs) if file and sha256)),
+        "files": list(dict.fromkeys((str(one.file), one.sha256) for one in sources if one.file and one.sha256)),
         "versions": record.versions,
         "levels": " to ".join(dict.fromkeys(f"{end:.1f}" for end in ends)),
         "moduli": any(prediction.direction.motion is STRAINING for prediction in predictions),

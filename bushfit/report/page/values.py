@@ -72,11 +72,10 @@ def headline_texts(record: ReportRecord, prediction: Prediction) -> dict[str, st
         row["static"], row["static_point"] = f"{format_aligned([static], 4)[0]} {unit}", f"at {curve.rate_text}"
         decimals = max(2, math.ceil(-math.log10(2.0 * half))) if half else 2  # the interval is not rounded to 0
         row["stiffening"] = f"{ratio:.{decimals}f}" + (f" ± {half:.{decimals}f}" if half else "")
-    for usable in result.usable:
-        if usable.place == str(place):
-            errors = number(100 * usable.stiffness, 2), number(usable.loss_factor, 2)
-            points_used = f"95 % of {usable.points} {'held-out ' if usable.held_out else ''}points"
-            row["accuracy"] = f"stiffness {errors[0]} %, loss factor {errors[1]} ({points_used})"
+    if usable := next((one for one in result.usable if one.place == str(place)), None):
+        points_used = f"95 % of {usable.points} {'held-out ' if usable.held_out else ''}points"
+        errors = f"stiffness {number(100 * usable.stiffness, 2)} %, loss factor {number(usable.loss_factor, 2)}"
+        row["accuracy"] = f"{errors} ({points_used})"
     return row
 
 

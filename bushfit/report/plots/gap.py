@@ -116,11 +116,12 @@ def column_titles(table: pd.DataFrame, diagnosis: Mapping[str, Any]) -> dict[str
         for name in table
         if str(name).endswith("before [%]")
     )
-    effects = diagnosis["effects"]
-    names = {"before": "before", "after": "after"} if changed else {"before": "nothing added"}
-    if changed and any(effect["test"] for effect in effects):
+    effects, names = diagnosis["effects"], {"before": "before", "after": "after"}
+    if not changed:
+        names = {"before": "nothing added"}
+    elif any(effect["test"] for effect in effects):
         names = {"before": "tests as recorded", "after": "with the record corrected"}
-    elif changed and effects:
+    elif effects:
         names["after"] = f"after adding {' and '.join(effect['name'] for effect in effects)}"
     gaps = diagnosis["gap"]["calibration"]
     tails = {side: f"\ndata fitted {gaps[side]:.2f} × noise" for side in names if gaps[side] is not None}

@@ -166,9 +166,9 @@ def _draw_strip(axes: Axes, history: Loop, reduction: Reduction, looks: dict[flo
     time, motion = history.time[rows], factor * history.displacement[rows]
     axes.plot(time, motion, color="#c8c8c8", lw=0.4)
     for level, look in looks.items():
-        steps = [step for step in reduction.steps if step.name == history.name and step.level == level]
-        inside = [(time >= step.start) & (time <= step.end) for step in steps]
-        used = np.any([np.zeros(time.shape, dtype=bool), *inside], axis=0)
+        used = np.zeros(time.shape, dtype=bool)
+        for step in (step for step in reduction.steps if (step.name, step.level) == (history.name, level)):
+            used |= (time >= step.start) & (time <= step.end)
         axes.plot(time, np.where(used, motion, np.nan), color=look.color, lw=0.4)
     style.label_axes(axes, "time [s]", f"{reduction.direction.motion.words[0]}\n[{unit}]")
     axes.margins(x=0.01)
