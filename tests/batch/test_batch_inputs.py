@@ -13,7 +13,7 @@ from bushfit.batch.limits import RESULTS, Limits, judge_part, judge_value, read_
 from bushfit.batch.manifest import Manifest, RowSettings, read_manifest
 from bushfit.batch.quantities import list_quantities, measured_at, parse_point
 from bushfit.batch.row import estimate_quantities
-from bushfit.errors import BatchError, CampaignError, ModelError
+from bushfit.errors import BatchError, ModelError
 from bushfit.geometry import Direction, Specimen
 from bushfit.model.result import Result
 from bushfit.reading.measurement import Sweep
@@ -200,17 +200,3 @@ def test_a_point_at_a_specimen_is_that_of_the_model(paper_model):
         estimate_quantities(result, [parse_point("DMA 10 Hz 1 mm")])
     with pytest.raises(ModelError, match="no such direction or specimen"):
         estimate_quantities(result, [parse_point("coupon 10 Hz 1 %")])
-
-
-@pytest.mark.parametrize(
-    ("lines", "problem", "place"),
-    [
-        (('"a.toml,A', "b.toml,B", "c.toml,C"), "a quote is not closed", "line 2"),
-        (("a.toml,A", '"b.toml,B', 'c.toml",C'), "a quote is not closed", "line 3"),
-        (("a.toml,A", 'b.toml,"B" two'), "a quote is not closed", "line 3"),
-    ],
-)
-def test_a_quote_that_swallows_rows_is_an_error(tmp_path, lines, problem, place):
-    with pytest.raises(CampaignError, match=problem) as error:
-        read(tmp_path, "\n".join(["campaign,name", *lines]), "m.csv")
-    assert error.value.place == place

@@ -191,4 +191,7 @@ MANIFESTS = [
     ("manifest.csv", "\n\n \ncampaign\na.toml,b.toml", "line 5", "more cells"),
     ("manifest.csv", "name\nx", "line 2", "a key is missing", "campaign"),
     ("manifest.csv", "campaign,name\n", "no rows"),
+    ("manifest.csv", 'campaign,name\n"a.toml,A\nb.toml,B\nc.toml,C', "line 2: a quote is not closed"),
+    ("manifest.csv", 'campaign,name\na.toml,A\n"b.toml,B\nc.toml",C', "line 3: a quote is not closed"),
+    ("manifest.csv", 'campaign,name\na.toml,A\nb.toml,"B" two', "line 3: a quote is not closed"),
 ]
