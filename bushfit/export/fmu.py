@@ -68,7 +68,7 @@ def export(request: ExportRequest) -> Exported:
     model = time_model(request)
     safe_name = re.sub(r"[^A-Za-z0-9]+", "_", folder_name(request.result.name))
     name = f"bushfit_{safe_name[:40].strip('_').lower()}"
-    sources = {file: (files("bushfit.export") / "c" / file).read_bytes() for file in _SHARED}
+    sources = {file: _source(file) for file in _SHARED}
     sources |= {"model.c": model_source(model).encode()}
     without_guid = [model_description(request, model, name, ""), model_header(model, "").encode()]
     digest = hashlib.sha256(b"".join([*sources.values(), *without_guid])).digest()
@@ -194,20 +194,11 @@ def model_description(request: ExportRequest, model: TimeModel, name: str, guid:
     """
     about = f"Rubber bushing, displacement in and force out, of {request.source.file} (SHA-256 {request.source.sha256})"
     about = "; ".join([about, *map(": ".join, request.remarks(model.omissions))])
-    root = ET.Element("fmiModelDescription", {
-        "fmiVersion": "2.0", "modelName": _xml_text(request.result.name), "guid": guid, "description": _xml_text(about),
-        "generationTool": f"bushfit {__version__}", "variableNamingConvention": "flat", "numberOfEventIndicators": "0",
-    })  # fmt: skip
-    simulation = ET.SubElement(root, "CoSimulation", {
-        "modelIdentifier": name, "canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true",
-        "canGetAndSetFMUstate": "true", "canSerializeFMUstate": "true",
-    })  # fmt: skip
-    source_files = ET.SubElement(simulation, "SourceFiles")
-    for file in (*(file for file in _SHARED if file.endswith(".c")), "model.c"):
-        ET.SubElement(source_files, "File", {"name": file})
-    definitions = ET.SubElement(root, "UnitDefinitions")
-    ET.SubElement(root, "DefaultExperiment", {"startTime": "0", "stopTime": "1", "stepSize": "0.001"})
-    variables = ET.SubElement(root, "ModelVariables")
+    root = ET.fromstring(_source("modelDescription.xml"))
+    root.attrib |= {"modelName": _xml_text(request.result.name), "guid": guid, "description": _xml_text(about)}
+    root.set("generationTool", f"bushfit {__version__}")
+    simulation, definitions, _, variables, structure = root
+    simulation.set("modelIdentifier", name)
     displays = {  # of displacements and forces by SI unit, where the two differ
         unit: display
         for place in model.places
@@ -224,11 +215,8 @@ def model_description(request: ExportRequest, model: TimeModel, name: str, guid:
         if unit in displays:
             display = {"name": displays[unit].name, "factor": repr(displays[unit].factor)}
             ET.SubElement(definition, "DisplayUnit", display)
-    structure = ET.SubElement(root, "ModelStructure")
-    outputs = [index for index, variable in enumerate(variables, start=1) if variable.attrib["causality"] == "output"]
-    for kind in ("Outputs", "InitialUnknowns"):
-        unknowns = ET.SubElement(structure, kind)
-        for index in outputs:
+    for index, variable in enumerate(variables, start=1):
+        for unknowns in structure if variable.attrib["causality"] == "output" else ():
             ET.SubElement(unknowns, "Unknown", {"index": str(index)})
     ET.indent(root)
     return ET.tostring(root, encoding="utf-8", xml_declaration=True)
@@ -242,7 +230,6 @@ def add_variables(variables: ET.Element, model: TimeModel, displays: Mapping[str
         model: time-domain model.
         displays: display units by SI unit.
     """
-
     count, rows = _OFFSET + len(model.values), list[tuple[str, int, dict[str, str], str, dict[str, str]]]()
     for index, place in enumerate(model.places, start=count):
         units = place.motion.displacement_unit, place.motion.force_unit
@@ -263,6 +250,11 @@ def add_variables(variables: ET.Element, model: TimeModel, displays: Mapping[str
         names = {"name": _xml_text(name), "valueReference": str(reference)}
         variable = ET.SubElement(variables, "ScalarVariable", {**names, **attributes})
         ET.SubElement(variable, "Real", {**({} if unit in ("", "1") else {"unit": unit}), **real})
+
+
+def _source(file: str) -> bytes:
+    """Read a file that all FMUs share."""
+    return (files("bushfit.export") / "c" / file).read_bytes()
 
 
 def _xml_text(text: str) -> str:
