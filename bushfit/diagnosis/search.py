@@ -19,13 +19,14 @@ from bushfit.diagnosis.claims import ClaimScreening, claims
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart
 from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, SearchState, Tests
-from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS
+from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS, RUBBER
 from bushfit.diagnosis.propose import has_used_parameters
 from bushfit.diagnosis.refit import refit_with_free_columns, refitted
 from bushfit.diagnosis.rig_errors import in_scatter_units
 from bushfit.diagnosis.verdict import decide_verdict
 from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
+from bushfit.geometry import stiffness_per_modulus
 from bushfit.model.model import Model
 from bushfit.progress import track
 
@@ -294,9 +295,20 @@ class Search:
             with suppress(FitError, ModelError):  # corrected tests that nothing can be fitted to
                 evidence = self.request.fit_corrected(claim.corrected(data))
                 if [test.size for test in evidence.data_sets] == [test.size for test in base.data_sets]:
-                    odds, change = log(ODDS["record"]) - log(len(possible)), _record_change(base, evidence)
+                    odds = log(ODDS["record"]) - log(len(possible)) - 0.5 * _modulus_deviation(evidence) ** 2
+                    change = _record_change(base, evidence)
                     tests = Tests(evidence, data.campaign.rig, without, odds, claim, change)
                     yield self._visit(SearchState.of_tests(tests))
+
+
+def _modulus_deviation(evidence: Evidence) -> float:
+    """Deviation of the median shear modulus of the tests from that of bushing rubber, in standard deviations."""
+    moduli = [
+        np.median(np.abs(test.measured)) / stiffness_per_modulus(evidence.model.bushing, test.direction)
+        for test in evidence.data_sets
+    ]
+    typical, spread = RUBBER
+    return float(np.log(np.median(moduli) / typical)) / spread
 
 
 def _record_change(base: Evidence, corrected: Evidence) -> float:

@@ -108,6 +108,8 @@ def test_what_cannot_be_told_apart_is_ambiguous(measured):
     """Loops in kgf, or sweeps multiplied by 9.81 once too often: the same ratio."""
     diagnosis = asked(in_kilograms(measured(None, SHARED)))
     assert diagnosis.verdict == "ambiguous"
+    assert diagnosis.effects[0].name == "kilogram_force", "rubber of 1 MPa and not of 0.1"
+    assert diagnosis.odds.explanations[0][1] > 5.0 * diagnosis.odds.explanations[1][1]
     alike = {" + ".join(effect.label for effect in diagnosis.effects), *diagnosis.effects[0].alternatives}
     assert alike == {
         "kilogram_force:loop_axial_1 + kilogram_force:loop_axial_2",
