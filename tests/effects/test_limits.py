@@ -46,15 +46,12 @@ def same(one: Model, other: Model, tolerance: float) -> None:
         assert np.max(np.abs(found - expected)) <= tolerance * np.max(np.abs(expected))
 
 
-FRICTION = {"sigma_fmax": 1.46e4, "eps_half": 1.3e-2}
-
-
 @pytest.mark.parametrize(
     ("one", "other", "tolerance"),
     [
         (added("maxwell", tau=1.1e-5, mu1=100.0 / 1.1e-5), added("viscous", eta=100.0), 1e-2),
         (added("maxwell", tau=99.0, mu1=1e5), PLAIN.with_values({"mu": 1.19e6}), 2e-3),
-        (added("second_friction", **FRICTION), PLAIN.with_values({"sigma_fmax": 2.92e4}), 1e-14),
+        (added("second_friction", **VALUES), PLAIN.with_values({"sigma_fmax": 2.92e4}), 1e-14),
         (added("fixture_resonance", mass=0.1, frequency=1e4, damping=0.1), added("inertia", mass=0.1), 1e-4),
     ],
     ids=["fast arm: dashpot", "slow arm: spring", "second friction like the first: twice it", "stiff fixture: mass"],
@@ -183,29 +180,23 @@ def test_a_spring_alone_under_a_force_channel_that_saturates():
     np.testing.assert_array_equal(np.abs(found) < np.abs(k), np.abs(k) * AMPLITUDE > 40.0)
 
 
-@pytest.mark.parametrize("strain", [1e-6, 3e-3, 5e-3, 0.015, 0.05, 0.1, 1.0])
+def jenkins_element(r: np.ndarray) -> np.ndarray:
+    """First harmonic of a spring in series with a slider that yields at r times the strain amplitude, r <= 1."""
+    t = np.arccos(1.0 - 2.0 * r)
+    return (t - 0.5 * np.sin(2.0 * t)) / np.pi + 4.0j / np.pi * r * (1.0 - r)
+
+
+@pytest.mark.parametrize("strain", [1e-6, 2e-3, 5e-3, 0.015, 0.05, 0.1, 1.0])
 def test_sliders_are_the_mean_of_very_many(strain):
-    """Below the range of their slip strains (4e-3 to 0.055), in it and beyond."""
-    places = (np.arange(100_000) + 0.5) / 50_000 - 1.0
-    slip = SLIDERS["e_s"] * np.exp(SLIDERS["spread"] * places)
-    r = np.minimum(slip / strain, 1.0)
-    t = np.arccos(1.0 - 2.0 * r)
-    each = ((t - 0.5 * np.sin(2.0 * t)) / np.pi + 4.0j / np.pi * r * (1.0 - r)) / slip
-    found = sliders.modulus(SLIDERS, np.array([30.0]), np.array([strain]))
-    np.testing.assert_allclose(found, 0.5 * SLIDERS["sigma"] * np.mean(each), rtol=1e-8)
-
-
-@pytest.mark.parametrize("strain", [1e-5, 2e-3, 0.01, 0.05, 1.0])
-def test_distributed_sliders_are_the_mean_of_very_many(strain):
-    """First harmonic of 100,000 equal springs with sliders, at strains far below, in and far above the distribution."""
-    probability = (np.arange(100_000) + 0.5) / 100_000
-    yield_strain = 0.01 * np.exp(0.9 * scipy.stats.norm.ppf(probability))
-    r = np.minimum(yield_strain / strain, 1.0)
-    t = np.arccos(1.0 - 2.0 * r)
-    modulus = (t - 0.5 * np.sin(2.0 * t)) / np.pi + 4.0j / np.pi * r * (1.0 - r)
+    """Below the range of their yield strains, in it and beyond: uniform in the logarithm, and normal."""
+    share, omega = (np.arange(100_000) + 0.5) / 100_000, np.array([30.0])
+    uniform = SLIDERS["e_s"] * np.exp(SLIDERS["spread"] * (2.0 * share - 1.0))
+    many = 0.5 * SLIDERS["sigma"] * np.mean(jenkins_element(np.minimum(uniform / strain, 1.0)) / uniform)
+    np.testing.assert_allclose(sliders.modulus(SLIDERS, omega, np.array([strain])), many, rtol=1e-8)
+    normal = 0.01 * np.exp(0.9 * scipy.stats.norm.ppf(share))
+    many = 5e5 * np.mean(jenkins_element(np.minimum(normal / strain, 1.0)))
     values = {"delta": 5e5, "e_s": 0.01, "spread": 0.9}
-    result = distributed_sliders.modulus(values, np.array([30.0]), np.array([strain]))
-    np.testing.assert_allclose(result, 5e5 * np.mean(modulus), rtol=2e-4)
+    np.testing.assert_allclose(distributed_sliders.modulus(values, omega, np.array([strain])), many, rtol=2e-4)
 
 
 def exact_shape(x: float) -> tuple[mpmath.mpf, mpmath.mpf]:
@@ -219,16 +210,11 @@ def exact_shape(x: float) -> tuple[mpmath.mpf, mpmath.mpf]:
     return in_phase / (2 * x), quadrature / (2 * x)
 
 
-def relative_error(found: float, exact: mpmath.mpf) -> float:
-    return abs(float(mpmath.mpf(float(found)) / exact - 1))
-
-
 def test_modulus_has_ten_digits_from_1e_8_to_1e6():
-    found = harmonic_shape(X)
     with mpmath.workdps(60):
-        exact = [exact_shape(x) for x in X]
-        for part, side in enumerate((found.real, found.imag)):
-            assert max(relative_error(value, e[part]) for value, e in zip(side, exact, strict=True)) <= 1e-10
+        for x, found in zip(X, harmonic_shape(X), strict=True):
+            for part, exact in zip((found.real, found.imag), exact_shape(x), strict=True):
+                assert abs(mpmath.mpf(float(part)) / exact - 1) <= 1e-10
 
 
 def test_limits_of_small_and_large_strain():

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bushfit.campaign.simulated import SimulateSettings
 from bushfit.effects.contract import Array
 from bushfit.fitting.prepared_loop import prepare_loop
 from bushfit.geometry import Direction
@@ -17,7 +16,6 @@ from bushfit.reading.stated import LoopFile
 from bushfit.reduction.programme import split_record
 
 STEP = 0.01
-NOISE = SimulateSettings(seed=2, force_noise=3e-3, displacement_noise=2e-4)
 
 
 def cycles(count: float, size: float, frequency: float = 0.1, start: float = 0.0, shape: str = "sine") -> Array:
