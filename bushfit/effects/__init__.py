@@ -41,7 +41,7 @@ _LAW = (
 _KINDS: dict[str, type[Effect]] = {"modulus": Branch, "adjust": Modifier, "stiffness": Layer}
 
 
-def _entry(name: str) -> dict[str, Any]:
+def _full_entry(name: str) -> dict[str, Any]:
     """Return the table of an effect in library.toml, completed by the table of the effect named under its key "like".
 
     The key "law" names the Python file with the equations.
@@ -49,10 +49,10 @@ def _entry(name: str) -> dict[str, Any]:
     entry: dict[str, Any] = dict(_TABLE[name])
     if "like" not in entry:
         return {"law": name.partition(".")[0], **entry}
-    return {**_entry(entry.pop("like")), "radial": {}, **entry}
+    return {**_full_entry(entry.pop("like")), "radial": {}, **entry}
 
 
-def _record(name: str, entry: dict[str, Any], module: ModuleType) -> Effect | Family:
+def _build(name: str, entry: dict[str, Any], module: ModuleType) -> Effect | Family:
     """Build an effect, or a family of effects (one per direction or specimen).
 
     Args:
@@ -74,8 +74,8 @@ def _record(name: str, entry: dict[str, Any], module: ModuleType) -> Effect | Fa
     return Family(record, places, radial) if name.endswith(".{place}") else record
 
 
-_ENTRIES = {name: _entry(name) for name in _TABLE}
-_RECORDS = [_record(name, entry, import_module(f"{__name__}.{entry.pop('law')}")) for name, entry in _ENTRIES.items()]
+_ENTRIES = {name: _full_entry(name) for name in _TABLE}
+_RECORDS = [_build(name, entry, import_module(f"{__name__}.{entry.pop('law')}")) for name, entry in _ENTRIES.items()]
 #: Families of effects (one effect per direction or specimen), by name.
 FAMILIES = {family.record.name.partition(".")[0]: family for family in _RECORDS if isinstance(family, Family)}
 #: All effects by name, from the rubber outward; a family is represented by its effect for the radial direction.
@@ -124,7 +124,7 @@ def register(name: str, law: ModuleType, origin: Origin) -> None:
         expected = "a name of letters, digits and _ that the library does not use"
         raise ModelError(f"the effect of {origin} cannot have this name", found=name, expected=expected)
     try:
-        effect = _record(name, dict(law.EFFECT), law)
+        effect = _build(name, dict(law.EFFECT), law)
     except (AttributeError, LookupError, TypeError, ValueError, StopIteration) as error:
         raise ModelError(
             f"the effect {name} of {origin} cannot be used",

@@ -2,8 +2,8 @@
 
 The measured response is built from the rubber outward. Inside are *branches* in parallel, each adding a stress.
 Around them lie *layers*: each takes the response below it and returns the response above it. A *modifier* changes
-values that the branches use, by operating condition, and is asked before them. Layers are ordered by level (material,
-component, instrument), never by the order in which they were added.
+values that the branches use, by operating condition, and is evaluated before them. Layers are ordered by level
+(material, component, instrument), never by the order in which they were added.
 
 Each effect has a complex stiffness over frequency and amplitude, and a force over time.
 
@@ -315,7 +315,8 @@ class Family:
     Args:
         record: effect with the placeholder {place} in its texts. The effect acts only in tests of one direction or
             specimen; the effect and its one parameter are named `<name>.<place>`.
-        places: function from the tested directions and specimens to those for which a search considers the effect.
+        places: function that selects, from the names of the tested directions and specimens (axial first), those for
+            which a search considers the effect.
         radial: texts for the radial direction that differ from those of the record.
     """
 

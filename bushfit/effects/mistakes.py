@@ -99,7 +99,7 @@ class Mistake(Effect):
         )
 
     def possible(self, test: Loop | Sweep) -> bool:
-        """Return True if the mistake can occur in this test, by its kind, motion, direction and stiffness."""
+        """Return True if a test of this kind, motion, direction and stiffness can have the mistake."""
         kind, place = "loop" if isinstance(test, Loop) else "sweep", test.direction
         fits = kind in self.kinds and self.motion in (None, place.motion)
         doubtful = self.doubt is None or (isinstance(test, Sweep) and self.doubt(test.stiffness))
@@ -122,7 +122,7 @@ class Mistake(Effect):
         return not _is_of_rubber(modulus, strain) and _is_of_rubber(factor * modulus, self.displacement * strain)
 
     def _direction(self, place: Place) -> Place:
-        """True direction of a test that states `place`."""
+        """True direction of a test that states `place`: the other of axial and radial if the mistake swaps them."""
         return _EXCHANGED.get(place, place) if self.swaps else place
 
     def corrected_bushing(self, bushing: Bushing) -> Bushing:
@@ -163,13 +163,13 @@ def _loss(stiffness: Complex) -> float:
     return float(np.median(stiffness.imag / stiffness.real))
 
 
-def _times_loss(factor: float, stiffness: Complex) -> Complex:
+def _scale_loss(factor: float, stiffness: Complex) -> Complex:
     """Complex stiffnesses, (n,), with unchanged magnitudes |K| and with loss factors multiplied by `factor`."""
     loss = 1.0 + 1j * factor * stiffness.imag / stiffness.real
     return np.asarray(np.abs(stiffness) * loss / np.abs(loss))
 
 
-def _sine(stiffness: Complex) -> Complex:
+def _loss_from_sine(stiffness: Complex) -> Complex:
     """Correct complex stiffnesses, (n,), whose stated loss factor is the sine of the loss angle; |K| is unchanged."""
     sine = np.clip(stiffness.imag / stiffness.real, -1.0, 1.0)
     return np.asarray(np.abs(stiffness) * (np.sqrt(1.0 - sine**2) + 1j * sine))
@@ -181,9 +181,9 @@ _LAWS: dict[str, Any] = {
     "complement": lambda k: 1j * np.conj(k),
     # the phase is in radians where it was read in degrees
     "turned": lambda k: np.abs(k) * np.exp(1j * np.degrees(1.0) * np.angle(k)),
-    "hundredth_of_loss": partial(_times_loss, 0.01),
-    "hundredfold_loss": partial(_times_loss, 100.0),
-    "sine": _sine,
+    "hundredth_of_loss": partial(_scale_loss, 0.01),
+    "hundredfold_loss": partial(_scale_loss, 100.0),
+    "sine": _loss_from_sine,
     # K' was given as |K|
     "magnitude": lambda k: k * np.abs(k) / k.real,
     # |K| was given as K', with the correct K''
@@ -197,7 +197,7 @@ _LAWS: dict[str, Any] = {
 }
 
 
-def _mistake(name: str, entry: dict[str, Any]) -> Mistake:
+def _build_mistake(name: str, entry: dict[str, Any]) -> Mistake:
     """Build a mistake from its name and its table in mistakes.toml."""
     laws = {key: _LAWS[entry.pop(key)] for key in ("stiffness", "doubt", "motion") if key in entry}
     kinds, units = tuple(entry.pop("kinds", ["sweep"])), entry.pop("units", {}).items()
@@ -208,7 +208,7 @@ def _mistake(name: str, entry: dict[str, Any]) -> Mistake:
 
 _TABLE = tomllib.loads(Path(__file__).with_name("mistakes.toml").read_text(encoding="utf-8"))
 #: All mistakes by name, the most frequent first.
-MISTAKES: dict[str, Mistake] = {name: _mistake(name, entry) for name, entry in _TABLE.items()}
+MISTAKES: dict[str, Mistake] = {name: _build_mistake(name, entry) for name, entry in _TABLE.items()}
 
 
 def labelled(name: str, test: str | None) -> str:

@@ -98,70 +98,72 @@ def force(p: Values, below: ForceBelow, history: History, setting: Setting) -> A
     imposed, solved, history = history.value, history.solved, history.as_driver()
     count = imposed.shape[-1]
     length = count if history.periodic else next_fast_len(count, real=True)
-    beneath = solved.setdefault("beneath", {})  # solutions of what gives way beneath it, as a sleeve in a rig
-    rigid, reached = solved.pop("compliance", (None, np.zeros_like(imposed)))
-    if reached.shape not in (imposed.shape[-1:], imposed.shape):
-        rigid, reached = None, np.zeros_like(imposed)
-    if rigid is None:
-        rigid = _pulse_stiffness(below, history, length)
-    yielding = 1.0 / (1.0 + compliance * rigid)
-    size = np.max(np.abs(imposed), axis=-1, keepdims=True)
-    farthest = 2.0 * size  # that a round may try
-    best = last = np.full_like(size, np.inf)
-    pace, idle, past, common = np.ones_like(size), 0, None, np.zeros_like(imposed)
+    inner_solved = solved.setdefault("beneath", {})  # of compliances in inner layers, such as a sleeve
+    stiffness_below, estimate = solved.pop("compliance", (None, np.zeros_like(imposed)))
+    if estimate.shape not in (imposed.shape[-1:], imposed.shape):
+        stiffness_below, estimate = None, np.zeros_like(imposed)
+    if stiffness_below is None:
+        stiffness_below = _pulse_stiffness(below, history, length)
+    softening = 1.0 / (1.0 + compliance * stiffness_below)
+    largest = np.max(np.abs(imposed), axis=-1, keepdims=True)
+    limit = 2.0 * largest  # of the motions that an iteration tries
+    best = last = np.full_like(largest, np.inf)
+    step_factor, idle, mixing, common = np.ones_like(largest), 0, None, np.zeros_like(imposed)
     for number in range(_ROUNDS):
-        motion = np.clip(imposed - compliance * reached, -farthest, farthest)
-        felt = below(history.with_value(motion, beneath)) - common
-        if number == 0 and felt.ndim > imposed.ndim:  # many models, which start from the solution of the last
-            residue = felt[-1] - reached
-            common = residue * (np.max(np.abs(compliance)) * np.max(np.abs(residue)) <= history.accuracy * size)
-            felt = felt - common
-        missing = felt - reached
-        error = np.max(np.abs(compliance * missing), axis=-1, keepdims=True)
-        change = np.fft.irfft(yielding * np.fft.rfft(missing, n=length), n=length)[..., :count]
-        past = past or _AndersonMixing(change.shape)
-        step = past.step(reached, change)
+        motion = np.clip(imposed - compliance * estimate, -limit, limit)
+        computed = below(history.with_value(motion, inner_solved)) - common
+        if number == 0 and computed.ndim > imposed.ndim:  # many models, which start from the solution of the last
+            shared = computed[-1] - estimate
+            is_small = np.max(np.abs(compliance)) * np.max(np.abs(shared)) <= history.accuracy * largest
+            common = shared * is_small
+            computed = computed - common
+        residual = computed - estimate
+        error = np.max(np.abs(compliance * residual), axis=-1, keepdims=True)
+        change = np.fft.irfft(softening * np.fft.rfft(residual, n=length), n=length)[..., :count]
+        mixing = mixing or _AndersonMixing(change.shape)
+        step = mixing.step(estimate, change)
         # a step after one that reduced the error tenfold is expected to reduce it tenfold, too
         reduction = np.where((error < _FAST * last) & np.isfinite(last), _FAST, 1.0)
-        # what is no number counts as settled, so that it takes no other with it
-        if not np.any(reduction * error > history.accuracy * size) and _differences_resolved(
-            reached, reduction * missing
+        # NaN counts as settled, so that one motion without a solution does not stop the others
+        if not np.any(reduction * error > history.accuracy * largest) and _differences_resolved(
+            estimate, reduction * residual
         ):
-            reached = reached + step
+            estimate = estimate + step
             many = imposed.ndim > 1  # else of many models on one motion the last is kept
-            latest = [array if many else array.reshape(-1, array.shape[-1])[-1].copy() for array in (rigid, reached)]
-            poor = number >= 16  # rounds, twice the usual: K is measured anew for the next solution
-            solved["compliance"] = (None if poor else latest[0], latest[1])
-            return reached
+            kept = (stiffness_below, estimate)
+            kept = kept if many else tuple(array.reshape(-1, array.shape[-1])[-1].copy() for array in kept)
+            poor = number >= 16  # iterations, twice the usual: K is measured anew for the next solution
+            solved["compliance"] = (None if poor else kept[0], kept[1])
+            return estimate
         idle = 0 if np.any(error < _NEARER * best) else idle + 1
         if idle == _IDLE:
             break
         best = np.where(error < _NEARER * best, error, best)
-        pace, last = np.where(error < last, np.minimum(1.0, 2.0 * pace), 0.5 * pace), error
-        reached = reached + pace * step
-    if not history.periodic and np.any(error > 1e-3 * size):  # less than any test resolves
+        step_factor, last = np.where(error < last, np.minimum(1.0, 2.0 * step_factor), 0.5 * step_factor), error
+        estimate = estimate + step_factor * step
+    if not history.periodic and np.any(error > 1e-3 * largest):  # less than any test resolves
         raise ModelError(
             "a rig or sleeve is too compliant to be simulated in time",
             found=f"{float(np.max(compliance)):.3g} m/N",
             expected="one that is several times stiffer than the bushing",
         )
-    return felt
+    return computed
 
 
-def _differences_resolved(reached: Array, missing: Array) -> bool:
+def _differences_resolved(estimate: Array, residual: Array) -> bool:
     """Return True if an iteration for the forces of several models is accurate enough for the models' differences.
 
     The differences, from which a fit computes derivatives, must be accurate to a thousandth or to rounding.
 
     Args:
-        reached: forces of the models after this iteration, (models, n) [N].
-        missing: change of the forces that the next iteration would make, (models, n) [N].
+        estimate: forces of the models after this iteration, (models, n) [N].
+        residual: change of the forces that the next iteration would make, (models, n) [N].
     """
-    if missing.ndim == 1:
+    if residual.ndim == 1:
         return True
-    reached = np.broadcast_to(reached, missing.shape)
-    spread, error = (np.max(np.abs(rows - rows[-1]), axis=-1) for rows in (reached, missing))
-    return not np.any(error > np.maximum(1e-3 * spread, 1e-13 * np.max(np.abs(reached), axis=-1)))
+    estimate = np.broadcast_to(estimate, residual.shape)
+    spread, error = (np.max(np.abs(rows - rows[-1]), axis=-1) for rows in (estimate, residual))
+    return not np.any(error > np.maximum(1e-3 * spread, 1e-13 * np.max(np.abs(estimate), axis=-1)))
 
 
 class _AndersonMixing:
@@ -176,14 +178,14 @@ class _AndersonMixing:
         self._place = 0
         self._before: tuple[Array, Array] | None = None
 
-    def step(self, reached: Array, change: Array) -> Array:
+    def step(self, estimate: Array, change: Array) -> Array:
         """Next change of the force, from the force and the proposed change of this iteration, (..., n) [N] each."""
-        before, self._before = self._before, (reached, change)
+        before, self._before = self._before, (estimate, change)
         if before is None:
             return change
         k, self._place = self._place, (self._place + 1) % _REMEMBERED
         changed = change - before[1]
-        self._changed[..., k, :], self._both[..., k, :] = changed, changed + reached - before[0]
+        self._changed[..., k, :], self._both[..., k, :] = changed, changed + estimate - before[0]
         products = self._products
         products[..., k, :] = products[..., :, k] = (self._changed @ changed[..., None])[..., 0]
         # above rounding, so that two differences that teach the same do no harm

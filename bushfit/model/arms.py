@@ -1,4 +1,4 @@
-"""Maxwell arms in place of what fades with memory: the law of a springpot in a form that steps through time.
+"""Maxwell arms (springs and dashpots in series) that replace viscoelastic branches in programs that step through time.
 
 A springpot depends on the whole past motion, which most programs cannot store. Over a band of frequencies a few springs
 with dashpots in series (Maxwell arms) have the same modulus within a stated error.

@@ -50,7 +50,7 @@ class Stack:
         setting: direction, kind and conditions of the test.
         values: parameter values [SI] by qualified name; arrays whose last axis has length 1 add leading axes.
         layers: layers to include, from the rubber outward, with their parameter values.
-        modified: False to leave out the modifiers.
+        modified: False for the stiffness of the rubber without its modifiers, which a modifier may use.
         last_moduli: time step [s] of the last steady cycle, and the modulus [Pa] of the linear branches at each of its
             harmonics, by number of samples.
     """
