@@ -23,6 +23,8 @@ LOOP = "time [s],displacement [mm],force [N]".replace(",", "\t")
 G = STIFFNESS / 200.0  # [MPa] at strains of 1 and 5 %
 MODULUS = {"frequency": F, "amplitude": A / 10.0, "stiffness": 1e6 * G}
 ONE_HZ = {"frequency": 0 * F + 1.0, "amplitude": A / 10.0, "stiffness": 1e6 * G}
+#: Force [N] with 20 times as much noise as loop.
+NOISE = 0.05 * FORCE + 1000.0 * (-1.0) ** np.arange(TIME.size)
 EXCEL_DAYS = TIME / 86_400.0 + 46_352.5
 
 

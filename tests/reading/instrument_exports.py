@@ -8,6 +8,7 @@ from export_tables import (
     FORCE,
     LVM,
     MODULUS,
+    NOISE,
     PHASE,
     STIFFNESS,
     TIME,
@@ -17,6 +18,7 @@ from export_tables import (
     F,
     G,
     K,
+    blocks,
     loop,
     sweep,
     table,
@@ -259,9 +261,22 @@ INSTRUMENT_EXPORTS: dict[str, Export] = {
         sweep("Frekvens (Hz)|Amplitud (mm)|Styvhet medel (N/mm)|Styvhet std (N/mm)|Förlustfaktor medel|Förlustfaktor std", F, A, K, 0 * F + 20, ETA, 0 * F + 0.004)
     ),
     "a range that is peak to peak": Export(sweep("Frekvence [Hz]|Rozkmit síly [N]|Rozkmit [mm]|Ztrátový úhel [°]", F, 2 * A * K, 2 * A, PHASE)),
-    "a footnote": Export("| f / Hz | Amplitude¹ / mm | K′ / kN/mm | K″ / kN/mm |\n|--:|--:|--:|--:|\n" + "".join(
-        f"| {f:g} | {a:g} | {k.real / 1e3:.9f} | {k.imag / 1e3:.9f} |\n" for f, a, k in zip(F, A, STIFFNESS, strict=True)
-    )),
+    **{
+        f"a footnote:{note}": Export("| f / Hz | Amplitude¹ / mm | K′ / kN/mm | K″ / kN/mm |\n|--:|--:|--:|--:|\n" + "".join(
+            f"| {f:g} | {factor * a:g} | {k.real / 1e3:.9f} | {k.imag / 1e3:.9f} |\n" for f, a, k in zip(F, A, STIFFNESS, strict=True)
+        ) + f"\n¹{note}\n")
+        for note, factor in ((" as set on the controller", 1), (" peak to peak, as set on the controller", 2))
+    },
+    "parts in a header of two levels": Export(
+        "part,,P01,P01,P02,P02\nquantity,,Kdyn_N_per_mm,loss_angle_deg,Kdyn_N_per_mm,loss_angle_deg\n"
+        + sweep("amplitude_mm|frequency_Hz||||", A, F, K, PHASE, K, PHASE, mark=",")
+    ),
+    "lines above the first block": Export(
+        "2 bushings in parallel\n" + blocks("Amplitude: {} mm".format, "f [Hz]|K* [N/mm]|tan delta"), words=["line 1 is not understood"]
+    ),
+    "a force of noise": Export(
+        loop("time [s]|displacement [mm]|force [N]", TIME, DISPLACEMENT, NOISE), "loop", ["the record is no steady loop"], reference={"force": NOISE}
+    ),
     "a row for each quantity": Export("".join(
         f"Amplituda drgań (0–szczyt);{a};mm\n" + "".join(
             f"{name};{';'.join(f'{value:.9g}' for value in values[a == A])}\n"

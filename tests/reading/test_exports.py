@@ -62,7 +62,7 @@ def test_an_export_is_read_right_or_raises_a_question(name, tmp_path):
         assert [path.name for path in tmp_path.iterdir()] == [file.name]
         return
     document, tests = inspected(tmp_path, file.name, **export.stated)
-    notes = " | ".join(sentence for seen in document["files"] for sentence in seen["odd"])
+    notes = " | ".join(text for seen in document["files"] for text in (*seen["odd"], *seen["facts"].values()))
     assert [word for word in export.words if word not in notes] == []
     assert {seen["kind"] for seen in document["files"]} == {export.kind}
     assert tests
@@ -105,6 +105,29 @@ def test_parts_side_by_side_and_date_cells_of_a_workbook(tmp_path):
     assert len(document["files"]) == len(tests) == 2
     for test, factor in zip(tests, (1.0, 1.1), strict=True):
         check(test, {**LOOP, "force": factor * FORCE})
+
+
+def test_hidden_rows_of_a_workbook_are_read_and_reported(tmp_path):
+    book = openpyxl.Workbook()
+    for row in ["time [s]", "displacement [mm]", "force [N]"], *zip(TIME.tolist(), DISPLACEMENT, FORCE, strict=True):
+        book.active.append(row)
+    for row in (2, 3):
+        book.active.row_dimensions[row].hidden = True
+    book.save(tmp_path / "loop.xlsx")
+    document, (test,) = inspected(tmp_path, "loop.xlsx")
+    assert "2 rows from row 2 on are hidden in the workbook, and are read too" in document["files"][0]["odd"]
+    check(test, LOOP)
+
+
+def test_a_second_channel_of_a_long_record_is_asked_about(tmp_path):
+    """It stands still for more rows than are looked at first, in a file that is read in several pieces."""
+    motion = np.concatenate([np.zeros(2_000), np.tile(DISPLACEMENT, 250)])
+    rows = np.column_stack([0.05 * np.arange(motion.size), motion, 1.2 * motion, 1000.0 * motion])
+    headers = "time [s],displacement [mm],LVDT [mm],force [N]"
+    np.savetxt(tmp_path / "loop.csv", rows, "%.6f", ",", header=headers, comments="")
+    assert (tmp_path / "loop.csv").stat().st_size > 1 << 22
+    done = typing(tmp_path)("inspect", "loop.csv", "--direction", "axial", "--json", status=2)
+    assert "more than one column could be the displacement" in done.stderr
 
 
 @pytest.mark.parametrize("title", ["", "Amplitude: 1 mm\n"])
