@@ -322,28 +322,26 @@ class Cells:
             MeasurementError: the numbers have two notations, or can be read in two ways.
         """
         notations = self.possible_numerals()
-        if isinstance(source := self.source, Text):
-            absent = [sign for sign in ",. '" if not source.may_contain(sign, self.layout)]
-            marks = "," if self.layout.delimiter == "," and "," in absent else ""
-            possible = (way for way in notations if way.thousands not in absent and way.decimal != marks)
+        if isinstance(self.source, Text):
+            absent = [sign for sign in ",. '" if not self.source.may_contain(sign, self.layout)]
+            decimal = "," if self.layout.delimiter == "," and "," in absent else ""  # is not the decimal mark
+            possible = (way for way in notations if way.thousands not in absent and way.decimal != decimal)
             notations = tuple(possible) or notations
         evidence = consistent_notations(self.number_texts(), notations)
-        if evidence.contrary is None and any(way.thousands for way in evidence.ways):
+        if not evidence.is_contrary and any(way.thousands for way in evidence.ways):
             evidence = consistent_notations(self.number_texts(), notations, all_cells=True)
-        question = evidence.contrary or evidence.unclear
-        if question is None:
-            return evidence.ways[0]
-        (line, index), text = question
-        if evidence.contrary:
+        usual = evidence.ways[0]
+        if evidence.question is None:
+            return usual
+        (line, index), text = evidence.question
+        if evidence.is_contrary:
             problem, found = "this number has another format than the others", f'"{text}"'
-            expected = f"numbers with a decimal {'comma' if evidence.ways[0].decimal == ',' else 'point'}"
+            expected = f"numbers with a decimal {'comma' if usual.decimal == ',' else 'point'}"
             hint = "correct this cell; or, if all numbers of the file are written so, state "
             hint += 'decimal = "..." and thousands = "..." in the campaign'
         else:
-            problem, found = (
-                "this number can be read in two ways",
-                f'"{text}", and no number in the file that settles it',
-            )
+            problem = "this number can be read in two ways"
+            found = f'"{text}", and no number in the file that settles it'
             expected = " or ".join(dict.fromkeys(f"{way.value(text) or 0.0:.15g}" for way in evidence.ways))
             hint = 'state decimal = "." or decimal = "," in the campaign'
         column = next(column for column in self.roles.values() if column.index == index)

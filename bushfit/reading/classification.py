@@ -257,7 +257,7 @@ def _add_by_unit(
     """
     if len(roles) + len(cells.headers) < 3:
         return [], []
-    usual = Vocabulary.shared(of_motion({**LOOP_COLUMNS, **SWEEP_COLUMNS}, motion), {}, {})
+    usual = Vocabulary(of_motion({**LOOP_COLUMNS, **SWEEP_COLUMNS}, motion), {}, {})
     free: dict[Column, set[str]] = {}
     for index, header in enumerate(cells.headers):
         if not (header or cells.layout.units[index]) or usual.heading(header) is not None:

@@ -52,7 +52,7 @@ def find_table(
     opened = file if isinstance(file, OpenedFile) else open_file(file, file_format or FileFormat())
     file_format, columns = opened.stated, dict(columns or {})
     named = {role: text for role, text in columns.items() if not text.isdecimal()}
-    vocabulary = Vocabulary.shared(of_motion(names, motion), named, stated_units or {})
+    vocabulary = Vocabulary(of_motion(names, motion), named, stated_units or {})
 
     def lay_out(source: RowSource) -> tuple[RowSource, Layout]:
         """Return rows and layout of the table in a part of the file; blocks and wide tables become long."""

@@ -195,18 +195,6 @@ class Vocabulary:
         self._known: dict[tuple[str, str | None], Heading | None] = {}
         self._names = {role: usual[0] for role, usual in names.items()} | dict(columns)
 
-    @classmethod
-    def shared(
-        cls, names: Mapping[str, Sequence[str]], columns: Mapping[str, str], stated_units: Mapping[str, str]
-    ) -> "Vocabulary":
-        """Return a vocabulary from a cache, because building one is slow.
-
-        Args:
-            names, columns, stated_units: as for the class.
-        """
-        usual = tuple((role, tuple(words)) for role, words in names.items())
-        return _shared(usual, tuple(columns.items()), tuple(stated_units.items()))
-
     def heading(self, header: str, unit_below: str | None = None) -> Heading | None:
         """Return the meaning of a header cell by its name and unit together.
 
@@ -278,15 +266,6 @@ class Vocabulary:
                 yield word
             elif _SYMBOL.fullmatch(symbol) and _UNLIKE_SYMBOL.isdisjoint(_folded(name).split()):
                 yield from [symbol] * any(units.is_compatible(unit or "", si) for si in ("N/m", "N*m/rad", "Pa"))
-
-
-@lru_cache(maxsize=64)
-def _shared(
-    names: tuple[tuple[str, tuple[str, ...]], ...],
-    columns: tuple[tuple[str, str], ...],
-    stated_units: tuple[tuple[str, str], ...],
-) -> Vocabulary:
-    return Vocabulary(dict(names), dict(columns), dict(stated_units))
 
 
 def fits(word: str, role: str, unit: str | None) -> bool:

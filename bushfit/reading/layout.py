@@ -12,6 +12,7 @@ import re
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Literal, NamedTuple
 
 from bushfit import units
@@ -175,15 +176,13 @@ def find_layout(
     before = [index for index in range(end) if header_line in (None, lines[index].number)]
     if header_line is not None and not before:
         before = [index for index, line in enumerate(lines) if line.number == header_line]
-    for commented in (False, True):
-        candidates = _candidates(lines, before, delimiters, vocabulary, commented)
-        if best := max(candidates, key=lambda candidate: candidate[0], default=None):
-            return _layout(lines, vocabulary, *best[1:])
-    return _layout(lines, vocabulary, *_likeliest(lines, before, end, delimiters))
+    candidates = _candidates(lines, before, delimiters, vocabulary)
+    best = max(candidates, key=lambda candidate: candidate[0], default=None)
+    return _layout(lines, vocabulary, *(best[1:] if best else _likeliest(lines, before, end, delimiters)))
 
 
 def _candidates(
-    lines: Sequence[Line], before: Sequence[int], delimiters: Sequence[str], vocabulary: Vocabulary, commented: bool
+    lines: Sequence[Line], before: Sequence[int], delimiters: Sequence[str], vocabulary: Vocabulary
 ) -> Iterator[tuple[tuple[int, ...], int, str, list[str]]]:
     """Yield the lines that may be the header: those that name two columns or more.
 
@@ -192,30 +191,26 @@ def _candidates(
         before: indices of lines that may be the header.
         delimiters: possible characters between cells.
         vocabulary: known column names.
-        commented: True for comments, False for other lines.
 
     Yields:
         Rank for the choice among headers, index in `lines`, delimiter and header cells.
     """
-    for index in before:
-        for order, delimiter in enumerate(delimiters):
-            content = lines[index].content
-            if is_comment(content, delimiter) != commented:
-                continue
-            if commented and isinstance(content, str):
-                content = content.lstrip().lstrip("#%/ " if delimiter == ";" else "#%/; ")
-            for cells in header_cells(content, delimiter):
-                named_count = len(vocabulary.roles(cells))
-                named_count += sum(_is_unit_alone(cell, vocabulary) for cell in cells[:_MOST_HEADINGS])
-                if named_count > 1 and not any(is_like_number(cell) for cell in cells):
-                    below = (split(line.content, delimiter) for line in _below(lines, index, delimiter))
-                    width = next((len(row) for row in below if is_row(row)), 0)
-                    shorter = delimiter != " " and len(cells) < 2 * width < 2 * len(cells)  # empty cells at the end
-                    followed = 2 if width == len(cells) else int(shorter)
-                    yield (followed, named_count, index, -order), index, delimiter, cells
+    for index, (order, delimiter) in product(before, enumerate(delimiters)):
+        content = lines[index].content
+        if (is_note := is_comment(content, delimiter)) and isinstance(content, str):
+            content = content.lstrip().lstrip("#%/ " if delimiter == ";" else "#%/; ")
+        for cells in header_cells(content, delimiter):
+            units_alone = [is_unit_alone(cell, vocabulary) for cell in cells[:_MOST_HEADINGS]]
+            named_count = len(vocabulary.roles(cells)) + sum(units_alone)
+            if named_count > 1 and not any(is_like_number(cell) for cell in cells):
+                below = (split(line.content, delimiter) for line in _below(lines, index, delimiter))
+                width = next((len(row) for row in below if is_row(row)), 0)
+                shorter = delimiter != " " and len(cells) < 2 * width < 2 * len(cells)  # empty cells at the end
+                followed = 2 if width == len(cells) else int(shorter)
+                yield (not is_note, followed, named_count, index, -order), index, delimiter, cells
 
 
-def _is_unit_alone(header: str, vocabulary: Vocabulary) -> bool:
+def is_unit_alone(header: str, vocabulary: Vocabulary) -> bool:
     """Return True if a header has a unit in brackets but no known name."""
     name, unit = units.split_header(split_convention(header)[0]) if header[-1:] in ("]", ")") else ("", None)
     return bool(name and unit) and unit != "-" and vocabulary.heading(header) is None and units.is_unit(unit or "")
@@ -288,20 +283,19 @@ def _likeliest(
     """
     if end == len(lines):
         first = next(iter(before), 0)
-        content = lines[first].content
-        delimiter = max(delimiters, key=lambda mark: len(split(content, mark)) if mark != " " else 0)
-        return first, delimiter, split(content, delimiter)
+        cells_of = {mark: split(lines[first].content, mark) for mark in delimiters}
+        delimiter = max(delimiters, key=lambda mark: len(cells_of[mark]) if mark != " " else 0)
+        return first, delimiter, cells_of[delimiter]
     rows = [(mark, split(lines[end].content, mark)) for mark in delimiters]
     rows = [(mark, cells) for mark, cells in rows if len(cells) > 1 and all(map(is_like_number, cells))] or rows
     for delimiter, row in rows:
         cells = {index: split(lines[index].content, delimiter) for index in reversed(before)}
-        are_units = {index: is_units_row(cells[index]) for index in cells}
-        fitting = [index for index in cells if len(row) == len(cells[index]) and not are_units[index]]
+        of_units = {index for index in cells if is_units_row(cells[index])}
+        fitting = [index for index in cells if len(row) == len(cells[index]) and index not in of_units]
         if fitting:
-            index = next((index for index in fitting if are_units.get(index + 1)), fitting[0])
+            index = next((index for index in fitting if index + 1 in of_units), fitting[0])
             return index, delimiter, cells[index]
-    delimiter, row = max(rows, key=lambda entry: len(entry[1]))
-    return end, delimiter, row
+    return end, *max(rows, key=lambda entry: len(entry[1]))
 
 
 def _layout(

@@ -168,17 +168,16 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
         days = np.cumsum(np.append(0.0, np.diff(time) < -0.5 * DAY))  # clock times fall back at midnight
         time = time + DAY * days
         time = time - time[0]
-    likelier_unit = "ms" if time.size and time[0] > _LATEST_SECOND else None
+    likelier = ("ms", "milliseconds since 1970", "") if time.size and time[0] > _LATEST_SECOND else None
     if column.scale == 1.0 and column.unit and are_day_numbers(time):
-        likelier_unit = "d"
-    if likelier_unit:
-        kind = "milliseconds since 1970" if likelier_unit == "ms" else "day numbers of a spreadsheet"
+        likelier = ("d", "day numbers of a spreadsheet", ", or days")
+    if likelier:
         raise table.error(
-            f"these times look like {kind}, not seconds",
+            f"these times look like {likelier[1]}, not seconds",
             column=column,
             found=f"{time[0] / column.scale:.15g} {column.unit or 's'} in the first row",
-            expected="times in seconds" if likelier_unit == "ms" else "times in seconds, or days",
-            hint=f'units = {{ time = "{likelier_unit}" }} in the campaign; or subtract the first time from all',
+            expected=f"times in seconds{likelier[2]}",
+            hint=f'units = {{ time = "{likelier[0]}" }} in the campaign; or subtract the first time from all',
         )
     stuck = time[1:] <= time[:-1]
     if stuck.any() and (even := spread(time)) is not None:
@@ -186,14 +185,11 @@ def increasing_time(table: Table, column: Column, time: Floats) -> tuple[Floats,
         return even, (f'"{column.header}" is rounded and repeats: its rows are spread evenly, at {rate:.6g} Hz',)
     hint = "if a column numbers the runs, bushfit init makes a loop of each"
     if "block" in table.headers:
-        hint = (
-            'this file has several blocks: rows = { block = "1" } in the campaign selects the first; bushfit '
-            "init uses all"
-        )
-    elif stuck.any() and np.all(np.diff(time) >= 0.0):
+        hint = 'this file has several blocks: rows = { block = "1" } in the campaign selects the first; '
+        hint += "bushfit init uses all"
+    elif np.all(np.diff(time) >= 0.0):
         hint = "export the file again with more digits of the time"
-    if stuck.any():
-        table.refuse(np.append(False, stuck), column, "time does not increase", "a later time on every row", hint)
+    table.refuse(np.append(False, stuck), column, "time does not increase", "a later time on every row", hint)
     if time[-1] - time[0] < LEAST_VALUE:
         raise table.error("the record takes no time", column=column, expected=f"{LEAST_VALUE:g} s or more")
     return time, ()

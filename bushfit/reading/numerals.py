@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import product
+from typing import NamedTuple
 
 #: Blanks that separate thousands: plain, unbreakable and thin ones.
 BLANKS = " \u00a0\u2009\u202f"
@@ -69,19 +70,19 @@ ALL_NUMERALS = tuple(
 Place = tuple[int, int]
 
 
-@dataclass(frozen=True)
-class NumeralEvidence:
+class NumeralEvidence(NamedTuple):
     """Notations (decimal mark and thousands separator) in which a table can be read, and the first problematic cell.
 
     Args:
         ways: notations in which all numbers can be read, the plainest first.
-        unclear: location and text of the first number with different values in these notations; None if there is none.
-        contrary: location and text of the first number that contradicts the others; None if there is none.
+        question: location and text of the first number that contradicts the others, or else has different values in
+            these notations; None if there is none.
+        is_contrary: True if this number contradicts the others.
     """
 
     ways: tuple[Numerals, ...]
-    unclear: tuple[Place, str] | None = None
-    contrary: tuple[Place, str] | None = None
+    question: tuple[Place, str] | None = None
+    is_contrary: bool = False
 
 
 @lru_cache(maxsize=4096)
@@ -127,7 +128,7 @@ def consistent_notations(
         fitting = tuple(way for way in ways if way.allows(text))
         if not fitting:
             if is_like_number(text):
-                return NumeralEvidence(ways, contrary=(place, text))
+                return NumeralEvidence(ways, (place, text), is_contrary=True)
             continue
         ways = fitting
         if group := _ONE_GROUP.fullmatch(text):
@@ -138,6 +139,6 @@ def consistent_notations(
             unclear = None
     # 62.598 between 20,000 and 3694,85 is a slip rather than 62 thousand; so is 594,436 between 595.1 and 596.25
     contrary = grouped.get(ways[0].thousands or "") if open_thousands else None
-    if contrary and not (ungrouped or contrary[0][1] in columns.get(ways[0].decimal, ())):
-        contrary = None
-    return NumeralEvidence(ways, unclear, contrary)
+    if contrary and (ungrouped or contrary[0][1] in columns.get(ways[0].decimal, ())):
+        return NumeralEvidence(ways, contrary, is_contrary=True)
+    return NumeralEvidence(ways, unclear)

@@ -256,14 +256,10 @@ class Table(Cells):
                 table is in doubt.
         """
         table, left_out = self.needing(wanted), list[FaultyRow]()
-        parts: dict[str, list[Floats]] = {role: [np.empty(0)] for role in wanted}
-        for block in table.blocks():
-            for values in table._read_block(block, wanted, left_out):
-                for role, numbers in values.items():
-                    parts[role].append(numbers)
+        parts = [part for block in table.blocks() for part in table._read_block(block, wanted, left_out)]
         if left_out:
-            refuse_other_columns(table, left_out, Vocabulary(of_motion(self.names, self.motion), {}))
-        values = {role: np.concatenate(parts.pop(role)) for role in wanted}
+            refuse_other_columns(table, left_out, Vocabulary(of_motion(self.names, self.motion)))
+        values = {role: np.concatenate([np.empty(0), *(part.pop(role) for part in parts)]) for role in wanted}
         if marks := table._marks_for_missing(wanted, values):
             self.marks.update(marks)
             return self.read(wanted, fewest_rows=fewest_rows)
@@ -369,15 +365,16 @@ class Table(Cells):
                 return
         rows = self.rows(block, left_out)
         while chunk := list(islice(rows, _CHUNK_ROWS)):
-            values = {}
-            for role, column in wanted.items():
-                number_in = clock if column.index in self.clocks else self.numerals.value
-                numbers = []
-                for line, cells in chunk:
-                    cell = cells[column.index]
-                    number = cell if not isinstance(cell, str) else number_in(cell)
-                    if number is None or not abs(number * column.scale) <= LARGEST_VALUE:
-                        raise self.bad_row(line, cells, column=column)
-                    numbers.append(number * column.scale)
-                values[role] = np.array(numbers, dtype=float)
-            yield values
+            yield {role: np.array([self._number(column, *row) for row in chunk]) for role, column in wanted.items()}
+
+    def _number(self, column: Column, line: int, cells: Sequence[str | float]) -> float:
+        """Number in the cell of a column, in SI.
+
+        Raises:
+            MeasurementError: the cell has no finite number, or one above LARGEST_VALUE.
+        """
+        cell, value_of = cells[column.index], clock if column.index in self.clocks else self.numerals.value
+        value = value_of(cell) if isinstance(cell, str) else cell
+        if value is None or not abs(value * column.scale) <= LARGEST_VALUE:
+            raise self.bad_row(line, cells, column=column)
+        return value * column.scale
