@@ -67,11 +67,14 @@ def find_table(
         return combined(source, layout, vocabulary)
 
     try:
-        layouts = {id(part): lay_out(part) for part in opened.parts}
-        part = opened.choose(lambda part: len(vocabulary.roles(layouts[id(part)][1].headers) - {"time"}) > 1)
+        layouts = [lay_out(part) for part in opened.parts]
     except csv.Error as error:
         raise MeasurementError("the table cannot be read", file=opened.file, found=str(error)) from error
-    source, layout = layouts[id(part)]
+    if len(layouts) > 1:
+        layouts = [entry for entry in layouts if len(vocabulary.roles(entry[1].headers) - {"time"}) > 1]
+    if len(layouts) != 1:
+        raise opened.no_choice([source for source, _ in layouts])
+    source, layout = layouts[0]
     if file_format.header_line not in (None, layout.header_line):
         found = f"header_line = {file_format.header_line}"
         problem, hint = "there is no header on this line", "lines count from 1"

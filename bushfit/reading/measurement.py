@@ -180,7 +180,7 @@ def rebuild_time(
     Args:
         displacement: displacement [m or rad], (n,), any number of strokes, with a range above zero.
         rate: speed [m/s or rad/s].
-        frequency: frequency [Hz], used if no rate is given.
+        frequency: frequency [Hz], used if no rate is given; default 1 Hz.
         waveform: shape of the displacement over time.
 
     Returns:
@@ -201,12 +201,7 @@ def rebuild_time(
         share = np.clip((stroke - start) / (end - start), 0.0, 1.0)
         if waveform == "sine":
             share = np.arccos(1.0 - 2.0 * share) / np.pi
-        if rate is not None:
-            duration = abs(end - start) / rate
-        elif frequency is not None:
-            duration = 0.5 / frequency
-        else:
-            raise TypeError("rebuild_time needs a rate or a frequency")
+        duration = abs(end - start) / rate if rate else 0.5 / (frequency or 1.0)
         highest, row = np.maximum.accumulate(share), np.arange(share.size)
         rises_on = np.append(highest[1:] > highest[:-1], True) & (highest > highest[0])
         rises_on[0] = True

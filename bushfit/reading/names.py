@@ -224,29 +224,28 @@ def _label_in_line(line: Line) -> Labels:
     if len(cells) < 2 or len(cells[0]) > _LONGEST_VALUE:
         return NO_LABELS
     name, unit = units.split_header(cells[0])
-    key = _KEY_OF.get(plain(name))
+    values: dict[str, Any] = {}
+    key, forms = _KEY_OF.get(plain(name)), (cells[1], " ".join(cells[1:3]), f"{cells[1]} {unit or ''}")
     if key in ("date", "operator", "specimen_number"):
         is_value = len(cells[1]) <= _LONGEST_VALUE and plain(cells[1]) not in _KEY_OF  # else a row of headers
-        values: dict[str, Any] = {key: cells[1]} if is_value else {}
+        values = {key: cells[1]} if is_value else {}
         return Labels(**values)
     if key in _SAMPLING:
         usual = "Hz" if key == "sampling_rate" else "s" if plain(name) == "wfincrement" else ""
-        for form in (" ".join(cells[1:3]), f"{cells[1]} {unit or usual}"):
+        for form in (forms[1], f"{cells[1]} {unit or usual}"):
             match = _NUMBER_AND_UNIT.fullmatch(form)
             if match and units.is_compatible(rate_unit := _SAMPLES.sub(r"\1Hz", match["unit"]), _SAMPLING[key]):
                 return Labels(sampling=f"{match['number']} {rate_unit}")
-    heading = _VOCABULARY.heading(cells[0])
-    for form in (cells[1], " ".join(cells[1:3]), f"{cells[1]} {unit or ''}"):
-        text = _COMMA.sub(r"\1.", form)
-        if key == "temperature" and _is_quantity(text, "K"):
-            return Labels(temperature=text)
-        if key == "preload" and (_is_quantity(text, "m") or _is_quantity(text, "N")):
-            return Labels(preload=text)
-        text, convention = split_convention(text)
-        if heading and not key and text[:1].isdigit():
-            fitting = [si for si in ("Hz", "m", "rad", "1") if _is_quantity(text, si)]
+    heading, expected = _VOCABULARY.heading(cells[0]), {"temperature": ["K"], "preload": ["m", "N"]}.get(key or "", [])
+    for text in (_COMMA.sub(r"\1.", form) for form in forms):
+        if any(_is_quantity(text, unit) for unit in expected):
+            values = {str(key): text}
+            return Labels(**values)
+        number, convention = split_convention(text)
+        if heading and not key and number[:1].isdigit():
+            fitting = [si for si in ("Hz", "m", "rad", "1") if _is_quantity(number, si)]
             if fitting and (fitting[0] == "Hz") == (heading.role == "frequency"):
-                return Labels((StatedQuantity(text, text.split()[-1], True, heading.convention or convention),))
+                return Labels((StatedQuantity(number, number.split()[-1], True, heading.convention or convention),))
     return NO_LABELS
 
 

@@ -1,6 +1,6 @@
 """Parts of a file that can contain a table: the text, worksheets of a workbook, or groups of recorded channels."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,27 +34,13 @@ class OpenedFile:
     stated: FileFormat
     parts: Sequence[RowSource]
 
-    def choose(self, is_usable: Callable[[RowSource], bool]) -> RowSource:
-        """Choose the part (sheet or group) that contains the table of the test; a file with one part needs no choice.
-
-        Args:
-            is_usable: function that returns True if a part can contain the table.
-
-        Returns:
-            The only part that is usable.
-
-        Raises:
-            MeasurementError: no part, or more than one, is usable.
-        """
-        parts = self.parts
-        usable = [part for part in parts if is_usable(part)] if len(parts) > 1 else parts
-        if len(usable) == 1:
-            return usable[0]
+    def no_choice(self, usable: Sequence[RowSource]) -> MeasurementError:
+        """Return the error for a file in which no part, or more than one (`usable`), can contain the table."""
         kind = word_for_part(self.file)
-        raise MeasurementError(
+        return MeasurementError(
             f"more than one {kind} holds such a table" if usable else f"no {kind} holds such a table",
             file=self.file,
-            found=_listed([part.sheet or "" for part in usable or parts]),
+            found=_listed([part.sheet or "" for part in usable or self.parts]),
             expected="one",
             hint=_ONE_GROUP if kind == "group" and not usable else 'choose it in the campaign: sheet = "..."',
         )

@@ -213,20 +213,18 @@ def _rows_at_temperature(
     if unit is None and temperature is None and np.ptp(values["temperature"]) <= ONE_TEST:
         return rows, None, None
     column = table.column("temperature", direction)
-    celsius = values["temperature"] + (si.kelvin_scale(unit or "") or (1.0, 0.0))[1] - si.CELSIUS
-    kelvin = celsius + si.CELSIUS
-    if temperature is None:
-        if np.ptp(celsius) <= ONE_TEST:
-            return rows, round(float(celsius.mean()), 2) + si.CELSIUS, kelvin
-        problem, expected = "this file contains tests at several temperatures", "one temperature"
-    else:
+    kelvin = values["temperature"] + (si.kelvin_scale(unit or "") or (1.0, 0.0))[1]
+    if temperature is None and np.ptp(kelvin) <= ONE_TEST:
+        return rows, round(float(kelvin.mean()) - si.CELSIUS, 2) + si.CELSIUS, kelvin
+    problem, expected = "this file contains tests at several temperatures", "one temperature"
+    if temperature is not None:
         rows = np.flatnonzero(np.abs(kelvin - temperature) <= SAME_TEMPERATURE)
         if rows.size >= _FEWEST_SWEEP_ROWS:
             return rows, temperature, kelvin[rows]
         problem = "too few rows are near the temperature that is stated"
         degrees = f"{temperature - si.CELSIUS:.4g} degC"
         expected = f"{_FEWEST_SWEEP_ROWS} rows or more within {SAME_TEMPERATURE:g} K of {degrees}"
-    ordered = np.sort(celsius)
+    ordered = np.sort(kelvin) - si.CELSIUS
     means = [part.mean() for part in np.split(ordered, np.flatnonzero(np.diff(ordered) > SAME_TEMPERATURE) + 1)]
     nearest = min(means, key=lambda mean: abs(mean + si.CELSIUS - (temperature or 0.0)))
     raise table.error(

@@ -267,19 +267,15 @@ def _long_table(
         problem = "this wide table states one quantity in two ways"
         expected = "one unit for each quantity, and levels of one kind"
     if problem:
-        kinds = Counter((m.role, m.unit, m.stepped, len(points)) for m, _, points in columns)
-        raise MeasurementError(
-            problem,
-            file=file,
-            place=f'sheet "{source.sheet}"' if source.sheet else f"line {columns[0].points[0][0] - 1}",
-            found="; ".join(
-                f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of {count} "
-                f"{'frequencies' if stepped == 'frequency' else 'amplitudes'}, {rows} rows"
-                for (role, unit, stepped, rows), count in kinds.items()
-            ),
-            expected=expected,
-            hint="correct the wide table, or write it as a long one: a row for each frequency and amplitude",
+        kinds = Counter((one.role, one.unit, one.stepped, len(points)) for one, _, points in columns)
+        found = (
+            f"{(role or 'not named').replace('_', ' ')}{f' [{unit}]' if unit else ''} of {count} "
+            f"{'frequencies' if stepped == 'frequency' else 'amplitudes'}, {rows} rows"
+            for (role, unit, stepped, rows), count in kinds.items()
         )
+        place = f'sheet "{source.sheet}"' if source.sheet else f"line {columns[0].points[0][0] - 1}"
+        hint = "correct the wide table, or write it as a long one: a row for each frequency and amplitude"
+        raise MeasurementError(problem, file=file, place=place, found="; ".join(found), expected=expected, hint=hint)
     headers = tuple(
         f"{vocabulary.name_of(role or '')}{COUNTED[convention]}{f' [{unit}]' if unit else ''}"
         for role, unit, convention in (*down, *across, *quantities)
