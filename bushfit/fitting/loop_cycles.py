@@ -1,8 +1,8 @@
 """The cycles of a loop: the steady ones, their frequency and number, and the name of the waveform.
 
-A motion is steady where it repeats itself one period later. The longest steady stretch is kept; a record that is steady
-throughout is unchanged, so it may start and end anywhere in its cycle. Of a record with a hole (missing rows) only the
-longest part without a hole is kept, because the number of cycles in the hole is unknown.
+The longest part of constant amplitude and rate is kept; a record that is steady throughout is unchanged, so it may
+start and end anywhere in its cycle. Of a record with a hole (missing rows) only the longest part without a hole is
+kept, because the number of cycles in the hole is unknown.
 """
 
 import numpy as np
@@ -14,13 +14,10 @@ from bushfit.fitting.outliers import gross_outliers
 from bushfit.reading.measurement import Loop
 from bushfit.reduction.cycles import HOLE, shifted_difference
 from bushfit.reduction.harmonics import basis, least_squares, resolved_order, spread_rows
-from bushfit.reduction.programme import ENOUGH_ROWS, SAME_MOTION, THREE_CYCLES, omitted_rows_sentence
+from bushfit.reduction.programme import ENOUGH_ROWS, THREE_CYCLES, omitted_rows_sentence, steady_spans
 
 #: Share of a period up to which a break in the steady motion, or a part left out, is ignored.
 _BRIEF = 0.02
-#: Difference from the motion a period later, in units of its median and of its range (for motions without noise),
-#: beyond which an end is drawn in, and by how many periods at most.
-_MOST_OFF, _LEAST_OFF, _EDGE = 8.0, 5e-4, 0.5
 #: Harmonics and rows by which a frequency is refined at most; chosen: what a triangle has beyond them shifts no phase.
 _MOST_HARMONICS, _ROWS_TO_REFINE = 15, 2000
 #: Step of Gauss-Newton relative to the frequency at which it has converged (rounding), and largest step (beyond which
@@ -108,28 +105,18 @@ def _steady_part(loop: Loop, time: Array, motion: Array) -> tuple[Loop, str | No
         part, note = _steady_part(whole, *_thinned(whole))
         sentence = f"rows are missing; of {time[-1] - time[0]:.3g} s only {first:.4g} to {last:.4g} s are used"
         return part, sentence if note is None else f"{sentence}, and of these {note}"
-    clock = time[time + period <= time[-1]]
-    difference = shifted_difference(time, motion, period, slice(0, clock.size))
-    steady = difference < SAME_MOTION * np.ptp(motion)
-    breaks = np.flatnonzero(np.diff(steady, prepend=True, append=True)).reshape(-1, 2)
-    breaks = breaks[clock[breaks[:, 1] - 1] - clock[breaks[:, 0]] > _BRIEF * period]
-    stretches = np.concatenate(([0], breaks.ravel(), [steady.size])).reshape(-1, 2)  # between breaks that count
-    start, end = stretches[np.argmax(np.diff(stretches))]
-    before, after = start > 0, end < difference.size
-    if start == end or not (before or after):  # none or all are steady
+    spans = steady_spans(loop, time, motion)
+    if not spans:
         return loop, None
-    most_off = _MOST_OFF * np.median(difference[start:end]) + _LEAST_OFF * np.ptp(motion)
-    unsteady = np.flatnonzero(difference[start:end] > most_off) + start
-    if before:
-        start = max(unsteady[clock[unsteady] < clock[start] + _EDGE * period], default=start - 1) + 1
-    if after:
-        end = min(unsteady[clock[unsteady] > clock[end - 1] - _EDGE * period], default=end)
-    first, last = float(time[start]), float(time[end - 1]) + period
-    if before and last - first > THREE_CYCLES * period:
-        first += period  # after a run-in the first cycle still remembers it
-    gaps = (f"{gap:.3g} s" if gap > _BRIEF * period else "" for gap in (first - time[0], time[-1] - last))
-    note = omitted_rows_sentence(gaps, (last - first) / period)
-    return _cut(loop, first, last if after else np.inf), note
+    span = max(spans, key=lambda span: span.end - span.begin)
+    first, last = span.begin, span.end
+    if first > time[0] and span.cycles > THREE_CYCLES:
+        first += span.period  # after a run-in the first cycle still remembers it
+    gaps = [f"{gap:.3g} s" if gap > _BRIEF * period else "" for gap in (first - time[0], time[-1] - last)]
+    if not any(gaps):
+        return loop, None
+    note = omitted_rows_sentence(gaps, (last - first) / span.period)
+    return _cut(loop, first, last if gaps[1] else np.inf), note
 
 
 def _cut(loop: Loop, first: float, last: float) -> Loop:
