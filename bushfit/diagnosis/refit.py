@@ -12,7 +12,7 @@ from bushfit.effects.contract import Array
 from bushfit.errors import FitError, ModelError
 from bushfit.fitting.common_error import CommonError
 from bushfit.fitting.coordinates import Bounds
-from bushfit.fitting.descent import TOLERANCE, Descent
+from bushfit.fitting.descent import Descent
 from bushfit.fitting.design import shape_start_values
 from bushfit.fitting.preparation import MeasuredTest
 from bushfit.fitting.problem import FitProblem
@@ -99,27 +99,3 @@ def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:
     ]
     tried = {name: shape_start_values(data_sets, model, parameter) for name, parameter in shapes}
     return {name: (float(values.min()), float(values.max())) for name, values in tried.items() if np.ptp(values) > 0.0}
-
-
-def refit_with_free_columns(
-    evidence: Evidence, bare: Evidence, columns: Array, start: Mapping[str, float], bounds: Bounds
-) -> Evidence:
-    """Refit a model together with free deviations of a faulty part of the tests, which else would distort the model.
-
-    Args:
-        evidence: the fitted model and the tests.
-        bare: the same fit with residuals in units of the scatter from point to point.
-        columns: change of the residuals of `bare` per unit of each free deviation, (c, n).
-        start: further starting values, by parameter.
-        bounds: limits of parameters inside their general limits.
-
-    Returns:
-        The better of the fits from the values of `evidence` and from `start`.
-    """
-    names = evidence.solution.coordinates.names
-    start_values = {name: value for name, value in start.items() if name in names}
-    starts = [evidence.model, *([evidence.model.with_values(start_values)] if start_values else [])]
-    problems = [FitProblem(model, bare.data_sets, names, bounds, CommonError(columns)) for model in starts]
-    fits = [Descent.start(problem, TOLERANCE).run() for problem in problems]
-    model = min(fits, key=lambda fit: fit.chi_square).model
-    return replace(evidence, solution=evidence.solution.reevaluate(model, evidence.data_sets))

@@ -21,7 +21,7 @@ from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart
 from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, SearchState, Tests
 from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS, RUBBER
 from bushfit.diagnosis.propose import has_used_parameters
-from bushfit.diagnosis.refit import refit_with_free_columns, refitted
+from bushfit.diagnosis.refit import refitted
 from bushfit.diagnosis.rig_errors import in_scatter_units
 from bushfit.diagnosis.verdict import decide_verdict
 from bushfit.effects.contract import Array
@@ -225,20 +225,19 @@ class Search:
             improves = state.log_weight + log_odds + worth.total > state.log_posterior
             if not improves or state.key | {part.name} in self._visited:
                 continue
-            evidence, bare = state.evidence, state.bare
-            if evidence.reduced_chi_square > _BENT:  # perhaps by the part
-                start = {} if state.effects else self.request.start
-                evidence = refit_with_free_columns(evidence, bare, better.columns, start, self.request.data.bounds)
-                bare = in_scatter_units(evidence)
             grown = replace(
                 state,
-                evidence=evidence,
-                bare=bare,
                 faulty_parts=(*state.faulty_parts, better),
                 log_prior=state.log_prior + log_odds,
                 amounts=(*state.amounts, worth.likeliest),
                 change=max(state.change, worth.size),
             )
+            if grown.evidence.reduced_chi_square > _BENT:  # perhaps by the part
+                models, columns = {"": grown.evidence.model}, grown.free_columns(0.0)
+                starts = [{}] if grown.effects else [{}, self.request.start]
+                fits = [fit for start in starts for _, fit in self._refitted(grown, models, start, columns)]
+                evidence = min(fits, key=lambda fit: (fit.joint or fit.solution).chi_square, default=grown.evidence)
+                grown = replace(grown, evidence=evidence, bare=in_scatter_units(evidence))
             yield self._visit(grown)
 
     def _without_earlier(self, state: SearchState) -> Iterator[SearchState]:
