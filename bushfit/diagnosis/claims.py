@@ -14,7 +14,7 @@ import numpy as np
 
 from bushfit.effects import BASE
 from bushfit.effects.contract import Array
-from bushfit.effects.mistakes import MISTAKES, SEPARATOR, Mistake, file_or_name, get_mistake, labelled
+from bushfit.effects.mistakes import MISTAKES, Mistake, file_or_name, get_mistake, labelled
 from bushfit.errors import ModelError
 from bushfit.fitting.preparation import MeasuredSweep, MeasuredTest, prepare_loops, with_gain_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
@@ -39,15 +39,17 @@ _LEAST_CHANGE = 1e-6
 _RIDGE = 1e-12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Claim:
     """Hypothesis that the record of a campaign has one mistake, in one or several tests or in [bushing].
 
     Args:
+        data: the campaign as it was read.
         mistake: kind of mistake, such as a wrong unit, with its correction.
         tests: indices of the affected tests, loops before sweeps; empty for a mistake in [bushing].
     """
 
+    data: PreparedCampaign
     mistake: Mistake
     tests: tuple[int, ...]
 
@@ -57,47 +59,43 @@ class Claim:
         return self.mistake.name, self.tests
 
     @property
-    def single_tests(self) -> list[Claim]:
-        """Split a claim on several tests into claims of the same mistake in one test; unchanged for [bushing]."""
-        return [Claim(self.mistake, (index,)) for index in self.tests] or [self]
+    def affected(self) -> list[MeasuredTest]:
+        """Affected tests; empty for a mistake in [bushing]."""
+        return [self.data.data_sets[index] for index in self.tests]
 
-    def test(self, data: PreparedCampaign) -> str | None:
-        """Name of the first affected test; None for a mistake in [bushing]."""
-        return [*data.loops, *data.sweeps][self.tests[0]].name if self.tests else None
-
-    def labels(self, data: PreparedCampaign) -> tuple[str, ...]:
+    @property
+    def labels(self) -> tuple[str, ...]:
         """Values of the option --adopt that correct the mistake, "mistake:test" for each affected test."""
-        return tuple(labelled(self.mistake.name, claim.test(data)) for claim in self.single_tests)
+        labels = tuple(labelled(self.mistake.name, test.name) for test in self.affected)
+        return labels or (self.mistake.name,)
 
-    def sentence(self, data: PreparedCampaign) -> str:
+    @property
+    def options(self) -> str:
+        """Options of the command diagnose that correct the mistake."""
+        return " ".join(f"--adopt {label}" for label in self.labels)
+
+    @property
+    def sentence(self) -> str:
         """Sentence that states the mistake, with the files of the affected tests."""
-        data_sets = [*data.loops, *data.sweeps]
-        files = [file_or_name(data_sets[index].test) for index in self.tests]
+        files = [file_or_name(test.test) for test in self.affected]
         return self.mistake.sentence.format(files=" and ".join(filter(None, (", ".join(files[:-1]), *files[-1:]))))
 
-    def corrections(self, data: PreparedCampaign) -> tuple[str, ...]:
+    @property
+    def corrections(self) -> tuple[str, ...]:
         """Lines to write into the campaign file to correct the mistake, one for each affected test."""
-        data_sets = [*data.loops, *data.sweeps]
-        return tuple(self.mistake.correction_line(data_sets[index].test) for index in self.tests) or (
+        return tuple(self.mistake.correction_line(test.test) for test in self.affected) or (
             self.mistake.correction_line(None),
         )
 
-    def corrected(self, data: PreparedCampaign) -> PreparedCampaign:
-        """Correct the mistake, in the tests or in the dimensions of the bushing.
-
-        Args:
-            data: the campaign as it was read.
-
-        Returns:
-            The corrected campaign.
-        """
-        campaign = data.campaign
+    def corrected(self) -> PreparedCampaign:
+        """Campaign in which the mistake is corrected, in the tests or in the dimensions of the bushing."""
+        data = self.data
         if not self.tests:
-            bushing = campaign.bushing and self.mistake.corrected_bushing(campaign.bushing)
-            return replace(data, campaign=replace(campaign, bushing=bushing)).with_rubber_conditions()
+            bushing = data.campaign.bushing and self.mistake.corrected_bushing(data.campaign.bushing)
+            return replace(data, campaign=replace(data.campaign, bushing=bushing)).with_rubber_conditions()
         loops, sweeps, count = list(data.loops), [sweep.test for sweep in data.sweeps], len(data.loops)
-        for index in self.tests:
-            test = self.mistake.corrected_test([*data.loops, *data.sweeps][index].test)
+        for index, affected in zip(self.tests, self.affected, strict=True):
+            test = self.mistake.corrected_test(affected.test)
             if isinstance(test, Loop):
                 loops[index] = prepare_loops([test], data.campaign.rig, without_outliers=data.robust)[0]
             elif isinstance(test, Sweep):
@@ -123,50 +121,18 @@ def correct_adopted(data: PreparedCampaign, names: Collection[str]) -> tuple[Pre
     """
     messages = []
     for name in names:
-        claim = _parse_claim(data, name)
-        messages.append(f"corrected by --adopt {name}: read as if {claim.sentence(data)}; {claim.corrections(data)[0]}")
-        data = claim.corrected(data)
+        mistake = get_mistake(name)
+        possible = {claim.labels: claim for claim in claims(data, ()) if claim.mistake is mistake}
+        if (claim := possible.get((name,))) is None:
+            expected = ", ".join(labels[0] for labels in possible if len(labels) == 1)
+            raise ModelError(
+                "this mistake is not possible in this test",
+                found=name,
+                expected=f"one of {expected}" if expected else "another mistake: this one is not possible in any test",
+            )
+        messages.append(f"corrected by --adopt {name}: read as if {claim.sentence}; {claim.corrections[0]}")
+        data = claim.corrected()
     return data, messages
-
-
-def _parse_claim(data: PreparedCampaign, name: str) -> Claim:
-    """Convert one value of --adopt to the hypothesis of a mistake in the record.
-
-    Args:
-        data: the campaign as it was read.
-        name: value of --adopt, "mistake:test" or "mistake".
-
-    Raises:
-        ModelError: no such test, or the mistake is not possible in the test.
-    """
-    mistake, (mistake_name, _, test) = get_mistake(name), name.partition(SEPARATOR)
-    data_sets: list[MeasuredTest] = [*data.loops, *data.sweeps]
-    possible = [index for index, data_set in enumerate(data_sets) if mistake and _is_possible(mistake, data_set, data)]
-    tests = tuple(index for index in possible if data_sets[index].name == test)
-    if mistake is None or bool(tests) != bool(mistake.kinds) or (test and not tests):
-        expected = [labelled(mistake_name, data_sets[index].name) for index in possible]
-        raise ModelError(
-            "this mistake is not possible in this test",
-            found=name,
-            expected="one of " + ", ".join(expected)
-            if expected
-            else "another mistake: this one is not possible in any test",
-        )
-    return Claim(mistake, tests)
-
-
-def _is_possible(mistake: Mistake, data_set: MeasuredTest, data: PreparedCampaign) -> bool:
-    """True if a mistake is possible in a test, whose modulus and strain it must make plausible.
-
-    Args:
-        mistake: kind of mistake, such as a wrong unit.
-        data_set: the test.
-        data: campaign as it was read, with the bushing.
-    """
-    bushing, place = data.campaign.bushing, data_set.direction
-    modulus = float(np.median(np.abs(data_set.measured))) / stiffness_per_modulus(bushing, place)
-    strain = float(np.max(data_set.amplitude)) * unit_strain(bushing, place)
-    return mistake.possible(data_set.test) and mistake.explains(data_set.test, modulus, strain)
 
 
 def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
@@ -179,24 +145,27 @@ def claims(data: PreparedCampaign, without: Collection[str]) -> list[Claim]:
     Returns:
         Hypotheses without duplicates.
     """
-    data_sets: list[MeasuredTest] = [*data.loops, *data.sweeps]
-    found = []
+    data_sets, bushing, found = data.data_sets, data.campaign.bushing, list[Claim]()
+    shared = [(data_set.kind, data_set.direction) for data_set in data_sets]
+    marks = dict.fromkeys([*(kind for kind, _ in shared), *(place for _, place in shared)])
+    moduli = [np.median(np.abs(x.measured)) / stiffness_per_modulus(bushing, x.direction) for x in data_sets]
+    strains = [np.max(x.amplitude) * unit_strain(bushing, x.direction) for x in data_sets]
     for mistake in MISTAKES.values():
         if mistake.name in without:
             continue
         if not mistake.kinds:
-            found += [Claim(mistake, ())] if data.campaign.bushing else []
+            found += [Claim(data, mistake, ())] if bushing else []
             continue
         indices = [
             index
             for index, data_set in enumerate(data_sets)
-            if _is_possible(mistake, data_set, data) and labelled(mistake.name, data_set.name) not in without
+            if labelled(mistake.name, data_set.name) not in without
+            and mistake.possible(data_set.test)
+            and mistake.explains(data_set.test, float(moduli[index]), float(strains[index]))
         ]
         groups: list[tuple[int, ...]] = [(index,) for index in indices]
-        groups += [tuple(p for p in indices if data_sets[p].kind == kind) for kind in ("loop", "sweep")]
-        directions = dict.fromkeys(data_set.direction for data_set in data_sets)
-        groups += [tuple(p for p in indices if data_sets[p].direction == direction) for direction in directions]
-        found += [Claim(mistake, group) for group in dict.fromkeys([*groups, tuple(indices)]) if group]
+        groups += [tuple(index for index in indices if mark in shared[index]) for mark in marks]
+        found += [Claim(data, mistake, group) for group in dict.fromkeys([*groups, tuple(indices)]) if group]
     return found
 
 
@@ -241,7 +210,7 @@ class ClaimScreening:
         bushing = self.data.campaign.bushing
         if claim and not claim.tests and bushing:
             bushing = claim.mistake.corrected_bushing(bushing)
-        data_sets: list[MeasuredTest] = [*self.data.loops, *self.data.sweeps]
+        data_sets = self.data.data_sets
         mistakes = [claim.mistake if claim and index in claim.tests else None for index in range(len(data_sets))]
         try:
             parts = [self._test_products(index, test, mistakes[index], bushing) for index, test in enumerate(data_sets)]

@@ -1,16 +1,16 @@
 """Names, texts and probabilities of the explanations of a gap, and the table of all candidates."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis
+from bushfit.diagnosis.hypotheses import Hypothesis
 from bushfit.diagnosis.record import CandidateResult, NamedCause, Odds, format_probability
 from bushfit.diagnosis.search import Search
 from bushfit.diagnosis.verdict import Composition, Finding
 from bushfit.effects import get_effect
-from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.model.covariance import Covariance
 from bushfit.model.model import Model
 
@@ -21,16 +21,16 @@ LEVELS = "errors of levels beyond the class of the rig"
 _LESS_LIKELY = "another explanation is more probable"
 
 
-def reported_names(composition: Composition, data: PreparedCampaign) -> list[str]:
+def reported_names(composition: Composition) -> list[str]:
     """Names of the mistakes in the record (as --adopt accepts them) and effects of an explanation."""
     claim = composition.best.claim
-    return [*(claim.labels(data) if claim else ()), *composition.names]
+    return [*(claim.labels if claim else ()), *composition.names]
 
 
-def label(composition: Composition, data: PreparedCampaign) -> str:
+def label(composition: Composition) -> str:
     """Name of an explanation: its mistakes, effects, faulty parts of the tests and other parts, joined by " + "."""
     faults = (f"fault: {part.name}" for part in composition.faulty_parts)
-    return " + ".join((*reported_names(composition, data), *faults, *_nameless(composition)))
+    return " + ".join((*reported_names(composition), *faults, *_nameless(composition)))
 
 
 def _nameless(composition: Composition) -> list[str]:
@@ -38,53 +38,50 @@ def _nameless(composition: Composition) -> list[str]:
     return [LEVELS] * composition.best.levels + [NAMELESS] * composition.unnamed
 
 
-def probability_text(composition: Composition, finding: Finding, data: PreparedCampaign) -> str:
-    """Text with the probability of an explanation and of its most probable rival.
-
-    Args:
-        composition: the explanation.
-        finding: verdict, with all reported explanations.
-        data: tests with their record.
+def probability_text(composition: Composition, finding: Finding) -> str:
+    """Text with the probability of an explanation and of its most probable rival among those reported.
 
     Returns:
         Text such as "probability 90 %, that of inertia 10 %".
     """
     rivals = [rival for rival in finding.reported if rival is not composition][:1]
-    following = [f"that of {label(rival, data)} {format_probability(rival.probability)}" for rival in rivals]
+    following = [f"that of {label(rival)} {format_probability(rival.probability)}" for rival in rivals]
     return ", ".join([f"probability {format_probability(composition.probability)}", *following])
 
 
 def claim_entries(
-    composition: Composition, finding: Finding, request: DiagnosisRequest, alternatives: tuple[str, ...] = ()
+    composition: Composition, finding: Finding, base: Evidence, alternatives: tuple[str, ...] = ()
 ) -> list[NamedCause]:
     """List the reported entries for the mistake in the record of an explanation, one for each affected test.
 
     Args:
         composition: the explanation.
         finding: verdict, with all reported explanations.
-        request: input of the search, with the tests as recorded and the starting model fitted to them.
+        base: starting model, fitted to the tests as recorded.
         alternatives: names of explanations that the tests cannot distinguish from this one.
 
     Returns:
         Entries with the sentence and the correction; none if the explanation has no mistake.
     """
-    data, claim = request.data, composition.best.claim
-    gain = request.base.chi_square - composition.best.state.evidence.chi_square
-    why = f"lowers chi-square by {gain:.0f} without a new parameter; {probability_text(composition, finding, data)}"
+    if (claim := composition.best.claim) is None:
+        return []
+    gain = base.chi_square - composition.best.state.evidence.chi_square
+    why = f"lowers chi-square by {gain:.0f} without a new parameter; {probability_text(composition, finding)}"
+    singles = [replace(claim, tests=(index,)) for index in claim.tests] or [claim]
     return [
         NamedCause(
             single.mistake.name,
             why,
             alternatives,
-            test=single.test(data),
-            sentence=single.sentence(data),
-            correction=single.corrections(data)[0],
+            test=next((test.name for test in single.affected), None),
+            sentence=single.sentence,
+            correction=single.corrections[0],
         )
-        for single in (claim.single_tests if claim else ())
+        for single in singles
     ]
 
 
-def explanation_odds(finding: Finding, data: PreparedCampaign) -> Odds:
+def explanation_odds(finding: Finding) -> Odds:
     """List the reported explanations with texts, probabilities and fitted models.
 
     Returns:
@@ -94,7 +91,7 @@ def explanation_odds(finding: Finding, data: PreparedCampaign) -> Odds:
     sentences, fits = list[str](), list[tuple[Model, Covariance] | None]()
     for composition in compositions:
         claim = composition.best.claim
-        parts = [claim.sentence(data)] if claim else []
+        parts = [claim.sentence] if claim else []
         parts += [f"{get_effect(name).phrase} ({name})" for name in composition.names]
         parts += [f"a faulty test: {part.name}" for part in composition.faulty_parts]
         *parts, last = (*parts, *_nameless(composition))
@@ -104,7 +101,7 @@ def explanation_odds(finding: Finding, data: PreparedCampaign) -> Odds:
             (evidence.model, evidence.covariance_of(evidence.model.values)) if composition.best.refitted else None
         )
     pairs = tuple(zip(sentences, (composition.probability for composition in compositions), strict=True))
-    labels = tuple(label(composition, data) for composition in compositions)
+    labels = tuple(label(composition) for composition in compositions)
     return Odds(finding.nothing, pairs, tuple(fits), labels, finding.verdict == "ambiguous")
 
 
@@ -121,7 +118,7 @@ def list_candidates(
     Returns:
         Candidates with the result of their refit and their probability, the highest score first.
     """
-    base, data = search.request.base, search.request.data
+    base = search.request.base
     log_posteriors = np.array([hypothesis.log_posterior for hypothesis in hypotheses])
     weights = np.exp(log_posteriors - log_posteriors[0])
     shares = (weights / weights.sum()).tolist()
@@ -135,7 +132,7 @@ def list_candidates(
         elif claim:
             gain = base.chi_square - evidence.chi_square
             why = "closes the gap" if first and first.best is hypothesis else _LESS_LIKELY
-            candidates.append(CandidateResult(" + ".join(claim.labels(data)), gain, gain, share, {}, why))
+            candidates.append(CandidateResult(" + ".join(claim.labels), gain, gain, share, {}, why))
     for proposal in search.root.proposals:
         name, after = proposal.name, alone.get(proposal.name)
         pairs = zip(hypotheses, shares, strict=True)

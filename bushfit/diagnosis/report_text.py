@@ -103,7 +103,7 @@ class DiagnosisWriter:
         base, plain = self._with_free_gains(request.base), self._with_free_gains(after)
         company = " with the other named effects" if len(names) > 1 else ""
         why = f"lowers chi-square by {base.chi_square - plain.chi_square:.0f}{company}; "
-        why += probability_text(first, self.finding, request.data)
+        why += probability_text(first, self.finding)
         entries = [NamedCause(name, why) for name in names]
         gap, rest, holdout = None, list[str](), None
         if self.finding.verdict == "named":
@@ -153,17 +153,16 @@ class DiagnosisWriter:
 
     def _mistaken_record(self, first: Composition) -> Diagnosis:
         """Diagnosis in which a mistake in the record explains the gap; the model to use is unchanged."""
-        data, best, claim = self.request.data, first.best, first.best.claim
+        best, claim = first.best, first.best.claim
         assert claim is not None
-        command = " ".join(["bushfit diagnose CAMPAIGN", *(f"--adopt {name}" for name in claim.labels(data))])
-        corrections = "; ".join(claim.corrections(data))
+        command, corrections = f"bushfit diagnose CAMPAIGN {claim.options}", "; ".join(claim.corrections)
         advice = f"if the records of the tests confirm this mistake, state {corrections} (or {command})"
-        summary = f"these tests agree if {claim.sentence(data)}"
-        entries = claim_entries(first, self.finding, self.request)
+        summary = f"these tests agree if {claim.sentence}"
+        entries = claim_entries(first, self.finding, self.request.base)
         diagnosis = self._build(
             self.finding.verdict, summary, self.request.base, entries, places=best, next_test=advice
         )
-        warning = f"fitted to the tests as they are, which only agree if {claim.sentence(data)}: {advice}"
+        warning = f"fitted to the tests as they are, which only agree if {claim.sentence}: {advice}"
         after = self._with_free_gains(best.state.evidence)
         return replace(
             diagnosis,
@@ -177,23 +176,21 @@ class DiagnosisWriter:
         """Diagnosis in which the tests cannot distinguish several explanations, with the test that would."""
         request, compositions = self.request, self.finding.reported
         leader = next((c for c in compositions if c.names or c.best.claim), None)
-        alternatives = tuple(
-            label(composition, request.data) for composition in compositions if composition is not leader
-        )
+        alternatives = tuple(label(composition) for composition in compositions if composition is not leader)
         fitted = [composition for composition in compositions if composition.best.effects and composition.best.refitted]
         models = [composition.best.state.evidence.model for composition in fitted]
         odds = [composition.probability for composition in fitted]
         advice = deciding_test(models, odds, request.base.data_sets, request.data.campaign.rig)
         entries: list[NamedCause] = []
         if leader and leader.best.claim:
-            entries = claim_entries(leader, self.finding, request, alternatives)
-            advice = f"check the records of the tests; {'; '.join(leader.best.claim.corrections(request.data))}"
+            entries = claim_entries(leader, self.finding, request.base, alternatives)
+            advice = f"check the records of the tests; {'; '.join(leader.best.claim.corrections)}"
         elif leader:
-            probability = probability_text(leader, self.finding, request.data)
+            probability = probability_text(leader, self.finding)
             entries = [NamedCause(name, probability, alternatives) for name in leader.names]
-        names = [" + ".join(reported_names(composition, request.data)) for composition in compositions]
+        names = [" + ".join(reported_names(composition)) for composition in compositions]
         are_distinct = all(names) and len({*names}) == len(names)
-        *labels, last = names if are_distinct else (label(composition, request.data) for composition in compositions)
+        *labels, last = names if are_distinct else (label(composition) for composition in compositions)
         summary = f"these tests cannot distinguish between {', '.join(labels)} and {last}"
         places = next((composition.best for composition in compositions if composition.faulty_parts), None)
         return self._build("ambiguous", summary, request.base, entries, places=places, next_test=advice)
@@ -203,7 +200,7 @@ class DiagnosisWriter:
         finding, best = self.finding, self.first.best if self.first else None
         leads = f"; leads: {' and '.join(finding.leads)}" if finding.leads else ""
         if best and best.claim and len({c.best.claim and c.best.claim.key for c in finding.reported}) == 1:
-            leads = f"; check first whether {best.claim.sentence(self.request.data)}"
+            leads = f"; check first whether {best.claim.sentence}"
         at_fault = " and ".join(part.name for part in best.faulty_parts) if best else ""
         is_fault = best is not None and finding.verdict == "unexplained"
         if not is_fault and (gap := self._described(self.request.base)):
@@ -267,7 +264,7 @@ class DiagnosisWriter:
         lacking = verdict in ("partly", "ambiguous", "unexplained") and not (self.first and self.first.best.claim)
         resolved, corrected = {*base.model.effects} - {*self.request.settings.unresolved}, gap.fitted if gap else None
         regions = tuple(sorted((*at_fault, *find_regions(base)), key=lambda region: -region.excess))
-        odds = explanation_odds(self.finding, self.request.data)
+        odds = explanation_odds(self.finding)
         result = odds.averaged(result_of(after, bounds, resolved, lacking=lacking, corrected=corrected, fixed=known))
         amounts = filter(None, (_format_amount(entry.name, result) for entry in entries))
         return Diagnosis(

@@ -292,7 +292,7 @@ class Search:
         possible = claims(data, without)
         for claim in track("mistakes put right", list(ClaimScreening(data).best(possible, _CLAIMS))):
             with suppress(FitError, ModelError):  # corrected tests that nothing can be fitted to
-                evidence = self.request.fit_corrected(claim.corrected(data))
+                evidence = self.request.fit_corrected(claim.corrected())
                 if [test.size for test in evidence.data_sets] == [test.size for test in base.data_sets]:
                     odds = log(ODDS["record"]) - log(len(possible)) - 0.5 * _modulus_deviation(evidence) ** 2
                     change = _record_change(base, evidence)

@@ -65,8 +65,7 @@ def diagnose(
         except FitError as error:
             thousands = [claim for claim in claims(data, settings.without) if claim.mistake.scales]
             for claim in ClaimScreening(data).best(thousands, 1):
-                options = " ".join(f"--adopt {label}" for label in claim.labels(data))
-                error.hint = f"these tests agree if {claim.sentence(data)}: {options} corrects it"
+                error.hint = f"these tests agree if {claim.sentence}: {claim.options} corrects it"
             raise
         known_rows = {(outlier.test, outlier.row) for outlier in excluded}  # a robust fit finds them anew
         candidates = (*outliers, *list_outliers(base.model, split_by_kind(base.data_sets)[1]))
