@@ -14,6 +14,7 @@ from bushfit.effects.contract import Array, RubberConditions
 from bushfit.fitting.noise import LineKey, SweepNoise, sweep_noise
 from bushfit.fitting.preparation import MeasuredLoop, MeasuredSweep, repeats_of, with_gain_errors
 from bushfit.fitting.prepared_campaign import PreparedCampaign
+from bushfit.gaussian_process import spread_nodes
 from bushfit.reading.measurement import Sweep
 
 #: Number of points above which a run is long; chosen for time: stepped sines have tens, a swept sine thousands.
@@ -83,27 +84,21 @@ def shorten_tests(data: PreparedCampaign) -> tuple[PreparedCampaign, tuple[str, 
 def _select_loops(loops: Sequence[MeasuredLoop]) -> Sequence[MeasuredLoop]:
     """Select loops with at most `_MOST_ROWS` rows in total, but at least one loop of each direction.
 
-    Distinct loops are selected before repeats. If they are too many, the selection is evenly spread over direction,
-    amplitude and frequency.
+    Distinct loops, far apart in direction, amplitude and frequency, are selected before repeats.
     """
-    sizes = np.array([loop.size for loop in loops])
+    sizes, directions = np.array([loop.size for loop in loops]), [str(loop.direction) for loop in loops]
     if sizes.sum() <= _MOST_ROWS:
         return loops
-    keys = [(str(loop.direction), loop.prepared.amplitude, loop.prepared.frequency) for loop in loops]
     times_before = np.tril(repeats_of(loops), -1).sum(axis=1)
-    distinct = sorted(np.flatnonzero(times_before == 0).tolist(), key=keys.__getitem__)
-    repeats = [n for n in np.argsort(times_before, kind="stable").tolist() if times_before[n]]
-    one_per_direction = {next(n for n in distinct if keys[n][0] == direction) for direction, *_ in keys}
-
-    def is_small(chosen: set[int]) -> bool:
-        return bool(sizes[list(chosen)].sum() <= _MOST_ROWS)
-
-    spread = (np.linspace(0, len(distinct) - 1, n).round().astype(int) for n in range(len(distinct), 0, -1))
-    choices = (one_per_direction | {distinct[n] for n in indices} for indices in spread)
-    chosen = next(filter(is_small, choices), one_per_direction)
-    for n in repeats if len(chosen) == len(distinct) else ():
-        if is_small(chosen | {n}):
-            chosen = chosen | {n}
+    distinct = np.flatnonzero(times_before == 0)
+    points = np.log([(loop.prepared.frequency, loop.prepared.amplitude) for loop in loops])
+    apart = 1e3 * np.unique(directions, return_inverse=True)[1]
+    spread = distinct[spread_nodes(np.column_stack((points, apart))[distinct], distinct.size)]
+    chosen = list[int]()
+    for n in dict.fromkeys([*spread.tolist(), *np.argsort(times_before, kind="stable").tolist()]):
+        is_first = directions[n] not in {directions[other] for other in chosen}
+        if is_first or sizes[[*chosen, n]].sum() <= _MOST_ROWS:
+            chosen.append(n)
     return [loops[n] for n in sorted(chosen)]
 
 

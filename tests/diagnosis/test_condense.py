@@ -120,7 +120,7 @@ def test_a_hidden_lag_is_named_in_a_long_sweep_and_the_means_are_told():
     assert low < 2e-4 < high
 
 
-@pytest.mark.parametrize(("most", "kept"), [(6.0, "012345"), (5.0, "01235"), (4.1, "0125"), (3.2, "015"), (0.1, "15")])
+@pytest.mark.parametrize(("most", "kept"), [(6.0, "012345"), (5.0, "01235"), (4.1, "0125"), (3.2, "015"), (0.1, "05")])
 def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_repeated(
     campaign, monkeypatch, most, kept
 ):
@@ -144,4 +144,4 @@ def test_of_very_many_rows_of_loops_each_loop_once_is_diagnosed_before_any_is_re
     assert all(f"{len(kept)} of the 6 loops are used in the diagnosis" in words for words in said)
     assert fewer.sweeps == data.sweeps
     whole = sum(made[int(name)][1] == 1.0 and made[int(name)][2] == 0 for name in kept)
-    assert fewer.loops[0].gain_error == pytest.approx(0.01 * np.sqrt(whole if kept[0] != "1" else 1))
+    assert fewer.loops[0].gain_error == pytest.approx(0.01 * np.sqrt(whole))
