@@ -12,13 +12,14 @@ from rigged import LEVELS, SHARED, both, loop_too_strong, off
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.explanations import Explanation, compound_shapes, is_pattern
+from bushfit.diagnosis.explanations import Explanation, compound, compound_shapes, is_pattern
 from bushfit.diagnosis.faulty_parts import find_faulty_parts
 from bushfit.diagnosis.linear_model import LinearModel
-from bushfit.diagnosis.propose import proposals, scores
+from bushfit.diagnosis.propose import proposals, scores, sensitivity
 from bushfit.diagnosis.rig_errors import in_scatter_units, rig_errors
 from bushfit.effects import BASE, LIBRARY
 from bushfit.fitting.preparation import split_by_kind
+from bushfit.geometry import Direction
 
 SHARED_RIG = RigSettings(gain_error=4e-3, phase_error=3.5e-3)
 
@@ -82,6 +83,17 @@ def test_scores_are_those_of_a_linear_refit(bare):
         assert seen
         assert gain == pytest.approx(float((before - after)[0]), rel=1e-6)
         assert amount == pytest.approx(-answer[-1], rel=1e-6)
+
+
+def test_beside_a_compound_that_deviates_the_strain_of_each_direction_is_inexact(bare):
+    """By five times its deviation, as one strain stands for an uneven field; only where there are two directions."""
+    columns = compound(bare).columns
+    (change,) = sensitivity(bare.model, bare.data_sets, LIBRARY["strain_scale.radial"])[1]
+    change *= 5.0 / LIBRARY["strain_scale.radial"].amount.typical
+    assert np.linalg.norm(columns[:, : change.size] - change, axis=1).min() < 0.02 * np.linalg.norm(change)
+    axial = tuple(test for test in bare.data_sets if test.direction == Direction.AXIAL)
+    one = replace(bare, solution=bare.solution.reevaluate(bare.model, axial), data_sets=axial)
+    assert len(compound(one).columns) == len(columns) - 2
 
 
 def test_the_compound_bends_a_loop_in_odd_overtones_and_in_the_first_cycle(bare):
