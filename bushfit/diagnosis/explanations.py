@@ -217,13 +217,14 @@ def outlier_clusters(
     return found
 
 
-def compound(evidence: Evidence) -> Group | None:
+def compound(evidence: Evidence, count: int = _COMPOUND_PATTERNS) -> Group | None:
     """Changes of the residuals by a compound whose modulus deviates smoothly from the model's laws.
 
     The relative deviation is a random function of frequency and strain, the same in all directions and specimens.
 
     Args:
         evidence: fitted model and tests.
+        count: maximum number of patterns.
 
     Returns:
         Group of independent patterns of the deviation, of unit variance at each operating point, and of deviations of
@@ -231,7 +232,7 @@ def compound(evidence: Evidence) -> Group | None:
     """
     if not evidence.data_sets:
         return None
-    limits = {"count": _COMPOUND_PATTERNS, "correlate": _compound_correlation}
+    limits = {"count": count, "correlate": _compound_correlation}
     columns, changes = _smooth_changes(evidence, evidence.data_sets, _COMPOUND_LENGTHS, **limits)
     columns, changes = map(np.concatenate, zip((columns, changes), _strain_changes(evidence), strict=True))
     for loops in group_repeats(split_by_kind(evidence.data_sets)[0]):

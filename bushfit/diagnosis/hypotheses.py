@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -24,6 +24,8 @@ from bushfit.effects import get_effect, qualified_name
 from bushfit.effects.contract import Array
 from bushfit.fitting.prepared_campaign import PreparedCampaign
 from bushfit.fitting.rig_class import ASSUMED, class_errors
+from bushfit.gaussian_process import MAXIMUM_NODES
+from bushfit.model.covariance import Covariance
 
 #: Natural log of the odds below the best at which a noise case is left out; chosen for time: a case of relative weight
 #: e^-8 changes no verdict.
@@ -293,6 +295,20 @@ class SearchState:
         compound = self.tests.compound_in_fits if deviation else None
         columns += [deviation * compound.whole] if compound else []
         return np.concatenate(columns) if columns else None
+
+    def covariance_of(self, names: Collection[str]) -> Covariance:
+        """Covariance of named parameters beside the rig's errors and a deviation of the compound in all its patterns.
+
+        Args:
+            names: names of parameters; those at the end of their range are left out.
+        """
+        solution = self.bare.solution
+        linear = replace(self.linear, compound=compound(self.bare, MAXIMUM_NODES), chosen_cases=self._likely_cases)
+        moves = np.isfinite([self.precision.get(name, 0.0) for name in solution.coordinates.names])
+        slopes, rows = solution.coordinates.slopes(self.bare.model.values)[moves], slice(np.count_nonzero(moves))
+        matrix = linear.parameter_covariance()[rows, rows] * np.outer(slopes, slopes)
+        fitted = Covariance(tuple(np.array(solution.coordinates.names)[moves].tolist()), matrix)
+        return fitted.restricted([name for name in names if name not in solution.at_bound])
 
     @cached_property
     def proposals(self) -> list[Proposal]:
