@@ -85,6 +85,15 @@ class Evidence:
         """Names of the parameters that the fit kept at their values."""
         return [name for name in self.model.values if name not in self.solution.coordinates.names]
 
+    def covariance_of(self, names: Collection[str]) -> Covariance:
+        """Covariance of named parameters, from the fit with errors that tests share, if there is one."""
+        fitted = self.joint or self.solution
+        full = np.linalg.pinv(fitted.jacobian @ fitted.jacobian.T, rcond=1e-12, hermitian=True)
+        full *= max(fitted.chi_square / max(fitted.residual.size - len(full), 1), 1.0)  # what the fit misses
+        slopes = fitted.coordinates.slopes(self.model.values)
+        covariance = Covariance(fitted.coordinates.names, full * np.outer(slopes, slopes))
+        return covariance.restricted([name for name in names if name not in fitted.at_bound])
+
     @cached_property
     def span(self) -> Array:
         """Orthonormal basis of the residuals that the parameters of the model can absorb, (n, k)."""

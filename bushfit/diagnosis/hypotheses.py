@@ -296,7 +296,7 @@ class SearchState:
         columns += [deviation * compound.whole] if compound else []
         return np.concatenate(columns) if columns else None
 
-    def covariance_of(self, names: Collection[str]) -> Covariance:
+    def amount_covariance(self, names: Collection[str]) -> Covariance:
         """Covariance of named parameters beside the rig's errors and a deviation of the compound in all its patterns.
 
         Args:

@@ -93,7 +93,7 @@ class DiagnosisWriter:
             added = {
                 key: state.evidence.model.values[key] for key in model.values if key not in request.base.model.values
             }
-            model, fixed, known = model.with_values(added), [*fixed, *added], state.covariance_of(added)
+            model, fixed, known = model.with_values(added), [*fixed, *added], state.amount_covariance(added)
         else:
             state = min(states, key=lambda state: len(state.effects) > len(names))
             model = state.evidence.model
