@@ -44,7 +44,7 @@ _PATTERN = re.compile(r"[*?\[]")
 
 
 def _check_name(lookup: Callable[[str], Effect], raw: object, _: object) -> object:
-    """Return the name of an effect unchanged; `lookup` raises an error for an unknown name."""
+    """Check the name of an effect in a manifest, for pydantic: `lookup` raises an error for an unknown name."""
     if isinstance(raw, str):
         lookup(raw)
     return raw

@@ -191,7 +191,11 @@ def comparable_sweeps(sweeps: pd.DataFrame | None, result: Result) -> pd.DataFra
 
 
 def group_warnings(warnings: Iterable[str]) -> dict[str, list[str]]:
-    """Group warnings by their meaning for the use of the numbers, the most important first."""
+    """Group warnings that have the same meaning for the use of the numbers.
+
+    Returns:
+        Warnings by the sentence that says what they mean, the most important first.
+    """
     groups = dict[str, list[str]]()
     for warning in by_importance(warnings):
         groups.setdefault(consequence_of(warning), []).append(warning)

@@ -97,7 +97,11 @@ def format_interval(values: Sequence[float], digits: int = 4) -> str:
 
 
 def describe_basis(record: ReportRecord, place: str) -> str:
-    """Describe the tests behind the prediction of a direction or specimen, and its deviation from tests not fitted.
+    """State from which tests a direction or specimen is predicted, and how far the model misses its unfitted tests.
+
+    Args:
+        record: input of the report.
+        place: name of the direction or specimen.
 
     Returns:
         The sentence, without a full stop.

@@ -59,7 +59,7 @@ class SweepGroup(NamedTuple):
 
     @property
     def shares_levels(self) -> bool:
-        """True if the curves differ only in the fixed amplitude or frequency, not in temperature, part or test."""
+        """True if the curves of this panel differ only in their fixed amplitude or frequency, so that a scale suits."""
         return self.palette in ("amplitude", "frequency")
 
     def thinned(self) -> SweepGroup:

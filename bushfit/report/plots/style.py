@@ -167,7 +167,7 @@ class Style(NamedTuple):
     marker: str
 
     def handle(self, marked: bool) -> Line2D:
-        """Make the line that represents this style in a legend; `marked` adds the marker."""
+        """Make the legend entry of this style: a line, and its marker if `marked` is true."""
         return Line2D([], [], color=self.color, ls=self.dashes, lw=1.3, marker=self.marker * marked, **POINT)
 
 

@@ -114,4 +114,5 @@ def test_medians_limits_and_names(count):
     assert titles(figure)[0].startswith(f"mu [MPa]: {out.sum()} out\n")
     assert titles(figure)[0].endswith(", ".join(f"$name {k}" for k in np.flatnonzero(out)[:3]))
     assert sum(len(line.get_xdata()) for line in points(axes)) == count - 1, "each bushing that has a value, once"
+    assert sum(len(line.get_xdata()) for line in points(axes) if line.get_color() == "#c1272d") == out.sum()
     assert other.get_ylim()[0] < 0.24 < other.get_ylim()[1]
