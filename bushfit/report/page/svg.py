@@ -54,17 +54,10 @@ def picture(chart: Chart, name: str, title: str) -> Picture:
     Returns:
         Title, caption and drawing for the template.
     """
-    full_height, full_ends = chart.get_figheight(), (chart.subplotpars.bottom, chart.subplotpars.top)
-    for text in (chart.heading, chart.footer):
-        text.set_visible(False)
-    chart.set_figheight(chart.panel_height / 2.54)
-    chart.subplots_adjust(bottom=chart.panel_ends[0], top=chart.panel_ends[1])
+    chart.arrange(texts=False)
     image, axes = plots.style.to_image(chart, "svg", outlines=False), list(panel_axes(chart))
     width, height = 72.0 * chart.get_size_inches()
-    for text in (chart.heading, chart.footer):
-        text.set_visible(True)
-    chart.set_figheight(full_height)
-    chart.subplots_adjust(bottom=full_ends[0], top=full_ends[1])
+    chart.arrange(texts=True)
     ElementTree.register_namespace("", _SVG.strip("{}"))
     root = ElementTree.parse(io.BytesIO(image)).getroot()
     _rewrite(root, name)

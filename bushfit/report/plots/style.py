@@ -123,14 +123,12 @@ class Chart(Figure):
         height: height of the panels with their labels [cm].
 
     Attributes:
-        panel_height: height of the panels with their labels [cm].
-        panel_ends: lower and upper end of the panels' axes, relative to this height.
         heading, footer: matplotlib texts above and below the panels.
         caption: explanation without the note, in one line, for use in a page.
     """
 
     def __init__(self, title: str, height: float) -> None:
-        self._title, self.panel_height = printable(title, lines=True), height
+        self._title, self._panel_height = printable(title, lines=True), height
         super().__init__(figsize=(_WIDTH / 2.54, height / 2.54), dpi=_DPI, facecolor="white")
 
     def explain(self, *sentences: str, note: str = "") -> Self:
@@ -147,16 +145,24 @@ class Chart(Figure):
         self.caption = printable(" ".join(filter(None, sentences)), lines=True)
         title = textwrap.wrap(self._title, _TITLE_LETTERS)
         lines = textwrap.wrap(f"{self.caption} {printable(note, lines=True)}", _NOTE_LETTERS)
-        above, below = _MARGIN + _TITLE_LINE * len(title), _MARGIN + _NOTE_LINE * len(lines)
-        height = above + self.panel_height + below
+        self._margins = _MARGIN + _TITLE_LINE * len(title), _MARGIN + _NOTE_LINE * len(lines)
+        height = self._panel_height + sum(self._margins)
         self.heading = self.suptitle("\n".join(title), y=1.0 - 0.25 / height, fontsize=TEXT + 1.5, weight="bold")
         below_panels: dict[str, Any] = {"x": 0.01, "y": 0.2 / height, "ha": "left", "fontsize": SMALL, "color": GREY}
         self.footer = self.supxlabel("\n".join(lines), **below_panels)
-        self.panel_ends = self.subplotpars.bottom, self.subplotpars.top  # the panels keep their size and distances
-        self.set_figheight(height / 2.54)
-        ends = ((below + end * self.panel_height) / height for end in self.panel_ends)
-        self.subplots_adjust(**dict(zip(("bottom", "top"), ends, strict=True)))
+        self._panel_ends = self.subplotpars.bottom, self.subplotpars.top
+        self.arrange(texts=True)
         return self
+
+    def arrange(self, *, texts: bool) -> None:
+        """Show or hide title and explanation, and fit the height of the figure; the panels keep size and distances."""
+        above, below = self._margins if texts else (0.0, 0.0)
+        height = above + self._panel_height + below
+        self.set_figheight(height / 2.54)
+        bottom, top = ((below + end * self._panel_height) / height for end in self._panel_ends)
+        self.subplots_adjust(bottom=bottom, top=top)
+        for text in (self.heading, self.footer):
+            text.set_visible(texts)
 
 
 class Style(NamedTuple):
