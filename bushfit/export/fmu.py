@@ -253,7 +253,7 @@ def add_variables(variables: ET.Element, model: TimeModel, displays: Mapping[str
 
 
 def _source(file: str) -> bytes:
-    """Read a file that all FMUs share."""
+    """Content of a C source, or of the skeleton of the XML description, that all FMUs share, from the package."""
     return (files("bushfit.export") / "c" / file).read_bytes()
 
 

@@ -154,7 +154,6 @@ def wrong_labels(
     Args:
         labels: quantities stated in the names of file and sheet.
         direction: direction or specimen.
-
         amplitudes: zero-to-peak amplitudes in the file [m, rad or strain].
         frequencies: frequencies in the file [Hz].
         sampling: sampling rate of a record [Hz], which its name may state; 0 for a sweep.

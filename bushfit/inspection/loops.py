@@ -13,7 +13,7 @@ from bushfit.inspection.plausible import implausible_sizes
 from bushfit.inspection.record import Findings, format_frequencies
 from bushfit.reading.measurement import Floats, Loop
 from bushfit.reading.names import Labels
-from bushfit.reduction.cycles import lone_outliers
+from bushfit.reduction.cycles import lone_outliers, stretches
 from bushfit.reduction.harmonics import cycle_harmonics, resolved_order, series
 from bushfit.reduction.steps import reduce
 from bushfit.reduction.turning_points import noise_threshold
@@ -144,16 +144,17 @@ def stuck_rows(motion: RecordedChannel, force: RecordedChannel) -> list[str]:
     Returns:
         List with one sentence on the longest run of such rows; empty without such rows.
     """
-    is_still = (np.diff(motion.values) == 0.0) & (np.diff(force.values) == 0.0)
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], is_still.astype(np.int8), [0]))))
-    starts, ends = edges[::2], edges[1::2]
-    after = np.minimum(ends + 1, motion.values.size - 1)  # a record may end stuck: then nothing went on
-    travel = np.abs(motion.values[after] - motion.values[starts])
-    stuck = (ends - starts + 1 >= _STUCK_ROWS) & (travel > _STUCK_MOTION * np.ptp(motion.values))
-    if not stuck.any():
+    moves = (np.diff(motion.values) != 0.0) | (np.diff(force.values) != 0.0)
+    last, smallest = motion.values.size - 1, _STUCK_MOTION * np.ptp(motion.values)
+    stuck = [
+        rows
+        for rows in stretches(moves, _STUCK_ROWS)  # a record may end stuck: then the motion did not continue
+        if abs(motion.values[min(rows.stop, last)] - motion.values[rows.start]) > smallest
+    ]
+    if not stuck:
         return []
-    longest = int(np.argmax(np.where(stuck, ends - starts, 0)))
-    rows = f"{ends[longest] - starts[longest] + 1} rows from data row {starts[longest] + 1} on"
+    longest = max(stuck, key=lambda rows: rows.stop - rows.start)
+    rows = f"{longest.stop - longest.start} rows from data row {longest.start + 1} on"
     return [f"{rows} repeat one {motion.name} and {force.name}, although the motion continued"]
 
 

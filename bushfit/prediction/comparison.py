@@ -213,7 +213,7 @@ def with_model_patterns(result: Result, predictions: Sequence[Prediction]) -> li
     ends = np.cumsum([prediction.frequency.size for prediction in predictions])[:-1]
 
     def spread(band: Band, shape: Array) -> Band:
-        """Replace the two errors of the model, equal at all n points, by sums of q patterns `shape`, (q, n)."""
+        """Replace the two errors of the model, one number at all n points, by one for each of q patterns, (q, n)."""
         errors = (shape[:, None] * band.root[-2:]).reshape(-1, shape.shape[1])
         return replace(band, root=np.concatenate((band.root[:-2], errors)))
 

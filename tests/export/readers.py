@@ -117,8 +117,7 @@ def by_abaqus(text: str) -> Curves:
     frequency dependence": D11, D12, D22, D13, D23, D33, D14, D24 / D34, D44, D15, D25, D35, D45, D55, D16 / D26, D36,
     D46, D56, D66, frequency in cycles per time.
     """
-    order = [(1, 1), (1, 2), (2, 2), (1, 3), (2, 3), (3, 3), (1, 4), (2, 4), (3, 4), (4, 4), (1, 5), (2, 5), (3, 5)]
-    order += [(4, 5), (5, 5), (1, 6), (2, 6), (3, 6), (4, 6), (5, 6), (6, 6)]
+    order = [(i, j) for j in range(1, 7) for i in range(1, j + 1)]
     found: Curves = {}
     rank, matrices = 0, dict[str, Any]()
     for keyword, parameters, lines in abaqus_options(text):
@@ -168,10 +167,11 @@ def teimorbit(text: str) -> dict[str, tuple[dict[str, str], list[str], np.ndarra
     return {block: (pairs, columns, np.array(table)) for block, (pairs, columns, table) in found.items()}
 
 
-def residual_slices(known: pd.DataFrame, direction: Direction, level: int) -> tuple[np.ndarray, np.ndarray]:
-    """Frequency and complex stiffness of the kept computation at a level of amplitude from 1, or else the last."""
+def residual_slices(known: pd.DataFrame, direction: Direction, level: int) -> tuple[float, np.ndarray, np.ndarray]:
+    """Amplitude, frequencies and complex stiffness of the kept computation at a level from 1, or else the last."""
     rows = known[known["direction"] == direction]
     amplitudes = np.sort(rows["amplitude"].unique())
-    rows = rows[rows["amplitude"] == amplitudes[min(level, amplitudes.size) - 1]].sort_values("frequency")
+    amplitude = amplitudes[min(level, amplitudes.size) - 1]
+    rows = rows[rows["amplitude"] == amplitude].sort_values("frequency")
     storage = rows["stiffness"] / np.hypot(1.0, rows["loss"])
-    return rows["frequency"].to_numpy(), (storage * (1.0 + 1j * rows["loss"])).to_numpy()
+    return float(amplitude), rows["frequency"].to_numpy(), (storage * (1.0 + 1j * rows["loss"])).to_numpy()
