@@ -1,7 +1,7 @@
 """Campaign file of a plan, with which `bushfit simulate` computes the planned tests."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
@@ -10,23 +10,16 @@ import numpy as np
 from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
 from bushfit.campaign.toml import body_lines, place_lines, toml_value
 from bushfit.effects import BASE, qualified_name
-from bushfit.geometry import Specimen
+from bushfit.geometry import Specimen, Unit
 from bushfit.planning.contract import Noise, Plan, Test
 
-#: Settings of [simulate] that are written as they are, in the order of the file.
-_SETTINGS = (
-    "seed", "noise", "force_noise", "force_correlation",
-    "gain_error", "phase_error", "level_gain_error", "level_phase_error",
-)  # fmt: skip
-#: Unit of each number in [simulate] and its tests, by key; None for the unit of the displacement.
-_UNITS: Mapping[str, str | None] = {
-    "phase_error": "rad",
-    "level_phase_error": "rad",
-    "frequency": "Hz",
-    "frequencies": "Hz",
-    "amplitude": None,
-    "amplitudes": None,
+#: Unit and factor from SI of the numbers with a unit in [simulate] and its tests, by key, beside amplitudes.
+_UNITS = {
+    **dict.fromkeys(("phase_error", "level_phase_error"), Unit("rad", 1.0)),
+    **dict.fromkeys(("frequency", "frequencies"), Unit("Hz", 1.0)),
 }
+#: Keys that are not written as a number or text.
+_OTHER_KEYS = ("direction", "temperature", "parameters", "effects", "loops", "sweeps")
 
 
 def simulation_settings(tests: Sequence[Test], noise: Noise) -> SimulateSettings:
@@ -65,44 +58,35 @@ def campaign_toml(plan: Plan) -> str:
         "# Planned by bushfit plan; bushfit simulate computes these tests from the model below. No rubber was tested.",
         "# All repeats of a sweep follow each other here; the order on the rig is that of the sheet.",
         *body_lines(knowledge.model.bushing, dict.fromkeys(place for place in tested if isinstance(place, Specimen))),
-        *("", "[simulate]", *(_toml_line(key, getattr(settings, key)) for key in _SETTINGS)),
+        *("", "[simulate]", *_key_lines(settings)),
         *("", "[simulate.parameters]"),
     ]
     for record in knowledge.model.records:
         lines += [] if record.name in BASE else ["", f"[simulate.effects.{toml_value(record.name)}]"]
         for parameter in record.parameters:
-            value = _twelve_digits(knowledge.model.values[qualified_name(record, parameter)])
+            value = f"{knowledge.model.values[qualified_name(record, parameter)]:.12g}"
             text = value if parameter.unit == "1" else toml_value(f"{value} {parameter.unit}")
             lines.append(f"{parameter.name} = {text}")
     for kind, tests in (("loops", settings.loops), ("sweeps", settings.sweeps)):
         for test in tests:
-            lines += ["", f"[[simulate.{kind}]]", *place_lines(test.direction)]
-            for key in fields(test):  # values other than the default
-                value = getattr(test, key.name)
-                if key.name not in ("direction", "temperature") and value != key.default:
-                    lines.append(_toml_line(key.name, value, test))
+            lines += ["", f"[[simulate.{kind}]]", *place_lines(test.direction), *_key_lines(test)]
     return "\n".join(lines) + "\n"
 
 
-def _toml_line(key: str, value: Any, test: Test | None = None) -> str:
-    """Format one line of a campaign file, with a unit if the key needs one.
+def _key_lines(table: SimulateSettings | Test) -> Iterator[str]:
+    """Generate a line of TOML for each number or text of [simulate], or of a test in it, other than the default.
 
-    Args:
-        key: key of the line.
-        value: value in SI.
-        test: test whose direction or specimen gives the unit of an amplitude; None if the value is no amplitude.
+    Numbers have twelve digits, which hides the rounding errors of unit conversions.
     """
-    if key not in _UNITS:
-        share = isinstance(value, float)
-        return f"{key} = {toml_value(f'{_twelve_digits(100.0 * value)} %') if share else toml_value(value)}"
-    unit, factor = _UNITS[key], 1.0
-    if unit is None and test:
-        unit, factor = test.direction.display.displacement
-    values: Iterable[float] = value if isinstance(value, tuple) else (value,)
-    texts = [toml_value(f"{_twelve_digits(factor * number)} {unit}") for number in values]
-    return f"{key} = [{', '.join(texts)}]" if isinstance(value, tuple) else f"{key} = {texts[0]}"
-
-
-def _twelve_digits(value: float) -> str:
-    """Format a number with twelve digits, which hides the rounding errors of unit conversions."""
-    return f"{value:.12g}"
+    units = dict(_UNITS)
+    if not isinstance(table, SimulateSettings):
+        units |= dict.fromkeys(("amplitude", "amplitudes"), table.direction.display.displacement)
+    for key in fields(table):
+        value = getattr(table, key.name)
+        if key.name in _OTHER_KEYS or value == key.default:
+            continue
+        unit = units.get(key.name, Unit("%", 100.0))
+        values: Iterable[Any] = value if isinstance(value, tuple) else (value,)
+        texts = (f"{unit.factor * one:.12g} {unit.name}" if isinstance(one, float) else one for one in values)
+        listed = ", ".join(map(toml_value, texts))
+        yield f"{key.name} = [{listed}]" if isinstance(value, tuple) else f"{key.name} = {listed}"
