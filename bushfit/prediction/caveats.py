@@ -135,7 +135,8 @@ def unfitted_warnings(result: Result, direction: Place) -> Iterator[str]:
     if not fitted:
         return
     corrected = {effect.corrects for effect in result.model.without(Level.INSTRUMENT).records}
-    bushing, tests = bushing_at(result.model.bushing, direction), " and ".join(fitted)
+    bushing = bushing_at(result.model.bushing, direction)
+    tests = " and ".join(filter(None, (", ".join(fitted[:-1]), fitted[-1])))
     axes = {place.axis for place in result.fitted_places}
     if str(direction) in fitted:
         is_radial = direction.axis is Direction.RADIAL and corrected.isdisjoint(direction.labels)
