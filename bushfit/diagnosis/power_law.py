@@ -77,13 +77,7 @@ _MEASURES: dict[Measure, str] = {
     "modulus": "the same modulus over strain",
     "gain": "the same share of the stiffness in every direction",
 }
-_QUARTERS = {
-    0: "in phase",
-    90: "in quadrature",
-    180: "in antiphase",
-    -180: "in antiphase",
-    -90: "in negative quadrature",
-}
+_QUARTERS = {0: "more stiffness", 90: "more loss", 180: "less stiffness", -180: "less stiffness", -90: "less loss"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +91,7 @@ class PowerLaw:
         frequency_power: power p of frequency, with the ends of its interval.
         amplitude_power: power q of amplitude, with the ends of its interval.
         is_likely: True if the evidence of the power law exceeds that of a smooth curve of any form.
+        of_one_place: True if one direction or specimen was tested, so that no measure is told from another.
     """
 
     measure: Measure
@@ -105,6 +100,7 @@ class PowerLaw:
     frequency_power: Interval
     amplitude_power: Interval
     is_likely: bool
+    of_one_place: bool = False
 
     @property
     def determined(self) -> list[bool]:
@@ -115,10 +111,12 @@ class PowerLaw:
 
     @property
     def sentence(self) -> str:
-        """Text on the law, such as "in quadrature, grows as f^0.8, independent of amplitude: acts like a damper"."""
+        """Text on the law, such as "more loss, grows as f^0.8, independent of amplitude: acts like a damper"."""
         phase, low, high = self.phase_deg
         near = next((text for quarter, text in _QUARTERS.items() if low <= quarter <= high), "")
-        parts = [near or f"phase {number(phase, 2)} deg"]
+        turned = np.exp(1j * np.radians(phase))
+        stiffness, loss = ("more" if part > 0.0 else "less" for part in (turned.real, turned.imag))
+        parts = [near or f"{stiffness} stiffness and {loss} loss (phase {number(phase, 2)} deg)"]
         if high - low > 2.0 * _PHASE_WIDTH:
             parts = ["at a phase that these tests do not determine"]
         powers = ((self.frequency_power, "f", "frequency"), (self.amplitude_power, "X", "amplitude"))
@@ -129,7 +127,8 @@ class PowerLaw:
                 parts.append(f"independent of {axis}")
             else:
                 parts.append(f"{'grows' if value > 0 else 'falls'} as {symbol}^{number(value, 2)}")
-        parts.append(" or ".join(_MEASURES[measure] for measure in (self.measure, *self.alternatives)))
+        if not self.of_one_place:
+            parts.append(" or ".join(_MEASURES[measure] for measure in (self.measure, *self.alternatives)))
         like = self._known_law() if all(self.determined) else ""
         return ", ".join(parts) + (f": acts like {like}" if like else "")
 
@@ -281,7 +280,8 @@ def nearest_power_law(
     law = logsumexp(log_ratios) + grids[0].log_evidence - log(len(grids))
     curves = replace(grids[0].linear, groups=plain.groups).group_evidence  # around the same parameters and term
     smooth = logsumexp([evidence.log_evidence for evidence in curves]) - log(len(curves))
-    return PowerLaw(grids[0].measure, alternatives, phase, p, q, bool(law > smooth))
+    of_one_place = len({test.direction for test in fitted.data_sets}) == 1
+    return PowerLaw(grids[0].measure, alternatives, phase, p, q, bool(law > smooth), of_one_place)
 
 
 @dataclass(frozen=True, eq=False)
