@@ -188,10 +188,14 @@ class DiagnosisWriter:
         elif leader:
             probability = probability_text(leader, self.finding)
             entries = [NamedCause(name, probability, alternatives) for name in leader.names]
-        names = [" + ".join(reported_names(composition)) for composition in compositions]
+        parts = [reported_names(composition) for composition in compositions]
+        shared = [name for name in parts[0] if all(name in other for other in parts)]
+        names = [" + ".join(name for name in some if name not in shared) for some in parts]
         are_distinct = all(names) and len({*names}) == len(names)
         *labels, last = names if are_distinct else (label(composition) for composition in compositions)
         summary = f"these tests cannot distinguish between {', '.join(labels)} and {last}"
+        if shared and are_distinct:
+            summary = f"all probable explanations contain {' and '.join(shared)}; beside this, {summary}"
         places = next((composition.best for composition in compositions if composition.faulty_parts), None)
         return self._build("ambiguous", summary, request.base, entries, places=places, next_test=advice)
 
@@ -199,8 +203,10 @@ class DiagnosisWriter:
         """Diagnosis without a named effect: described by a correction, or unexplained, or with a faulty test."""
         finding, best = self.finding, self.first.best if self.first else None
         leads = f"; leads: {' and '.join(finding.leads)}" if finding.leads else ""
-        if best and best.claim and len({c.best.claim and c.best.claim.key for c in finding.reported}) == 1:
-            leads = f"; check first whether {best.claim.sentence}"
+        claims = {c.best.claim.key if c.best.claim else None: c.best.claim for c in finding.reported}
+        if claims and all(claims.values()):
+            sentences = [claim.sentence for claim in claims.values() if claim]
+            leads = f"; check first whether {' or whether '.join(sentences)}"
         at_fault = " and ".join(part.name for part in best.faulty_parts) if best else ""
         is_fault = best is not None and finding.verdict == "unexplained"
         if not is_fault and (gap := self._described(self.request.base)):
