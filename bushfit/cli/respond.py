@@ -99,7 +99,7 @@ def print_response(output: Output, response: ResponseOutput) -> None:
         shares = [f"{number(100.0 * share, 2)} %" for share in part.shares_beyond] if part.tested else ["", ""]
         forces = [f"{number(factor * size, 4)} {unit}" for size in (part.peak, part.rms)]
         strains = number(100.0 * strain, 3), shares[0], number(rate, 3), shares[1]
-        power = f"{number(part.power, 3)} {'W/m^3' if unit == 'MPa' else 'W'}"
+        power = f"{number(part.power, 3)} {'W/m^3' if part.direction.motion.force_unit == 'Pa' else 'W'}"
         rows.append((str(part.direction), *forces, power, *strains))
     heads = ("peak", "rms", "mean power", "strain [%]", "beyond tests", "rate [1/s]", "beyond tests")
     output.print_table("force, power, and largest strain and rate", ("direction", *heads), rows)

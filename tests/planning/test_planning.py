@@ -9,13 +9,13 @@ from fits import joint_fit
 from bushfit.campaign.campaign import load_campaign, model_of
 from bushfit.campaign.quantities import Compound
 from bushfit.campaign.schema import RigSettings
-from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep, SimulateSettings
+from bushfit.campaign.simulated import SimulatedLoop, SimulatedSweep
 from bushfit.commands.plan import plan as plan_tests
 from bushfit.effects import get_effect
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, planned_loop, planned_sweep
 from bushfit.fitting.problem import FitProblem
-from bushfit.geometry import Bushing, Direction, Place, Specimen
+from bushfit.geometry import Bushing, Direction, Specimen
 from bushfit.model.covariance import Z95
 from bushfit.model.model import FIVE, Model
 from bushfit.planning.campaign import campaign_toml, simulation_settings
@@ -31,7 +31,7 @@ from bushfit.planning.contract import (
     Programme,
     Target,
     Test,
-    amplitudes_and_frequencies,
+    operating_points,
 )
 from bushfit.planning.information import CandidateGrid, ModelInformation, relative_slopes, rival_chi_squares
 from bushfit.planning.plan import plan
@@ -81,12 +81,6 @@ def view_of(known: Knowledge, tests: tuple[Test, ...]) -> ModelInformation:
     return replace(grid.information(known, delayed), prior=np.linalg.inv(known.covariance))
 
 
-def points_of(test: SimulatedSweep) -> tuple[Place, Array, Array]:
-    amplitudes, frequencies = amplitudes_and_frequencies(test)
-    frequency, amplitude = (a.ravel() for a in np.meshgrid(frequencies, amplitudes))
-    return test.direction, frequency, amplitude
-
-
 def mean_error(programme: Programme) -> float:
     """Root mean square of the relative errors of the stiffness."""
     errors = [programme.predictions[f"stiffness.{grid.place}"] for grid in GRIDS]
@@ -97,7 +91,9 @@ def slopes_of(model: Model, test: SimulatedSweep) -> Array:
     """Gain and phase of the stiffness by the logarithm of each parameter, by central differences, (k, 2, n)."""
 
     def stiffness(name: str, factor: float) -> Array:
-        return np.log(model.with_values({name: factor * model.values[name]}).stiffness(*points_of(test)))
+        return np.log(
+            model.with_values({name: factor * model.values[name]}).stiffness(test.direction, *operating_points(test))
+        )
 
     rows = [(stiffness(name, np.exp(1e-4)) - stiffness(name, np.exp(-1e-4))) / 2e-4 for name in model.parameters]
     return np.stack([np.real(rows), np.imag(rows)], axis=1)
@@ -142,8 +138,7 @@ def test_an_effect_shows_as_a_fit_without_it_misses_it(known):
 
 def _noise_free(model: Model, truth: Model, test: SimulatedSweep) -> MeasuredSweep:
     """One run of a sweep, as the truth has it."""
-    place, frequency, amplitude = points_of(test)
-    sweep = planned_sweep(model, place, frequency, amplitude, NOISE.scatter, NOISE.shared)
+    sweep = planned_sweep(model, test.direction, *operating_points(test), NOISE.scatter, NOISE.shared)
     if test.stepped == "amplitude":
         held = replace(sweep.sweep, stepped="amplitude")
         noise = replace(sweep.noise, random={("new", test.frequencies[0]): NOISE.scatter})
@@ -210,8 +205,11 @@ def test_a_detectable_mass_exceeds_the_class_of_the_rig_somewhere(planned, known
     """However many repeats average the noise: errors of the class may vary with frequency as the mass does."""
     amounts = planned.planned.detectable
     heavy = known.model.with_effect("inertia", {"inertia.mass": amounts["inertia"]})
-    sweeps = [points_of(test) for test in planned.planned.tests if isinstance(test, SimulatedSweep)]
-    changes = np.concatenate([np.log(heavy.stiffness(*x) / known.model.stiffness(*x)) for x in sweeps])
+    sweeps = [
+        (test.direction, *operating_points(test)) for test in planned.planned.tests if isinstance(test, SimulatedSweep)
+    ]
+    points = [(sweep.direction, *operating_points(sweep)) for sweep in sweeps]
+    changes = np.concatenate([np.log(heavy.stiffness(*x) / known.model.stiffness(*x)) for x in points])
     relative = np.abs([changes.real / NOISE.level[0], changes.imag / NOISE.level[1]])
     assert relative.max() == pytest.approx(1.0, rel=0.01)
     assert 0.3 < amounts["fixture_resonance"] / amounts["inertia"] < 1.0, "a resonance at a tested frequency is rare"
@@ -224,8 +222,7 @@ def test_a_detectable_mass_exceeds_the_class_of_the_rig_somewhere(planned, known
 def test_no_test_is_beyond_the_rig(known, limit, most):
     found = candidates(known, wanted("predictions", 4.0, **{limit: most}))
     for test in found:
-        amplitudes, frequencies = amplitudes_and_frequencies(test)
-        f, x = (a.ravel() for a in np.meshgrid(frequencies, amplitudes))
+        f, x = operating_points(test)
         force = np.abs(known.model.stiffness(test.direction, f, x)) * x
         reached = {"max_force": force, "max_displacement": x, "max_frequency": f, "max_velocity": 2 * np.pi * f * x}
         assert reached[limit].max() <= most * (1 + 1e-6)
@@ -290,14 +287,13 @@ def test_the_campaign_of_a_plan_is_what_simulate_reads(small, tmp_path):
     campaign = load_campaign(file)
     asked, read = simulation_settings(tests, known.noise), campaign.simulate
     assert [test.repeats for test in read.sweeps] == [2, 1, 1]
-    for each in fields(SimulateSettings):
-        if each.name not in ("parameters", "effects", "loops", "sweeps"):
-            assert getattr(read, each.name) == pytest.approx(getattr(asked, each.name)), each.name
-    for one, other in zip((*asked.loops, *asked.sweeps), (*read.loops, *read.sweeps), strict=True):
-        for each in fields(one):
-            expected = getattr(one, each.name)
-            numbers = isinstance(expected, tuple | float)
-            assert getattr(other, each.name) == (pytest.approx(expected) if numbers else expected), each.name
+    pairs = zip((asked, *asked.loops, *asked.sweeps), (read, *read.loops, *read.sweeps), strict=True)
+    for expected, found in pairs:
+        for key in fields(expected):
+            value = getattr(expected, key.name)
+            if key.name not in ("parameters", "effects", "loops", "sweeps"):
+                is_number = isinstance(value, tuple | float)
+                assert getattr(found, key.name) == (pytest.approx(value) if is_number else value), key.name
     assert dict(model_of(campaign).values) == pytest.approx(dict(model.values), rel=1e-10)
 
 
