@@ -23,7 +23,6 @@ from bushfit.model.result import Misfit, Result
 from bushfit.reading.measurement import Sweep
 from tests.fits import jacobian, solve
 
-BAND = (5.0, 15.0, 45.0, 100.0, 155.0)
 LEVELS = (1e-4, 2e-4, 5e-4)
 
 
@@ -41,10 +40,11 @@ def test_the_covariance_of_one_stage_is_no_less_than_that_of_least_squares(measu
 
 
 @pytest.fixture
-def small(rig) -> Campaign:
-    """An axial loop, an axial and a radial sweep."""
-    sweeps = tuple(SimulatedSweep(direction, (1e-4, 5e-4), BAND) for direction in (Direction.AXIAL, Direction.RADIAL))
-    return rig(1, loops=(SimulatedLoop(Direction.AXIAL, 1e-3, 0.1),), sweeps=sweeps)
+def levelled(rig) -> Campaign:
+    """Simulated: an axial loop, an axial and a radial sweep of three levels."""
+    frequencies = tuple(np.arange(5.0, 156.0, 10.0))
+    sweeps = tuple(SimulatedSweep(direction, LEVELS, frequencies) for direction in (Direction.AXIAL, Direction.RADIAL))
+    return rig(5, loops=(SimulatedLoop(Direction.AXIAL, 1e-3, 0.1),), sweeps=sweeps)
 
 
 def stiffer(test: Sweep, factor: float) -> Sweep:
@@ -55,17 +55,17 @@ def without(campaign: Campaign, direction: Direction) -> tuple[Sweep, ...]:
     return tuple(sweep for sweep in campaign.sweeps if sweep.direction is not direction)
 
 
-def test_the_nrmse_of_a_loop_excludes_the_zero_of_the_load_cell(small):
-    (loop,) = small.loops
+def test_the_nrmse_of_a_loop_excludes_the_zero_of_the_load_cell(levelled):
+    (loop,) = levelled.loops
     shifted = replace(loop, force=loop.force + 0.02 * np.ptp(loop.force))
-    results = [fit_joint(PreparedCampaign.from_campaign(replace(small, loops=(each,)))) for each in (loop, shifted)]
+    results = [fit_joint(PreparedCampaign.from_campaign(replace(levelled, loops=(each,)))) for each in (loop, shifted)]
     assert results[1].quality.nrmse == pytest.approx(results[0].quality.nrmse, rel=0.02)
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.05])
-def test_a_test_that_was_left_out_is_told_where_the_model_misses_it(small, factor):
-    radial = [stiffer(sweep, factor) for sweep in without(small, Direction.AXIAL)]
-    data = PreparedCampaign.from_campaign(replace(small, sweeps=(*without(small, Direction.RADIAL), *radial)))
+def test_a_test_that_was_left_out_is_told_where_the_model_misses_it(levelled, factor):
+    radial = [stiffer(sweep, factor) for sweep in without(levelled, Direction.AXIAL)]
+    data = PreparedCampaign.from_campaign(replace(levelled, sweeps=(*without(levelled, Direction.RADIAL), *radial)))
     told = [line for line in fit_joint(data).warnings if "was not fitted" in line]
     assert len(told) == (factor != 1.0)
     if told:
@@ -75,14 +75,14 @@ def test_a_test_that_was_left_out_is_told_where_the_model_misses_it(small, facto
     assert not any("was not fitted" in line for line in both.warnings)
 
 
-def test_kilonewtons_taken_for_newtons_are_told(small):
+def test_kilonewtons_taken_for_newtons_are_told(levelled):
     """In the sweep, and in the loop as well."""
-    axial = without(small, Direction.RADIAL)
-    slip = replace(small, sweeps=tuple(stiffer(sweep, 1e-3) for sweep in axial))
+    axial = without(levelled, Direction.RADIAL)
+    slip = replace(levelled, sweeps=tuple(stiffer(sweep, 1e-3) for sweep in axial))
     (told,) = [line for line in joint_fit(slip).warnings if "units" in line]
-    assert told.startswith(f"{small.loops[0].name} shows ")
+    assert told.startswith(f"{levelled.loops[0].name} shows ")
     assert f"times the modulus of {axial[0].name}, which no rubber does: check the units" in told
-    loops = tuple(replace(loop, force=1e-3 * loop.force) for loop in small.loops)
+    loops = tuple(replace(loop, force=1e-3 * loop.force) for loop in levelled.loops)
     (told,) = [line for line in joint_fit(replace(slip, loops=loops)).warnings if "units" in line]
     assert "kPa is that of no rubber" in told
 
@@ -106,14 +106,6 @@ def test_what_wrong_weights_cost_is_that_of_a_mean_of_two_groups(paper_model):
     grown = wide.matrix[0, 0] / plain.matrix[0, 0] - 1.0
     assert grown == pytest.approx(4.0 * np.sum(share * (1.0 - share) / freedom), rel=1e-3)
     assert wide.freedom(np.ones((1, 1)))[0] == pytest.approx(1.0 / np.sum(share**2 / freedom), rel=0.01)
-
-
-@pytest.fixture
-def levelled(rig) -> Campaign:
-    """Simulated: an axial loop, an axial and a radial sweep of three levels."""
-    frequencies = tuple(np.arange(5.0, 156.0, 10.0))
-    sweeps = tuple(SimulatedSweep(direction, LEVELS, frequencies) for direction in (Direction.AXIAL, Direction.RADIAL))
-    return rig(5, loops=(SimulatedLoop(Direction.AXIAL, 1e-3, 0.1),), sweeps=sweeps)
 
 
 def level_off(campaign: Campaign, test: int, level: float, factor: float) -> Campaign:

@@ -32,7 +32,7 @@ from bushfit.model.result import Result
 from bushfit.prediction.stiffness import Prediction, predict
 from bushfit.reading.measurement import Loop, Sweep
 from bushfit.reduction.harmonics import basis
-from tests.fits import jacobian
+from tests.fits import held_by_bands, jacobian
 
 #: Relative error of the stiffness at frequencies [Hz] and amplitudes [m].
 Off = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -99,13 +99,12 @@ def held(result: Result, truth: Model, off: Off) -> tuple[list[float], np.ndarra
         return truth.stiffness(found.direction, frequency, amplitude) * (1.0 + off(frequency, amplitude))
 
     there = rubber(found.frequency, found.amplitude)
-    pairs = ((found.stiffness, np.abs(there)), (found.loss_factor, there.imag / there.real))
     model, names = result.model, result.covariance.names
     steps = {name: 1e-4 * model.values[name] for name in names}
     moved = [of_model(model.with_values({name: model.values[name] + steps[name]})) for name in names]
     slopes = np.array([(each - of_model(model)) / step for each, step in zip(moved, steps.values(), strict=True)])
     inside = np.abs(of_model(model) - meant(rubber)) <= result.covariance.half_width(slopes)
-    return [float(np.mean((band.low <= true) & (true <= band.high))) for band, true in pairs], inside
+    return [float(np.mean(held_in)) for held_in in held_by_bands(found, there)[:2]], inside
 
 
 @pytest.mark.parametrize(

@@ -24,9 +24,8 @@ from bushfit.fitting.procedures import fit_dynamic, fit_joint, fit_static, fit_t
 from bushfit.geometry import Direction
 from bushfit.model.model import FIVE, Model
 from bushfit.model.result import Result
-from bushfit.prediction.bands import Band
 from bushfit.prediction.stiffness import predict
-from tests.fits import solve
+from tests.fits import held_by_bands, solve
 
 Rig = Callable[..., Campaign]
 NAMES = ("paper", "soft and long", "stiff and thin", "strongly filled")
@@ -131,13 +130,7 @@ def bands_covered(result: Result, truth: Model) -> np.ndarray:
         amplitudes = np.array([0.05, 0.3, 0.8]) * top / truth.bushing.unit_strain(direction)
         found = predict(result, direction, [1.0, 40.0, 250.0], amplitudes)
         stiffness = truth.stiffness(direction, found.frequency, found.amplitude)
-        pairs: list[tuple[Band, np.ndarray]] = [
-            (found.stiffness, np.abs(stiffness)),
-            (found.loss_factor, stiffness.imag / stiffness.real),
-            (found.storage_stiffness, stiffness.real),
-            (found.loss_stiffness, stiffness.imag),
-        ]
-        shares.append([np.mean((band.low <= true) & (true <= band.high)) for band, true in pairs])
+        shares.append([np.mean(inside) for inside in held_by_bands(found, stiffness)])
     return np.array(shares)
 
 

@@ -131,7 +131,6 @@ def _body(table: str, name: str) -> str:
     [
         (("long", "lung", 2), "no bushing of the campaign"),
         (("bushing = ", "specimen = ", 1), "not in the campaign"),
-        (("[simulate]\nseed", _body("[[bushings]]", "short"), 1), "two bodies have one name"),
         (("[simulate]\nseed", _body("[bushing]", "one"), 1), "two lists of bushings"),
         (('name = "long"', 'name = "radial"', 1), "another table has this name"),
     ],
