@@ -216,23 +216,18 @@ def test_bodies_of_any_name_stand_in_a_tie(bushfit, root, tmp_path, tie):
 
 
 @pytest.mark.parametrize(
-    ("command", "tie", "lacking"),
+    ("command", "tie", "said"),
     [
-        ("fit", '[fit.m]\nexpression = "1e6 * inertia.mass"', "inertia.mass"),
-        ("fit", '[fit."inertia.mass"]\nexpression = "1e-8 * mu"', "inertia.mass"),
-        ("fit-static", '[fit.m]\nexpression = "0.18 * mu"', "m"),
+        ("fit", '[fit.m]\nexpression = "1e6 * inertia.mass"', "is not used: the model lacks inertia.mass"),
+        ("fit", '[fit."inertia.mass"]\nexpression = "1e-8 * mu"', "is not used: the model lacks inertia.mass"),
+        ("fit-static", '[fit.m]\nexpression = "0.18 * mu"', "is not used: the model lacks m"),
+        ("fit", '[fit.alpha]\nexpression = "0.24"', "alpha (tied) 0.2400 fixed -"),
     ],
 )
-def test_a_tie_that_is_not_used_is_reported(bushfit, root, tmp_path, command, tie, lacking):
+def test_a_tie_that_is_not_used_or_constant_is_reported(bushfit, root, tmp_path, command, tie, said):
     campaign = written(root, tmp_path, "cmp_15961_prior", tie)
     done = bushfit(command, campaign, "-o", tmp_path / "x", "--no-plots", "-v")
-    assert re.search(rf"is not used: the model lacks {lacking}\n", done.stderr)
-
-
-def test_a_parameter_tied_to_a_constant_is_fixed(bushfit, root, tmp_path):
-    campaign = written(root, tmp_path, "cmp_15961_prior", '[fit.alpha]\nexpression = "0.24"')
-    done = bushfit("fit", campaign, "-o", tmp_path / "x", "--no-plots")
-    assert ["alpha", "(tied)", "0.2400", "fixed", "-"] in [line.split() for line in done.stderr.splitlines()]
+    assert any(" ".join(line.split()).endswith(said) for line in done.stderr.splitlines())
 
 
 @pytest.mark.parametrize("prior", [".24 +- .003", "+0.24 ± 3e-3", "24 % +/- 0.3 %"])

@@ -44,7 +44,6 @@ def test_a_raw_record_becomes_a_sweep_that_fits(typed, root, tmp_path, paper_mod
     assert (table["cycles used"] >= 4).all()
     sweep = read_sweep(tmp_path / "x/sweep.csv", Direction.AXIAL, SweepFile(file="sweep.csv"))
     off = sweep.stiffness / paper_model.stiffness(Direction.AXIAL, sweep.frequency, sweep.amplitude_reached) - 1.0
-    print(f"raw record with noise: |K| and phase of 15 points within {abs(off).max():.1e}")
     assert abs(off).max() < 3e-3
     assert len(set(sweep.amplitude)) == 3
 
@@ -55,7 +54,6 @@ def test_a_raw_record_becomes_a_sweep_that_fits(typed, root, tmp_path, paper_mod
     fitted = typed("fit", "x/campaign.toml", "-o", "fit", "--no-plots", "--json")
     for name, entry in json.loads(fitted.stdout)["parameters"].items():
         off = entry["value"] / table_1[name] - 1.0
-        print(f"{name}: {100 * off:+.2f} %, {off * table_1[name] / entry['stderr']:+.1f} standard errors")
         assert abs(off) < 0.03
         assert abs(off) * table_1[name] < 3.0 * entry["stderr"]
 
