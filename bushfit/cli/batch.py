@@ -33,17 +33,15 @@ def parse_effect(text: str) -> str:
 @option_group(
     "Work on each bushing",
     option(
-        "--command commands",
-        "COMMAND",
+        "--command commands COMMAND",
         "Command to run for each bushing: fit, diagnose, predict, respond or run [fit].",
         type=click.Choice(["run", "fit", "diagnose", "predict", "respond"]),
         multiple=True,
     ),
     direction_option("fit", "as of `bushfit fit`"),
-    option("--effect effects", "NAME", "Add this effect to each model.", type=parse_effect, multiple=True),
+    option("--effect effects NAME", "Add this effect to each model.", type=parse_effect, multiple=True),
     option(
-        "--at operating_points",
-        "POINT",
+        "--at operating_points POINT",
         'Add table columns with stiffness and loss factor at this point, such as "axial 25 Hz 0.1 mm".',
         multiple=True,
     ),
@@ -56,8 +54,8 @@ def parse_effect(text: str) -> str:
 @option_group(
     "Execution",
     flag("--resume", "Evaluate only bushings without results, with an error, or with changed input."),
-    option("--jobs", "N", "Number of worker processes [one per core].", type=click.IntRange(1)),
-    option("--scheduler", "ADDRESS", "Run on the Dask cluster at this address, such as tcp://10.0.0.5:8786."),
+    option("--jobs N", "Number of worker processes [one per core].", type=click.IntRange(1)),
+    option("--scheduler ADDRESS", "Run on the Dask cluster at this address, such as tcp://10.0.0.5:8786."),
 )
 @option_group(
     "Output",

@@ -28,10 +28,9 @@ _ALL = "all"
     "Range of the comparison",
     direction_option("compare", "all that were fitted in every result"),
     grid_options("as measured"),
-    option("--preload", "LOAD", 'Preload such as "500 N" or "1.5 mm", within the tests of each result [none].'),
+    option("--preload LOAD", 'Preload such as "500 N" or "1.5 mm", within the tests of each result [none].'),
     option(
-        "--families",
-        "[NAME,...]",
+        "--families [NAME,...]",
         "Fit the paper's model and these models to campaign A; NAME is an effect, or several joined by +, such as "
         "kraus+inertia [each law of frequency with each law of amplitude].",
         is_flag=False,

@@ -28,19 +28,17 @@ _COLOURS = {"consistent": "green", "named": "green", "unexplained": "red"}
 @option_group(
     "What may be missing",
     option(
-        "--max-effects", "N", "Largest number of effects to add to the model [3].", type=click.IntRange(0, 5), default=3
+        "--max-effects N", "Largest number of effects to add to the model [3].", type=click.IntRange(0, 5), default=3
     ),
     option(
-        "--adopt",
-        "EFFECT",
+        "--adopt EFFECT",
         "Add this effect to the model, such as inertia, or correct this mistake in a test file, such as "
         "peak_to_peak:sweep_axial. If no effect has this name, all names are printed.",
         multiple=True,
     ),
-    option("--without", "EFFECT", "Exclude this effect or mistake from the search.", multiple=True),
+    option("--without EFFECT", "Exclude this effect or mistake from the search.", multiple=True),
     option(
-        "--tolerance",
-        "SHARE",
+        "--tolerance SHARE",
         "Ignore differences between tests and model below this share of the stiffness [1 %].",
         type=quantity("1", "0 % to 100 %", lambda share: 0.0 <= share <= 1.0),
         default="1 %",

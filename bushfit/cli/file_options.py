@@ -21,10 +21,7 @@ _OF_TESTS = {
     ),
     "at_amplitude": ("SIZE", 'Amplitude of the whole file, such as "0.1 mm" [from a column or the file name].'),
     "at_frequency": ("FREQUENCY", 'Frequency of the whole file, such as "10 Hz" [from a column or the file name].'),
-    "temperature": (
-        "TEMP",
-        'Temperature of the test, such as "23 degC"; selects its rows in a file with several.',
-    ),
+    "temperature": ("TEMP", 'Temperature of the test, such as "23 degC"; selects its rows in a file with several.'),
     "preload": ("LOAD", 'Static preload of the test, such as "500 N axial" or "none"; shown in the report.'),
     "rate": ("SPEED", None),
     "frequency": ("FREQUENCY", None),
@@ -83,8 +80,8 @@ def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tes
     unit, header = ("axial=mm", "radial=Sy") if kind == "displacements" else ("force=kN", "force=Fz")
     words = f'Header of a column, such as "{header}"; if ROLE does not exist, all roles are printed.'
     columns = (
-        option("--unit units", "ROLE=UNIT", f'Unit of a column, such as "{unit}".', multiple=True),
-        option("--column columns", "ROLE=HEADER", words, multiple=True),
+        option("--unit units ROLE=UNIT", f'Unit of a column, such as "{unit}".', multiple=True),
+        option("--column columns ROLE=HEADER", words, multiple=True),
     )
     written = (_metadata_option(key, metavar) for key, metavar in _AS_WRITTEN.items())
     record = "test_options", partial(_test_options, kind)
@@ -96,7 +93,7 @@ def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tes
     information = (
         _metadata_option("direction", "DIRECTION", "Direction: axial, radial or torsion [from file names]."),
         *columns,
-        _metadata_option("force_sign", "-1", sign),
+        _metadata_option("force_sign", "SIGN", sign),
         *(_metadata_option(key, *texts) for key, texts in _OF_TESTS.items() if kind == "tests"),
     )
     return lambda function: add_parameters(
@@ -128,7 +125,7 @@ def _test_options(kind: str, _: click.Context, values: dict[str, Any]) -> dict[s
 
 def _metadata_option(key: str, metavar: str, words: str | None = None) -> Parameter:
     """Create the option of a campaign key, with its metavar and help text."""
-    return option(option_name(key), metavar, words, type=TYPES.get(key))
+    return option(f"{option_name(key)} {metavar}", words, type=TYPES.get(key))
 
 
 def require_tests(context: click.Context, _: click.Parameter, value: Any) -> Any:

@@ -81,8 +81,7 @@ def dynamic(
     "Tests and model",
     direction_option("fit", "axial, and all specimens"),
     option(
-        "--effect effects",
-        "NAME",
+        "--effect effects NAME",
         "Add this effect to the model, such as inertia. If no effect has this name, all names are printed.",
         multiple=True,
     ),

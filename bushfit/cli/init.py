@@ -59,20 +59,12 @@ _Read = TypeVar("_Read")
 )
 @option_group(
     "The rubber of the bushing",
-    option("--inner-radius", "LENGTH"),
-    option(
-        "--inner-diameter", "LENGTH", 'Radius or diameter where the rubber meets the inner sleeve, such as "20 mm".'
-    ),
-    option("--outer-radius", "LENGTH"),
-    option(
-        "--outer-diameter", "LENGTH", 'Radius or diameter where the rubber meets the outer sleeve, such as "36 mm".'
-    ),
-    option(
-        "--length",
-        "LENGTH",
-        'Length of the rubber along the axis, such as "34 mm"; the mean of inside and outside.',
-    ),
-    option("--name", "NAME", "Name of the bushing [name of the folder of the first file]."),
+    option("--inner-radius LENGTH"),
+    option("--inner-diameter LENGTH", 'Radius or diameter where the rubber meets the inner sleeve, such as "20 mm".'),
+    option("--outer-radius LENGTH"),
+    option("--outer-diameter LENGTH", 'Radius or diameter where the rubber meets the outer sleeve, such as "36 mm".'),
+    option("--length LENGTH", 'Length of the rubber along the axis, such as "34 mm"; the mean of inside and outside.'),
+    option("--name NAME", "Name of the bushing [name of the folder of the first file]."),
 )
 @metadata_options()
 @option_group("Output", flag("--no-input", "Ask no questions; report missing information as an error."))

@@ -40,19 +40,21 @@ class Option(click.Option):
             return super().type_cast_value(ctx, value)
 
 
-def option(names: str, metavar: str | None, words: str | None = None, **more: Any) -> Parameter:
+def option(usage: str, words: str | None = None, **more: Any) -> Parameter:
     """Create an option of a command.
 
     Args:
-        names: names separated by blanks; the last may be the name of the Python argument.
-        metavar: placeholder of the value in the help; None for an option without a value.
+        usage: names, perhaps the name of the Python argument, and the placeholder of the value in capitals, such as
+            "-o --output DIR"; a flag has no placeholder.
         words: help text, which ends with the default in brackets; None if the option shares that of the next option.
         **more: further arguments of click.option; an option with `multiple=True` says that it may be given again.
     """
     if words and more.get("multiple"):
         text, bracket, default = words.removesuffix(".").partition(" [")
         words = f"{text}; may be given again{bracket}{default}."
-    return click.option(*names.split(), cls=Option, metavar=metavar, help=words, **more)
+    names = [word for word in usage.split() if word == word.lower()]
+    metavar = usage.split()[-1] if len(names) < len(usage.split()) else None
+    return click.option(*names, cls=Option, metavar=metavar, help=words, **more)
 
 
 def flag(names: str, words: str | None = None, **more: Any) -> Parameter:
@@ -63,7 +65,7 @@ def flag(names: str, words: str | None = None, **more: Any) -> Parameter:
         words: help text; None if the option shares the text of the next option.
         **more: further arguments of click.option.
     """
-    return option(names, None, words, is_flag=True, **more)
+    return option(names, words, is_flag=True, **more)
 
 
 class Command(click.Command):
@@ -158,9 +160,9 @@ def direction_option(action: str, default: str, name: str = "directions") -> Par
         name: argument of the command's function.
     """
     words = f"Direction (axial, radial, torsion) or specimen to {action} [{default}]."
-    return option(f"--direction {name}", "PLACE", words, multiple=True)
+    return option(f"--direction {name} PLACE", words, multiple=True)
 
 
 def file_option(name: str, words: str) -> Parameter:
     """Create an option whose value is a file, with the help text `words`."""
-    return option(name, "FILE", words, type=FILE)
+    return option(f"{name} FILE", words, type=FILE)

@@ -31,8 +31,7 @@ from bushfit.report.results import Formats, Picture, ResultFile, check_free, to_
 Written = Literal["tables", "pictures", "pages"]
 _FORMAT_OPTIONS: dict[Written, Parameter] = {
     "tables": option(
-        "--table-format",
-        "FORM",
+        "--table-format FORM",
         "Format of tables: csv, decimal-comma (German Excel) or xlsx [csv].",
         type=click.Choice(get_args(Form)),
         default="csv",
@@ -40,8 +39,7 @@ _FORMAT_OPTIONS: dict[Written, Parameter] = {
         show_envvar=True,
     ),
     "pictures": option(
-        "--plot-format",
-        "FORM",
+        "--plot-format FORM",
         "Format of plots: png, svg or pdf [png].",
         type=click.Choice(get_args(Picture)),
         multiple=True,
@@ -236,7 +234,7 @@ def with_output(folder: str, *written: Written) -> Parameter:
 
     return option_group(
         "Output",
-        option("-o --output", "DIR", f"Write the results to this folder [{folder}].", type=Folder(path_type=Path)),
+        option("-o --output DIR", f"Write the results to this folder [{folder}].", type=Folder(path_type=Path)),
         flag("--force", "Replace earlier results in this folder."),
         *(_FORMAT_OPTIONS[kind] for kind in written),
         flag("--no-plots", "Do not write plots.", hidden="pictures" not in written),

@@ -47,29 +47,26 @@ def parse_names(text: str) -> tuple[str, ...]:
 @option_group(
     "Aim of the plan",
     option(
-        "--hours",
-        "HOURS",
+        "--hours HOURS",
         "Available time on the rig, in hours [8].",
         type=number_up_to(_MOST_HOURS, "time in hours such as 8"),
         default="8",
     ),
     option(
-        "--for aim",
-        "AIM",
+        "--for aim AIM",
         "Purpose of the tests: predictions (small errors of the stiffness), parameters (small errors of the "
         "parameters), or rivals (a decision between possible effects) [predictions].",
         type=click.Choice(["parameters", "predictions", "rivals"]),
     ),
     direction_option("test", "axial and radial, or all specimens", "test_directions"),
     option(
-        "--target targets",
-        "NAME=SIZE",
+        "--target targets NAME=SIZE",
         'Accuracy to reach, as half the width of the 95 % interval: "mu=2 %", "stiffness=1 %".',
         type=parse_target,
         multiple=True,
     ),
     *(
-        option(name, "NAME,...", words, type=parse_names, default="")
+        option(f"{name} NAME,...", words, type=parse_names, default="")
         for name, words in (
             ("--parameters", "With --for parameters: the parameters to determine [all]."),
             ("--rivals", "With --for rivals: the effects to distinguish [those that diagnose cannot distinguish]."),

@@ -41,21 +41,18 @@ def parse_motion(text: str) -> LargeMotion:
 @option_group(
     "Further predictions",
     option(
-        "--preload preloads",
-        "LOAD",
+        "--preload preloads LOAD",
         'Predict at this preload, "500 N" or "1.5 mm", between the tested preloads [none].',
         multiple=True,
     ),
     option(
-        "--bushing",
-        "NAME",
+        "--bushing NAME",
         "Predict this bushing: the name of one of several fitted bushings, or a TOML file with the [bushing] table of "
         "another bushing of the same compound.",
     ),
-    option("--mass", "MASS", type=quantity("kg")),
+    option("--mass MASS", type=quantity("kg")),
     option(
-        "--base-acceleration",
-        "ACCELERATION",
+        "--base-acceleration ACCELERATION",
         'Also predict the resonance of this mass, such as "1.2 kg", on the bushing. The base of the bushing '
         'vibrates with this acceleration, such as "0.1 g".',
         type=quantity("m/s^2"),
@@ -63,15 +60,13 @@ def parse_motion(text: str) -> LargeMotion:
     flag("--static", "Also write the static curve: force over displacement in a slow motion, and its slope."),
     static_rate_option("Rate of the static curve"),
     option(
-        "--over",
-        "MOTION",
+        "--over MOTION",
         'Predict a small vibration on a slow large motion, such as "0.5 Hz 1 mm", or on an offset, such as "1 mm".',
         type=parse_motion,
     ),
     flag("--wide", "Also write tables with one column per amplitude, without bands."),
     option(
-        "--arms",
-        "[ERROR]",
+        "--arms [ERROR]",
         "Also write Maxwell arms (a Prony series) that represent the springpot within this error [1 %].",
         is_flag=False,
         flag_value="1 %",

@@ -40,24 +40,20 @@ _DISPLAYED = ("displacement", "stiffness")
 @metadata_options("histories")
 @option_group(
     "Raw histories",
-    option("--levels", "GRID", 'Nominal amplitudes of the steps, zero-to-peak, such as "0.1, 0.2 mm" [detected].'),
-    option(
-        "--cycles", "N", "Use only steps with at least N steady cycles [3].", type=click.IntRange(3, 1000), default=3
-    ),
+    option("--levels GRID", 'Nominal amplitudes of the steps, zero-to-peak, such as "0.1, 0.2 mm" [detected].'),
+    option("--cycles N", "Use only steps with at least N steady cycles [3].", type=click.IntRange(3, 1000), default=3),
 )
 @option_group(
     "Resonance test",
-    option("--mass", "MASS", 'Mass that the mount carries on the shaker, such as "0.5 kg".', type=quantity("kg")),
+    option("--mass MASS", 'Mass that the mount carries on the shaker, such as "0.5 kg".', type=quantity("kg")),
     option(
-        "--mass-added",
-        "MASS",
+        "--mass-added MASS",
         'Further mass that moves with it, such as "15 g" of accelerometer and cable; added to --mass.',
         type=quantity("kg"),
     ),
-    option("--specimen", "NAME", "Name of the tested specimen, if the test is not of a bushing."),
+    option("--specimen NAME", "Name of the tested specimen, if the test is not of a bushing."),
     option(
-        "--base-acceleration",
-        "ACCELERATION",
+        "--base-acceleration ACCELERATION",
         'Acceleration amplitude of the base, such as "0.1 g", if no column states it.',
         type=quantity("m/s^2"),
     ),

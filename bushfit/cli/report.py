@@ -14,7 +14,7 @@ from bushfit.cli.output import Output, with_output
 @click.argument("folder", metavar="DIR", type=FILE)
 @option_group(
     "Content",
-    option("--date", "DATE", 'Date of the report, such as "2026-03-20", or today [from the campaign, else none].'),
+    option("--date DATE", 'Date of the report, such as "2026-03-20", or today [from the campaign, else none].'),
 )
 @with_output("DIR")
 def command(folder: Path, date: str | None, output: Output) -> None:

@@ -32,8 +32,7 @@ if TYPE_CHECKING:
     ),
     flag("--steady", "Treat the history as whole cycles of a steady motion [as a motion from rest]."),
     option(
-        "--lowpass",
-        "FREQUENCY",
+        "--lowpass FREQUENCY",
         'Remove the noise of the displacement above this frequency, such as "200 Hz"; friction would turn the '
         "noise into force [no filter].",
         type=quantity("Hz"),

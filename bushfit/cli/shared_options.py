@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 
 #: Option of commands that predict from a model.
 TEMPERATURE = option(
-    "--temperature",
-    "TEMP",
+    "--temperature TEMP",
     'Temperature, such as "40 degC", if the model was fitted with --effect temperature [23 degC].',
     type=parse_temperature,
 )
@@ -45,8 +44,8 @@ def campaign_options(function: Function) -> Function:
         click.argument("campaigns", metavar="CAMPAIGN", nargs=-1, required=True, type=FILE),
         option_group(
             "Fit",
-            option("--loss", "LOSS", loss, type=click.Choice(["linear", "soft_l1"])),
-            option("--max-nrmse", "SHARE", limit, type=number_up_to(1.0, "share up to 1, such as 0.02 or 2 %")),
+            option("--loss LOSS", loss, type=click.Choice(["linear", "soft_l1"])),
+            option("--max-nrmse SHARE", limit, type=number_up_to(1.0, "share up to 1, such as 0.02 or 2 %")),
         ),
     )
 
@@ -93,7 +92,7 @@ def exit_above(max_nrmse: float | None, result: Result) -> None:
 def grid_options(default: str) -> Parameter:
     """Create the options for the frequencies and amplitudes of a prediction; `default` is the default in the help."""
     options = [
-        option(f"--{name}", "GRID", words, type=grid(unit))
+        option(f"--{name} GRID", words, type=grid(unit))
         for name, unit, words in (
             ("frequencies", "Hz", f'Frequencies: start:stop:step, "5:155:10 Hz", or a list, "20, 50 Hz" [{default}].'),
             ("amplitudes", "m", f'Displacement amplitudes, zero-to-peak, such as "0.1, 0.5 mm" [{default}].'),
@@ -122,7 +121,7 @@ def prediction_options(campaign: str) -> Parameter:
 def static_rate_option(subject: str) -> Parameter:
     """Create the option --static-rate, the loading rate of static curves; its help text begins with `subject`."""
     words = f'{subject}, such as "10 mm/min" [rate of the slowest loop, else 10 mm/min].'
-    return option("--static-rate static_rates", "RATE", words, type=parse_rate)
+    return option("--static-rate static_rates RATE", words, type=parse_rate)
 
 
 def displacement_unit(text: str, per: str = "") -> str:

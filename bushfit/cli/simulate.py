@@ -22,22 +22,20 @@ if TYPE_CHECKING:
 @click.argument("source", metavar="CAMPAIGN|MODEL.json", type=FILE)
 @option_group(
     "Tests and effects",
-    option("--effect effects", "EFFECT", 'Add an effect to the model, such as "inertia.mass=0.1 kg".', multiple=True),
-    option("--repeats", "N", "Number of repeats of each sweep [1].", type=click.IntRange(1, 1000)),
-    option("--seed", "N", "Seed of the random numbers [0].", type=click.IntRange(0)),
+    option("--effect effects EFFECT", 'Add an effect to the model, such as "inertia.mass=0.1 kg".', multiple=True),
+    option("--repeats N", "Number of repeats of each sweep [1].", type=click.IntRange(1, 1000)),
+    option("--seed N", "Seed of the random numbers [0].", type=click.IntRange(0)),
 )
 @option_group(
     "Noise and errors of the rig [from the campaign, else none]",
     *(
-        option(
-            f"--{name}", metavar, words, type=quantity(unit, "0 up to 100 %, or below 1 rad", lambda x: 0.0 <= x < 1.0)
-        )
-        for name, metavar, unit, words in (
-            ("noise", "SHARE", "1", 'Random error of each sweep point, relative to the stiffness |K|: "0.5 %".'),
-            ("force-noise", "SHARE", "1", 'Noise of the force in loops, relative to half its range: "0.3 %".'),
-            ("displacement-noise", "SHARE", "1", 'Noise of the displacement in loops, of the amplitude: "0.02 %".'),
-            ("gain-error", "SHARE", "1", 'Gain error of all points of a run (one repeat of one amplitude): "0.4 %".'),
-            ("phase-error", "ANGLE", "rad", 'Phase error of all points of a run, drawn for each run: "0.2 deg".'),
+        option(f"--{usage}", words, type=quantity(unit, "0 up to 100 %, or below 1 rad", lambda x: 0.0 <= x < 1.0))
+        for usage, unit, words in (
+            ("noise SHARE", "1", 'Random error of each sweep point, relative to the stiffness |K|: "0.5 %".'),
+            ("force-noise SHARE", "1", 'Noise of the force in loops, relative to half its range: "0.3 %".'),
+            ("displacement-noise SHARE", "1", 'Noise of the displacement in loops, of the amplitude: "0.02 %".'),
+            ("gain-error SHARE", "1", 'Gain error of all points of a run (one repeat of one amplitude): "0.4 %".'),
+            ("phase-error ANGLE", "rad", 'Phase error of all points of a run, drawn for each run: "0.2 deg".'),
         )
     ),
 )
