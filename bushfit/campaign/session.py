@@ -95,7 +95,7 @@ def session(bushing: Bushing | None, tests: Sequence[SessionTest]) -> list[Rubbe
     bodies = [test.place.body for test in tests]
     conditions: dict[int, RubberConditions] = {}
     for body in dict.fromkeys(bodies):
-        indices = sorted((i for i, other in enumerate(bodies) if other == body), key=numbers.__getitem__)
+        indices = sorted((i for i, tested_body in enumerate(bodies) if tested_body == body), key=numbers.__getitem__)
         strains = [tests[i].amplitude * unit_strain(bushing, tests[i].place) for i in indices]
         ends = np.cumsum([strain.size for strain in strains])
         turn = np.arange(ends[-1]) / max(float(ends[-1]) - 1.0, 1.0)

@@ -155,30 +155,30 @@ def make_bushing(name: str, sizes: Mapping[str, str | None]) -> tuple[Bushing, d
     from bushfit.campaign.bodies import BushingSettings
     from bushfit.validation import validate_tables
 
-    stated = {key: text for key, text in sizes.items() if text is not None}
-    for key, text in stated.items():
+    texts = {key: text for key, text in sizes.items() if text is not None}
+    for key, text in texts.items():
         with error_location(place=option_name(key)):
             parse_quantity(text, "m")
     for side in _SIDES:
         radius, diameter = f"--{side}-radius", f"--{side}-diameter"
-        given = {f"{side}_radius", f"{side}_diameter"} & stated.keys()
-        if len(given) > 1:
+        keys_of_side = {f"{side}_radius", f"{side}_diameter"} & texts.keys()
+        if len(keys_of_side) > 1:
             raise click.UsageError(f"'{radius}' and '{diameter}' state the same size; give one of them.")
-        if not given:
+        if not keys_of_side:
             hint = f'state it: {diameter} "20 mm", or {radius} "10 mm"'
             raise CampaignError(f"the {side} size of the rubber is not stated", hint=hint)
-    if "length" not in stated:
+    if "length" not in texts:
         raise CampaignError("the length of the rubber is not stated", hint='state it: --length "34 mm"')
     try:
-        bushing = validate_tables({"name": name, **stated}, None, BushingSettings).to_bushing()
+        bushing = validate_tables({"name": name, **texts}, None, BushingSettings).to_bushing()
     except BushfitError as error:
         keys = (error.place or "").split(", ")
-        names = [key if key in stated else key.replace("radius", "diameter") for key in keys]
+        names = [key if key in texts else key.replace("radius", "diameter") for key in keys]
         error.file, error.place = None, ", ".join(map(option_name, names)) if error.place else None
         if names != keys:
             error.hint = "a diameter is halved; check that inner and outer are not swapped"
         raise
-    return bushing, stated | ({"shape": "calibrated"} if bushing.correction is not None else {})
+    return bushing, texts | ({"shape": "calibrated"} if bushing.correction is not None else {})
 
 
 def inspect_sources(

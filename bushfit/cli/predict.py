@@ -97,8 +97,8 @@ def command(
     result, loaded = load_model(model), load_campaign(campaign) if campaign else None
     if (mass is None) != (base_acceleration is None):
         raise click.UsageError("'--mass' and '--base-acceleration' go together.")
-    other = None if bushing is None else _bushing_of(result, bushing)
-    predicted = predict(result, loaded, bushing=other, mass=mass, base_acceleration=base_acceleration, **settings)
+    target = None if bushing is None else _bushing_of(result, bushing)
+    predicted = predict(result, loaded, bushing=target, mass=mass, base_acceleration=base_acceleration, **settings)
     _print_summary(output, predicted)
     print_predictions(output, predicted)
     for resonance in predicted.resonances:
@@ -111,7 +111,7 @@ def command(
     for part in predicted.arms:
         output.print(part.sentence)
     print_tests(output, predicted.tests, predicted.usable)
-    inputs = input_files(loaded, model_file(model), Path(bushing) if bushing and other != bushing else None)
+    inputs = input_files(loaded, model_file(model), Path(bushing) if bushing and target != bushing else None)
     folder = output.folder((loaded or predicted.result).name)
     output.write(folder, predicted.files, predicted.document, inputs)
 

@@ -190,9 +190,9 @@ def grid(unit: str) -> Callable[[str], Grid]:
             hint = "write the step, too: start:stop:step" if is_span else None
             raise UnitError("these are not values with a unit", found=repr(text), expected=expected, hint=hint)
         is_range = ":" in parts[1]
-        stated = [parse_quantity(f"{number} {parts[2]}", unit) for number in parts[1].split(":" if is_range else ",")]
-        hint = "predict --static writes the static curve" if unit == "Hz" and stated[0] == 0.0 else None
-        values = Grid(regular_steps(*stated) if is_range else stated)
+        numbers = [parse_quantity(f"{number} {parts[2]}", unit) for number in parts[1].split(":" if is_range else ",")]
+        hint = "predict --static writes the static curve" if unit == "Hz" and numbers[0] == 0.0 else None
+        values = Grid(regular_steps(*numbers) if is_range else numbers)
         values.text = text
         if not values:
             raise UnitError("start:stop:step does not count upward", found=text, expected=expected, hint=hint)

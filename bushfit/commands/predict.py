@@ -228,12 +228,12 @@ def requested_preloads(result: Result, place: Place, preloads: Sequence[str]) ->
 
 def requested_settings(grid: GridOptions) -> PredictSettings:
     """Settings of the prediction grid that a user states; None for the default of an axis."""
-    stated: dict[str, Any] = {
+    axes: dict[str, Any] = {
         key: tuple(value if isinstance(value, str) else float(value) for value in values)
         for key, values in grid.items()
         if isinstance(values, Iterable)
     }
-    return PredictSettings(**{key: values for key, values in stated.items() if values})
+    return PredictSettings(**{key: values for key, values in axes.items() if values})
 
 
 def _predictable_sweeps(result: Result, campaign: Campaign) -> list[MeasuredSweep]:

@@ -69,7 +69,15 @@ def option_words(**options: str | bool | Iterable[str] | None) -> list[str]:
 
 
 def input_files(campaign: Campaign | None, *others: Path | None) -> list[Path]:
-    """Files that a command has read: campaign file, its test files and logo, and the other files that were given."""
+    """Files that a command has read.
+
+    Args:
+        campaign: campaign; None without one.
+        others: other files; None for those that were not given.
+
+    Returns:
+        Campaign file, its test files and logo, and the other files.
+    """
     files = [file for file in others if file]
     if campaign is None:
         return files
