@@ -11,52 +11,40 @@ TYPE_CHECKING = False  # type checkers take it for true; importing typing takes 
 if TYPE_CHECKING:
     from typing import Any
 
-    from bushfit.campaign.campaign import load_campaign
-    from bushfit.commands.compare import compare
-    from bushfit.commands.diagnose import diagnose
-    from bushfit.commands.fit import fit, fit_dynamic, fit_static
-    from bushfit.commands.loading import load_model
-    from bushfit.commands.predict import predict
-    from bushfit.commands.respond import respond
-    from bushfit.commands.results import parameters, picture, save, table
-    from bushfit.commands.run import run
-    from bushfit.commands.simulate import simulate
+    from bushfit.campaign.campaign import load_campaign as load_campaign
+    from bushfit.commands.compare import compare as compare
+    from bushfit.commands.diagnose import diagnose as diagnose
+    from bushfit.commands.fit import fit as fit
+    from bushfit.commands.fit import fit_dynamic as fit_dynamic
+    from bushfit.commands.fit import fit_static as fit_static
+    from bushfit.commands.loading import load_model as load_model
+    from bushfit.commands.predict import predict as predict
+    from bushfit.commands.respond import respond as respond
+    from bushfit.commands.results import parameters as parameters
+    from bushfit.commands.results import picture as picture
+    from bushfit.commands.results import save as save
+    from bushfit.commands.results import table as table
+    from bushfit.commands.run import run as run
+    from bushfit.commands.simulate import simulate as simulate
 
-__all__ = [
-    "compare",
-    "diagnose",
-    "fit",
-    "fit_dynamic",
-    "fit_static",
-    "load_campaign",
-    "load_model",
-    "parameters",
-    "picture",
-    "predict",
-    "respond",
-    "run",
-    "save",
-    "simulate",
-    "table",
-]
-#: Module of each function that is not in the module of its name below bushfit.commands.
+#: Module of each public function.
 _MODULES = {
-    "fit_dynamic": "commands.fit",
-    "fit_static": "commands.fit",
-    "load_campaign": "campaign.campaign",
-    "load_model": "commands.loading",
+    **{name: f"commands.{name}" for name in ("compare", "diagnose", "fit", "predict", "respond", "run", "simulate")},
+    **dict.fromkeys(("fit_dynamic", "fit_static"), "commands.fit"),
     **dict.fromkeys(("parameters", "picture", "save", "table"), "commands.results"),
+    **{"load_campaign": "campaign.campaign", "load_model": "commands.loading"},
 }
+__all__ = list(_MODULES)
 
 
 def __getattr__(name: str) -> Any:
     """Import a public function when it is first used, because importing all of them takes a second."""
-    if name not in __all__:
+    if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(f"bushfit.{_MODULES.get(name, f'commands.{name}')}"), name)
+    return getattr(import_module(f"bushfit.{_MODULES[name]}"), name)
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *_MODULES})

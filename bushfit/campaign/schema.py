@@ -8,12 +8,7 @@ import numpy as np
 from pydantic import ConfigDict, Field
 
 from bushfit.campaign.bodies import BushingSettings, SeveralBushings, SpecimenSettings, specimens_of
-from bushfit.campaign.quantities import (
-    Compound,
-    EffectsSettings,
-    ReportSettings,
-    parameter_settings,
-)
+from bushfit.campaign.quantities import Compound, EffectsSettings, ReportSettings, parameter_settings
 from bushfit.campaign.simulated import SimulateSettings
 from bushfit.effects import is_parameter, parameter_names
 from bushfit.reading.stated import LoopFile, SweepFile, ValidationFile, with_places

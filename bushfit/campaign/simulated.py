@@ -7,10 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, InstanceOf, WithJsonSchema
 
-from bushfit.campaign.quantities import (
-    convert_effects,
-    parameter_value,
-)
+from bushfit.campaign.quantities import convert_effects, parameter_value
 from bushfit.effects.contract import Array
 from bushfit.errors import CampaignError
 from bushfit.geometry import TRANSLATION, Place

@@ -13,43 +13,24 @@ import click
 from bushfit.cli.options import DIRECTIONS, FILE, Parameter, add_parameters, option, option_group, option_name
 from bushfit.errors import BushfitError, MeasurementError
 
-#: Options for metadata that a loop or sweep file may not contain: campaign key, metavar and help text.
+#: Options for metadata that a loop or sweep file may not contain: campaign key with its placeholder, and help text.
 _OF_TESTS = {
-    "amplitude": (
-        "COUNTING",
-        "Meaning of the amplitudes in the file: zero-to-peak, peak-to-peak or rms [from the header].",
-    ),
-    "at_amplitude": ("SIZE", 'Amplitude of the whole file, such as "0.1 mm" [from a column or the file name].'),
-    "at_frequency": ("FREQUENCY", 'Frequency of the whole file, such as "10 Hz" [from a column or the file name].'),
-    "temperature": ("TEMP", 'Temperature of the test, such as "23 degC"; selects its rows in a file with several.'),
-    "preload": ("LOAD", 'Static preload of the test, such as "500 N axial" or "none"; shown in the report.'),
-    "rate": ("SPEED", None),
-    "frequency": ("FREQUENCY", None),
-    "waveform": ("WAVE", None),
-    "sampling_rate": (
-        "FREQUENCY",
-        'For a loop without time: speed ("10 mm/min"), frequency ("0.1 Hz") with waveform (sine, triangle), or '
-        "sampling rate [from the file].",
-    ),
-    "specimen": ("NAME", "Name of the specimen, if no bushing was tested [coupon, or bar for tension]."),
-    "area": ("AREA", None),
-    "thickness": ("LENGTH", None),
-    "elements": (
-        "N",
-        'For a specimen of N rubber blocks in shear [1]: sheared area ("772 mm^2") and thickness ("6 mm") of '
-        "one block.",
-    ),
-    "specimen_number": ("NUMBER", "Serial number of the part; selects its rows in a file with several."),
+    "amplitude COUNTING": "Meaning of the amplitudes in the file: zero-to-peak, peak-to-peak or rms [from the header].",
+    "at_amplitude SIZE": 'Amplitude of the whole file, such as "0.1 mm" [from a column or the file name].',
+    "at_frequency FREQUENCY": 'Frequency of the whole file, such as "10 Hz" [from a column or the file name].',
+    "temperature TEMP": 'Temperature of the test, such as "23 degC"; selects its rows in a file with several.',
+    "preload LOAD": 'Static preload of the test, such as "500 N axial" or "none"; shown in the report.',
+    **dict.fromkeys(("rate SPEED", "frequency FREQUENCY", "waveform WAVE")),
+    "sampling_rate FREQUENCY": 'For a loop without time: speed ("10 mm/min"), frequency ("0.1 Hz") with waveform '
+    "(sine, triangle), or sampling rate [from the file].",
+    "specimen NAME": "Name of the specimen, if no bushing was tested [coupon, or bar for tension].",
+    **dict.fromkeys(("area AREA", "thickness LENGTH")),
+    "elements N": 'For a specimen of N rubber blocks in shear [1]: sheared area ("772 mm^2") and thickness ("6 mm") '
+    "of one block.",
+    "specimen_number NUMBER": "Serial number of the part; selects its rows in a file with several.",
 }
-#: Options for the file format: campaign key and metavar.
-_AS_WRITTEN = {
-    "encoding": "NAME",
-    "delimiter": "WORD",
-    "decimal": "MARK",
-    "thousands": "MARK",
-    "header_line": "LINE",
-    "sheet": "NAME",
-}
+#: Options for the file format: campaign key with its placeholder.
+_AS_WRITTEN = ("encoding NAME", "delimiter WORD", "decimal MARK", "thousands MARK", "header_line LINE", "sheet NAME")
 #: Descriptions of files that are not test files, by extension.
 _NO_TESTS = {".toml": "a campaign or another TOML file", ".json": "a model or another JSON file"}
 #: click types of the options by key; other options are texts.
@@ -60,7 +41,7 @@ TYPES: dict[str, "click.ParamType[Any]"] = {
     "amplitude": click.Choice(["zero-to-peak", "peak-to-peak", "rms"]),
     **dict.fromkeys(("force_sign", "elements", "header_line"), click.INT),
 }
-_SAME_NAME = ("force_sign", *_OF_TESTS, *_AS_WRITTEN)
+_SAME_NAME = ("force_sign", *(usage.split()[0] for usage in (*_OF_TESTS, *_AS_WRITTEN)))
 #: Keys of all metadata options, except columns and units.
 STATED = ("direction", *_SAME_NAME)
 #: Pattern of an inline table of TOML in the hint of an error.
@@ -83,7 +64,7 @@ def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tes
         option("--unit units ROLE=UNIT", f'Unit of a column, such as "{unit}".', multiple=True),
         option("--column columns ROLE=HEADER", words, multiple=True),
     )
-    written = (_metadata_option(key, metavar) for key, metavar in _AS_WRITTEN.items())
+    written = map(_metadata_option, _AS_WRITTEN)
     record = "test_options", partial(_test_options, kind)
     file_format = option_group("File format, if it is not detected", *written, record=record)
     heading = "Information that is missing in the file"
@@ -91,10 +72,10 @@ def metadata_options(kind: Literal["tests", "histories", "displacements"] = "tes
         return lambda function: add_parameters(function, option_group(heading, *columns, record=record), file_format)
     sign = "Reverse the sign of the force: use -1 if the force falls while the displacement rises."
     information = (
-        _metadata_option("direction", "DIRECTION", "Direction: axial, radial or torsion [from file names]."),
+        _metadata_option("direction DIRECTION", "Direction: axial, radial or torsion [from file names]."),
         *columns,
-        _metadata_option("force_sign", "SIGN", sign),
-        *(_metadata_option(key, *texts) for key, texts in _OF_TESTS.items() if kind == "tests"),
+        _metadata_option("force_sign SIGN", sign),
+        *(_metadata_option(usage, words) for usage, words in _OF_TESTS.items() if kind == "tests"),
     )
     return lambda function: add_parameters(
         function,
@@ -123,9 +104,9 @@ def _test_options(kind: str, _: click.Context, values: dict[str, Any]) -> dict[s
     return {key: value for key, value in values.items() if value not in (None, {})}
 
 
-def _metadata_option(key: str, metavar: str, words: str | None = None) -> Parameter:
-    """Create the option of a campaign key, with its metavar and help text."""
-    return option(f"{option_name(key)} {metavar}", words, type=TYPES.get(key))
+def _metadata_option(usage: str, words: str | None = None) -> Parameter:
+    """Create the option of a campaign key, which stands with its placeholder in `usage`; `words` is the help text."""
+    return option(option_name(usage), words, type=TYPES.get(usage.split()[0]))
 
 
 def require_tests(context: click.Context, _: click.Parameter, value: Any) -> Any:

@@ -36,7 +36,6 @@ _FORMAT_OPTIONS: dict[Written, Parameter] = {
         type=click.Choice(get_args(Form)),
         default="csv",
         envvar="BUSHFIT_TABLE_FORMAT",
-        show_envvar=True,
     ),
     "pictures": option(
         "--plot-format FORM",
@@ -45,7 +44,6 @@ _FORMAT_OPTIONS: dict[Written, Parameter] = {
         multiple=True,
         default=["png"],
         envvar="BUSHFIT_PLOT_FORMAT",
-        show_envvar=True,
     ),
     "pages": flag("--no-report", "Do not write the HTML report."),
 }
