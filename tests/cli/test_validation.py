@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 from commandline import typing
 from shell import BUSHING, RUBBER, document
-from virtual_rig import LOOP
 
 SIMULATED = f"""{BUSHING}
 [simulate]
@@ -15,39 +14,21 @@ seed = 3
 repeats = 3
 noise = "0.3 %"
 force_noise = "0.2 %"
-
-{RUBBER}
-[simulate.effects.inertia]
-mass = "0.2 kg"
-
-{LOOP.format("axial", "1 mm", "0.1 Hz")}
+effects.inertia.mass = "0.2 kg"
+loops = [{{ direction = "axial", amplitude = "1 mm", frequency = "0.1 Hz" }}]
+validation = [
+  {{ direction = "axial", motion = "random", frequencies = ["2 Hz", "60 Hz"], amplitudes = ["1 mm", "1 mm"], \
+rms = "0.05 mm", duration = "3 s" }},
+  {{ direction = "axial", motion = "sines", frequencies = ["2 Hz", "50 Hz"], amplitudes = ["0.2 mm", "0.05 mm"], \
+duration = "2 s" }},
+  {{ direction = "axial", motion = "road", frequencies = ["1 Hz", "40 Hz"], rms = "0.1 mm", duration = "4 s" }},
+]
 [[simulate.sweeps]]
 direction = "axial"
 amplitudes = ["0.1 mm", "0.2 mm", "0.5 mm"]
 frequencies = {{ start = "5 Hz", stop = "155 Hz", step = "10 Hz" }}
 
-[[simulate.validation]]
-direction = "axial"
-motion = "random"
-frequencies = ["2 Hz", "60 Hz"]
-amplitudes = ["1 mm", "1 mm"]
-rms = "0.05 mm"
-duration = "3 s"
-
-[[simulate.validation]]
-direction = "axial"
-motion = "sines"
-frequencies = ["2 Hz", "50 Hz"]
-amplitudes = ["0.2 mm", "0.05 mm"]
-duration = "2 s"
-
-[[simulate.validation]]
-direction = "axial"
-motion = "road"
-frequencies = ["1 Hz", "40 Hz"]
-rms = "0.1 mm"
-duration = "4 s"
-"""
+{RUBBER}"""
 
 
 @pytest.fixture(scope="module")
@@ -152,7 +133,7 @@ def test_a_low_pass_and_corrections_of_a_record_are_stated(campaign, bushfit, tm
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
-        ('rms = "0.05 mm"', "", "these keys do not state a motion"),
+        ('rms = "0.05 mm", ', "", "these keys do not state a motion"),
         ('["2 Hz", "60 Hz"]', '["60 Hz", "2 Hz"]', "these frequencies are no band"),
         ('duration = "3 s"', 'duration = "3000 s"', "too long to simulate"),
     ],
