@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +43,7 @@ def command(
     model: Path,
     history: Path,
     directions: tuple[str, ...],
-    test_options: Mapping[str, Any],
+    test_options: dict[str, Any],
     output: Output,
     **settings: Any,
 ) -> None:
@@ -67,15 +65,15 @@ def command(
         )
     result = load_model(model)
     folder = output.folder(result.name, output.formats.table("response"))
-    file_format = FileFormat(**{key.name: test_options.get(key.name) for key in fields(FileFormat)})
+    columns, units = (test_options.pop(key, None) for key in ("columns", "units"))
     with options_named():
         response = respond(
             result,
             history,
             direction=directions[0] if directions else None,
-            columns=test_options.get("columns"),
-            units=test_options.get("units"),
-            file_format=file_format,
+            columns=columns,
+            units=units,
+            file_format=FileFormat(**test_options),
             **settings,
         )
     print_response(output, response)
