@@ -5,10 +5,6 @@ import numpy as np
 #: Prior probability of each kind of explanation; the rest to 1 is the prior probability that nothing is missing. One
 #: bushing in two meets its model; for most others the library has the missing effect.
 ODDS = {"effect": 0.22, "part": 0.15, "record": 0.03, "unnamed": 0.10}
-#: Dynamic shear modulus of the rubber of bushings [Pa] and standard deviation of its natural log: 35 to 80 IRHD (P. B.
-#: Lindley, Engineering Design with Natural Rubber, 1974). Of two mistakes that make the tests agree alike, the one that
-#: gives such a rubber is more probable.
-RUBBER = 1.2e6, 0.8
 #: Sizes of missing effects and faults, relative to |K|, of equal prior probability: from invisible to obvious.
 SIZES = np.geomspace(0.004, 0.4, 7)
 #: Largest relative change of |K| by a refitted effect: some effects make a bushing several times as stiff.

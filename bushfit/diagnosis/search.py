@@ -19,12 +19,13 @@ from bushfit.diagnosis.claims import ClaimScreening, claims
 from bushfit.diagnosis.evidence import Evidence
 from bushfit.diagnosis.explanations import COMPOUND, Explanation, FaultyPart
 from bushfit.diagnosis.hypotheses import DiagnosisRequest, Hypothesis, SearchState, Tests
-from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS, RUBBER
+from bushfit.diagnosis.priors import BEAM, DOES_NOT_FIT, LOG_ODDS_CUTOFF, NAMED, ODDS, REFITS, ROUNDS
 from bushfit.diagnosis.propose import has_used_parameters
 from bushfit.diagnosis.refit import refitted
 from bushfit.diagnosis.rig_errors import in_scatter_units
 from bushfit.diagnosis.verdict import decide_verdict
 from bushfit.effects.contract import Array
+from bushfit.effects.mistakes import USUAL_MODULUS
 from bushfit.errors import FitError, ModelError
 from bushfit.geometry import stiffness_per_modulus
 from bushfit.model.model import Model
@@ -306,7 +307,7 @@ def _modulus_deviation(evidence: Evidence) -> float:
         np.median(np.abs(test.measured)) / stiffness_per_modulus(evidence.model.bushing, test.direction)
         for test in evidence.data_sets
     ]
-    typical, spread = RUBBER
+    typical, spread = USUAL_MODULUS
     return float(np.log(np.median(moduli) / typical)) / spread
 
 

@@ -24,6 +24,10 @@ _Test = TypeVar("_Test", bound=Loop | Sweep)
 #: Ranges of plausible shear moduli of rubber [Pa] and strain amplitudes of tests [-]; chosen: a tenth of the softest to
 #: ten times the stiffest compound, a tenth of the smallest to twice the largest test.
 _MODULI, _STRAINS = (2e4, 3e8), (3e-4, 5.0)
+#: Dynamic shear modulus of the rubber of bushings [Pa] and standard deviation of its natural log: 35 to 80 IRHD (P. B.
+#: Lindley, Engineering Design with Natural Rubber, 1974). Of two mistakes that make the tests agree alike, the one that
+#: gives such a rubber is more probable.
+USUAL_MODULUS = 1.2e6, 0.8
 #: The direction that a test may have been exchanged with, by its direction.
 _EXCHANGED: Mapping[Place, Direction] = {Direction.AXIAL: Direction.RADIAL, Direction.RADIAL: Direction.AXIAL}
 #: Separator between the name of a mistake and the name of the test, in options.
