@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 
 from bushfit.batch.document import Estimate
-from bushfit.effects import get_parameter, is_parameter, parameter_names
+from bushfit.effects import get_parameter, is_parameter, library_parameters
 from bushfit.errors import UnitError, did_you_mean
 from bushfit.geometry import ROTATION, STRAINING, TRANSLATION, Direction, Motion
 from bushfit.reading.measurement import Sweep
@@ -132,7 +132,7 @@ def list_quantities(names: Collection[str], points: Iterable[Point]) -> dict[str
         names: names of the quantities that have values; those that are parameters are listed in library order.
         points: operating points of stiffness and loss factor.
     """
-    in_order = dict.fromkeys([*parameter_names(), *sorted(filter(is_parameter, names))])
+    in_order = dict.fromkeys([*library_parameters(), *sorted(filter(is_parameter, names))])
     units = {name: get_parameter(name).unit for name in in_order if name in names}
     parameters = [PartQuantity(name, "-" if unit == "1" else unit) for name, unit in units.items()]
     at_points = [point_quantity(point, name) for point in points for name in (STIFFNESS, LOSS_FACTOR)]

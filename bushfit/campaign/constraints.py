@@ -9,7 +9,7 @@ import numpy as np
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.quantities import parameter_value
 from bushfit.campaign.schema import ParameterSetting
-from bushfit.effects import get_parameter, is_parameter, parameter_names, place_suffix
+from bushfit.effects import get_parameter, is_parameter, library_parameters, place_suffix
 from bushfit.errors import CampaignError, error_location
 from bushfit.geometry import get_places
 from bushfit.model.constraints import Constraints, Prior, Tie
@@ -120,7 +120,7 @@ def _tie(campaign: Campaign, name: str, setting: ParameterSetting) -> Tie:
         tie = Tie(name, equal, (equal,), "p0", campaign.path)
         if not is_parameter(equal):
             hint = 'expression = "..." takes the value of an expression'
-            raise unknown_key(equal, parameter_names(), hint)
+            raise unknown_key(equal, library_parameters(), hint)
     else:
         tie = Tie.from_expression(name, setting.expression or "", labels, campaign.path)
     for used in tie.names:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator
 
-from bushfit.effects import get_parameter, is_parameter, parameter_names
+from bushfit.effects import get_parameter, is_parameter, library_parameters
 from bushfit.errors import CampaignError, UnitError, error_location
 from bushfit.reading.files import view_bytes
 from bushfit.units import check_size, parse_quantity
@@ -49,7 +49,7 @@ def parameter_value(place: str, name: str, raw: Any) -> float:
     """
     with error_location(place=place):
         if not is_parameter(name):
-            raise unknown_key(name, parameter_names())
+            raise unknown_key(name, library_parameters())
         file_unit = get_parameter(name).unit
         unit = _S_TO_ALPHA.sub("", file_unit)
         is_number = isinstance(raw, int | float) and not isinstance(raw, bool)

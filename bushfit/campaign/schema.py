@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field
 from bushfit.campaign.bodies import BushingSettings, SeveralBushings, SpecimenSettings, specimens_of
 from bushfit.campaign.quantities import Compound, EffectsSettings, ReportSettings, parameter_settings
 from bushfit.campaign.simulated import SimulateSettings
-from bushfit.effects import is_parameter, parameter_names
+from bushfit.effects import is_parameter, library_parameters
 from bushfit.reading.stated import LoopFile, SweepFile, ValidationFile, with_places
 from bushfit.validation import (
     Angle,
@@ -141,7 +141,7 @@ class FitSettings:
     effects: tuple[Text, ...] = ()
     prior: Text | None = None
     parameters: Annotated[Mapping[str, ParameterSetting], table(parameter_settings)] = field(
-        default_factory=dict, metadata=inline_keys(parameter_names)
+        default_factory=dict, metadata=inline_keys(library_parameters)
     )
 
 

@@ -134,7 +134,7 @@ def register(name: str, law: ModuleType, origin: Origin) -> None:
     assert isinstance(effect, Effect)  # the name has no place
     LIBRARY[name] = replace(effect, sentence=f"{effect.sentence} (Law of {origin}.)")
     ORIGINS[name] = origin
-    _parameters.cache_clear()
+    library_parameters.cache_clear()
 
 
 #: Names of the effects in the paper's model.
@@ -184,7 +184,7 @@ def place_suffix(name: str) -> str | None:
     ('radial', None)
     """
     family, _, place = name.partition(".")
-    of_place = name in LIBRARY or name not in _parameters()
+    of_place = name in LIBRARY or name not in library_parameters()
     return place or None if family in FAMILIES and of_place else None
 
 
@@ -229,21 +229,16 @@ def effect_name_of(name: str) -> str:
 
 
 @cache
-def _parameters() -> dict[str, Parameter]:
-    """All parameters of the library by their names in files and reports."""
+def library_parameters() -> dict[str, Parameter]:
+    """All parameters by their names in files and reports, in the order of the library; cached."""
     return {
         qualified_name(effect, parameter): parameter for effect in LIBRARY.values() for parameter in effect.parameters
     }
 
 
-def parameter_names() -> tuple[str, ...]:
-    """Names of all parameters in files and reports, in the order of the library."""
-    return tuple(_parameters())
-
-
 def is_parameter(name: str) -> bool:
     """Return True if a parameter has this name in files and reports."""
-    return name in _parameters() or place_suffix(name) is not None
+    return name in library_parameters() or place_suffix(name) is not None
 
 
 def get_parameter(name: str) -> Parameter:
@@ -252,7 +247,7 @@ def get_parameter(name: str) -> Parameter:
     >>> get_parameter("inertia.mass").meaning
     'moving mass'
     """
-    return _parameters()[name] if name in _parameters() else get_effect(name).parameters[0]
+    return library_parameters()[name] if name in library_parameters() else get_effect(name).parameters[0]
 
 
 def effects_for_places(places: Iterable[str]) -> dict[str, Effect]:

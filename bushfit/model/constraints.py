@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from bushfit.effects import get_parameter, is_parameter, parameter_names
+from bushfit.effects import get_parameter, is_parameter, library_parameters
 from bushfit.effects.contract import Array
 from bushfit.errors import ModelError
 from bushfit.validation import unknown_key
@@ -83,7 +83,7 @@ class Tie:
         for used in names:
             if not is_parameter(used):
                 hint = "expressions have values in SI units, without the units"
-                raise unknown_key(used, parameter_names(), hint)
+                raise unknown_key(used, library_parameters(), hint)
         code = pattern.sub(lambda match: f"p{names.index(match[0])}", expression)
         tie = cls(name, expression, names, code, file)
         tie.value({used: get_parameter(used).typical + 0j for used in names})  # complex, as for derivatives
