@@ -303,7 +303,10 @@ class Layer(Effect):
     force: Callable[[Values, ForceBelow, History, Setting], Array]
 
     def acts_at(self, place: Place) -> bool:
-        """Return True if the layer acts in this direction or specimen; a modulus test has only formula corrections."""
+        """Return True if the layer acts in tests of this direction or specimen.
+
+        Tests of a modulus have neither rig nor sleeve: only layers that correct a stiffness formula act there.
+        """
         acts = self.corrects is not None if place.motion is STRAINING else self.turns or not place.is_rotation
         return acts and super().acts_at(place)
 

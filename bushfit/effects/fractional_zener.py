@@ -42,7 +42,11 @@ def modulus(p: Values, omega: Array, strain: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def _circle(length: int) -> tuple[Array, Array]:
-    """Evaluate ln(1 - z) on a half circle |z| = r < 1, (length // 2 + 1,), and the powers r^0, r^1, ..., (length,)."""
+    """Evaluate ln(1 - z) on a circle |z| = r < 1, from which `stress` computes the coefficients of a power series.
+
+    Returns:
+        ln(1 - z) on half of the circle, (length // 2 + 1,), and the powers r^0, r^1, ..., (length,).
+    """
     radius = _ECHO ** (1.0 / length)
     turn = np.exp(-2.0j * np.pi * np.arange(length // 2 + 1) / length)
     return np.log(1.0 - radius * turn), radius ** np.arange(length)

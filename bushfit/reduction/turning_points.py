@@ -32,8 +32,8 @@ def reversals(value: NDArray[Any]) -> NDArray[np.bool_]:
         True at each sample, except the last, at which the motion reverses, (..., n - 1). If the motion rests before it
         reverses, the last sample of the rest is the reversal.
 
-    >>> reversals(np.array([0.0, 1.0, 1.0, 0.0]))
-    array([False, False,  True])
+    >>> reversals(np.array([0.0, 0.0, 1.0, 1.0, 0.0]))
+    array([False, False, False,  True])
     """
     steps = np.diff(value, axis=-1)
     rising = steps > 0.0

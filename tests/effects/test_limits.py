@@ -77,10 +77,11 @@ def test_compliances_in_series_add():
     np.testing.assert_allclose(*forces, rtol=1e-10)
 
 
-def test_a_rig_in_series_leaves_the_bushing_its_share_of_the_amplitude():
+@pytest.mark.parametrize("alone", [PLAIN, added("clearance", delta=4e-5)], ids=["plain", "with play"])
+def test_a_rig_in_series_leaves_the_bushing_its_share_of_the_amplitude(alone):
     """1/K = 1/K_b + c, where K_b is the bushing's stiffness at |1 - c K| of the amplitude."""
-    total = added("rig_compliance", compliance=4e-7).stiffness(*AXIAL)
-    inside = PLAIN.stiffness("axial", FREQUENCY, AMPLITUDE * np.abs(1.0 - 4e-7 * total))
+    total = added("rig_compliance", alone, compliance=4e-7).stiffness(*AXIAL)
+    inside = alone.stiffness("axial", FREQUENCY, AMPLITUDE * np.abs(1.0 - 4e-7 * total))
     np.testing.assert_allclose(total, inside / (1.0 + 4e-7 * inside), rtol=1e-6)
 
 
