@@ -208,8 +208,7 @@ def test_a_detectable_mass_exceeds_the_class_of_the_rig_somewhere(planned, known
     sweeps = [
         (test.direction, *operating_points(test)) for test in planned.planned.tests if isinstance(test, SimulatedSweep)
     ]
-    points = [(sweep.direction, *operating_points(sweep)) for sweep in sweeps]
-    changes = np.concatenate([np.log(heavy.stiffness(*x) / known.model.stiffness(*x)) for x in points])
+    changes = np.concatenate([np.log(heavy.stiffness(*x) / known.model.stiffness(*x)) for x in sweeps])
     relative = np.abs([changes.real / NOISE.level[0], changes.imag / NOISE.level[1]])
     assert relative.max() == pytest.approx(1.0, rel=0.01)
     assert 0.3 < amounts["fixture_resonance"] / amounts["inertia"] < 1.0, "a resonance at a tested frequency is rare"
