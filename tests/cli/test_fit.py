@@ -138,6 +138,15 @@ def test_held_parameters_that_miss_the_tests_are_said_to(own):
     assert "every parameter is fixed" in typing(own)("diagnose", CAMPAIGN, "-o", "y", "--no-plots", status=2).stderr
 
 
+def test_a_wrong_unit_is_the_headline(own):
+    sweep = pd.read_csv(own / SWEEP)
+    sweep["stiffness [N/mm]"] *= 1000.0
+    sweep.to_csv(own / SWEEP, index=False)
+    verdict, action = typing(own)("fit", CAMPAIGN, "-o", "x", "--no-plots").stderr.splitlines()[:2]
+    assert "which no rubber does: check the units" in verdict
+    assert action.split()[1:3] == ["bushfit", "diagnose"]
+
+
 def test_a_parameter_on_a_bound_shows_no_interval(own):
     """Sweeps whose stiffness falls with frequency leave the springpot nothing to do."""
     sweep = pd.read_csv(own / SWEEP)
