@@ -259,15 +259,14 @@ def judge_part(
         estimate = record.quantities.get(name)
         if estimate and poor and name not in FIT_NAMES:
             estimate, bound, source = record.measured.get(name), None, "measured "
-        if estimate is None:
-            outcomes[name] = (
-                ("not judged", f"{name} not judged: poor fit") if source else ("fail", f"{name} is not known")
-            )
-            continue
-        result = judge_value(estimate, low, high)
-        if bound:
-            result = max(result, "conditional pass", key=RESULTS.index)
-        outcomes[name] = result, source + limit_sentence(quantities[name], estimate, (low, high), result, bound)
+        if estimate:
+            best: LimitResult = "conditional pass" if bound else "pass"
+            result = max(judge_value(estimate, low, high), best, key=RESULTS.index)
+            outcomes[name] = result, source + limit_sentence(quantities[name], estimate, (low, high), result, bound)
+        elif source:
+            outcomes[name] = "not judged", f"{name} not judged: poor fit"
+        else:
+            outcomes[name] = "fail", f"{name} is not known"
     if limits.verdicts and record.verdict not in limits.verdicts:
         sentence = f"verdict {record.verdict or 'not known'}, allowed {', '.join(limits.verdicts)}"
         outcomes["verdict"] = "fail", sentence

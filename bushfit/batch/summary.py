@@ -284,12 +284,10 @@ class BatchResult:
             more = f" and {len(names) - _NAMES_LISTED} more" if len(names) > _NAMES_LISTED else ""
             return ", ".join(names[:_NAMES_LISTED]) + more
 
-        at_bound, outside, warnings = dict[str, list[str]](), list[str](), list[str]()
+        at_bound, warnings = dict[str, list[str]](), list[str]()
         for part, record in zip(parts, self.records, strict=True):
             for parameter in record.at_bound:
                 at_bound.setdefault(parameter, []).append(part.name)
-            if any(BEYOND in line for line in record.warnings):
-                outside.append(part.name)
         if poor := [part.name for part in parts if part.poor_fit]:
             judged = "; their limits are judged on measured points, if such points exist" if self.plan.limits else ""
             warnings.append(f"the model misses the tests of {listed(poor)}: do not use their parameters{judged}")
@@ -297,7 +295,7 @@ class BatchResult:
         if at_bound:
             clauses = [f"{parameter} of {listed(names)}" for parameter, names in at_bound.items()]
             warnings.append(f"at a bound of the fit, because the tests do not determine them: {'; '.join(clauses)}")
-        if outside:
+        if outside := [part.name for part in parts if any(BEYOND in line for line in part.warnings)]:
             sentence = "a point is outside the tested range, where no test confirms the model"
             warnings.append(f"{sentence}: {listed(outside)}")
         return warnings
