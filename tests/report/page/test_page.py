@@ -93,7 +93,8 @@ def test_what_it_says_is_what_the_documents_say(results):
     for words in (
         *("Mystery mount", "inner diameter 24 mm, outer diameter 48 mm, length 50 mm", "Verdict: named"),
         *(diagnosis["summary"], diagnosis["next_test"], "rig_compliance"),
-        *("0.7793", "0.7712 to 0.7874", "1.2 %", "bushfit run mystery_mount.toml"),
+        *("0.7793", " to ".join(f"{1e-6 * end:.4f}" for end in model["parameters"]["mu"]["ci95"])),
+        *("1.2 %", "bushfit run mystery_mount.toml"),
         *(where["reading"] for where in diagnosis["where"]),
         *(source["sha256"] for source in model["provenance"]["inputs"]),
         *(model["campaign"]["sha256"], "numpy", "1.69", "0.99"),
