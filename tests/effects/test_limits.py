@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from bushfit.effects import BASE, LIBRARY, History, distributed_sliders, qualified_name, sliders
+from bushfit.effects import BASE, LIBRARY, History, Layer, distributed_sliders, qualified_name, sliders
 from bushfit.effects.contract import RubberConditions
 from bushfit.effects.dead_zone import first_harmonic
 from bushfit.effects.friction import _strokes, harmonic_shape, mean_stress_decay, modulus
 from bushfit.effects.temperature import log_shift
-from bushfit.geometry import Bushing, Direction
+from bushfit.geometry import Bushing, Direction, Specimen
 from bushfit.model.model import Model
 from bushfit.units import CELSIUS
 
@@ -113,6 +113,17 @@ def test_what_corrects_a_formula_scales_that_direction_and_no_other(effect):
         plain = PLAIN.stiffness(direction, FREQUENCY, AMPLITUDE)
         np.testing.assert_allclose(model.stiffness(direction, FREQUENCY, AMPLITUDE), factor * plain, rtol=1e-14)
         np.testing.assert_allclose(model.force(direction, LOOP), factor * PLAIN.force(direction, LOOP), rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "effect", [one for one in LIBRARY.values() if isinstance(one, Layer)], ids=lambda one: one.name
+)
+def test_rig_and_sleeve_act_neither_on_a_modulus_nor_all_in_torsion(effect):
+    values = {qualified_name(effect, parameter): parameter.value_at_share(0.5) for parameter in effect.parameters}
+    model, coupon = PLAIN.with_effect(effect.name, values), Specimen("coupon", "modulus")
+    for place in (coupon, *([] if effect.turns else [Direction.TORSION])):
+        stiffness = [one.stiffness(place, FREQUENCY, 20.0 * AMPLITUDE, kind="sweep") for one in (model, PLAIN)]
+        np.testing.assert_array_equal(*stiffness)
 
 
 @pytest.mark.parametrize("shift", [0.01, 0.03, 0.13])
