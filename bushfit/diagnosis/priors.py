@@ -23,8 +23,6 @@ WITHIN_CLASS = 1.5
 COMPOUND = ((0.0, 0.5), (0.01, 0.15), (0.02, 0.15), (0.04, 0.1), (0.08, 0.06), (0.16, 0.04))
 #: Number of harmonics of the drift along a run; the variance of harmonic j falls as 1/j^2.
 WAVES = 4
-#: Degrees of freedom of the estimated scatter above which the scatter is treated as known.
-KNOWN = 30
 #: Natural log of the odds below the best at which a state of the search is abandoned.
 LOG_ODDS_CUTOFF = 12.0
 #: Number of states of the search that are kept, in the first round and later; and number of rounds.

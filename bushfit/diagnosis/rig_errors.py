@@ -11,7 +11,7 @@ from scipy.special import chdtri, logsumexp
 
 from bushfit.campaign.schema import RigSettings
 from bushfit.diagnosis.evidence import Evidence
-from bushfit.diagnosis.priors import COMPOUND, KNOWN, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
+from bushfit.diagnosis.priors import COMPOUND, LEVELS, RUNS, WANDERING, WAVES, WITHIN_CLASS
 from bushfit.effects.contract import Array
 from bushfit.fitting.preparation import MeasuredSweep, group_repeats, split_by_kind, with_gain_weighting
 from bushfit.fitting.rig_class import ASSUMED, class_errors
@@ -20,6 +20,8 @@ from bushfit.fitting.rig_class import ASSUMED, class_errors
 _RUN, _LEVEL, _WAVE, _LOOP = range(4)
 #: Minimum number of points of a run that can drift.
 _FEWEST = 4
+#: Degrees of freedom of the estimated scatter above which the scatter is treated as known.
+_KNOWN = 30
 
 
 @dataclass(frozen=True)
@@ -151,7 +153,7 @@ def noise_cases(evidence: Evidence) -> list[NoiseCase]:
     sweeps = split_by_kind(evidence.data_sets)[1]
     freedom = max((sweep.noise.scatter_freedom for sweep in sweeps), default=0)
     thirds = (np.arange(3) + 0.5) / 3
-    scatters = np.sqrt(freedom / chdtri(freedom, 1.0 - thirds)).tolist() if 0 < freedom < KNOWN else [1.0]
+    scatters = np.sqrt(freedom / chdtri(freedom, 1.0 - thirds)).tolist() if 0 < freedom < _KNOWN else [1.0]
     runs, waves = (RUNS, WANDERING) if sweeps else (((0.0, 1.0),),) * 2
     unnormalised = [
         NoiseCase(
