@@ -75,7 +75,7 @@ def describe(evidence: Evidence, rig: RigSettings, start: Mapping[str, float], b
     """
     if NAME in evidence.model.effects:
         return None
-    fitted, correction = with_model_error(evidence.estimate, bounds, smooth=True)
+    fitted, correction = with_model_error(evidence.solution, bounds, smooth=True)
     if correction is None or correction.uncertainty >= 1.0:
         return None
     harmonic = tuple(test.fundamental() for test in evidence.data_sets)
@@ -87,9 +87,9 @@ def describe(evidence: Evidence, rig: RigSettings, start: Mapping[str, float], b
     except FitError:  # too few points are left for the parameters
         return None
     model = replace(fitted.model, effects=(*evidence.model.effects, NAME), unnamed=correction)
-    after = Evidence(fitted.reevaluate(model, harmonic), harmonic)
-    whole = Evidence(fitted.reevaluate(model, evidence.data_sets), evidence.data_sets)
-    law = nearest_power_law(Evidence(base, harmonic), rig, start, bounds)
+    after = Evidence(fitted.reevaluate(model, harmonic))
+    whole = Evidence(fitted.reevaluate(model, evidence.data_sets))
+    law = nearest_power_law(Evidence(base), rig, start, bounds)
     sentences = _form(correction, law), _validity(correction, whole)
     return GapDescription(after, fitted, _hold_out_inside(evidence, fitted), law, *sentences)
 

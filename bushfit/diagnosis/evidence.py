@@ -35,13 +35,16 @@ class Evidence:
 
     Args:
         solution: fit with residuals in units of noise.
-        data_sets: tests that the model was fitted to.
         joint: same fit with residuals whitened by errors that all tests share; None if it was fitted without them.
     """
 
     solution: FitResult
-    data_sets: tuple[MeasuredTest, ...]
     joint: FitResult | None = None
+
+    @property
+    def data_sets(self) -> tuple[MeasuredTest, ...]:
+        """Tests that the model was fitted to."""
+        return tuple(self.solution.problem.tests)
 
     @property
     def model(self) -> Model:
@@ -52,11 +55,6 @@ class Evidence:
     def residual(self) -> Array:
         """Whitened residuals, model minus measurement in units of noise, (n,)."""
         return self.solution.residual
-
-    @property
-    def estimate(self) -> FitResult:
-        """Result of the fit with each test weighted by its own noise, without errors that several tests share."""
-        return replace(self.solution, problem=replace(self.solution.problem, tests=self.data_sets, shared_error=None))
 
     @property
     def chi_square(self) -> float:
@@ -124,7 +122,7 @@ def fit(model: Model, data_sets: Sequence[MeasuredTest], fixed: Sequence[str], b
         ModelError: no response.
     """
     problem = FitProblem.with_fixed(model, data_sets, fixed, bounds)
-    return Evidence(Descent.start(problem).run(EVALUATIONS).solution, tuple(data_sets))
+    return Evidence(Descent.start(problem).run(EVALUATIONS).solution)
 
 
 def result_of(
@@ -152,7 +150,7 @@ def result_of(
     Returns:
         The model with covariance, quality, range, warnings and expected error.
     """
-    model, solution, error = evidence.model, evidence.estimate, None
+    model, solution, error = evidence.model, evidence.solution, None
     if corrected:
         solution = replace(corrected, noise_weighted=evidence.data_sets)
     elif lacking:

@@ -178,7 +178,7 @@ def _chain(
         laws = " or ".join(name for name in (*_RATE, *_AMPLITUDE) if _can_add(chain[-1].model, name))
         raise ModelError(problem, found=last, expected=f"such as {laws}")
     solution = with_effect(chain[-1].solution, chain[-1].data_sets, effect, fixed, bounds)
-    return [*chain, Evidence(solution, chain[-1].data_sets)]
+    return [*chain, Evidence(solution)]
 
 
 def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bounds) -> float:
@@ -190,7 +190,7 @@ def _log_evidence(chain: Sequence[Evidence], names: Sequence[str], bounds: Bound
         bounds: limits of parameters inside their general limits.
     """
     *before, last = chain
-    found = with_model_error(last.estimate, bounds)[0]
+    found = with_model_error(last.solution, bounds)[0]
     priors = [laplace(name, replace(last, solution=found), one) for name, one in zip(names, before, strict=True)]
     precisions = {name: value for _, precision, _ in priors for name, value in precision.items()}
     return sum(density for density, *_ in priors) + log_likelihood(found, precisions)

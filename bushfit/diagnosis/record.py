@@ -270,7 +270,7 @@ class Diagnosis:
                 interval = self.result.interval(name) if name in model.values else None
                 parameters[name] = {
                     "value": value,
-                    "stderr": covariance.stderr(name) if name in model.values else None,
+                    "stderr": covariance.stderr(name),
                     "ci95": None if interval is None else list(interval),
                     "unit": get_parameter(name).unit,
                 }

@@ -74,9 +74,9 @@ def refitted(
         if fit.converged or fit.evaluations >= EVALUATIONS or fit.chi_square <= best + _FAR
     }
     if columns is None:
-        return {name: Evidence(solution, evidence.data_sets) for name, solution in near.items()}
-    plain = {name: solution.reevaluate(solution.model, evidence.data_sets) for name, solution in near.items()}
-    return {name: Evidence(plain[name], evidence.data_sets, solution) for name, solution in near.items()}
+        return {name: Evidence(solution) for name, solution in near.items()}
+    plain = {name: solution.reevaluate(solution.model, tests) for name, solution in near.items()}
+    return {name: Evidence(plain[name], solution) for name, solution in near.items()}
 
 
 def within_reach(model: Model, data_sets: Sequence[MeasuredTest]) -> Bounds:

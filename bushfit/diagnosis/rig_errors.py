@@ -131,7 +131,7 @@ def in_scatter_units(evidence: Evidence) -> Evidence:
         else data_set
         for data_set in with_gain_weighting(evidence.data_sets, weigh=False)
     )
-    return Evidence(evidence.solution.reevaluate(evidence.model, data_sets), data_sets)
+    return Evidence(evidence.solution.reevaluate(evidence.model, data_sets))
 
 
 def rig_errors(evidence: Evidence, rig: RigSettings) -> RigErrors:

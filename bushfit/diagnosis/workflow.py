@@ -131,4 +131,4 @@ def _initial_fit(
         outliers, data_sets = robust.outliers, robust.data_sets
     data_sets = [data_set.with_weight() for data_set in with_gain_weighting(data_sets, weigh=True)]
     descent = Descent.start(FitProblem.with_fixed(model, data_sets, fixed, data.bounds)).run(EVALUATIONS)
-    return Evidence(descent.solution, tuple(data_sets)), start, outliers
+    return Evidence(descent.solution), start, outliers
