@@ -51,10 +51,10 @@ def refitted(
     fits, tests = dict[str, Descent](), evidence.data_sets
     shared_error = None if columns is None else CommonError(columns)
     for name, model in models.items():
-        limits = {**within_reach(model, evidence.data_sets), **bounds}
-        start_values = {parameter: value for parameter, value in start.items() if parameter in model.values}
+        model = model.with_values({key: value for key, value in start.items() if key in model.values})
+        limits = {**within_reach(model, tests), **bounds}  # at the start, because the gap has distorted the fit before
         with suppress(FitError, ModelError):  # no response with this effect: no candidate
-            problem = FitProblem.with_fixed(model.with_values(start_values), tests, fixed, limits)
+            problem = FitProblem.with_fixed(model, tests, fixed, limits)
             fits[name] = Descent.start(replace(problem, shared_error=shared_error))
     running, best = list(fits), 0.0
     for _ in track("evaluations of effects", range(1, EVALUATIONS)):
