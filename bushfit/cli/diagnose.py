@@ -110,7 +110,7 @@ def print_verdict(output: Output, diagnosed: DiagnosisOutput, action: str = "") 
     from bushfit.diagnosis.record import format_odds
 
     colour = _COLOURS.get(diagnosed.headline, "yellow")
-    output.print_headline(diagnosed.name, diagnosed.headline, action, f"bold {colour}")
+    output.print_headline(diagnosed.data.campaign.name, diagnosed.headline, action, f"bold {colour}")
     for line in (diagnosed.diagnosis.summary, *format_odds(diagnosed.document)):
         output.console.print(f"  {escape(line)}")
     if diagnosed.diagnosis.adopt:

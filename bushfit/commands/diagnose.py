@@ -31,7 +31,6 @@ class DiagnosisOutput:
     """Output of the command diagnose: verdict, model to use, and result files.
 
     Args:
-        name: name of the campaign.
         data: the campaign, prepared for a fit.
         diagnosis: the diagnosis.
         document: content of diagnosis.json.
@@ -40,7 +39,6 @@ class DiagnosisOutput:
         validations_before: comparisons of the joint fit without the added effects; empty if none were added.
     """
 
-    name: str
     data: PreparedCampaign
     diagnosis: Diagnosis
     document: DiagnosisFile
@@ -49,7 +47,7 @@ class DiagnosisOutput:
     validations_before: Sequence[Validation] = ()
 
     def __repr__(self) -> str:
-        return f"{self.name}: {self.headline}\n  {self.diagnosis.summary}"
+        return f"{self.data.campaign.name}: {self.headline}\n  {self.diagnosis.summary}"
 
     @property
     def headline(self) -> str:
@@ -120,33 +118,18 @@ def diagnose(
             }
             for validation, plain_validation in zip_longest(validations, before)
         ]
+    title, gap = data.campaign.name, ResultFile("gap", "table", partial(diagnosed.gap_table, diagnosis))
+    draw = lambda table: plots.gap.gap_figure(table, diagnosis.result, document, title)  # noqa: E731  # imported late
     files = [
         ResultFile("diagnosis", "json", document),
         ResultFile("model", "json", result_document(diagnosis.result, origin)),
-    ]
-    files += diagnosis_files(diagnosis, document, data.campaign.name)
-    files += validation_files(validations, before, data.campaign.name)
-    files.append(ResultFile("report", "page", partial(report_page, files)))
-    return DiagnosisOutput(data.campaign.name, data, diagnosis, document, files, validations, before)
-
-
-def diagnosis_files(diagnosis: Diagnosis, document: DiagnosisFile, title: str) -> list[ResultFile]:
-    """Tables of the gap (measured minus model) and of the candidate effects, and the figure of the gap.
-
-    Args:
-        diagnosis: the diagnosis.
-        document: content of diagnosis.json.
-        title: title of the figure.
-
-    Returns:
-        Files gap.csv, gap.png and candidates.csv, not yet rendered.
-    """
-    gap = ResultFile("gap", "table", partial(diagnosed.gap_table, diagnosis))
-    return [
         gap,
-        ResultFile("gap", "figure", lambda table: plots.gap.gap_figure(table, diagnosis.result, document, title), gap),
+        ResultFile("gap", "figure", draw, gap),
         ResultFile("candidates", "table", partial(diagnosed.candidates_table, diagnosis)),
     ]
+    files += validation_files(validations, before, title)
+    files.append(ResultFile("report", "page", partial(report_page, files)))
+    return DiagnosisOutput(data, diagnosis, document, files, validations, before)
 
 
 def _require_free_parameter(data: PreparedCampaign, model: Model | None, settings: DiagnosisSettings) -> None:

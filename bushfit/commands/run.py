@@ -10,7 +10,7 @@ from typing_extensions import TypedDict
 
 from bushfit.campaign.campaign import Campaign
 from bushfit.campaign.schema import Loss
-from bushfit.commands.diagnose import DiagnosisOutput, diagnose, diagnosis_files
+from bushfit.commands.diagnose import DiagnosisOutput, diagnose
 from bushfit.commands.fit import FitOutput, campaign_files, fit, fit_static, prepare_tests
 from bushfit.commands.predict import predict
 from bushfit.commands.predicted import PredictionOutput
@@ -121,14 +121,15 @@ def run(campaign: Campaign | PreparedCampaign, *, loss: Loss | None = None) -> R
         for name, result in results.items()
         if result
     }
-    if diagnosed:
-        documents["diagnosis"] = diagnosed.document
     files = [ResultFile(name, "json", document) for name, document in documents.items()]
     files += campaign_files(data, predicted.result)
-    files += diagnosis_files(diagnosed.diagnosis, diagnosed.document, data.campaign.name) if diagnosed else []
     files += [file for file in predicted.files if file.name != "measured"]
-    validations = diagnosed.validations if diagnosed else validate(predicted.result, data.campaign.validation)
-    files += validation_files(validations, diagnosed.validations_before if diagnosed else (), data.campaign.name)
+    if diagnosed:
+        documents["diagnosis"], validations = diagnosed.document, diagnosed.validations
+        files += [file for file in diagnosed.files if file.name not in ("model", "report")]
+    else:
+        validations = validate(predicted.result, data.campaign.validation)
+        files += validation_files(validations, (), data.campaign.name)
     files.append(ResultFile("report", "page", partial(report_page, files)))
     document = {**documents, "warnings": predicted.warnings}
     return RunOutput(data, static, two_step, reason, joint, diagnosed, predicted, document, files, validations)
