@@ -274,7 +274,8 @@ def _common_places(results: Sequence[Result], names: Sequence[str] | None) -> li
     """Find the directions or specimens to compare: those with the given names, or all that the results have in common.
 
     Returns:
-        The direction or specimen in each result, one list for each; the rubber compound if nothing is in common.
+        For each direction or specimen a list of what it is in every result; only the rubber compound if the results
+        have nothing in common.
     """
     if names:
         columns = list[list[Place]]()

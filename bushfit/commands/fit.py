@@ -83,11 +83,11 @@ def fit(
 def fit_static(
     campaign: Campaign | PreparedCampaign, *, dynamic: Result | HasResult | None = None, loss: Loss | None = None
 ) -> FitOutput:
-    """Fit mu, sigma_fmax and eps_half to the loops of a campaign.
+    """Fit the static modulus mu and the friction (sigma_fmax, eps_half) to the loops of a campaign.
 
     Args:
         campaign: the campaign, or a campaign prepared by `prepare_tests`.
-        dynamic: result whose m and alpha are kept fixed.
+        dynamic: result whose springpot (m, alpha) is kept fixed; default that of [fit], else no springpot.
         loss: "soft_l1" or "linear"; default the campaign's.
     """
     data = prepare_tests(campaign, loss)
@@ -101,7 +101,7 @@ def fit_static(
 def fit_dynamic(
     campaign: Campaign | PreparedCampaign, *, static: Result | HasResult | None = None, loss: Loss | None = None
 ) -> FitOutput:
-    """Fit m and alpha to the sweep of smallest amplitude of a campaign.
+    """Fit the springpot (m, alpha) to the sweep of smallest amplitude of a campaign.
 
     Args:
         campaign: the campaign, or a campaign prepared by `prepare_tests`.
